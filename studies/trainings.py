@@ -10,8 +10,8 @@ from typing import NamedTuple
 from lowalt.config.layers import load
 from lowalt.recognition import runs, tables
 from lowalt.recognition.evaluated import Evaluated
-from lowalt.recognition.methods import built
-from lowalt.recognition.protocols import folds
+from lowalt.recognition.network import built
+from lowalt.recognition.protocols import evaluated_folds, folds
 from lowalt.recognition.samples import Samples, ViewSamples
 from lowalt.recognition.schemes import Scheme
 from lowalt.shards import ShardSet
@@ -71,8 +71,7 @@ def trained(
         samples = {part: source(job.scheme, folds(job.protocol, part), part) for part in PARTS}
         settings = settings_of(config, data, job.scheme, job.seed)
         runs.train(samples, job.scheme, job.protocol, settings, folder, build=build)
-        asked = ("validation", "test", *(("seen_test",) if job.protocol == "unseen" else ()))
-        pairs = set().union(*(folds(job.protocol, part) for part in asked))
+        pairs = evaluated_folds(job.protocol)
         model = runs.load(folder / "model.pt", build=build)
         runs.evaluate(model, source(job.scheme, pairs, "asked"), config["recognition"]["evaluation"], path)
     return path

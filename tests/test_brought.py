@@ -170,7 +170,7 @@ def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, cap
 
 
 def test_a_model_on_code_of_its_user_answers_where_he_names_it(tmp_path, monkeypatch):
-    from test_own_backbone import GOOD
+    from test_recognition import GOOD
 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(GOOD)

@@ -135,8 +135,8 @@ def test_a_training_names_the_class_without_samples_and_wants_two():
     block = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")["recognition"]["training"]
     with pytest.raises(InputError, match=r"no training sample of \['Bird'\]"):
         training.Trainer(
-            torch.nn.Linear(1, 2), {"train": Source, "validation": Source}, [0], settings | {"training": block}, (), "",
-            "", None,
+            torch.nn.Linear(1, 2), {"train": Source, "validation": Source}, [0], settings | {"training": block},
+            None, None,
         )  # fmt: skip
     given = settings | {"training": block, "size": 24, "colour_map": "gray", "network": {}, "classes": ["Bat"]}
     with pytest.raises(InputError, match="expected two or more"):

@@ -1,4 +1,4 @@
-"""The network: token layout, pooling, palettes, parameter counts, on small timm backbones."""
+"""The network: token layout, pooling, palettes, parameter counts, on small timm backbones and one of the user's own."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from torch import nn
 
 from lowalt.files.errors import InputError
 from lowalt.recognition import fusion as fusion_of
-from lowalt.recognition import network, schemes
+from lowalt.recognition import network, own_backbone, schemes
 
 BLOCK = {
     "backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4, "feed_forward": 2,
@@ -17,6 +17,22 @@ BLOCK = {
 }  # fmt: skip
 SIZE = 32
 PALETTES = np.stack([np.arange(256)[:, None] * [1, 0.5, 0.25] + shift for shift in (0, 0, 0)]).astype(np.uint8)
+
+GOOD = """
+import torch
+from torch import nn
+
+def small(size):
+    return nn.Sequential(nn.Conv2d(3, 5, 3), nn.BatchNorm2d(5), nn.AdaptiveAvgPool2d(1), nn.Flatten())
+
+def empty(size):
+    return nn.Identity()
+
+def broken(size):
+    raise ValueError("no network today")
+
+number = 3
+"""
 
 
 def recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", **changes):
@@ -186,3 +202,50 @@ def test_weights_come_from_a_local_file_also_at_another_size(tmp_path: Path):
     (tmp_path / "broken.safetensors").write_bytes(b"not weights")
     with pytest.raises(InputError, match=r"broken\.safetensors"):
         recogniser(weights=str(tmp_path / "broken.safetensors"))
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(GOOD)
+    return tmp_path / "mine.py"
+
+
+def test_only_a_python_file_with_a_function_is_one_s_own():
+    assert own_backbone.file_of("folder/mine.py:small").name == "mine.py"
+    assert own_backbone.file_of("test_resnet") is None and own_backbone.file_of("hf_hub:timm/resnet18") is None
+
+
+def test_the_module_gives_its_features_and_learns(file):
+    made = network.backbone(f"{file}:small", "none", 24)
+    assert made.num_features == 5 and made.training and made.pretrained_cfg["std"] == (0.5, 0.5, 0.5)
+    assert made(torch.zeros(4, 3, 24, 24)).shape == (4, 5)
+    # The trial of the module leaves no trace in its running means.
+    assert float(made[1].num_batches_tracked) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("none.py:small", "no file none.py"),
+        ("{file}:other", "no function 'other'"),
+        ("{file}:number", "no function 'number'"),
+        ("{file}:broken", "ValueError: no network today"),
+        ("{file}:empty", r"gives \(2, 3, 24, 24\) for two images"),
+    ],
+)
+def test_a_wrong_name_is_refused(file, name, message):
+    with pytest.raises(InputError, match=message):
+        network.backbone(name.format(file=file), "none", 24)
+
+
+def test_weights_of_a_library_do_not_fit_a_module_of_one_s_own(file):
+    with pytest.raises(InputError, match="expected 'none'"):
+        network.backbone(f"{file}:small", "hub", 24)
+
+
+def test_a_file_with_a_fault_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.py").write_text("def small(size:\n")
+    with pytest.raises(InputError, match=r"bad\.py:small.*SyntaxError"):
+        network.backbone(f"{tmp_path}/bad.py:small", "none", 24)

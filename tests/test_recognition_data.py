@@ -1,6 +1,7 @@
 """Samples, order, schemes, protocols and frozen inputs: data for recognition, which need no torch."""
 
 import csv
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from lowalt.recognition import freeze, order, protocols, samples, schemes, score
 from lowalt.spectra import NAMES
 from made_predictions import SNRS, SUBTYPES, facts
 
+ROW = {"scheme": "x", "stations": "A", "spectra": "VT", "fusion": "attention", "backbone": "", "protocols": "seen"}
 UNUSED = ("model", "group", "fold", "range_m", "aspect_rad")
 
 
@@ -31,7 +33,9 @@ def test_the_table_of_schemes_holds_every_row_of_the_paper():
         published = {(row["protocol"], row["scheme"]) for row in csv.DictReader(file)}
     ours = {(protocol, entry.name) for entry in table.values() for protocol in entry.protocols}
     assert published <= ours
-    assert table["ABC:VRP+TRP+VT"].columns == [station * len(NAMES) + image for station in range(3) for image in range(3)]
+    assert table["ABC:VRP+TRP+VT"].columns == [
+        station * len(NAMES) + image for station in range(3) for image in range(3)
+    ]
     assert table["B:VRP+TRP+VT"].columns == [len(NAMES) + image for image in range(3)]
     assert table["A:VT"].columns == [2]
     assert schemes.named("config/schemes.csv", "abc-vit-b-16-mean-fusion", "ABC").backbone == "vit_base_patch16_224"
@@ -66,10 +70,50 @@ def test_a_row_may_bring_its_own_size_steps_and_share(tmp_path):
     bare = schemes.Scheme("plain", (0,), (2,))
     assert bare.settled(block) == block and (bare.share, bare.fusion) == (1.0, "attention")
     assert bare.protocols == ("seen", "unseen")
-    for column, value in (("size", "4"), ("steps", "0"), ("share", "1.5"), ("share", "half")):
-        path.write_text(f"{','.join((*schemes.COLUMNS, column))}\nx,A,VT,mean,,seen,{value}\n")
-        with pytest.raises(InputError, match=f"{column} '{value}'"):
-            schemes.read(path, "ABC")
+
+
+def made(**changes):
+    return schemes.scheme({**ROW, **changes}, "table line 2", "ABC")
+
+
+@pytest.mark.parametrize(
+    ("column", "good", "bad"),
+    [("size", ("8", "1024"), ("7", "1025", "8.5", "x")), ("steps", ("1", "1000000000"), ("0", "1000000001", "1.5")),
+     ("share", ("0.000001", "1"), ("0.0000009", "1.0000001", "-1", "nan"))],
+)  # fmt: skip
+def test_numbers_of_a_row_are_taken_up_to_both_ends_of_their_range(column, good, bad):
+    for text in good:
+        assert getattr(made(**{column: text}), column) == float(text)
+    for text in bad:
+        with pytest.raises(InputError, match=f"table line 2: {column} '{text}', expected nothing or a number in"):
+            made(**{column: text})
+    empty = made(**{column: ""})
+    assert (empty.size, empty.steps, empty.share) == (0, 0, 1.0)
+
+
+def test_views_are_numbered_over_all_spectra_and_found_among_those_a_data_set_has():
+    """The catalogue begins with VRP, TRP and VT; the data set's tiles hold VT before VRP, and no TRP."""
+    count = len(schemes.SPECTRA)
+    scheme = schemes.Scheme("x", (0, 2), (0, 2))
+    assert scheme.columns == [0, 2, 2 * count, 2 * count + 2]
+    assert schemes.columns_in(scheme.columns, ["vt", "vrp"], 3, "here") == [1, 0, 5, 4]
+    with pytest.raises(InputError, match="here: 2 stations, the scheme needs 3"):
+        schemes.columns_in(scheme.columns, ["vt", "vrp"], 2, "here")
+    with pytest.raises(InputError, match=r"here: spectra \['vt'\], the scheme also needs \['vrp'\]"):
+        schemes.columns_in(scheme.columns, ["vt"], 3, "here")
+
+
+def test_stations_of_one_letter_stand_together_and_others_are_joined():
+    assert made().stations == (0,)
+    assert schemes.scheme({**ROW, "stations": "CA"}, "", "ABC").stations == (0, 2)
+    names = ["north", "south", "W"]
+    assert schemes.scheme({**ROW, "stations": "W+north"}, "", names).stations == (0, 2)
+    assert schemes.joined(["A", "B"]) == "AB" and schemes.joined(["A", "west"]) == "A+west"
+
+
+def test_a_record_is_the_scheme_and_survives_json():
+    plain = schemes.Scheme("x", (0,), (1, 2), size=24)
+    assert schemes.of_record(plain.record) == schemes.of_record(json.loads(json.dumps(plain.record))) == plain
 
 
 def test_a_share_takes_the_first_models_of_every_subtype_and_all_their_snrs():
@@ -89,8 +133,12 @@ def test_protocols_never_share_a_fold_between_their_parts():
         assert set(used) == everything
     assert {group for group, _ in protocols.folds("unseen", "test")} == {"unseen"}
     assert {group for part in ("train", "validation") for group, _ in protocols.folds("unseen", part)} == {"seen"}
+    for protocol, parts in protocols.FOLDS.items():
+        assert protocols.evaluated_folds(protocol) == everything - parts["train"]
     with pytest.raises(InputError, match="seen_test"):
         protocols.folds("seen", "seen_test")
+    with pytest.raises(InputError, match="protocol 'own'"):
+        protocols.evaluated_folds("own")
 
 
 def test_samples_in_memory_are_those_written_and_no_others(tmp_path):
@@ -220,7 +268,7 @@ def test_a_file_of_predictions_is_scored_against_the_shards_alone(tmp_path, monk
 
 
 def test_commands_for_data_do_not_import_torch():
-    names = ("__main__", "views", "evaluated", "tables", "freeze", "score", "samples", "augment", "order")
+    names = ("__main__", "sources", "evaluated", "tables", "freeze", "score", "augment", "order")
     lines = "; ".join(f"import lowalt.recognition.{name}" for name in names)
     code = f"{lines}; import sys; assert not any(name.split('.')[0] in ('torch', 'timm') for name in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

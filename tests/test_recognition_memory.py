@@ -9,8 +9,7 @@ import torch
 
 from lowalt.files.errors import InputError
 from lowalt.recognition import inference, network, objective, recipe, runs
-from lowalt.recognition.ahead import ReadAhead, Unchanged
-from lowalt.recognition.reader import Reader
+from lowalt.recognition.ahead import Augmented, ReadAhead, Unchanged
 from lowalt.recognition.schemes import SPECTRA
 from lowalt.tiles import colour_map
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
@@ -82,11 +81,6 @@ def test_a_training_in_parts_with_activations_computed_again_ends_near_the_plain
     assert apart["parts"] < 1e-4 < 1e-3 < apart["half"]
 
 
-def test_parts_beyond_the_batch_are_refused():
-    with pytest.raises(InputError, match="accumulate is 9, expected at most batch, 8"):
-        recipe.check({**TRAINING, "accumulate": 9})
-
-
 class Who:
     """Samples that say which process reads them."""
 
@@ -113,7 +107,7 @@ def test_training_and_validation_read_by_the_same_workers_in_every_epoch(views, 
     """12 steps are two epochs; both readers note the processes that call them."""
     log = tmp_path / "log"
     log.mkdir()
-    for kind in (Reader, Unchanged):
+    for kind in (Augmented, Unchanged):
         get = kind.__getitem__
 
         def noted(self, item, get=get, kind=kind):
@@ -124,7 +118,7 @@ def test_training_and_validation_read_by_the_same_workers_in_every_epoch(views, 
     settings = with_training(steps=12, validate_every=4, batch=8, workers=1)
     one = train(views, tmp_path / "ahead", settings)
     names = sorted(path.name.partition("-")[0] for path in log.iterdir())
-    assert names == ["Reader", "Unchanged"]
+    assert names == ["Augmented", "Unchanged"]
     assert not any(path.name.endswith(f"-{os.getpid()}") for path in log.iterdir())
     monkeypatch.undo()
     two = train(views, tmp_path / "here", with_training(steps=12, validate_every=4, batch=8))

@@ -1,5 +1,6 @@
-"""Several ranks: they train and evaluate as one."""
+"""Several ranks, over one node and two: they train and evaluate as one; batch norm takes its statistics over all."""
 
+import copy
 import csv
 import json
 import os
@@ -7,15 +8,19 @@ import subprocess
 import sys
 
 import pytest
+import timm
 import torch
+from torch import nn
 
 from lowalt.config.layers import load_yaml
-from lowalt.recognition import checkpoint, predictions, schemes
+from lowalt.recognition import batch_norm, checkpoint, predictions, schemes
 from lowalt.recognition.__main__ import main
+from lowalt.recognition.batch_norm import over_ranks
+from lowalt.workflow.launch import Launch
 from trainings import SETTINGS, with_training
 
-# One process imports torch, which takes seconds, and becomes two ranks by forks, with the variables that torchrun sets;
-# tests/test_recognition_nodes.py starts them by torchrun itself.
+# One process imports torch, which takes seconds, and becomes two ranks by forks, with the variables that torchrun sets.
+# The slow tests below start them by torchrun itself.
 PROGRAM = """
 import json, os, sys, traceback
 import timm, torch
@@ -112,27 +117,124 @@ def test_two_ranks_train_as_one_with_both_their_samples(both):
     assert losses["half"] != pytest.approx(losses["one"], rel=1e-3)
 
 
-def test_batch_norm_over_one_rank_is_that_of_torch_and_keeps_names_and_activations(tmp_path):
-    """In a process group of one rank the sums of all ranks are this rank's own."""
-    from timm.layers import BatchNormAct2d
-    from torch import distributed, nn
+def launched(lines, processes):
+    """Run one training under a launcher for each command line, with so many processes each.
 
-    from lowalt.recognition.batch_norm import over_ranks
+    Returns the exit status and the text of each launcher.
+    """
+    nodes = len(lines)
+    port = str(20000 + os.getpid() % 20000 + nodes)
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
+    launchers = []
+    for node, arguments in enumerate(lines):
+        command = [sys.executable, "-m", "torch.distributed.run", "--nnodes", str(nodes), "--node-rank", str(node)]
+        command += ["--nproc-per-node", str(processes), "--master-addr", "127.0.0.1", "--master-port", port]
+        command += ["-m", "lowalt.recognition", *arguments]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        launchers.append(subprocess.Popen(command, env=environment, **pipes))
+    texts = [launcher.communicate(timeout=300)[0] for launcher in launchers]
+    return [(launcher.returncode, text) for launcher, text in zip(launchers, texts, strict=True)]
 
-    def network():
-        torch.manual_seed(5)
-        return nn.Sequential(nn.Conv2d(3, 4, 3), nn.BatchNorm2d(4), nn.Sequential(BatchNormAct2d(4)))
 
-    distributed.init_process_group("gloo", init_method=f"file://{tmp_path}/group", rank=0, world_size=1)
-    try:
-        images = 3 + torch.randn(6, 3, 9, 9, generator=torch.Generator().manual_seed(1))
-        plain, shared = network(), over_ranks(network())
-        assert plain.state_dict().keys() == shared.state_dict().keys()
-        for model in (plain, shared):
-            (model(images) ** 3).sum().backward()
-        for (name, one), other in zip(plain.named_parameters(), shared.parameters(), strict=True):
-            torch.testing.assert_close(other.grad, one.grad, rtol=2e-4, atol=2e-3, msg=name)
-        torch.testing.assert_close(shared.state_dict(), plain.state_dict(), rtol=1e-5, atol=1e-6)
-        torch.testing.assert_close(shared.eval()(images), plain.eval()(images), rtol=1e-5, atol=1e-6)
-    finally:
-        distributed.destroy_process_group()
+def trained(lines, processes):
+    """The same, where all must end well."""
+    for status, text in launched(lines, processes):
+        assert status == 0, text[-3000:]
+
+
+@pytest.mark.slow
+def test_the_workflow_s_launcher_trains_to_the_bytes_of_plain_torchrun(views, tmp_path):
+    """The words that the rule `train` puts between `python -m` and the module (`recognition.processes: 2`)."""
+    settings = json.dumps(with_training(steps=4, validate_every=2))
+    line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "A:VRP"]
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nA:VRP,A,VRP,attention,,seen\n")
+    line += ["--stations", "A", "B", "C", "--schemes", str(table), "--out"]
+    trained([[*line, str(tmp_path / "plain")]], 2)
+    words = Launch.of({"processes": 2}).words
+    command = [sys.executable, "-m", *words, "lowalt.recognition", *line, str(tmp_path / "rule")]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr[-3000:]
+    assert json.loads((tmp_path / "rule/run.json").read_text())["ranks"] == 2
+    assert (tmp_path / "rule/model.pt").read_bytes() == (tmp_path / "plain/model.pt").read_bytes()
+
+
+@pytest.mark.slow
+def test_two_nodes_of_one_process_train_to_the_bytes_of_one_node_of_two(views, tmp_path):
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
+    settings = json.dumps(with_training(steps=12, validate_every=6))
+    for name, nodes, processes in (("one", 1, 2), ("two", 2, 1)):
+        line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "AB:VRP+VT"]
+        line += ["--stations", "A", "B", "C", "--schemes", str(table), "--out", str(tmp_path / name)]
+        trained(nodes * [line], processes)
+        assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == 2
+    for name in ("model.pt", "history.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+
+
+@pytest.mark.slow
+def test_nodes_that_train_unlike_things_are_told_instead_of_mixing_their_gradients(views, tmp_path):
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nA:VRP,A,VRP,attention,,seen\n")
+    lines = []
+    for precision in ("fp32", "bf16"):
+        settings = json.dumps(with_training(steps=2, validate_every=2, precision=precision))
+        line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "A:VRP"]
+        lines.append([*line, "--stations", "A", "B", "C", "--schemes", str(table), "--out", str(tmp_path / "out")])
+    found = launched(lines, 1)
+    assert all(status for status, _ in found)
+    assert any("stands at step 0, another rank differs in that" in text for _, text in found), found
+    assert not (tmp_path / "out/model.pt").exists()
+
+
+@pytest.fixture
+def ranks(monkeypatch):
+    """Stands for so many ranks with the same images: a sum over them is that many times each one's."""
+    found = {"count": 1}
+    monkeypatch.setattr(batch_norm.distributed, "all_reduce", lambda values: values.mul_(found["count"]))
+    return found
+
+
+def layer():
+    """A layer with weights, running means and settings of its own."""
+    torch.manual_seed(4)
+    own = nn.BatchNorm2d(3, eps=1e-2, momentum=0.3)
+    for value in (own.weight, own.bias, own.running_mean):
+        nn.init.normal_(value)
+    own.running_var.uniform_(0.5, 2)
+    return own
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_step_of_all_ranks_is_that_of_one_with_the_whole_batch(ranks, count):
+    ranks["count"] = count
+    own = layer()
+    shared = over_ranks(nn.Sequential(copy.deepcopy(own)))[0]
+    assert type(shared) is batch_norm.BatchNormOverRanks and (shared.eps, shared.momentum) == (1e-2, 0.3)
+    images = (5 + torch.randn(2, 3, 4, 5)).requires_grad_()
+    both = torch.cat([images.detach()] * count).requires_grad_()
+    wanted, found = own(both), shared(images)
+    torch.testing.assert_close(found, wanted[:2], rtol=1e-4, atol=1e-4)
+    assert found.dtype == images.dtype and found.is_contiguous(memory_format=torch.channels_last)
+    gradient = torch.randn_like(found)
+    found.backward(gradient)
+    wanted.backward(torch.cat([gradient] * count))
+    torch.testing.assert_close(images.grad, both.grad[:2], rtol=1e-3, atol=1e-4)
+    for name in ("running_mean", "running_var", "num_batches_tracked"):
+        torch.testing.assert_close(getattr(shared, name), getattr(own, name), rtol=1e-4, atol=1e-5)
+    before = shared.running_mean.clone()
+    torch.testing.assert_close(shared.eval()(both), own.eval()(both), rtol=1e-4, atol=1e-4)
+    assert torch.equal(shared.running_mean, before) and shared.num_batches_tracked == 1
+
+
+def test_every_batch_norm_of_a_backbone_is_replaced_with_its_activation(ranks):
+    torch.manual_seed(5)
+    own = timm.create_model("test_efficientnet", num_classes=0).train()
+    shared = over_ranks(copy.deepcopy(own))
+    counts = [sum(isinstance(one, nn.BatchNorm2d) for one in model.modules()) for model in (own, shared)]
+    assert counts[0] == counts[1] == sum(type(one) is batch_norm.BatchNormOverRanks for one in shared.modules()) > 3
+    images = torch.randn(4, 3, 32, 32)
+    torch.testing.assert_close(shared(images), own(images), rtol=1e-3, atol=1e-3)
+    assert shared.state_dict().keys() == own.state_dict().keys()

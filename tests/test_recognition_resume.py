@@ -115,23 +115,15 @@ def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path
     train(views, tmp_path, settings)
 
 
-def test_a_gpu_s_generator_is_saved_and_taken_up_with_the_processor_s():
-    class Gpu:
-        state = torch.arange(4, dtype=torch.uint8)
-
-        @classmethod
-        def get_rng_state(cls, device):
-            return cls.state.clone()
-
-        @classmethod
-        def set_rng_state(cls, state, device):
-            cls.state = state
-
+def test_a_gpu_s_generator_is_saved_and_taken_up_with_the_processor_s(monkeypatch):
+    of_gpu = {"state": torch.arange(4, dtype=torch.uint8)}
+    monkeypatch.setattr(torch.cuda, "get_rng_state", lambda device: of_gpu["state"].clone())
+    monkeypatch.setattr(torch.cuda, "set_rng_state", lambda state, device: of_gpu.update(state=state))
     device = torch.device("cuda:1")
-    states = recipe.random_state(device, Gpu)
-    drawn, Gpu.state = torch.rand(3), torch.zeros(4, dtype=torch.uint8)
-    recipe.set_random_state(device, states, Gpu)
-    assert torch.equal(torch.rand(3), drawn) and Gpu.state.tolist() == [0, 1, 2, 3]
+    states = recipe.random_state(device)
+    drawn, of_gpu["state"] = torch.rand(3), torch.zeros(4, dtype=torch.uint8)
+    recipe.set_random_state(device, states)
+    assert torch.equal(torch.rand(3), drawn) and of_gpu["state"].tolist() == [0, 1, 2, 3]
     assert set(recipe.random_state(torch.device("cpu"))) == {"cpu"}
-    with pytest.raises(InputError, match="this training runs on cpu"):
+    with pytest.raises(InputError, match=r"random states of \['cpu', 'cuda'\], but this training runs on cpu"):
         recipe.set_random_state(torch.device("cpu"), states)

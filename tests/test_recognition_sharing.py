@@ -1,4 +1,4 @@
-"""Models that others can use: safetensors with the run's identity, cards, 8-bit entries of the zoo, the hub."""
+"""Models that others can use: safetensors with the run's identity, ONNX, cards, 8-bit entries of the zoo, the hub."""
 
 import json
 import shutil
@@ -261,3 +261,32 @@ def test_the_hubs_own_client_is_asked_with_the_token_and_nothing_is_sent(finishe
     upload.main(["--model", str(tmp_path / "mine.safetensors"), "--repository", "somebody/echoes"])
     assert seen == [("hf_token_of_nobody", ("somebody/echoes",)), "somebody/echoes"]
     assert "hf_token" not in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_an_onnx_file_gives_the_same_answers_at_any_batch_size(trained, views, tmp_path):
+    pytest.importorskip("onnxscript")
+    onnxruntime = pytest.importorskip("onnxruntime")
+    model = runs.load(trained / "model.pt")
+    export(model, tmp_path / "model.onnx")
+    session = onnxruntime.InferenceSession(str(tmp_path / "model.onnx"), providers=["CPUExecutionProvider"])
+    source = sources(views)["validation"]
+    for count in (1, 5):
+        index = source.views(np.arange(count))
+        with torch.inference_mode():
+            expected = model.model(torch.from_numpy(index)).softmax(1).numpy()
+        (found,) = session.run(None, {session.get_inputs()[0].name: index})
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_an_exported_program_gives_the_same_answers_at_any_batch_size(trained, views, tmp_path):
+    model = runs.load(trained / "model.pt")
+    export(model, tmp_path / "model.pt2")
+    program = torch.export.load(tmp_path / "model.pt2").module()
+    source = sources(views)["validation"]
+    for count in (1, 5):
+        index = torch.from_numpy(source.views(np.arange(count)))
+        with torch.inference_mode():
+            torch.testing.assert_close(program(index), model.model(index).softmax(1), atol=1e-6, rtol=1e-5)
+    with pytest.raises(InputError, match="pt2 or"):
+        export(model, tmp_path / "model.bin")

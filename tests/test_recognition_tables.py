@@ -1,39 +1,22 @@
-"""Prediction files and the tables made of them: values by hand, malformed files refused, orderings by intervals."""
+"""Tables made of prediction files: values by hand, macro F1 as scikit-learn computes it, orderings by intervals, and
+models of other runs compared sample by sample."""
+
+import json
 
 import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError
-from lowalt.recognition import orderings, predictions, protocols, schemes, tables
+from lowalt.numerics.streams import stream
+from lowalt.recognition import orderings, predictions, samples, schemes, tables, transfer
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.evaluated import Evaluated
+from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
+from lowalt.report.tables import macro_f1 as in_words
 from made_predictions import read_rows, run_files
 
+SNRS = (3.0, np.inf)
 PUBLISHED = orderings.read_published("config/published_accuracy.csv")
-
-
-def test_predictions_survive_writing_and_align_by_key(tmp_path):
-    path, found, guess = run_files(tmp_path, "seen", "A:VT", 0.8)
-    back = predictions.read(path)
-    assert (back.key == found.key).all() and (back.guesses == guess).all()
-    assert (back.range_m == found.range_m[:, [0, 2]].min(1)).all()
-    part = back.take(np.arange(len(back))[::-1]).of(protocols.folds("seen", "test"))
-    assert part.key.tolist() == sorted(found.key[found.fold == "test"].tolist())
-    twice = path.read_bytes()
-    predictions.write(path, back)
-    assert path.read_bytes() == twice
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [("0.7", "1.7", "sum 1"), ("0.7", "0.702", "sum 1"), ("0.7", "x", "line"), ("p_bird", "bird", "columns"),
-     ("Mini-1-3,", "Mini-0-3,", "twice")],
-)  # fmt: skip
-def test_malformed_predictions_are_refused_by_line(tmp_path, old, new, words):
-    path, *_ = run_files(tmp_path, "seen", "A:VT", 0.8)
-    path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(InputError, match=words):
-        predictions.read(path)
 
 
 def test_tables_say_what_the_predictions_say(tmp_path):
@@ -158,3 +141,132 @@ def test_published_accuracies_are_read_as_averages_and_others_refused(tmp_path):
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match=r"other\.csv: lacks the columns"):
         orderings.read_published(tmp_path / "other.csv")
+
+
+def test_macro_f1_by_hand_counts_every_class_alike():
+    # Class 0: 9 of 10 found, one of class 1 taken for it; class 1: one of two.
+    counts = np.array([[9, 1], [1, 1]])
+    assert macro_f1(counts) == pytest.approx((0.9 + 0.5) / 2)
+    assert macro_f1(np.diag([5, 0, 3])) == 1.0
+    # A class without samples that is guessed lowers the others' precision alone.
+    assert macro_f1(np.array([[2, 2], [0, 0]])) == pytest.approx(2 * 2 / (2 * 2 + 0 + 2))
+
+
+def test_macro_f1_is_scikit_learns():
+    scores = pytest.importorskip("sklearn.metrics")
+    rng = stream(1, "f1")
+    labels, guesses = rng.integers(0, 4, 500), rng.integers(0, 4, 500)
+    counts = np.zeros((4, 4))
+    np.add.at(counts, (labels, guesses), 1)
+    assert macro_f1(counts) == pytest.approx(scores.f1_score(labels, guesses, average="macro"), abs=1e-12)
+
+
+def test_the_table_holds_macro_f1_within_its_interval_and_the_report_reads_it(tmp_path):
+    paths = [run_files(tmp_path, "seen", "A:VT", share, seed)[0] for seed, share in ((0, 0.8), (1, 0.7))]
+    runs = [Evaluated(path) for path in paths]
+    tables.write(runs, schemes.names("config/schemes.csv"), {}, tmp_path / "out", seed=1)
+    rows = read_rows(tmp_path / "out/accuracy.csv")
+    for row in rows[:3]:
+        wanted = []
+        for run in runs:
+            part = run.test.take(run.test.snr_db == float(row["snr_db"]))
+            counts = np.zeros((4, 4))
+            np.add.at(counts, (part.label, part.guesses), 1)
+            wanted.append(100 * macro_f1(counts))
+        assert float(row["macro_f1_percent"]) == pytest.approx(np.mean(wanted), abs=1e-4)
+        assert float(row["macro_f1_low"]) < float(row["macro_f1_percent"]) < float(row["macro_f1_high"])
+    mean = np.mean([float(row["macro_f1_percent"]) for row in rows[:3]])
+    assert float(rows[3]["macro_f1_percent"]) == pytest.approx(mean, abs=1e-3)
+    words = in_words(rows)["seen"]["A:VT"]
+    assert words.startswith(f"{mean:.1f}"[:-1]) and " to " in words
+    # A table of an earlier version has no macro F1; nothing is then said.
+    assert in_words([{key: row[key] for key in ("protocol", "scheme", "snr_db")} for row in rows]) == {}
+
+
+def test_whole_subtypes_give_the_wider_interval_where_subtypes_differ(tmp_path):
+    found = Evaluated(run_files(tmp_path, "unseen", "A:VT", 0.9)[0]).test
+    worst = found.subtype == "Owl"
+    found.probabilities[worst] = np.roll(np.eye(4)[found.label[worst]], 1, axis=1)
+    width = {}
+    for whole in (False, True):
+        interval = f1_by_snr([found], 4, whole, stream(1, "f1"))["avg"]
+        width[whole] = interval.high - interval.low
+    assert width[True] > 1.5 * width[False]
+
+
+def predicted(path, right, trained_on="", scheme="A:VT", seed=0):
+    """Predictions for 40 motion models, at 3 dB and without noise, of which the `right` ones are called rightly."""
+    count = len(right)
+    label = np.arange(count // 2).repeat(2) % 4
+    facts = samples.Facts(
+        key=np.array([f"k{number:03d}" for number in range(count)]), subtype=np.char.add("s", label.astype(str)),
+        model=np.arange(count // 2).repeat(2), snr_db=np.tile(SNRS, count // 2), group=np.full(count, "seen"),
+        fold=np.full(count, "test"), label=label, range_m=np.ones((count, 3)), aspect_rad=np.ones((count, 3)),
+    )  # fmt: skip
+    guess = np.where(right, label, (label + 1) % 4)
+    predictions.write(path, predictions.from_facts(facts, (0,), np.eye(4)[guess]))
+    about = {"protocol": "seen", "scheme": scheme, "seed": seed, "hardware": "none", "trained_on": trained_on}
+    path.with_suffix(".json").write_text(json.dumps(about))
+    return Evaluated(path)
+
+
+def test_differences_are_paired_and_every_snr_stands_apart(tmp_path):
+    own = np.ones(80, dtype=bool)
+    own[:8] = False
+    other = own.copy()
+    # The other model loses ten motion models at 3 dB and none without noise.
+    other[20:40:2] = False
+    runs = predicted(tmp_path / "own.csv", own), predicted(tmp_path / "other.csv", other, "elsewhere")
+    transfer.write([runs[0]], [runs[1]], ["A:VT"], tmp_path / "transfer.csv", 1)
+    rows = read_rows(tmp_path / "transfer.csv")
+    assert [row["snr_db"] for row in rows] == ["3", "inf", "avg"]
+    assert {row["trained_on"] for row in rows} == {"elsewhere"}
+    assert [float(row["own_percent"]) for row in rows] == [90.0, 90.0, 90.0]
+    assert [float(row["difference_points"]) for row in rows] == [-25.0, 0.0, -12.5]
+    assert [int(row["samples"]) for row in rows] == [40, 40, 80]
+    low, high = float(rows[0]["low"]), float(rows[0]["high"])
+    assert -45 < low < -25 < high < -10
+    assert (float(rows[1]["low"]), float(rows[1]["high"])) == (0.0, 0.0)
+    assert {(row["seeds"], row["spread_points"]) for row in rows} == {("1", "")}
+
+
+def test_the_spread_between_seeds_is_that_of_both_models_pooled(tmp_path):
+    shares = {"": (40, 44), "elsewhere": (60, 60)}
+    runs = {
+        name: [
+            predicted(tmp_path / f"{name}{seed}.csv", np.arange(80) < right, name, seed=seed)
+            for seed, right in enumerate(rights)
+        ]
+        for name, rights in shares.items()
+    }
+    transfer.write(runs[""], runs["elsewhere"], ["A:VT"], tmp_path / "transfer.csv", 1)
+    average = read_rows(tmp_path / "transfer.csv")[-1]
+    assert (average["seeds"], float(average["difference_points"])) == ("2", 22.5)
+    # 50 and 55 % of one model, 75 % twice of the other: variances 12.5 and 0.
+    assert float(average["spread_points"]) == pytest.approx(2.5)
+
+
+def test_a_model_compared_with_itself_differs_nowhere(tmp_path):
+    right = stream(1, "right").random(80) < 0.7
+    own = predicted(tmp_path / "own.csv", right)
+    same = predicted(tmp_path / "same.csv", right, "twin")
+    for row in transfer.comparison([own], [same], "twin", 1):
+        assert row[3:6] == ["0.0000"] * 3
+
+
+def test_strangers_are_refused_by_name(tmp_path):
+    own = predicted(tmp_path / "own.csv", np.ones(80, dtype=bool))
+    fewer = predicted(tmp_path / "fewer.csv", np.ones(60, dtype=bool), "small")
+    with pytest.raises(InputError, match="A:VT of small was tested on other samples"):
+        transfer.write([own], [fewer], ["A:VT"], tmp_path / "t.csv", 1)
+    lost = predicted(tmp_path / "lost.csv", np.ones(80, dtype=bool), "far", scheme="B:VT")
+    with pytest.raises(InputError, match="far has B:VT in the seen protocol, this run has not"):
+        transfer.write([own], [lost], ["A:VT", "B:VT"], tmp_path / "t.csv", 1)
+
+
+def test_a_split_that_would_leak_is_refused():
+    own = {"run": "here", "seed": 1, "split": {"by": "motion", "train": 8, "val": 1, "test": 1}}
+    transfer.check_folds(own, {**own, "run": "there"})
+    transfer.check_folds(own, {"run": "there", "seed": 2, "split": {"by": "sample", "train": 7, "val": 2, "test": 1}})
+    with pytest.raises(InputError, match="'there' has the same seed 1"):
+        transfer.check_folds(own, {**own, "run": "there", "split": {**own["split"], "by": "sample"}})

@@ -1,7 +1,8 @@
-"""Training: it learns, repeats bit for bit, stops on NaN by name, and refuses wrong settings."""
+"""Training: it learns, repeats bit for bit, stops on NaN by name, refuses wrong settings; its recipe by formulas."""
 
 import csv
 import json
+import math
 import os
 import subprocess
 import sys
@@ -10,9 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from timm.utils import ModelEmaV3
+from torch import nn
 
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, inference, recipe, runs
+from lowalt.recognition import checkpoint, inference, recipe, runs, samples
+from lowalt.recognition import training as loop
+from lowalt.recognition.matrix_products import MatrixProduct
+from lowalt.recognition.order import batches, epoch_order
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
 
 PATHS = os.pathsep.join(str(Path(__file__).parents[1] / folder) for folder in ("src", "tests/support"))
@@ -47,7 +53,8 @@ def test_workers_that_read_ahead_change_no_bit(views, tmp_path):
 
 @pytest.mark.parametrize("precision", ["fp32", "bf16"])
 def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(views, tmp_path, precision):
-    overflow = with_training(rate=1e30, clip=1e30, warmup=0.0, checkpoint_s=0, ema=0.0, precision=precision)
+    beyond = {"rate": 1, "backbone_rate": 1e30, "clip": 1e30}
+    overflow = with_training(**beyond, warmup=0.0, checkpoint_s=0, ema=0.0, precision=precision)
     with pytest.raises(InputError, match=r"loss is .* at step"):
         train(views, tmp_path, overflow)
     kept = tmp_path / "checkpoint.pt"
@@ -58,7 +65,7 @@ def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(view
 
 
 def test_weights_that_a_finite_loss_steps_beyond_the_largest_number_are_never_written(views, tmp_path):
-    beyond = with_training(rate=1e39, warmup=0.0, steps=2, validate_every=1, checkpoint_s=0, ema=0.0)
+    beyond = with_training(rate=1, backbone_rate=1e39, warmup=0.0, steps=2, validate_every=1, checkpoint_s=0, ema=0.0)
     with pytest.raises(InputError, match=r"weights .* are not finite after step 1;"):
         train(views, tmp_path / "validated", beyond)
     with pytest.raises(InputError, match=r"weights .* are not finite after step 1;"):
@@ -110,10 +117,59 @@ def test_early_stopping_counts_validations_without_gain(views, tmp_path):
     assert len(history.splitlines()) == 1 + 4
 
 
-@pytest.mark.parametrize("change", [{"steps": 0}, {"rate": -1.0}, {"precision": "fp16"}, {"warmup": 2}, {"epochs": 3}])
+@pytest.mark.parametrize("change", [{"steps": 0}, {"rate": -1.0}, {"precision": "fp16"}, {"warmup": 2}, {"epochs": 3},
+                                    {"batch": True}, {"ema": math.nan}, {"threads": 1.0}])  # fmt: skip
 def test_wrong_training_settings_are_refused_by_name(change):
-    with pytest.raises(InputError, match=next(iter(change))):
+    with pytest.raises(InputError, match=rf"recognition\.training: .*{next(iter(change))}.*, expected"):
         recipe.check({**TRAINING, **change})
+
+
+@pytest.mark.parametrize("change", [{"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1}])
+def test_wrong_augmentation_is_refused_by_name(views, tmp_path, change):
+    settings = {**SETTINGS, "augmentation": {**SETTINGS["augmentation"], **change}}
+    with pytest.raises(InputError, match=rf"recognition\.augmentation: .*{next(iter(change))}.*, expected"):
+        train(views, tmp_path, settings)
+
+
+def test_settings_that_may_be_left_out_change_nothing_then():
+    checked = recipe.check(TRAINING)
+    assert checked == {**TRAINING, "accumulate": 1, "activation_checkpointing": False}
+    assert recipe.check({**TRAINING, "batch": 3, "accumulate": 3})["accumulate"] == 3
+    with pytest.raises(InputError, match="accumulate is 4, expected at most batch, 3"):
+        recipe.check({**TRAINING, "batch": 3, "accumulate": 4})
+
+
+def test_batches_follow_each_epoch_s_order_and_validations_the_steps_and_the_end(views, tmp_path):
+    read = []
+
+    class Noted(samples.ViewSamples):
+        def changed(self, numbers, *given):
+            read.append(numbers.tolist())
+            return super().changed(numbers, *given)
+
+    parts = sources(views) | {"train": Noted([views], SCHEME.columns, {("seen", "train")})}
+    settings = with_training(steps=8, batch=13, validate_every=3)
+    runs.train(parts, SCHEME, "seen", settings, tmp_path)
+    keys = (settings["seed"], ("seen", SCHEME.name))
+    orders = [batches(epoch_order(parts["train"].facts, *keys, epoch, 1), 13) for epoch in range(3)]
+    assert len(orders[0]) == 3
+    assert read == [part.tolist() for order in orders for part in order][:8]
+    rows = (tmp_path / "history.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[:3] for row in rows] == [["3", "0", "39"], ["6", "1", "78"], ["8", "2", "104"]]
+
+
+@pytest.mark.parametrize("last", [True, False])
+def test_weights_lie_in_memory_as_the_settings_say_and_products_stand_for_convolutions_in_float32(
+    views, tmp_path, last
+):
+    for precision, kind in (("fp32", MatrixProduct), ("bf16", nn.Conv2d)):
+        settings = with_training(channels_last=last)
+        settings["training"] = recipe.check(settings["training"])
+        machine = inference.Machine(torch.device("cpu"), precision)
+        run = loop.TrainingRun(("a",), "x", tmp_path)
+        model = loop.Trainer(nn.Conv2d(4, 8, 3), sources(views), SCHEME.columns, settings, run, machine).model
+        assert model.weight.is_contiguous(memory_format=torch.channels_last) == last
+        assert type(model) is kind and model.training
 
 
 def test_the_rate_rises_linearly_and_falls_as_a_cosine():
@@ -176,3 +232,45 @@ def test_a_compiled_network_trains_to_the_same_history(views, tmp_path):
     assert weights.keys() == plain[0].keys()
     one, other = (np.loadtxt(text.splitlines()[1:], delimiter=",") for text in (plain[1], history.read_text()))
     np.testing.assert_allclose(other, one, rtol=1e-3)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.6, 0.99, 1.0])
+def test_the_moving_average_weighs_the_weights_of_k_steps_ago_by_the_decay_to_the_k(decay):
+    weights = [3.0, -1.0, 4.0, 1.5, 9.0]
+    average = 77.0
+    for step, weight in enumerate(weights, start=1):
+        kept = recipe.averaging(decay, step)
+        average = kept * average + (1 - kept) * weight
+        ages = [decay**age for age in range(step)][::-1]
+        assert average == pytest.approx(np.average(weights[:step], weights=ages))
+
+
+def test_averages_of_a_network_are_those_of_timm_bit_for_bit():
+    torch.manual_seed(3)
+    model = nn.Sequential(nn.Linear(3, 4), nn.BatchNorm1d(4))
+    average, reference = recipe.MovingAverage(model), ModelEmaV3(model)
+    for step in range(1, 8):
+        model(torch.randn(5, 3)).sum().backward()
+        with torch.no_grad():
+            for value in model.parameters():
+                value -= 0.1 * torch.randn_like(value)
+        reference.decay = recipe.averaging(0.9, step)
+        average.update(reference.decay)
+        reference.update(model)
+        assert average.module[1].num_batches_tracked == step
+        assert equal(average.module.state_dict(), reference.module.state_dict())
+    # It goes on with the weights that a checkpoint brings.
+    average.module.load_state_dict({name: torch.full_like(value, 1) for name, value in model.state_dict().items()})
+    model.load_state_dict({name: torch.full_like(value, 3) for name, value in model.state_dict().items()})
+    average.update(0.5)
+    assert torch.equal(average.module[0].weight, torch.full((4, 3), 2.0))
+
+
+def test_seed_names_and_threads_fix_what_torch_draws():
+    drawn = []
+    for seed, keys in ((1, ("a",)), (1, ("a",)), (2, ("a",)), (1, ("b",))):
+        recipe.seeded(seed, keys, 1)
+        drawn.append(torch.rand(3).tolist())
+    assert drawn[0] == drawn[1] and drawn[2] != drawn[0] != drawn[3]
+    assert torch.get_num_threads() == 1 and torch.are_deterministic_algorithms_enabled()
+    assert not torch.utils.deterministic.fill_uninitialized_memory

@@ -178,5 +178,5 @@ class HeightRecogniser(Recogniser):
 
 
 def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) -> HeightRecogniser:
-    """Return a network with fresh weights; arguments as of `lowalt.recognition.methods.built`."""
+    """Return a network with fresh weights; arguments as of `lowalt.recognition.network.built`."""
     return HeightRecogniser(scheme, block, size, np.stack([colour_map(colours)] * len(SPECTRA)), classes)

@@ -25,8 +25,7 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
-from lowalt.recognition.compared import whole_subtypes
-from lowalt.recognition.evaluated import Evaluated
+from lowalt.recognition.evaluated import Evaluated, whole_subtypes
 from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.schemes import named
 

@@ -86,7 +86,7 @@ def predicted(options: argparse.Namespace) -> Answer:
         )
     config = overlaid(options.overlay) if options.overlay else {}
     own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")
-    model, settings = opened(options.model, own=own)
+    model, settings = opened(options.model, trusted=own)
     if options.input.suffix == ".yaml":
         return _recording(model, settings, options)
     if "radar" in settings and options.input.suffix == ".npy":

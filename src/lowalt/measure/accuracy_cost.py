@@ -33,8 +33,7 @@ from lowalt.files.atomic import text_of
 from lowalt.files.csv_tables import read_csv, short, write_csv
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition.compared import difference
-from lowalt.recognition.evaluated import Evaluated
+from lowalt.recognition.evaluated import Evaluated, difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, joined, named, names
 from lowalt.recognition.statistics import pareto
 from lowalt.recognition.tables import accuracy_rows

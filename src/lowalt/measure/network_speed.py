@@ -22,7 +22,7 @@ from lowalt.machine.hardware import describe
 from lowalt.machine.timing import least_s
 from lowalt.recognition import network, recipe
 from lowalt.recognition.inference import Machine
-from lowalt.recognition.methods import built
+from lowalt.recognition.network import built
 from lowalt.recognition.objective import objective
 from lowalt.recognition.schemes import TABLE, Scheme, named
 

@@ -2,15 +2,16 @@
 
 import json
 import sys
+from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 
 from lowalt.config.command import dispatch, name_backbone, parser, pick, run
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition.protocols import folds
-from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
-from lowalt.recognition.sources import name_sources, of_size
+from lowalt.recognition.protocols import evaluated_folds
+from lowalt.recognition.schemes import PROTOCOLS, TABLE, named, names
 
 
 def _views(arguments: list[str]) -> None:
@@ -23,87 +24,88 @@ def _views(arguments: list[str]) -> None:
     line.add_argument("--reduced", help="images of the shard's chunk at this size, from the tiles stage (.npy)")
     line.add_argument("--motion", help="with --reduced: motion table of the chunk")
     line.add_argument("--out", required=True, help="views to write (.npz)")
-    given = line.parse_args(arguments)
-    if (given.reduced is None) != (given.motion is None):
+    options = line.parse_args(arguments)
+    if (options.reduced is None) != (options.motion is None):
         raise InputError("expected both --reduced and --motion, or neither")
-    size, *levels = pick(given.settings, "size", *(["snr_db"] if given.reduced else []))
-    source = Reduced(Path(given.reduced), Path(given.motion), tuple(map(float, levels[0]))) if levels else None
-    count = cache_shard(given.index, given.shard, size, given.out, source)
-    print(f"{given.out}: {count} samples", file=sys.stderr)
+    size, *levels = pick(options.settings, "size", *(["snr_db"] if options.reduced else []))
+    source = Reduced(Path(options.reduced), Path(options.motion), tuple(map(float, levels[0]))) if levels else None
+    count = cache_shard(options.index, options.shard, size, options.out, source)
+    print(f"{options.out}: {count} samples", file=sys.stderr)
 
 
 def _freeze(arguments: list[str]) -> None:
     """Write the checksums of files, or check them. Settings: none ({})."""
-    from lowalt.recognition.freeze import command
+    from lowalt.recognition.freeze import freeze, verify
 
-    command(arguments, _freeze.__doc__)
+    line = parser("lowalt.recognition freeze", _freeze.__doc__)
+    line.add_argument("--files", nargs="+", help="clouds and motion tables, below the folder of --out")
+    line.add_argument("--out", required=True, help="SHA256SUMS, written where --files is given, else checked")
+    options = line.parse_args(arguments)
+    pick(options.settings)
+    if options.files:
+        freeze(options.files, options.out)
+    print(f"{options.out}: {verify(options.out)} files as frozen", file=sys.stderr)
 
 
-def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
-    """Return the samples of some (group, fold) pairs from the source that the command line names."""
-    from lowalt.recognition.samples import ViewSamples
-    from lowalt.recognition.views import ShardSamples
+def _add_source(line: ArgumentParser) -> None:
+    """Add the options that name samples, and the files that these rest on."""
+    line.add_argument("--views", nargs="+", help="caches of views (.npz)")
+    line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
+    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds, whose samples are made")
+    line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
 
-    if sum(source is not None for source in (given.views, given.index, given.dataset)) != 1:
+
+def _source(options: Namespace):
+    """Return the source of samples that a command line names, after a check of what is frozen."""
+    from lowalt.recognition.freeze import verify
+    from lowalt.recognition.sources import Source
+
+    for sums in options.frozen:
+        verify(sums)
+    if sum(place is not None for place in (options.views, options.index, options.dataset)) != 1:
         raise InputError("expected one of --views, --index and --dataset")
-    if given.dataset is not None:
-        from lowalt.recognition.made import DatasetSamples, opened
+    if options.dataset is None:
+        return Source(options.views, options.index)
+    from lowalt.recognition.made import DatasetSamples, opened
 
-        return DatasetSamples(opened(given.dataset), scheme.columns, pairs, size, placed)
-    if given.views is None:
-        return ShardSamples(given.index, scheme.columns, pairs, size, placed)
-    return of_size(ViewSamples(given.views, scheme.columns, pairs), size)
+    return Source(made=partial(DatasetSamples, opened(options.dataset)))
 
 
 def _train(arguments: list[str]) -> None:
     """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation,
     classes."""
-    from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
-    from lowalt.recognition.samples import first_models
 
     line = parser("lowalt.recognition train", _train.__doc__)
-    name_sources(line)
+    _add_source(line)
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
-    given = line.parse_args(arguments)
-    for sums in given.frozen:
-        verify(sums)
-    scheme = named(given.schemes, given.scheme, given.stations)
-    pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
-    settings = scheme.settled(given.settings)
-    samples = {
-        part: _open(given, folds(given.protocol, part), scheme, settings["size"], placed=False)
-        for part in ("train", "validation")
-    }
-    if scheme.share < 1:
-        samples["train"].keep(first_models(samples["train"].facts, scheme.share))
-    train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard)
+    options = line.parse_args(arguments)
+    scheme, source = named(options.schemes, options.scheme, options.stations), _source(options)
+    pick(options.settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
+    settings = scheme.settled(options.settings)
+    samples = source.for_training(scheme, options.protocol, settings["size"])
+    train(samples, scheme, options.protocol, settings, Path(options.out), options.tensorboard)
 
 
 def _evaluate(arguments: list[str]) -> None:
     """Predict all validation and test samples of a model's protocol. Settings: batch, threads, precision, mirror."""
-    from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import evaluate, load
 
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
-    name_sources(line)
+    _add_source(line)
     line.add_argument("--model", required=True, help="model.pt of a training run")
     name_backbone(line)
     line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
     line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
-    given = line.parse_args(arguments)
-    for sums in given.frozen:
-        verify(sums)
-    trained = load(given.model, given.backbone)
-    seen = ("seen_test",) if trained.protocol == "unseen" else ()
-    pairs = set().union(*(folds(trained.protocol, part) for part in ("validation", "test", *seen)))
-    found = _open(given, pairs, trained.scheme, trained.size, placed=True)
-    evaluate(trained, found, given.settings, given.out, given.trained_on)
+    options = line.parse_args(arguments)
+    source, trained = _source(options), load(options.model, options.backbone)
+    samples = source.samples(trained.scheme.columns, evaluated_folds(trained.protocol), trained.size, placed=True)
+    evaluate(trained, samples, options.settings, options.out, options.trained_on)
 
 
 def _tables(arguments: list[str]) -> None:
@@ -117,11 +119,11 @@ def _tables(arguments: list[str]) -> None:
     line.add_argument("--published", help="the paper's accuracies (.csv), if there are any to compare with")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="folder for the tables")
-    given = line.parse_args(arguments)
-    (seed,) = pick(given.settings, "seed")
-    published = read_published(given.published) if given.published else {}
-    runs = [Evaluated(path) for path in given.predictions]
-    tables.write(runs, names(given.schemes), published, given.out, seed)
+    options = line.parse_args(arguments)
+    (seed,) = pick(options.settings, "seed")
+    published = read_published(options.published) if options.published else {}
+    runs = [Evaluated(path) for path in options.predictions]
+    tables.write(runs, names(options.schemes), published, options.out, seed)
 
 
 def _transfer(arguments: list[str]) -> None:
@@ -135,13 +137,13 @@ def _transfer(arguments: list[str]) -> None:
     line.add_argument("--configs", nargs="+", required=True, help="configuration of this run, then of the others")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="table to write (.csv)")
-    given = line.parse_args(arguments)
-    (seed,) = pick(given.settings, "seed")
-    first, *others = map(load_yaml, given.configs)
+    options = line.parse_args(arguments)
+    (seed,) = pick(options.settings, "seed")
+    first, *others = map(load_yaml, options.configs)
     for other in others:
         transfer.check_folds(first, other)
-    own, other = ([Evaluated(path) for path in paths] for paths in (given.own, given.other))
-    transfer.write(own, other, names(given.schemes), given.out, seed)
+    own, other = ([Evaluated(path) for path in paths] for paths in (options.own, options.other))
+    transfer.write(own, other, names(options.schemes), options.out, seed)
 
 
 def _distances(arguments: list[str]) -> None:
@@ -154,10 +156,10 @@ def _distances(arguments: list[str]) -> None:
     line.add_argument("--clouds", nargs="+", required=True, help="all cloud files")
     line.add_argument("--motion", nargs="+", required=True, help="motion tables with a row of every subtype")
     line.add_argument("--out", required=True, help="table to write (.csv)")
-    given = line.parse_args(arguments)
-    pick(given.settings)
-    motion = [row for path in given.motion for row in read_table(path)]
-    distances.write(given.out, distances.rows([read_cloud(path) for path in given.clouds], motion))
+    options = line.parse_args(arguments)
+    pick(options.settings)
+    motion = [row for path in options.motion for row in read_table(path)]
+    distances.write(options.out, distances.rows([read_cloud(path) for path in options.clouds], motion))
 
 
 def _score(arguments: list[str]) -> None:
@@ -169,11 +171,11 @@ def _score(arguments: list[str]) -> None:
     line.add_argument("--index", required=True, help="index of the shards")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--out", required=True, help="scores to write (.json)")
-    given = line.parse_args(arguments)
-    pick(given.settings)
-    with replacing(given.out) as temporary:
-        found = score(given.predictions, given.index, given.protocol)
-        temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
+    options = line.parse_args(arguments)
+    pick(options.settings)
+    with replacing(options.out) as temporary:
+        scores = score(options.predictions, options.index, options.protocol)
+        temporary.write_text(json.dumps(scores, indent=1, sort_keys=True) + "\n")
 
 
 def _export(arguments: list[str]) -> None:
@@ -185,9 +187,9 @@ def _export(arguments: list[str]) -> None:
     line.add_argument("--model", required=True, help="model.pt of a training run")
     name_backbone(line)
     line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md), .pt2 or .onnx")
-    given = line.parse_args(arguments)
-    pick(given.settings)
-    export(load(given.model, given.backbone), given.out)
+    options = line.parse_args(arguments)
+    pick(options.settings)
+    export(load(options.model, options.backbone), options.out)
 
 
 COMMANDS = {

@@ -1,4 +1,5 @@
-"""Batches read ahead by worker processes that live as long as their reader: they start once, not once an epoch."""
+"""Batches of a training and an evaluation, read ahead by workers that live as long as their reader: they start once,
+not once an epoch."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -6,6 +7,9 @@ from typing import Any
 import numpy as np
 import torch
 from torch.utils.data import DataLoader, Dataset
+
+from lowalt.numerics.streams import stream
+from lowalt.recognition.samples import Samples
 
 
 def tensors(arrays: Any) -> Any:
@@ -16,13 +20,34 @@ def tensors(arrays: Any) -> Any:
 class Unchanged(Dataset):
     """Index images of samples as they are: the map from sample numbers to a batch that evaluation reads."""
 
-    def __init__(self, source: Any) -> None:
-        """source: samples, with a method `inputs`."""
+    def __init__(self, source: Samples) -> None:
+        """Take the samples."""
         self.source = source
 
     def __getitem__(self, numbers: np.ndarray) -> Any:
         """Return the inputs of the network for the samples `numbers` as tensors."""
         return tensors(self.source.inputs(numbers))
+
+
+class Augmented(Dataset):
+    """Augmented batches of a training by (step, sample numbers)."""
+
+    def __init__(self, source: Samples, columns: list[int], block: dict, keys: tuple, rank: int, ranks: int) -> None:
+        """columns: views of the samples; block: `recognition.augmentation`; keys: seed and names of the random stream;
+        rank, ranks: the share of each batch that is read here."""
+        self.source, self.columns, self.block, self.keys, self.rank, self.ranks = (
+            source, columns, block, keys, rank, ranks
+        )  # fmt: skip
+
+    def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[Any, torch.Tensor]:
+        """Return this rank's share of a batch: index images (B, views, S, S) uint8, or what else the source gives, and
+        labels (B,)."""
+        step, numbers = item
+        mine = numbers[self.rank :: self.ranks]
+        seed, *names = self.keys
+        generator = stream(seed, "recognition-augment", *names, step, self.rank)
+        changed = self.source.changed(mine, self.columns, self.block, generator)
+        return tensors(changed), torch.from_numpy(self.source.facts.label[mine]).long()
 
 
 class ReadAhead:

@@ -3,34 +3,12 @@
 Every change keeps the class: a mirrored Doppler axis is the target turned by 180 degrees, a cyclic shift along it
 another speed, a shift in time another start. No left-right flip: that would be time reversed.
 
-Settings of this module, the block `recognition.augmentation` (zeros change nothing):
-    mirror           probability of turning the Doppler axis around
-    shift_doppler    largest cyclic shift along Doppler, share of the axis
-    shift_time       largest cyclic shift along time, share of the axis
-    contrast         largest |log2| of the exponent on the distance from the zero index
-    mask_doppler     largest height of one band set to zero, share of the axis
-    mask_time        largest width of one strip set to zero, share of the axis
-    drop_view        probability that a view goes blank (never all views of a sample)
+Settings are the block `recognition.augmentation` of workflow/schemas/config.schema.yaml; zeros change nothing.
 """
 
 import numpy as np
 
-from lowalt.config.command import pick
-from lowalt.files.errors import InputError
 from lowalt.spectra.catalogue import NAMES, zero_index
-
-KEYS = ("mirror", "shift_doppler", "shift_time", "contrast", "mask_doppler", "mask_time", "drop_view")
-
-
-def check(block: dict) -> dict:
-    """Return the block if every key is there and within 0..1.
-
-    Raises: InputError naming the key and value.
-    """
-    for key, value in zip(KEYS, pick(block, *KEYS), strict=True):
-        if not isinstance(value, (int, float)) or not 0 <= value <= 1:
-            raise InputError(f"augmentation: {key} is {value!r}, expected a number in 0..1")
-    return block
 
 
 def _contrast(exponents: np.ndarray, zero: int) -> np.ndarray:

@@ -45,8 +45,8 @@ class BatchNormOverRanks(nn.BatchNorm2d):
             self.running_mean.lerp_(mean, self.momentum)
             self.running_var.lerp_(variance * count / (count - 1), self.momentum)
         scale = self.weight * torch.rsqrt(variance + self.eps)
-        found = apart * scale[:, None, None] + self.bias[:, None, None]
-        return self.after(found.to(images.dtype).contiguous(memory_format=torch.channels_last))
+        normalised = apart * scale[:, None, None] + self.bias[:, None, None]
+        return self.after(normalised.to(images.dtype).contiguous(memory_format=torch.channels_last))
 
 
 def over_ranks(model: nn.Module) -> nn.Module:

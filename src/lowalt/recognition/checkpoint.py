@@ -73,20 +73,20 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
     try:
         # Load tensors and plain values only, so that a checkpoint from elsewhere cannot run code.
         content = torch.load(path, map_location="cpu", weights_only=True)
-        found, digest, state = content["identity"], content["digest"], content["state"]
-        own, named = _digest(state), isinstance(found, str)
+        stored, digest, state = content["identity"], content["digest"], content["state"]
+        computed, named = _digest(state), isinstance(stored, str)
     except Exception as error:
         # torch's reader meets damaged bytes with nearly any exception.
         raise InputError(f"{path}: not a checkpoint ({in_one_line(error)})") from error
     if not named:
-        raise InputError(f"{path}: not a checkpoint (its identity is {type(found).__name__}, expected text)")
-    if own != digest:
+        raise InputError(f"{path}: not a checkpoint (its identity is {type(stored).__name__}, expected text)")
+    if computed != digest:
         raise InputError(f"{path}: checkpoint is damaged, its values do not match their SHA-256")
-    if name is not None and found != name:
-        theirs, ours = _facts(found), _facts(name)
+    if name is not None and stored != name:
+        theirs, ours = _facts(stored), _facts(name)
         differs = sorted(key for key in theirs.keys() | ours.keys() if theirs.get(key) != ours.get(key))
         raise InputError(f"{path}: checkpoint of another run, its {', '.join(differs)} differ")
-    return found, state
+    return stored, state
 
 
 def model(path: str | Path) -> tuple[dict, dict]:
@@ -94,10 +94,10 @@ def model(path: str | Path) -> tuple[dict, dict]:
 
     Raises: InputError as `load`, or naming the setting that is wrong.
     """
-    found, state = load(path)
-    if not isinstance(state, dict) or not isinstance(json.loads(found), dict):
+    stored, state = load(path)
+    if not isinstance(state, dict) or not isinstance(json.loads(stored), dict):
         raise InputError(f"{path}: not a trained model, expected a model.pt")
     check_brought("model", {name: value for name, value in state.items() if name != "weights"}, path)
     if "weights" not in state:
         raise InputError(f"{path}: not a trained model, it has no weights")
-    return json.loads(found), state
+    return json.loads(stored), state

@@ -85,7 +85,7 @@ def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
     if lacking:
         raise InputError(f"distances: no motion row of {lacking}")
     forms = {cloud.subtype: form(swept(cloud, first[cloud.subtype])) for cloud in clouds}
-    found = []
+    lines = []
     for category in dict.fromkeys(cloud.category for cloud in clouds):
         names = sorted(cloud.subtype for cloud in clouds if cloud.category == category)
         apart = {(a, b): energy_distance(forms[a][0], forms[b][0]) for a in names for b in names if a < b}
@@ -101,8 +101,8 @@ def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
                     continue
                 sizes = sorted((forms[name][1], forms[near][1]))
                 line += [near, f"{apart[min(name, near), max(name, near)]:.4f}", f"{sizes[1] / sizes[0]:.3f}"]
-            found.append(line)
-    return found
+            lines.append(line)
+    return lines
 
 
 def write(out: str | Path, lines: list[list]) -> None:

@@ -19,18 +19,18 @@ def rounded(weights: Mapping[str, torch.Tensor], matrices: Collection[str]) -> d
 
     weights: float32 (rows, ...) where they are to be rounded.
     """
-    found = {}
+    stored = {}
     for name, value in weights.items():
         if name not in matrices:
-            found[name] = value
+            stored[name] = value
             continue
         rows = value.contiguous().flatten(1)
         scale = rows.abs().amax(1) / LARGEST
         # A row of zeros keeps them with any scale.
         steps = rows / torch.where(scale > 0, scale, 1)[:, None]
-        found[name] = steps.round().clamp(-LARGEST, LARGEST).to(torch.int8).view(value.shape)
-        found[name + SCALE] = scale
-    return found
+        stored[name] = steps.round().clamp(-LARGEST, LARGEST).to(torch.int8).view(value.shape)
+        stored[name + SCALE] = scale
+    return stored
 
 
 def restored(tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
@@ -39,10 +39,10 @@ def restored(tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
     Raises: KeyError for an int8 matrix without scales.
     """
     scales = {name + SCALE for name, value in tensors.items() if value.dtype == torch.int8}
-    found = {}
+    weights = {}
     for name, value in tensors.items():
         if value.dtype == torch.int8:
-            found[name] = (value.flatten(1).float() * tensors[name + SCALE][:, None]).view(value.shape)
+            weights[name] = (value.flatten(1).float() * tensors[name + SCALE][:, None]).view(value.shape)
         elif name not in scales:
-            found[name] = value
-    return found
+            weights[name] = value
+    return weights

@@ -1,12 +1,16 @@
-"""A trained and evaluated scheme, read back from its prediction file and the record next to it."""
+"""Trained and evaluated schemes, read back from prediction files and the records next to them; and their differences.
 
-import json
+Which differences a table shows is the table's business.
+"""
+
 from pathlib import Path
 
+import numpy as np
+
 from lowalt.config.classes import stated
-from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 from lowalt.recognition import predictions
+from lowalt.recognition.intervals import Interval, model_shares, strict_difference
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.protocols import folds
 
@@ -19,14 +23,13 @@ class Evaluated:
 
         Raises: InputError where either is missing or the test part is empty.
         """
-        side = existing(Path(path).with_suffix(".json"), "run record")
+        self.about = about = predictions.record(path)
         try:
-            self.about = about = json.loads(side.read_text())
             self.protocol, self.scheme, self.seed = about["protocol"], about["scheme"], about["seed"]
             self.hardware, self.trained_on = about["hardware"], about.get("trained_on", "")
             self.classes = stated(about)
         except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{side}: not a run record ({error!r})") from error
+            raise InputError(f"{Path(path).with_suffix('.json')}: not a run record ({error!r})") from error
         self.all = predictions.read(path, self.classes)
         self.test = self.part("test")
         if not len(self.test):
@@ -35,3 +38,36 @@ class Evaluated:
     def part(self, name: str) -> Predictions:
         """Return the predictions of a part of the run's protocol."""
         return self.all.of(folds(self.protocol, name))
+
+
+def difference(
+    first: list[Evaluated], second: list[Evaluated], generator: np.random.Generator, snr_db: float | None = None
+) -> Interval:
+    """Return the mean over seeds of first - second, with its 95 % interval; all in shares of correct samples.
+
+    first, second: trainings of the two schemes, one a seed; snr_db: the SNR whose samples count, None for all. The
+    interval resamples seeds, in the unseen protocol subtypes, and motion models. A scheme differs from itself by 0.
+    Raises: InputError where the trainings were tested on different samples. Source: `intervals.strict_difference`.
+    """
+    test = first[0].test
+    for run in (*first, *second):
+        if not np.array_equal(run.test.key, test.key):
+            raise InputError(f"{first[0].scheme} and {run.scheme} were tested on different samples")
+    if first is second:
+        return Interval(0.0, 0.0, 0.0)
+    rows = slice(None) if snr_db is None else test.snr_db == snr_db
+    shares = [model_shares(test.motion[rows], [run.test.correct[rows] for run in runs]) for runs in (first, second)]
+    (place, count, ours), (*_, theirs) = shares
+    return strict_difference(ours, theirs, count, test.subtype[rows][place], whole_subtypes(first), generator)
+
+
+def whole_subtypes(runs: list[Evaluated]) -> bool:
+    """Return whether results of these trainings are to hold for other subtypes, so that whole subtypes are drawn."""
+    return runs[0].protocol == "unseen"
+
+
+def spread_points(*groups: list[float]) -> float | None:
+    """Return the standard deviation between seeds, pooled over groups of accuracies in percent; None for one seed."""
+    several = [np.array(group) for group in groups if len(group) > 1]
+    freedom = sum(len(group) - 1 for group in several)
+    return float(np.sqrt(sum(((group - group.mean()) ** 2).sum() for group in several) / freedom)) if freedom else None

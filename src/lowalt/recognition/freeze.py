@@ -4,10 +4,8 @@ later use.
 The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies it without our code.
 """
 
-import sys
 from pathlib import Path
 
-from lowalt.config.command import parser, pick
 from lowalt.files.atomic import existing, replacing, sha256, text_of
 from lowalt.files.errors import InputError
 
@@ -47,15 +45,3 @@ def verify(sums: str | Path) -> int:
         if sha256(existing(folder / name, "frozen file")) != digest:
             raise InputError(f"{folder / name}: has changed since it was frozen in {sums}")
     return len(lines)
-
-
-def command(arguments: list[str], words: str) -> None:
-    """Write or check a checksum list as the command line says; words: its help. Raises: InputError as above."""
-    line = parser("lowalt.recognition freeze", words)
-    line.add_argument("--files", nargs="+", help="clouds and motion tables, below the folder of --out")
-    line.add_argument("--out", required=True, help="SHA256SUMS, written where --files is given, else checked")
-    given = line.parse_args(arguments)
-    pick(given.settings)
-    if given.files:
-        freeze(given.files, given.out)
-    print(f"{given.out}: {verify(given.out)} files as frozen", file=sys.stderr)

@@ -98,24 +98,17 @@ FUSIONS: dict[str, Callable[[int, tuple[int, int], dict], Fusion]] = {
 """How each fusion is made of the features of a token, (stations, views of a station) and the network's settings."""
 
 
-def fusion(name: str, width: int, shape: tuple[int, int], block: dict) -> Fusion:
-    """Return the fusion of a scheme; width: features of a token; shape: stations, views of a station; block: settings.
-
-    Raises: InputError for heads that do not divide the features.
-    """
-    return FUSIONS[name](width, shape, block)
-
-
 class Fused(nn.Module):
     """A network of tokens, fusion and classifier; a subclass makes `backbone` and says how inputs become tokens."""
 
     def add_head(self, name: str, width: int, shape: tuple[int, int], block: dict, classes: int) -> None:
         """Add fusion and classifier behind the tokens.
 
-        name: fusion; width: features of a token; shape: stations, views of a station; block: `recognition.network`.
+        name: of FUSIONS; width: features of a token; shape: stations, views of a station; block: `recognition.network`.
+        Raises: InputError for heads that do not divide the features.
         """
         self.shape, self.classes = shape, classes
-        self.fusion = fusion(name, width, shape, block)
+        self.fusion = FUSIONS[name](width, shape, block)
         width = self.fusion.width
         if block["hidden"]:
             self.classifier = nn.Sequential(

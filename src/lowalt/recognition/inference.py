@@ -14,7 +14,7 @@ from lowalt.files.errors import InputError
 from lowalt.recognition import gpus
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.matrix_products import as_products
-from lowalt.recognition.samples import ViewSamples
+from lowalt.recognition.samples import Samples
 
 
 def arithmetic(precision: str, device: str) -> str:
@@ -52,7 +52,7 @@ class Machine:
         place = int(os.environ.get("LOCAL_RANK", "0"))
         if gpu and ranks == 1:
             every = range(torch.cuda.device_count())
-            place = gpus.own([str(torch.cuda.get_device_properties(number).uuid) for number in every])
+            place = gpus.claimed(tuple(str(torch.cuda.get_device_properties(number).uuid) for number in every))
         device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
             distributed.init_process_group("nccl" if gpu else "gloo")
@@ -108,7 +108,7 @@ def evaluation(block: dict) -> list:
 @torch.inference_mode()
 def probabilities(
     model: nn.Module,
-    samples: ViewSamples,
+    samples: Samples,
     numbers: np.ndarray,
     machine: Machine,
     batch: int,
@@ -126,8 +126,8 @@ def probabilities(
     mine = list(range(0, len(numbers), batch))[machine.rank :: machine.ranks]
     ahead = ahead or ReadAhead(Unchanged(samples), 0, pin=False)
     read = ahead([numbers[start : start + batch] for start in mine])
-    for start, found in zip(mine, read, strict=True):
-        images = found.to(machine.device, non_blocking=True)
+    for start, inputs in zip(mine, read, strict=True):
+        images = inputs.to(machine.device, non_blocking=True)
         seen = (images, model.mirrored(images)) if mirror else (images,)
         with machine.autocast():
             logits = [model(image) for image in seen]

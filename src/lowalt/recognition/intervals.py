@@ -36,13 +36,6 @@ def bootstrap(
     return Interval(float(np.mean(values)), float(low), float(high))
 
 
-def paired_difference(
-    clusters: np.ndarray, one: np.ndarray, other: np.ndarray, generator: np.random.Generator
-) -> Interval:
-    """Mean of one - other, two measures (samples,) of the same samples, with its interval as `bootstrap` gives it."""
-    return bootstrap(clusters, np.asarray(one, float) - other, generator)
-
-
 def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the first sample (models,) and the number of samples (models,) of each motion model, and its share of
     correct samples by seed (seeds, models), so that a motion model brings one value.
@@ -103,23 +96,25 @@ def model_weights(subtypes: np.ndarray, whole: bool, repeats: int, generator: np
     drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
     weights = np.zeros((repeats, len(subtypes)))
     for number in range(len(names)):
-        mine = np.flatnonzero(place == number)
+        members = np.flatnonzero(place == number)
         # A subtype that is drawn twice brings its motion models twice, each time drawn anew.
-        weights[:, mine] = generator.multinomial(drawn[:, number] * len(mine), np.full(len(mine), 1 / len(mine)))
+        weights[:, members] = generator.multinomial(
+            drawn[:, number] * len(members), np.full(len(members), 1 / len(members))
+        )
     return weights
 
 
 def strict_difference(
-    one: np.ndarray, other: np.ndarray, count: np.ndarray, subtypes: np.ndarray, whole_subtypes: bool,
+    first: np.ndarray, second: np.ndarray, count: np.ndarray, subtypes: np.ndarray, whole_subtypes: bool,
     generator: np.random.Generator, repeats: int = 4000,
 ) -> Interval:  # fmt: skip
-    """Mean of one - other over seeds and samples, with the 95 % interval that resamples seeds, subtypes and models.
+    """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes and models.
 
-    one, other (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of the
-    two are drawn independently, since two schemes draw different numbers from equal seeds. count (models,): samples of
-    each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of motion
-    models, for results that are to hold for other subtypes. With one seed the interval holds for these trained networks
-    alone.
+    first, second (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of
+    the two are drawn independently, since two schemes draw different numbers from equal seeds. count (models,): samples
+    of each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of
+    motion models, for results that are to hold for other subtypes. With one seed the interval holds for these trained
+    networks alone.
     How often such intervals hold the truth is simulated in `benchmarks/interval_coverage.py`. Source: as `_stretch`.
     """
     if whole_subtypes:
@@ -127,7 +122,9 @@ def strict_difference(
     else:
         weights = model_weights(subtypes, False, repeats, generator) * count
     weights /= weights.sum(1, keepdims=True)
-    means = [((weights @ shares.T) * _seed_weights(len(shares), repeats, generator)).sum(1) for shares in (one, other)]
+    means = [
+        ((weights @ shares.T) * _seed_weights(len(shares), repeats, generator)).sum(1) for shares in (first, second)
+    ]
     low, high = np.quantile(means[0] - means[1], [0.025, 0.975])
-    value = np.average(one.mean(0) - other.mean(0), weights=count)
+    value = np.average(first.mean(0) - second.mean(0), weights=count)
     return Interval(float(value), float(low), float(high))

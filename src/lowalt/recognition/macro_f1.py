@@ -22,9 +22,9 @@ def macro_f1(counts: np.ndarray) -> np.ndarray:
     return each.sum(-1) / np.maximum(present.sum(-1), 1)
 
 
-def _counts(found: Predictions, chosen: np.ndarray, place: np.ndarray, models: int, classes: int) -> np.ndarray:
+def _counts(predictions: Predictions, chosen: np.ndarray, place: np.ndarray, models: int, classes: int) -> np.ndarray:
     """Confusion counts (models, classes, classes) of the samples `chosen`; place (samples,): their motion models."""
-    cell = (place * classes + found.label) * classes + found.guesses
+    cell = (place * classes + predictions.label) * classes + predictions.guesses
     return np.bincount(cell[chosen], minlength=models * classes**2).reshape(models, classes, classes)
 
 
@@ -43,7 +43,7 @@ def f1_by_snr(
     drawn = generator.integers(0, len(parts), (repeats, len(parts)))
     values, resampled = {}, {}
     for snr in np.unique(test.snr_db).tolist():
-        counts = [_counts(found, test.snr_db == snr, place, len(first), classes) for found in parts]
+        counts = [_counts(predictions, test.snr_db == snr, place, len(first), classes) for predictions in parts]
         values[snr] = float(np.mean([macro_f1(seed.sum(0)) for seed in counts]))
         of_seed = np.stack([macro_f1(np.tensordot(weights, seed, 1)) for seed in counts], axis=1)
         resampled[snr] = np.take_along_axis(of_seed, drawn, axis=1).mean(1)

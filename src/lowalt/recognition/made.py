@@ -111,18 +111,18 @@ class DatasetSamples(samples.Samples):
             entry = json.loads(record(rows[number], levels[level], fold, plan.seed, network, self.dataset.classes))
             places.append(geometry(entry, network))
         places = places or [(blank, blank)] * len(chosen)
-        own = [rows[number] for number, _ in chosen]
-        snrs = [levels[level] for _, level in chosen]
+        models, snrs = [rows[number] for number, _ in chosen], [levels[level] for _, level in chosen]
+        keys = [sample_key(row["subtype"], row["model"], snr) for row, snr in zip(models, snrs, strict=True)]
         return Facts(
-            key=np.array([sample_key(row["subtype"], row["model"], snr) for row, snr in zip(own, snrs, strict=True)]),
-            subtype=np.array([row["subtype"] for row in own]),
-            model=np.array([row["model"] for row in own], np.int64),
+            key=np.array(keys),
+            subtype=np.array([row["subtype"] for row in models]),
+            model=np.array([row["model"] for row in models], np.int64),
             snr_db=np.array(snrs, float),
-            group=np.array([row["group"] for row in own]),
-            fold=np.array([fold] * len(own)),
-            label=np.array([label(self.dataset.classes, row) for row in own], np.int64),
-            range_m=np.array([place[0] for place in places]).reshape(len(own), -1),
-            aspect_rad=np.array([place[1] for place in places]).reshape(len(own), -1),
+            group=np.array([row["group"] for row in models]),
+            fold=np.array([fold] * len(models)),
+            label=np.array([label(self.dataset.classes, row) for row in models], np.int64),
+            range_m=np.array([place[0] for place in places]).reshape(len(models), -1),
+            aspect_rad=np.array([place[1] for place in places]).reshape(len(models), -1),
         )
 
     def _prepare(self) -> None:
@@ -144,11 +144,11 @@ class DatasetSamples(samples.Samples):
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
-        maker, found = self.dataset.maker, []
+        maker, images = self.dataset.maker, []
         for number in numbers:
             place, snr_db = self.chosen[number]
-            found.append(views_of(maker, self.rows[place], snr_db, self.columns, self.size, self.stations))
-        return np.stack(found)
+            images.append(views_of(maker, self.rows[place], snr_db, self.columns, self.size, self.stations))
+        return np.stack(images)
 
     def sha256(self) -> str:
         """Return the SHA-256 of all that a training sees of these samples; clouds, rows and settings stand for images.
@@ -160,5 +160,5 @@ class DatasetSamples(samples.Samples):
         sums = {name: cloud_sha256(cloud) for name, cloud in clouds.items()}
         rows = hashlib.sha256(json.dumps([self.rows[place] for place, _ in self.chosen], sort_keys=True).encode())
         settings = {"size": self.size, "columns": self.columns, "render": maker.render, "echo": maker.echo}
-        told = json.dumps([settings, self.dataset.plan.seed, sums, rows.hexdigest()], sort_keys=True)
-        return samples.fingerprint(self.facts, told.encode())
+        described = json.dumps([settings, self.dataset.plan.seed, sums, rows.hexdigest()], sort_keys=True)
+        return samples.fingerprint(self.facts, described.encode())

@@ -50,14 +50,14 @@ class MatrixProduct(nn.Conv2d):
         """Images (B, C, rows, columns) -> (B, O, rows, columns), channels last where it is a matrix product."""
         if self.kernel_size == self.stride == (1, 1) and self.padding == (0, 0):
             return nn.functional.linear(images.permute(0, 2, 3, 1), self.weight.flatten(1), self.bias).movedim(-1, 1)
-        given = zip(images.shape[2:], self.kernel_size, self.stride, self.padding, strict=True)
-        spans = [_span(*axis) for axis in given]
+        axes = zip(images.shape[2:], self.kernel_size, self.stride, self.padding, strict=True)
+        spans = [_span(*axis) for axis in axes]
         if None in spans:
             return super().forward(images)
         (rows, top), (columns, left) = spans
         at = (slice(None), slice(None), slice(top, top + rows), slice(left, left + columns))
-        found = _OnePixel.apply(images[:, :, :rows, :columns], self.weight, at)
-        return (found if self.bias is None else found + self.bias)[:, :, None, None]
+        product = _OnePixel.apply(images[:, :, :rows, :columns], self.weight, at)
+        return (product if self.bias is None else product + self.bias)[:, :, None, None]
 
 
 def as_products(model: nn.Module) -> nn.Module:

@@ -105,19 +105,19 @@ def read(path: str | Path) -> ModelFile:
         with safe_open(path, framework="pt") as file:
             about = json.loads((file.metadata() or {})["lowalt"])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        digest, own = about.pop("digest"), _digest(tensors, about)
+        digest, computed = about.pop("digest"), _digest(tensors, about)
     except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{path}: not a model file of lowalt ({type(error).__name__}: {in_one_line(error)})"
         ) from error
-    if own != digest:
+    if computed != digest:
         raise InputError(f"{path}: model file is damaged, its content does not match its SHA-256")
     check_brought("about", about, path)
     return ModelFile(tensors, **about)
 
 
-def trained(content: ModelFile, path: str | Path, own: str = "") -> Trained:
-    """Return the model of a file's content, ready to answer; path: where it came from; own: as in `runs.of_state`.
+def trained(content: ModelFile, path: str | Path, trusted: str = "") -> Trained:
+    """Return the model of a file's content, ready to answer; path: where it came from; trusted: as in `runs.of_state`.
 
     Raises: InputError where weights and settings do not fit together.
     """
@@ -125,4 +125,4 @@ def trained(content: ModelFile, path: str | Path, own: str = "") -> Trained:
         weights = restored(content.tensors) if content.weights == EIGHT else content.tensors
     except (KeyError, TypeError, IndexError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
-    return of_state({**content.model, "weights": weights}, path, own)
+    return of_state({**content.model, "weights": weights}, path, trusted)

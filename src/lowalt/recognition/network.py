@@ -1,17 +1,8 @@
 """The fusion network of the paper on any timm backbone: images of several stations and spectra to classes.
 
 Axes of every tensor: B samples, K stations, V spectra of a station, then channels, rows, columns. The same code
-serves any subset of stations and spectra; a view is a (station, spectrum) pair, station-major.
-
-Settings of this module, the block `recognition.network`:
-    backbone      timm model name ("test_resnet", "swin_base_patch4_window7_224", ...), or FILE.py:FUNCTION
-    weights       "none", "hub" (the name's default tag) or the path of a .pth or .safetensors file
-    intra_depth   layers of the encoder over a station's spectra
-    inter_depth   layers of the encoder over the stations
-    heads         attention heads; must divide the backbone's features
-    feed_forward  width of the encoders' hidden layer, in features
-    dropout       in the encoders and the classifier, 0..1
-    hidden        width of the classifier's hidden layer; 0 for one linear layer
+serves any subset of stations and spectra; a view is a (station, spectrum) pair, station-major. Settings are the block
+`recognition.network` of workflow/schemas/config.schema.yaml.
 """
 
 from pathlib import Path
@@ -28,6 +19,7 @@ from lowalt.files.errors import InputError
 from lowalt.recognition import own_backbone
 from lowalt.recognition.fusion import Fused
 from lowalt.recognition.schemes import SPECTRA, Scheme
+from lowalt.tiles import colour_map
 
 KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
 
@@ -117,6 +109,15 @@ class Recogniser(Fused):
     def mirrored(index: torch.Tensor) -> torch.Tensor:
         """Return index images (..., rows, columns) turned around along Doppler: the target turned by 180 degrees."""
         return index.flip(-2)
+
+
+def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) -> nn.Module:
+    """Return a network with fresh weights.
+
+    block: `recognition.network`; size: pixels a side; colours: name of the colour map; classes: their number.
+    Raises: InputError for a setting that does not fit.
+    """
+    return Recogniser(scheme, block, size, np.stack([colour_map(colours)] * len(SPECTRA)), classes)
 
 
 def checkpoint_activations(model: Recogniser) -> None:

@@ -2,8 +2,8 @@
 
     python -m lowalt.recognition.nodes NODES COUNT MODULE [ARGUMENT ...]
 
-runs MODULE in NODES times COUNT processes: srun starts one task a node, and torchrun in each task COUNT processes with
-GPUs of their own (`gpus.py`). They find each other through a store that this process keeps, at a port that is free.
+runs MODULE in NODES times COUNT processes: srun starts one task a node, and torchrun in each task COUNT processes. They
+find each other through a store that this process keeps, at a port that is free.
 Ranks compute the same whichever node they are on, so nodes of one kind train to the bytes of one machine.
 """
 
@@ -21,21 +21,6 @@ NAMED = ["sh", "-c", 'export PET_LOCAL_ADDR="$(hostname)"; exec "$@"', "sh"]
 """Before a task's command: torchrun's own idea of its node's name is "localhost" where /etc/hosts lists that first."""
 
 
-def allocated() -> str:
-    """Return the number of the Slurm job that this process is a part of.
-
-    Raises: InputError outside Slurm.
-    """
-    number = os.environ.get("SLURM_JOB_ID")
-    if not number or not shutil.which("srun"):
-        lacking = "srun is not installed" if number else "SLURM_JOB_ID is not set"
-        raise InputError(
-            f"recognition.nodes: no Slurm job here ({lacking}), expected one: --workflow-profile profiles/slurm, "
-            "or recognition.nodes: 1"
-        )
-    return number
-
-
 def command(nodes: int, count: int, endpoint: str, job: str, module: list[str]) -> list[str]:
     """Return the command that runs a module, with its arguments, in `count` processes on each of `nodes` nodes.
 
@@ -46,26 +31,30 @@ def command(nodes: int, count: int, endpoint: str, job: str, module: list[str]) 
     # Another step of the job, such as the one this process may run in, keeps no core from these tasks.
     step = ["srun", f"--nodes={nodes}", f"--ntasks={nodes}", "--ntasks-per-node=1", f"--cpus-per-task={cores}"]
     step += ["--overlap", "--kill-on-bad-exit=1", "--export=ALL", "--input=none"]
-    torchrun = ["torch.distributed.run", f"--nnodes={nodes}", f"--nproc-per-node={count}", "--rdzv-backend=c10d"]
+    torchrun = ["-m", "torch.distributed.run", f"--nnodes={nodes}", f"--nproc-per-node={count}", "--rdzv-backend=c10d"]
     torchrun += [f"--rdzv-endpoint={endpoint}", f"--rdzv-id={job}", "--rdzv-conf=is_host=0", "-m", *module]
-    return [*step, *NAMED, sys.executable, "-m", "lowalt.recognition.gpus", str(count), *torchrun]
+    return [*step, *NAMED, sys.executable, *torchrun]
 
 
 def main(arguments: list[str]) -> None:
     """Run a module on several nodes: NODES COUNT MODULE [ARGUMENT ...].
 
-    Raises: InputError for other arguments and outside Slurm; SystemExit with the status of srun where that is not 0.
+    Raises: InputError outside Slurm; SystemExit with the status of srun where that is not 0.
     """
-    if len(arguments) < 3 or not all(word.isdigit() and int(word) for word in arguments[:2]):
-        raise InputError(f"arguments {arguments}, expected NODES COUNT MODULE [ARGUMENT ...]")
-    nodes, count = map(int, arguments[:2])
-    job = allocated()
+    nodes, count, *module = arguments
+    job = os.environ.get("SLURM_JOB_ID")
+    if not job or not shutil.which("srun"):
+        lacking = "srun is not installed" if job else "SLURM_JOB_ID is not set"
+        raise InputError(
+            f"recognition.nodes: no Slurm job here ({lacking}), expected one: --workflow-profile profiles/slurm, "
+            "or recognition.nodes: 1"
+        )
     # Only here, so that a refusal does not wait for torch.
     from torch.distributed import TCPStore
 
     host = socket.gethostname()
     store = TCPStore(host, 0, is_master=True, wait_for_workers=False)
-    tasks = subprocess.Popen(command(nodes, count, f"{host}:{store.port}", job, arguments[2:]))
+    tasks = subprocess.Popen(command(int(nodes), int(count), f"{host}:{store.port}", job, module))
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: tasks.send_signal(number))
     status = tasks.wait()

@@ -19,10 +19,10 @@ def objective(
     stations = images.shape[1] // unwrapped(model).shape[1]
     weight = block["alone"] if stations > 1 else 0
     with machine.autocast():
-        found = model(images, alone=bool(weight))
+        logits = model(images, alone=bool(weight))
     if not weight:
-        return criterion(found.float(), labels)
-    together, alone = found
+        return criterion(logits.float(), labels)
+    together, alone = logits
     each = criterion(alone.float(), labels.repeat_interleave(stations))
     return (criterion(together.float(), labels) + weight * each) / (1 + weight)
 
@@ -38,10 +38,10 @@ def descent(
     """
     parts = list(zip(images.chunk(block["accumulate"]), labels.chunk(block["accumulate"]), strict=True))
     total = torch.zeros((), device=machine.device)
-    for number, (some, told) in enumerate(parts, start=1):
+    for number, (part, part_labels) in enumerate(parts, start=1):
         alone = contextlib.nullcontext() if machine.ranks == 1 or number == len(parts) else model.no_sync()
         with alone:
-            loss = objective(model, some, told, block, machine) * (len(told) / len(labels))
+            loss = objective(model, part, part_labels, block, machine) * (len(part_labels) / len(labels))
             loss.backward()
         total += loss.detach()
     return total

@@ -9,10 +9,9 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import inference, runs, zoo
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.protocols import folds
-from lowalt.recognition.samples import Samples, ViewSamples, first_models
 from lowalt.recognition.schemes import named
 from lowalt.recognition.score import scores
-from lowalt.recognition.views import ShardSamples
+from lowalt.recognition.sources import Source
 from lowalt.shards import ShardSet
 
 
@@ -28,18 +27,14 @@ def train(
     Raises: InputError for a run that is not finished, or a wrong name or setting.
     """
     config, index = _opened(run)
-    block, shards = config["recognition"], ShardSet(index)
+    block = config["recognition"]
     chosen = named(block["table"], scheme, station_names(config["network"]))
     settings = chosen.settled({
         **{name: block[name] for name in ("size", "network", "augmentation")}, "seed": seed,
         "training": {**block["training"], **training}, "colour_map": config["images"]["colour_map"],
-        "classes": list(shards.classes),
+        "classes": list(ShardSet(index).classes),
     })  # fmt: skip
-    samples = {
-        part: _samples(index, chosen.columns, settings["size"], protocol, part) for part in ("train", "validation")
-    }
-    if chosen.share < 1:
-        samples["train"].keep(first_models(samples["train"].facts, chosen.share))
+    samples = Source.of_run(index, settings["size"]).for_training(chosen, protocol, settings["size"])
     runs.train(samples, chosen, protocol, settings, Path(out))
     return runs.load(Path(out) / "model.pt")
 
@@ -55,9 +50,9 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path) -> dict:
     config, index = _opened(run)
     settings = config["recognition"]["evaluation"]
     machine = Machine.here(inference.evaluation(settings)[2])
-    samples = _samples(index, trained.scheme.columns, trained.size, trained.protocol, "test")
-    found = runs.answers(trained, samples, settings, machine)
-    return {"protocol": trained.protocol, **scores(samples.facts, found)}
+    pairs = folds(trained.protocol, "test")
+    samples = Source.of_run(index, trained.size).samples(trained.scheme.columns, pairs, trained.size)
+    return {"protocol": trained.protocol, **scores(samples.facts, runs.answers(trained, samples, settings, machine))}
 
 
 def _opened(run: str | Path) -> tuple[dict, Path]:
@@ -67,12 +62,3 @@ def _opened(run: str | Path) -> tuple[dict, Path]:
     if not (config.is_file() and index.is_file()):
         raise InputError(f"{folder}: has no config.yaml or no shards/index.json, expected the folder of a finished run")
     return located(load_yaml(config)), index
-
-
-def _samples(index: Path, columns: list[int], size: int, protocol: str, part: str) -> Samples:
-    """The samples of a protocol's part: from images that the run has reduced to the size, else from its shards."""
-    reduced, pairs = sorted(index.parents[1].glob(f"views/{size}/*.npz")), folds(protocol, part)
-    names = {Path(shard["name"]).stem for shard in ShardSet(index).index["shards"]}
-    if {path.stem for path in reduced} == names:
-        return ViewSamples(reduced, columns, pairs)
-    return ShardSamples(index, columns, pairs, size, placed=False)

@@ -29,10 +29,10 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
     return _named(path, split, tile, len(named(settings["spectra"])))
 
 
-def _named(path: Path, call: Callable[..., Any], *given: object) -> Any:
+def _named(path: Path, call: Callable[..., Any], *arguments: object) -> Any:
     """Return call(*given); a refusal of it gets the file's name in front."""
     try:
-        return call(*given)
+        return call(*arguments)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -41,14 +41,21 @@ def _signals(path: Path) -> np.ndarray:
     """Return the complex array of a signal file. Raises: InputError naming the file, for another kind of file."""
     if path.suffix != ".npy":
         raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
-    found = array_of(path, "signals")
-    if found.dtype.kind != "c" or found.ndim != 2:
-        raise InputError(f"{path}: {found.dtype} {found.shape}, expected complex (stations, symbols)")
-    return found
+    signals = array_of(path, "signals")
+    if signals.dtype.kind != "c" or signals.ndim != 2:
+        raise InputError(f"{path}: {signals.dtype} {signals.shape}, expected complex (stations, symbols)")
+    return signals
 
 
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
-    """Return the probability of each category for one signal file or tile, in full precision."""
+    """Return the probability of each category for one signal file or tile, in full precision.
+
+    >>> from lowalt.recognition.zoo import opened
+    >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4).astype(np.complex64))
+    >>> model, settings = opened("default-seen")
+    >>> list(predict(model, Path("sample.npy"), settings))
+    ['UAV', 'Bird', 'Vehicle', 'Pedestrian']
+    """
     return answer(trained, images_of(path, settings), settings, str(path))
 
 
@@ -60,9 +67,9 @@ def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> 
     """
     names = named(settings["spectra"])
     places = columns_in(trained.scheme.columns, names, len(images) // len(names), where)
-    seen = torch.from_numpy(resize(images, trained.size)[places][None])
+    views = torch.from_numpy(resize(images, trained.size)[places][None])
     with torch.inference_mode():
-        found = trained.model(seen).double().softmax(1)[0]
-    if not torch.isfinite(found).all():
+        shares = trained.model(views).double().softmax(1)[0]
+    if not torch.isfinite(shares).all():
         raise InputError(f"{trained.path}: answers {where} with numbers that are not finite, expected another model")
-    return dict(zip(trained.classes, found.tolist(), strict=True))
+    return dict(zip(trained.classes, shares.tolist(), strict=True))

@@ -8,7 +8,7 @@ from lowalt.files.errors import InputError
 
 CLAIMS = (
     *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),
-    *(("ABC:VRP+TRP+VT", f"{one}:VRP+TRP+VT", "three stations over one") for one in "ABC"),
+    *(("ABC:VRP+TRP+VT", f"{station}:VRP+TRP+VT", "three stations over one") for station in "ABC"),
     *(("ABC:VRP+TRP+VT", f"ABC:{name}mean fusion", "proposed over mean fusion")
       for name in ("", "Swin-B ", "ConvNeXt-B ", "ViT-B/16 ")),
 )  # fmt: skip

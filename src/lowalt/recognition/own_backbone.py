@@ -24,19 +24,19 @@ def file_of(name: str) -> Path | None:
     return Path(path) if colon and path.endswith(".py") else None
 
 
-def allowed(name: str, own: str) -> str:
-    """Return the backbone of a model whose file names `name`; own: the FILE.py:FUNCTION that the user names, or "".
+def allowed(name: str, trusted: str) -> str:
+    """Return the backbone of a model whose file names `name`; trusted: the FILE.py:FUNCTION that the user names, or "".
 
     Raises: InputError where the file names code and the user does not.
     """
     if file_of(name) is None:
         return name
-    if file_of(own) is None:
+    if file_of(trusted) is None:
         raise InputError(
             f"its backbone {name!r} is code, which a file may not choose; "
             "expected `--backbone FILE.py:FUNCTION` with code that you trust"
         )
-    return own
+    return trusted
 
 
 def backbone(name: str, size: int) -> nn.Module:
@@ -49,16 +49,16 @@ def backbone(name: str, size: int) -> nn.Module:
     if path is None or not path.is_file():
         raise InputError(f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that exists")
     function = name.rpartition(":")[2]
-    found = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)
-    held = importlib.util.module_from_spec(found)
-    sys.modules[found.name] = held
+    specification = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[specification.name] = module
     try:
-        found.loader.exec_module(held)
-        if not callable(getattr(held, function, None)):
+        specification.loader.exec_module(module)
+        if not callable(getattr(module, function, None)):
             raise InputError(f"network: backbone {name!r}: {path} has no function {function!r}")
-        made = getattr(held, function)(size)
+        network = getattr(module, function)(size)
         with torch.no_grad():
-            features = made.eval()(torch.zeros(2, 3, size, size))
+            features = network.eval()(torch.zeros(2, 3, size, size))
     except InputError:
         raise
     except Exception as error:
@@ -66,7 +66,7 @@ def backbone(name: str, size: int) -> nn.Module:
     if not isinstance(features, torch.Tensor) or features.ndim != 2 or len(features) != 2:
         shape = tuple(features.shape) if isinstance(features, torch.Tensor) else type(features).__name__
         raise InputError(f"network: backbone {name!r} gives {shape} for two images, expected (2, features)")
-    made.num_features = features.shape[1]
-    if not hasattr(made, "pretrained_cfg"):
-        made.pretrained_cfg = MIDDLE
-    return made.train()
+    network.num_features = features.shape[1]
+    if not hasattr(network, "pretrained_cfg"):
+        network.pretrained_cfg = MIDDLE
+    return network.train()

@@ -35,6 +35,20 @@ def probability_columns(classes: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"p_{word(name)}" for name in classes)
 
 
+def shares_of(row: dict, columns: tuple[str, ...], where: str) -> list[float]:
+    """Return the class probabilities of a row of a prediction file; columns: theirs.
+
+    Raises: InputError naming `where` for what is no number, negative, or does not sum to one.
+    """
+    try:
+        values = [float(row[name]) for name in columns]
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{where}: {error}") from error
+    if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
+        raise InputError(f"{where}: probabilities {values}, expected {len(columns)} >= 0 with sum 1")
+    return values
+
+
 @dataclass(frozen=True)
 class Predictions:
     """Columns of a prediction file; `probabilities` (samples, classes), everything else (samples,)."""
@@ -86,12 +100,12 @@ def record(path: str | Path) -> dict:
     """
     side = existing(Path(path).with_suffix(".json"), "run record")
     try:
-        found = json.loads(text_of(side, "run record"))
+        content = json.loads(text_of(side, "run record"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{side}: not a run record ({error})") from error
-    if not isinstance(found, dict):
+    if not isinstance(content, dict):
         raise InputError(f"{side}: not a run record, expected a JSON object")
-    return found
+    return content
 
 
 def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarray) -> Predictions:
@@ -110,21 +124,21 @@ def _number(value: float) -> str:
 
 
 def write(
-    path: str | Path, found: Predictions, classes: tuple[str, ...] = CATEGORIES, protocol: str | None = None
+    path: str | Path, table: Predictions, classes: tuple[str, ...] = CATEGORIES, protocol: str | None = None
 ) -> None:
     """Write a prediction file, with the column `part` where a protocol is named; equal predictions give equal bytes."""
     parts = {pair: part for part, pairs in (FOLDS[protocol].items() if protocol else ()) for pair in pairs}
-    more = ("part",) if protocol else ()
+    part_column = ("part",) if protocol else ()
     rows = (
         [
-            found.key[row], found.subtype[row], found.group[row], found.fold[row], int(found.model[row]),
-            _number(found.snr_db[row]), int(found.label[row]), _number(found.range_m[row]),
-            _number(found.aspect_deg[row]), *(repr(float(value)) for value in found.probabilities[row]),
-            *(parts[found.group[row], found.fold[row]] for _ in more),
+            table.key[row], table.subtype[row], table.group[row], table.fold[row], int(table.model[row]),
+            _number(table.snr_db[row]), int(table.label[row]), _number(table.range_m[row]),
+            _number(table.aspect_deg[row]), *(repr(float(value)) for value in table.probabilities[row]),
+            *(parts[table.group[row], table.fold[row]] for _ in part_column),
         ]
-        for row in range(len(found))
+        for row in range(len(table))
     )  # fmt: skip
-    write_csv(path, (*COLUMNS, *probability_columns(classes), *more), rows)
+    write_csv(path, (*COLUMNS, *probability_columns(classes), *part_column), rows)
 
 
 def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions:
@@ -132,31 +146,23 @@ def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions
 
     Raises: InputError naming the file, the line and what is wrong.
     """
-    rows, shares = [], probability_columns(classes)
+    rows, columns = [], probability_columns(classes)
     with text_file(path, "predictions") as file:
         reader = csv.DictReader(file)
-        if tuple(name for name in reader.fieldnames or () if name != "part") != (*COLUMNS, *shares):
-            raise InputError(f"{path}: columns {reader.fieldnames}, expected {[*COLUMNS, *shares]}")
+        if tuple(name for name in reader.fieldnames or () if name != "part") != (*COLUMNS, *columns):
+            raise InputError(f"{path}: columns {reader.fieldnames}, expected {[*COLUMNS, *columns]}")
         for line, row in enumerate(reader, start=2):
             try:
-                rows.append((
+                facts = (
                     row["key"], row["subtype"], row["group"], row["fold"], int(row["model"]), float(row["snr_db"]),
                     int(row["label"]), float(row["range_m"] or "nan"), float(row["aspect_deg"] or "nan"),
-                    [float(row[name]) for name in shares],
-                ))  # fmt: skip
+                )  # fmt: skip
             except (TypeError, ValueError) as error:
                 raise InputError(f"{path} line {line}: {error}") from error
+            rows.append((*facts, shares_of(row, columns, f"{path} line {line}")))
     if not rows:
         raise InputError(f"{path}: no predictions")
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    found = Predictions(*columns)
-    sums = found.probabilities.sum(1)
-    bad = ~((found.probabilities >= 0).all(1) & (np.abs(sums - 1) <= 1e-3))
-    if bad.any():
-        line = int(np.argmax(bad))
-        raise InputError(
-            f"{path} line {line + 2}: probabilities {rows[line][-1]}, expected {len(classes)} >= 0 with sum 1"
-        )
-    if len(np.unique(found.key)) != len(found):
+    predictions = Predictions(*(np.array(column) for column in zip(*rows, strict=True)))
+    if len(np.unique(predictions.key)) != len(predictions):
         raise InputError(f"{path}: a key stands twice, expected one row a sample")
-    return found
+    return predictions

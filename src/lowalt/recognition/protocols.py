@@ -22,3 +22,8 @@ def folds(protocol: str, part: str) -> set[tuple[str, str]]:
         return FOLDS[protocol][part]
     except KeyError:
         raise InputError(f"protocol {protocol!r} has no part {part!r}, expected one of {FOLDS}") from None
+
+
+def evaluated_folds(protocol: str) -> set[tuple[str, str]]:
+    """Return the (group, fold) pairs of all parts of a protocol but its training part. Raises: as `folds`."""
+    return set().union(*(folds(protocol, part) for part in FOLDS.get(protocol, ("test",)) if part != "train"))

@@ -18,25 +18,17 @@ from torch import nn
 
 from lowalt.config.classes import stated
 from lowalt.config.command import pick
+from lowalt.config.schema import check_brought
 from lowalt.files.atomic import replacing, sha256
 from lowalt.files.errors import InputError, in_one_line
 from lowalt.machine.hardware import describe
-from lowalt.recognition import (
-    augment,
-    checkpoint,
-    inference,
-    metrics,
-    network,
-    own_backbone,
-    predictions,
-    recipe,
-)  # fmt: skip
+from lowalt.recognition import checkpoint, inference, metrics, network, own_backbone, predictions, recipe
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recognition.methods import built
-from lowalt.recognition.samples import Samples
+from lowalt.recognition.network import built
+from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
-from lowalt.recognition.training import Trainer
+from lowalt.recognition.training import Trainer, TrainingRun
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
 
 Build = Callable[[Scheme, dict, int, str, int], nn.Module]
@@ -49,24 +41,27 @@ def train(
 ) -> None:  # fmt: skip
     """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
 
-    samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training,
-    augmentation, classes}, the classes by label; events: whether to write the metrics for TensorBoard too,
-    into `events/` of the folder; build: makes the network.
+    samples: the sources "train", of which the scheme's share is kept, and "validation"; settings: {seed, size,
+    colour_map, network, training, augmentation, classes}, the classes by label; events: whether to write the metrics
+    for TensorBoard too, into `events/` of the folder; build: makes the network.
     Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block, classes = recipe.check(settings["training"]), settings["classes"]
     if len(classes) < 2:
         raise InputError(f"training: classes {classes}, expected two or more to tell apart")
-    augment.check(settings["augmentation"])
+    check_brought("augmentation", settings["augmentation"], "recognition.augmentation")
+    if scheme.share < 1:
+        samples["train"].keep(first_models(samples["train"].facts, scheme.share))
     machine = Machine.here(block["precision"])
-    name = _identity(samples, scheme, protocol, settings, machine)
+    identity = _identity(samples, scheme, protocol, settings, machine)
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
     model = build(scheme, settings["network"], settings["size"], settings["colour_map"], len(classes))
-    trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
+    run = TrainingRun(keys, identity, folder)
+    trainer = Trainer(model, samples, scheme.columns, {**settings, "training": block}, run, machine)
     resumed = trainer.resume()
-    machine.agree(name, trainer.at.steps)
+    machine.agree(identity, trainer.at.steps)
     if resumed and machine.rank == 0:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
     if events and machine.rank == 0:
@@ -95,13 +90,14 @@ def train(
 
 def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine) -> str:
     """Return the JSON text of all that determines a training's weights."""
-    own = own_backbone.file_of(scheme.backbone_of(settings["network"]))
+    code = own_backbone.file_of(scheme.backbone_of(settings["network"]))
     # Leave out settings that change no weight, and name the precision that this machine computes with.
-    kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
+    replaced = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     return checkpoint.identity(
-        scheme=scheme.record, protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
+        scheme=scheme.record, protocol=protocol,
+        settings={**settings, "training": {**settings["training"], **replaced}},
         samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
-        **({"own": sha256(own)} if own and own.is_file() else {}),
+        **({"own": sha256(code)} if code and code.is_file() else {}),
     )  # fmt: skip
 
 
@@ -124,24 +120,25 @@ class Trained:
     classes: tuple[str, ...]
 
 
-def load(path: str | Path, own: str = "", build: Build = built) -> Trained:
-    """Return the trained model of a `model.pt`; own, build: as in `of_state`.
+def load(path: str | Path, trusted: str = "", build: Build = built) -> Trained:
+    """Return the trained model of a `model.pt`; trusted, build: as in `of_state`.
 
     Raises: InputError where the file is missing, damaged or not a model of this project.
     """
-    return of_state(checkpoint.model(path)[1], path, own, build)
+    return of_state(checkpoint.model(path)[1], path, trusted, build)
 
 
-def of_state(state: dict, path: str | Path, own: str = "", build: Build = built) -> Trained:
+def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = built) -> Trained:
     """Return the trained model of what a model file keeps: `weights` and the checked settings of its network.
 
-    path: its file; own: the user's FILE.py:FUNCTION for a model whose backbone is such code; build: makes its network.
+    path: its file; trusted: the user's FILE.py:FUNCTION for a model whose backbone is such code; build: makes its
+    network.
     Raises: InputError where weights and settings do not fit together, or the backbone is code that nobody named.
     """
     scheme, classes, weights = of_record(state["scheme"]), stated(state), state["weights"]
     try:
         refuse_unfinite(weights, path)
-        model = _network(scheme, state, len(classes), path, own, build)
+        model = _network(scheme, state, len(classes), path, trusted, build)
     except InputError as error:
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from error
     except Exception as error:
@@ -150,21 +147,21 @@ def of_state(state: dict, path: str | Path, own: str = "", build: Build = built)
     return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), classes)
 
 
-def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, own: str, build: Build) -> nn.Module:
-    """The network of a file with its weights; own, build: as in `of_state`."""
-    named = scheme.backbone_of(state["network"])
-    name = own_backbone.allowed(named, own)
-    block, told = {**state["network"], "backbone": name, "weights": "none"}, replace(scheme, backbone="")
+def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, trusted: str, build: Build) -> nn.Module:
+    """The network of a file with its weights; trusted, build: as in `of_state`."""
+    named_backbone = scheme.backbone_of(state["network"])
+    name = own_backbone.allowed(named_backbone, trusted)
+    block, bare = {**state["network"], "backbone": name, "weights": "none"}, replace(scheme, backbone="")
     views, size = len(scheme.columns), state["size"]
 
-    def made() -> nn.Module:
+    def fresh() -> nn.Module:
         """The network with fresh weights."""
-        return build(told, block, size, state["colour_map"], classes)
+        return build(bare, block, size, state["colour_map"], classes)
 
-    if name == named and build is built:
-        return filled(made, lambda: torch.zeros(2, views, size, size, dtype=torch.uint8), state["weights"], path)
+    if name == named_backbone and build is built:
+        return filled(fresh, lambda: torch.zeros(2, views, size, size, dtype=torch.uint8), state["weights"], path)
     # The user's own code may not know of the device without memory.
-    model = made()
+    model = fresh()
     refuse_unfit(state["weights"], model, path)
     model.load_state_dict(state["weights"])
     return model
@@ -190,16 +187,16 @@ def evaluate(
     """
     _, _, precision, mirror, _ = inference.evaluation(settings)
     machine, start = Machine.here(precision), time.monotonic()
-    found = answers(trained, samples, settings, machine)
+    shares = answers(trained, samples, settings, machine)
     seconds = time.monotonic() - start
     if machine.rank:
         return
-    told = predictions.from_facts(samples.facts, trained.scheme.stations, found)
-    predictions.write(out, told, trained.classes, trained.protocol)
+    table = predictions.from_facts(samples.facts, trained.scheme.stations, shares)
+    predictions.write(out, table, trained.classes, trained.protocol)
     side = trained.path.with_name("run.json")
     known = json.loads(side.read_text()) if side.exists() else {}
     _record(Path(out).with_suffix(".json"), {
         **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
-        "hardware": describe(), "evaluated_samples": len(found), "evaluate_s": seconds,
+        "hardware": describe(), "evaluated_samples": len(shares), "evaluate_s": seconds,
         "trained_on": trained_on, "mirror": mirror, "classes": list(trained.classes), **(more or {}),
     })  # fmt: skip

@@ -1,7 +1,7 @@
-"""Samples for the network: index images with labels and records, from a cache of views or straight from shards.
+"""Samples for the network: index images and what is known of each. A source of them is a `Samples`.
 
-Both sources answer the same calls: `facts` (labels and what is known of each sample) and
-`views(numbers, columns)`, uint8 index images of the scheme's size. No torch here.
+Sources: caches of views (`ViewSamples`, here), shards (`views.ShardSamples`), and a data set that makes samples when
+they are asked for (`made.DatasetSamples`). `sources.Source` chooses one. No torch here.
 
 A cache file (.npz) holds, for the samples of one shard in its order,
     views   (samples, stations spectra, size, size) uint8, station-major, index images averaged over areas
@@ -14,7 +14,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -68,10 +68,10 @@ def first_models(facts: Facts, share: float) -> np.ndarray:
     """
     chosen = np.zeros(len(facts), dtype=bool)
     for subtype in np.unique(facts.subtype):
-        mine = facts.subtype == subtype
-        models = np.unique(facts.model[mine])
-        kept = models[: max(1, round(share * len(models)))]
-        chosen |= mine & np.isin(facts.model, kept)
+        of_subtype = facts.subtype == subtype
+        models = np.unique(facts.model[of_subtype])
+        first = models[: max(1, round(share * len(models)))]
+        chosen |= of_subtype & np.isin(facts.model, first)
     return np.flatnonzero(chosen)
 
 
@@ -87,41 +87,10 @@ def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
     return hasher.hexdigest()
 
 
-class Cached(NamedTuple):
-    """Content of a cache file: facts of all its samples, which of them are asked for (samples,) bool, and arrays."""
-
-    facts: Facts
-    keep: np.ndarray
-    arrays: dict[str, np.ndarray]
-
-
-def cached(path: Path, what: str, folds: set[tuple[str, str]], *names: str) -> Cached | None:
-    """Return the arrays `names` of a cache file, None where no sample is of one of the (group, fold) pairs `folds`.
-
-    what: word for the file's content in messages. Raises: InputError naming a file that is no such cache.
-    """
-    checked_archive(path, what)
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            facts = Facts(*(data[name] for name in FACTS))
-            if any(
-                value.dtype.kind not in KINDS[name] or value.ndim != 1 + (name in OF_STATIONS)
-                or len(value) != len(facts) or (name in OF_STATIONS and value.shape != facts.range_m.shape)
-                for name, value in vars(facts).items()
-            ):  # fmt: skip
-                raise ValueError("facts of other shapes or types than one of each sample")
-            pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
-            keep = np.array([pair in folds for pair in pairs], dtype=bool)
-            return Cached(facts, keep, {name: data[name] for name in names}) if keep.any() else None
-    except UNREADABLE as error:
-        raise InputError(f"{path}: not a {what} file ({error})") from error
-
-
 class Samples:
     """A source of samples: `facts` of each, `size` of its images, `views` of some, and `sha256` of all.
 
-    A training and an evaluation ask `changed` and `inputs`; a source whose network takes more than images, or something
-    else, has its own.
+    A training asks `changed`, an evaluation `inputs`; a source whose network takes more than images has its own.
     """
 
     facts: Facts
@@ -154,10 +123,10 @@ class ViewSamples(Samples):
         """
         images, facts = [], []
         for path in sorted(map(Path, paths)):
-            found = _load(path, columns, folds)
-            if found is not None:
-                images.append(found[0])
-                facts.append(found[1])
+            of_file, facts_of_file = _load(path, columns, folds)
+            if len(facts_of_file):
+                images.append(of_file)
+                facts.append(facts_of_file)
         if not images:
             raise InputError(f"views: none of the {len(paths)} files has samples of {sorted(folds)}")
         sizes = {array.shape[2:] for array in images}
@@ -193,24 +162,39 @@ def joined_sources(first: ViewSamples, second: ViewSamples) -> ViewSamples:
     """
     if first.size != second.size:
         raise InputError(f"samples: sizes {first.size} and {second.size}, expected one size")
-    found = copy.copy(first)
-    found.images = np.concatenate([first.images, second.images])
-    found.facts = joined([first.facts, second.facts])
-    return found
+    both = copy.copy(first)
+    both.images = np.concatenate([first.images, second.images])
+    both.facts = joined([first.facts, second.facts])
+    return both
 
 
-def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:
-    """Return the images and facts of a cache file that are in `folds`, None where none is."""
-    found = cached(path, "views", folds, "views", "spectra")
-    if found is None:
-        return None
-    facts, keep, images = found.facts, found.keep, found.arrays["views"]
-    spectra = found.arrays["spectra"].tolist()
-    count = len(spectra) * facts.range_m.shape[1]
+def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts]:
+    """Return the images and facts of those samples of a cache file that are in `folds`.
+
+    Raises: InputError naming a file that is no such cache.
+    """
+    checked_archive(path, "views")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            facts = Facts(*(data[name] for name in FACTS))
+            if any(
+                value.dtype.kind not in KINDS[name] or value.ndim != 1 + (name in OF_STATIONS)
+                or len(value) != len(facts) or (name in OF_STATIONS and value.shape != facts.range_m.shape)
+                for name, value in vars(facts).items()
+            ):  # fmt: skip
+                raise ValueError("facts of other shapes or types than one of each sample")
+            pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
+            wanted = np.array([pair in folds for pair in pairs], dtype=bool)
+            if not wanted.any():
+                return np.empty(0), facts.take(wanted)
+            images, spectra = data["views"], data["spectra"].tolist()
+    except UNREADABLE as error:
+        raise InputError(f"{path}: not a views file ({error})") from error
+    stations = facts.range_m.shape[1]
+    count = len(spectra) * stations
     if images.ndim != 4 or images.shape[:2] != (len(facts), count) or images.dtype != np.uint8:
         raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, S, S)")
-    places = columns_in(columns, spectra, facts.range_m.shape[1], str(path))
-    return images[keep][:, places], facts.take(keep)
+    return images[wanted][:, columns_in(columns, spectra, stations, str(path))], facts.take(wanted)
 
 
 def write(path: str | Path, views: np.ndarray, facts: Facts, spectra: Sequence[str] = LISTED) -> None:

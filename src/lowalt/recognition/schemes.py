@@ -135,8 +135,8 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
     Raises: InputError naming `where`, the column and the value.
     """
     if set(row) - set(OPTIONAL) != set(COLUMNS):
-        found = sorted(map(str, row))
-        raise InputError(f"{where}: columns {found}, expected {list(COLUMNS)}, perhaps {list(OPTIONAL)}")
+        columns = sorted(map(str, row))
+        raise InputError(f"{where}: columns {columns}, expected {list(COLUMNS)}, perhaps {list(OPTIONAL)}")
     if row["fusion"] not in FUSIONS:
         raise InputError(f"{where}: fusion {row['fusion']!r}, expected one of {FUSIONS}")
     protocols = tuple(row["protocols"].split("+"))
@@ -157,15 +157,15 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
 
 def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
     """Rows of a table, each with its place in words, by the scheme's name; no name stands twice."""
-    found: dict[str, tuple[dict, str]] = {}
+    rows: dict[str, tuple[dict, str]] = {}
     for number, row in enumerate(read_csv(path, "scheme", what="table of schemes"), start=2):
         name, where = row["scheme"], f"{path} line {number}"
-        if slug(name) in map(slug, found):
+        if slug(name) in map(slug, rows):
             raise InputError(f"{where}: scheme {name!r} stands twice")
-        found[name] = row, where
-    if not found:
+        rows[name] = row, where
+    if not rows:
         raise InputError(f"{path}: no schemes, expected at least one row")
-    return found
+    return rows
 
 
 def names(path: str | Path) -> list[str]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
-from lowalt.recognition.predictions import probability_columns
+from lowalt.recognition.predictions import probability_columns, shares_of
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion
@@ -16,18 +16,12 @@ from lowalt.shards import ShardSet
 
 def _probabilities(path: str | Path, columns: tuple[str, ...]) -> dict[str, list[float]]:
     """Read and check the class probabilities of a prediction file: {key: probabilities}."""
-    found: dict[str, list[float]] = {}
+    by_key: dict[str, list[float]] = {}
     for line, row in enumerate(read_csv(path, "key", *columns, what="predictions"), start=2):
-        try:
-            values = [float(row[name]) for name in columns]
-        except ValueError as error:
-            raise InputError(f"{path} line {line}: {error}") from error
-        if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
-            raise InputError(f"{path} line {line}: probabilities {values}, expected {len(columns)} >= 0 with sum 1")
-        if row["key"] in found:
+        if row["key"] in by_key:
             raise InputError(f"{path} line {line}: key {row['key']!r} stands twice")
-        found[row["key"]] = values
-    return found
+        by_key[row["key"]] = shares_of(row, columns, f"{path} line {line}")
+    return by_key
 
 
 def score(path: str | Path, index: str | Path, protocol: str) -> dict:
@@ -40,11 +34,11 @@ def score(path: str | Path, index: str | Path, protocol: str) -> dict:
     pairs = folds(protocol, "test")
     shards = ShardSet(index, sorted({group for group, _ in pairs}), sorted({fold for _, fold in pairs}), check=False)
     facts = facts_of(shards, np.arange(len(shards)), placed=False)
-    given = _probabilities(path, probability_columns(shards.classes))
-    missing = [key for key in facts.key.tolist() if key not in given]
+    by_key = _probabilities(path, probability_columns(shards.classes))
+    missing = [key for key in facts.key.tolist() if key not in by_key]
     if missing:
         raise InputError(f"{path}: {len(missing)} test samples have no prediction, the first is {missing[0]!r}")
-    probabilities = np.array([given[key] for key in facts.key.tolist()])
+    probabilities = np.array([by_key[key] for key in facts.key.tolist()])
     return {"protocol": protocol, **scores(facts, probabilities)}
 
 

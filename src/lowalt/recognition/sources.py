@@ -1,21 +1,51 @@
-"""The options of a command line that name samples, and the check of these samples."""
+"""The one door to samples: caches of views, shards, or a data set that makes them."""
 
-from argparse import ArgumentParser
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 
 from lowalt.files.errors import InputError
-from lowalt.recognition.samples import Samples
+from lowalt.recognition.protocols import folds
+from lowalt.recognition.samples import Samples, ViewSamples
+from lowalt.recognition.schemes import Scheme
+from lowalt.recognition.views import ShardSamples
+from lowalt.shards import ShardSet
 
 
-def name_sources(line: ArgumentParser) -> None:
-    """Add the arguments that name samples: cached views, shards, or a data set that makes them."""
-    line.add_argument("--views", nargs="+", help="caches of views (.npz)")
-    line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
-    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds, whose samples are made")
-    line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
+@dataclass(frozen=True)
+class Source:
+    """Where samples come from, one of three: caches of views, the index of shards, or a maker of samples.
 
+    made: called as `samples`. The caller imports it, so that reading stored samples does not depend on the simulation.
+    """
 
-def of_size(found: Samples, size: int) -> Samples:
-    """Return the samples; refuse images of another size than the settings'."""
-    if found.size != size:
-        raise InputError(f"--views: images of {found.size} pixels, settings say {size}")
-    return found
+    views: list[str | Path] | None = None
+    index: str | Path | None = None
+    made: Callable[..., Samples] | None = None
+
+    @classmethod
+    def of_run(cls, index: Path, size: int) -> "Source":
+        """Return a run's caches of views of this size where every shard has one, else its shards (index)."""
+        caches = sorted(index.parents[1].glob(f"views/{size}/*.npz"))
+        shards = {Path(shard["name"]).stem for shard in ShardSet(index).index["shards"]}
+        return cls(views=caches) if {path.stem for path in caches} == shards else cls(index=index)
+
+    def samples(self, columns: list[int], pairs: set[tuple[str, str]], size: int, placed: bool = False) -> Samples:
+        """Return the samples of some (group, fold) pairs.
+
+        columns: views of a scheme (`Scheme.columns`); size: pixels a side; placed: whether facts carry ranges and
+        aspects, which those of a cache always do.
+        Raises: InputError for cached images of another size, or what the source refuses.
+        """
+        if self.made is not None:
+            return self.made(columns, pairs, size, placed)
+        if self.views is None:
+            return ShardSamples(self.index, columns, pairs, size, placed)
+        cached = ViewSamples(self.views, columns, pairs)
+        if cached.size != size:
+            raise InputError(f"--views: images of {cached.size} pixels, expected {size}")
+        return cached
+
+    def for_training(self, scheme: Scheme, protocol: str, size: int) -> dict[str, Samples]:
+        """Return the samples of a protocol's parts "train" and "validation" as a scheme sees them."""
+        return {part: self.samples(scheme.columns, folds(protocol, part), size) for part in ("train", "validation")}

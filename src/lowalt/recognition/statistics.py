@@ -123,17 +123,17 @@ def alarm_intervals(
     wanted = validation[0].labels == LOOKED_FOR
     of_class = [test[0].labels == label for label in range(classes)]
     drawn = generator.integers(0, len(test), (repeats, len(test)))
-    found = np.full((repeats, classes), np.nan)
+    resampled = np.full((repeats, classes), np.nan)
     for repeat in range(repeats):
         rates = []
         for seed in drawn[repeat]:
             level = _weighted_threshold(validation[seed].scores[wanted], set_on[repeat, wanted], detection)
             called = test[seed].scores >= level
-            totals = [judged[repeat, mine].sum() for mine in of_class]
-            hits = [judged[repeat, mine] @ called[mine] for mine in of_class]
+            totals = [judged[repeat, members].sum() for members in of_class]
+            hits = [judged[repeat, members] @ called[members] for members in of_class]
             rates.append([hit / total if total else np.nan for hit, total in zip(hits, totals, strict=True)])
-        found[repeat] = np.mean(rates, axis=0)
-    kept = found[~np.isnan(found).any(1)]
+        resampled[repeat] = np.mean(rates, axis=0)
+    kept = resampled[~np.isnan(resampled).any(1)]
     return np.quantile(kept, [0.025, 0.975], axis=0).T if len(kept) else np.full((classes, 2), np.nan)
 
 

@@ -30,9 +30,8 @@ from lowalt.config.classes import word
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import compared
 from lowalt.recognition.confidence_tables import alarm_rows, calibration_rows, percent, reliability_rows
-from lowalt.recognition.evaluated import Evaluated
+from lowalt.recognition.evaluated import Evaluated, difference, whole_subtypes
 from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
@@ -64,9 +63,9 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
         snr if snr == "avg" else snr_text(snr): interval
         for snr, interval in f1_by_snr(parts, len(runs[0].classes), whole, generator).items()
     }
-    tables = [accuracy_by(found.snr_db, found.correct) for found in parts]
-    shares = {snr_text(snr): [table[snr][0] for table in tables] for snr in tables[0]}
-    counts = {snr_text(snr): count for snr, (_, count) in tables[0].items()}
+    by_snr = [accuracy_by(predictions.snr_db, predictions.correct) for predictions in parts]
+    shares = {snr_text(snr): [table[snr][0] for table in by_snr] for snr in by_snr[0]}
+    counts = {snr_text(snr): count for snr, (_, count) in by_snr[0].items()}
     shares["avg"] = np.mean(list(shares.values()), axis=0).tolist()
     counts["avg"] = len(parts[0])
     for snr, values in shares.items():
@@ -106,10 +105,10 @@ def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
 def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float) -> Iterable[list]:
     """Yield rows [from, to, accuracy_percent, samples] over bands of a value; samples without one are left out."""
     test = runs[0].test
-    found = values(test)
-    known = ~np.isnan(found)
+    numbers = values(test)
+    known = ~np.isnan(numbers)
     correct = np.mean([run.test.correct for run in runs], axis=0)
-    for band, (share, count) in accuracy_by(np.floor(found[known] / width), correct[known]).items():
+    for band, (share, count) in accuracy_by(np.floor(numbers[known] / width), correct[known]).items():
         yield [f"{band * width:g}", f"{(band + 1) * width:g}", percent(share), count]
 
 
@@ -121,8 +120,8 @@ def comparison_rows(first: list[Evaluated], second: list[Evaluated], seed: int) 
     """
     seeds = min(len(first), len(second))
     generator = stream(seed, "bootstrap", first[0].protocol, first[0].scheme, second[0].scheme)
-    interval = compared.difference(first, second, generator)
-    levels = ["seeds"] * (seeds > 1) + ["subtypes"] * compared.whole_subtypes(first) + ["motion models"]
+    interval = difference(first, second, generator)
+    levels = ["seeds"] * (seeds > 1) + ["subtypes"] * whole_subtypes(first) + ["motion models"]
     yield [", ".join(levels), seeds, *map(percent, interval)]
 
 
@@ -133,10 +132,10 @@ def _write(path: Path, columns: list[str], rows: list[list]) -> None:
 
 def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
     """The classes of all runs; refuses runs of several sets."""
-    found = sorted({run.classes for run in runs})
-    if len(found) != 1:
-        raise InputError(f"predictions of the classes {' and '.join(map(str, found))}, expected one set of classes")
-    return found[0]
+    sets = sorted({run.classes for run in runs})
+    if len(sets) != 1:
+        raise InputError(f"predictions of the classes {' and '.join(map(str, sets))}, expected one set of classes")
+    return sets[0]
 
 
 def write(runs: list[Evaluated], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
@@ -164,8 +163,8 @@ def write(runs: list[Evaluated], order: list[str], published: dict, folder: str 
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
         "confusion": (["category", "predicted", "samples"], confusion_rows),
         "subtypes": (["category", "subtype", *share], subtype_rows),
-        "ranges": (bands, lambda group: band_rows(group, lambda found: found.range_m, 50)),
-        "aspects": (bands, lambda group: band_rows(group, lambda found: found.aspect_deg, 30)),
+        "ranges": (bands, lambda group: band_rows(group, lambda test: test.range_m, 50)),
+        "aspects": (bands, lambda group: band_rows(group, lambda test: test.aspect_deg, 30)),
         "alarms": (alarm, lambda group: alarm_rows(group, seed)),
         "calibration": (["calibration_error", "brier", "cross_entropy"], calibration_rows),
         "reliability": (["from", "to", "confidence_percent", "accuracy_percent", "samples"], reliability_rows),

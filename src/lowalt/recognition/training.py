@@ -9,6 +9,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -18,19 +19,34 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import Reporter
 from lowalt.recognition import checkpoint, network
-from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition.ahead import Augmented, ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
-from lowalt.recognition.moving_average import MovingAverage
 from lowalt.recognition.objective import descent
 from lowalt.recognition.order import batches, epoch_order
-from lowalt.recognition.reader import Reader
-from lowalt.recognition.recipe import averaging, check, optimiser, random_state, schedule, set_random_state
+from lowalt.recognition.recipe import (
+    MovingAverage,
+    averaging,
+    optimiser,
+    random_state,
+    schedule,
+    set_random_state,
+)
+from lowalt.recognition.samples import Samples
 from lowalt.recognition.statistics import cross_entropy
 
 HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", "validation_accuracy")
+
+
+class TrainingRun(NamedTuple):
+    """A run's name and place. keys: names of its random streams; identity: what its checkpoints carry; folder: of its
+    files."""
+
+    keys: tuple
+    identity: str
+    folder: Path
 
 
 @dataclass
@@ -52,108 +68,103 @@ class TrainingState:
 class Trainer:
     """One training run: `fit` ends with the best averaged weights in `model.pt` and the history in `history.csv`."""
 
-    def __init__(self, model, samples, columns, settings, keys, name, folder, machine: Machine) -> None:
-        """model: a Recogniser; samples: {"train": ..., "validation": ...} sources; columns: views of the scheme.
+    def __init__(
+        self, model: nn.Module, samples: dict[str, Samples], columns: list[int], settings: dict, run: TrainingRun,
+        machine: Machine,
+    ) -> None:  # fmt: skip
+        """model: a Recogniser; samples: the sources "train" and "validation"; columns: views of the scheme.
 
-        settings: {"seed", "training", "augmentation", "classes"}; keys: what names the run's random streams; name: the
-        run's identity, which its checkpoints carry; folder: where its files go.
+        settings: {seed, training (as `recipe.check` returns it), augmentation, classes}.
+        Raises: InputError for a class without training samples.
         """
-        self.block = check(settings["training"])
-        self.augmentation, self.seed = settings["augmentation"], settings["seed"]
+        self.block, self.seed, self.run, self.machine = settings["training"], settings["seed"], run, machine
         self.train, self.validation = samples["train"], samples["validation"]
-        self.columns, self.keys, self.name, self.folder, self.machine = columns, keys, name, Path(folder), machine
         classes = settings["classes"]
         missing = sorted(set(range(len(classes))) - set(np.unique(self.train.facts.label).tolist()))
         if missing:
-            raise InputError(
-                f"training: no training sample of {[classes[one] for one in missing]}, expected some of each"
-            )
+            names = [classes[label] for label in missing]
+            raise InputError(f"training: no training sample of {names}, expected some of each")
         if self.block["activation_checkpointing"]:
             network.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
         shared = over_ranks(model) if machine.ranks > 1 else model
-        cpu = not machine.gpu and not self.block["compile"]
-        shared = as_products(shared) if cpu and machine.precision == "fp32" else shared
+        plain = not machine.gpu and not self.block["compile"] and machine.precision == "fp32"
+        shared = as_products(shared) if plain else shared
         self.model = shared.to(machine.device, memory_format=layout)
-        self.optimiser = optimiser(self.model, self.block, flat=cpu and machine.ranks == 1)
-        self.weights = [value for group in self.optimiser.param_groups for value in group["params"]]
-        self.ema = MovingAverage(self.model, self.block["ema"])
+        self.optimiser = optimiser(self.model, self.block)
+        self.average = MovingAverage(self.model)
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model).train()
         # Readers keep their workers over all epochs and validations.
-        reader = Reader(self.train, columns, self.augmentation, (self.seed, *keys), machine)
-        readers = (reader, Unchanged(self.validation))
+        keys = (self.seed, *run.keys)
+        augmented = Augmented(self.train, columns, settings["augmentation"], keys, machine.rank, machine.ranks)
+        readers = (augmented, Unchanged(self.validation))
         self.read, self.read_validation = (ReadAhead(read, self.block["workers"], pin=machine.gpu) for read in readers)
         self.best_weights: dict = {}
         self.waited_s = 0.0
         self.metrics: Metrics | None = None
         self.at = TrainingState()
 
-    def _order(self, epoch: int) -> np.ndarray:
-        """Return the sample numbers of an epoch in training order."""
-        return epoch_order(self.train.facts, self.seed, self.keys, epoch, self.block["snrs_per_model"])
-
-    def _numbered(self, parts: list[np.ndarray]) -> list[tuple[int, np.ndarray]]:
-        """Return the sample numbers of the next batches, each with its step, which alone decides what a batch holds."""
-        return list(enumerate(parts, start=self.at.steps))
-
     def save(self) -> None:
         """Write the checkpoint; refuses to write weights that are not finite."""
-        self._finite()
-        self._finite_weights()
+        self._refuse_unfinite_loss()
+        self._refuse_unfinite_weights()
         if self.machine.rank == 0:
-            checkpoint.save(self.folder / "checkpoint.pt", self.name, self._state())
+            checkpoint.save(self.run.folder / "checkpoint.pt", self.run.identity, self._state())
 
     def _state(self) -> dict:
         """Return everything that a resumed training needs."""
         return {
-            "model": self.model.state_dict(), "ema": self.ema.module.state_dict(), "best": self.best_weights,
+            "model": self.model.state_dict(), "ema": self.average.module.state_dict(), "best": self.best_weights,
             "optimiser": self.optimiser.state_dict(), "at": vars(self.at),
             "random": random_state(self.machine.device),
         }  # fmt: skip
 
     def resume(self) -> bool:
         """Continue from the checkpoint of this run, if there is one; return whether there was one."""
-        path = self.folder / "checkpoint.pt"
+        path = self.run.folder / "checkpoint.pt"
         if not path.exists():
             return False
-        _, state = checkpoint.load(path, self.name)
+        _, state = checkpoint.load(path, self.run.identity)
         self.model.load_state_dict(state["model"])
-        self.ema.module.load_state_dict(state["ema"])
+        self.average.module.load_state_dict(state["ema"])
         self.optimiser.load_state_dict(state["optimiser"])
         self.best_weights = state["best"]
         self.at = TrainingState(**state["at"])
         set_random_state(self.machine.device, state["random"])
         return True
 
-    def _finite(self) -> None:
-        """Refuse a loss that is not finite."""
+    def _refuse_unfinite_loss(self) -> None:
+        """Raise InputError where the loss is not finite."""
         if not math.isfinite(self.at.loss_sum):
-            raise InputError(
-                f"training: loss is {self.at.loss_sum} in epoch {self.at.epoch} at step {self.at.steps}; "
-                f"no checkpoint was written since. Try a lower training.rate than {self.block['rate']}"
-            )
+            where = f"in epoch {self.at.epoch} at step {self.at.steps}"
+            raise InputError(f"training: loss is {self.at.loss_sum} {where}; {self._advice}")
 
-    def _finite_weights(self) -> None:
+    def _refuse_unfinite_weights(self) -> None:
         """Raise InputError naming the weights that are not finite."""
         # A step of finite loss and gradient can overflow a weight; the next loss would show it only after a checkpoint.
         for name, value in self.model.state_dict().items():
             if value.is_floating_point() and not bool(value.isfinite().all()):
-                raise InputError(
-                    f"training: weights {name} are not finite after step {self.at.steps}; no checkpoint was written "
-                    f"since. Try a lower training.rate than {self.block['rate']}"
-                )
+                raise InputError(f"training: weights {name} are not finite after step {self.at.steps}; {self._advice}")
+
+    @property
+    def _advice(self) -> str:
+        """What to do where numbers are not finite."""
+        return f"no checkpoint was written since. Try a lower training.rate than {self.block['rate']}"
+
+    def _rate(self, step: int) -> float:
+        """Learning rate of a step (1, 2, ...), before a group's factor."""
+        return self.block["rate"] * schedule(step / self.block["steps"], self.block["warmup"])
 
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         """Take one optimiser step on a batch and update the moving average of the weights."""
         images, labels = (part.to(self.machine.device, non_blocking=True) for part in (images, labels))
-        rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
         for group in self.optimiser.param_groups:
-            group["lr"] = rate * group["factor"]
+            group["lr"] = self._rate(self.at.steps + 1) * group["factor"]
         loss = descent(self.step_model, images, labels, self.block, self.machine)
-        norm = nn.utils.clip_grad_norm_(self.weights, self.block["clip"], foreach=True)
+        norm = nn.utils.clip_grad_norm_(self.model.parameters(), self.block["clip"], foreach=True)
         self.at.loss_sum += float(loss)
         self.at.loss_steps += 1
-        self._finite()
+        self._refuse_unfinite_loss()
         if math.isfinite(float(norm)):
             self.optimiser.step()
             self.at.skipped = 0
@@ -163,29 +174,26 @@ class Trainer:
             print(f"training: gradient is {float(norm)} at step {self.at.steps}, step left out", file=sys.stderr)
             if self.at.skipped >= 10:
                 raise InputError(f"training: ten gradients in a row were not finite, last at step {self.at.steps}")
-        self.optimiser.zero_grad(set_to_none=True)
+        self.optimiser.zero_grad()
         self.at.steps += 1
-        if self.block["ema"]:
-            self.ema.decay = averaging(self.block["ema"], self.at.steps)
-            self.ema.update(self.model)
-        else:
-            self.ema.set(self.model)
+        self.average.update(averaging(self.block["ema"], self.at.steps))
 
     def _validate(self) -> None:
         """Validate the averaged weights, keep the best, and decide whether to stop early."""
-        self._finite_weights()
-        facts, batch, ahead = self.validation.facts, self.block["batch"], self.read_validation
-        numbers, loss = np.arange(len(facts)), self.at.loss_sum / self.at.loss_steps
-        found = probabilities(self.ema.module, self.validation, numbers, self.machine, batch, False, ahead)
-        accuracy = float(np.mean(found.argmax(1) == facts.label))
-        rate = self.block["rate"] * schedule(self.at.steps / self.block["steps"], self.block["warmup"])
-        row = (self.at.steps, self.at.epoch, self.at.steps * self.block["batch"], rate,
-               loss, float(cross_entropy(found, facts.label)), accuracy)  # fmt: skip
+        self._refuse_unfinite_weights()
+        facts, loss = self.validation.facts, self.at.loss_sum / self.at.loss_steps
+        answers = probabilities(
+            self.average.module, self.validation, np.arange(len(facts)), self.machine, self.block["batch"],
+            ahead=self.read_validation,
+        )  # fmt: skip
+        accuracy = float(np.mean(answers.argmax(1) == facts.label))
+        row = (self.at.steps, self.at.epoch, self.at.steps * self.block["batch"], self._rate(self.at.steps),
+               loss, float(cross_entropy(answers, facts.label)), accuracy)  # fmt: skip
         self.at.history.append(row)
         if accuracy >= self.at.best:
             self.at.since_best = 0 if accuracy > self.at.best else self.at.since_best + 1
             self.at.best = accuracy
-            weights = self.ema.module.state_dict()
+            weights = self.average.module.state_dict()
             self.best_weights = {key: value.detach().cpu().clone() for key, value in weights.items()}
         else:
             self.at.since_best += 1
@@ -194,13 +202,15 @@ class Trainer:
 
     def fit(self) -> TrainingState:
         """Train to the last step or until validation stops improving; goes on from where the run stands."""
-        start, last, first = time.monotonic(), time.monotonic(), self.at.steps
+        start, saved, first = time.monotonic(), time.monotonic(), self.at.steps
         report = Reporter(steps := self.block["steps"], "steps")
         while self.at.steps < steps and not self.at.done:
-            parts = batches(self._order(self.at.epoch), self.block["batch"])
-            rest = parts[self.at.batch : self.at.batch + steps - self.at.steps]
-            read = self.read(self._numbered(rest))
-            while self.at.batch < len(parts) and self.at.steps < steps and not self.at.done:
+            order = epoch_order(self.train.facts, self.seed, self.run.keys, self.at.epoch, self.block["snrs_per_model"])
+            parts = batches(order, self.block["batch"])
+            # A batch's step alone decides how its samples are augmented.
+            numbered = list(enumerate(parts[self.at.batch :], start=self.at.steps))[: steps - self.at.steps]
+            read = self.read(numbered)
+            for _ in numbered:
                 asked = time.monotonic()
                 batch = next(read)
                 self.waited_s += time.monotonic() - asked
@@ -211,9 +221,11 @@ class Trainer:
                 if self.at.steps % self.block["validate_every"] == 0 or self.at.steps == steps:
                     self._validate()
                     self._say(start, first)
-                if time.monotonic() - last > self.block["checkpoint_s"]:
+                if time.monotonic() - saved > self.block["checkpoint_s"]:
                     self.save()
-                    last = time.monotonic()
+                    saved = time.monotonic()
+                if self.at.done:
+                    break
             if self.at.batch == len(parts):
                 self.at.epoch, self.at.batch = self.at.epoch + 1, 0
         return self.at
@@ -241,6 +253,7 @@ class Trainer:
         """Write `model.pt` (best averaged weights, `extra`) and `history.csv`, and drop the checkpoint."""
         if self.machine.rank:
             return
-        checkpoint.save(self.folder / "model.pt", self.name, {"weights": self.best_weights, **extra})
-        write_csv(self.folder / "history.csv", HISTORY, [[repr(value) for value in row] for row in self.at.history])
-        (self.folder / "checkpoint.pt").unlink(missing_ok=True)
+        folder = self.run.folder
+        checkpoint.save(folder / "model.pt", self.run.identity, {"weights": self.best_weights, **extra})
+        write_csv(folder / "history.csv", HISTORY, [[repr(value) for value in row] for row in self.at.history])
+        (folder / "checkpoint.pt").unlink(missing_ok=True)

@@ -21,8 +21,7 @@ import numpy as np
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import compared
-from lowalt.recognition.evaluated import Evaluated
+from lowalt.recognition.evaluated import Evaluated, difference, spread_points
 from lowalt.recognition.tables import snr_text
 
 COLUMNS = (
@@ -64,11 +63,9 @@ def comparison(own: list[Evaluated], other: list[Evaluated], name: str, seed: in
         rows = slice(None) if snr is None else test.snr_db == snr
         word = "avg" if snr is None else snr_text(snr)
         generator = stream(seed, "transfer-bootstrap", own[0].protocol, own[0].scheme, name, word)
-        interval = compared.difference(other, own, generator, snr)
+        interval = difference(other, own, generator, snr)
         numbers = [f"{100 * value:.4f}" for value in (theirs[rows].mean(), mine[rows].mean(), *interval)]
-        spread = compared.spread_points(
-            *([100 * run.test.correct[rows].mean() for run in runs] for runs in (own, other))
-        )
+        spread = spread_points(*([100 * run.test.correct[rows].mean() for run in runs] for runs in (own, other)))
         yield [word, *numbers, len(mine[rows]), own[0].hardware, len(other), "" if spread is None else f"{spread:.4f}"]
 
 

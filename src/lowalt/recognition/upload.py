@@ -19,16 +19,16 @@ NAMES = {"model": "model.safetensors", "card": "README.md"}
 """Names of the two files in the repository; the hub shows its README.md as the card."""
 
 
-def upload(model: str | Path, repository: str, client: Any, private: bool = True, own: str = "") -> str:
+def upload(model: str | Path, repository: str, client: Any, private: bool = True, trusted: str = "") -> str:
     """Create the repository where there is none, upload model and card in one commit, return the commit's message.
 
     model: a .safetensors file, its card (.md) next to it; client: a `huggingface_hub.HfApi` with its token, or an
-    object with the same methods; own: as in `runs.of_state`.
+    object with the same methods; trusted: as in `runs.of_state`.
     Raises: InputError where the file is damaged, has no card, or the repository's name is not USER/NAME.
     """
     hub_upload.check_repository(repository)
     content = model_file.read(model)
-    model_file.trained(content, model, own)
+    model_file.trained(content, model, trusted)
     card = existing(Path(model).with_suffix(".md"), "model card")
     message = f"{content.model['scheme']['name']}, {content.model['protocol']}, seed {content.model['seed']}"
     with tempfile.TemporaryDirectory() as folder:
@@ -44,9 +44,9 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--model", required=True, help="model file (.safetensors), its card (.md) next to it")
     hub_upload.add_options(options, "model")
     name_backbone(options)
-    given = options.parse_args(arguments)
-    message = upload(given.model, given.repository, hub_upload.client(), not given.public, given.backbone)
-    print(f"{given.repository}: {message}")
+    chosen = options.parse_args(arguments)
+    message = upload(chosen.model, chosen.repository, hub_upload.client(), not chosen.public, chosen.backbone)
+    print(f"{chosen.repository}: {message}")
 
 
 if __name__ == "__main__":

@@ -87,56 +87,29 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
 
 
 @dataclass(frozen=True)
-class ChunkFile:
-    """A file with a value of every sample of a chunk, and the data that locate each sample in it.
+class Reduced:
+    """Images of a whole chunk that the tiles stage has already reduced, a file of `lowalt.tiles.reduced`.
 
-    path: the file; motion: the chunk's motion table; snrs_db: the noise levels of every motion model, in the order of
-    the chunk's signals.
+    motion: the chunk's motion table; snrs_db: the SNRs of every motion model, in the order of the chunk's signals.
     """
 
     path: Path
     motion: Path
     snrs_db: tuple[float, ...]
 
-    def places(self, facts: Facts) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
-        """Return the number of each sample's motion model and of its SNR, and how many of both the chunk has.
-
-        Raises: InputError where the chunk has no such motion model or SNR.
-        """
-        rows = {(row["subtype"], row["model"]): number for number, row in enumerate(read_table(self.motion))}
-        levels = {snr: number for number, snr in enumerate(self.snrs_db)}
-        try:
-            models = [rows[pair] for pair in zip(facts.subtype.tolist(), facts.model.tolist(), strict=True)]
-            snrs = [levels[snr] for snr in facts.snr_db.tolist()]
-        except KeyError as error:
-            raise InputError(f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}") from None
-        return np.array(models, np.int64), np.array(snrs, np.int64), (len(rows), len(levels))
-
-
-class Reduced(ChunkFile):
-    """Images of a whole chunk that the tiles stage has already reduced, a file of `lowalt.tiles.reduced`."""
-
     def images(self, facts: Facts, size: int) -> np.ndarray:
         """Return the images (len(facts), views, size, size) uint8 of these samples.
 
         Raises: InputError where the chunk has no such motion model or SNR, or the file does not fit them.
         """
-        models, snrs, (rows, levels) = self.places(facts)
-        return reduced.read(self.path, size, rows * levels)[models * levels + snrs]
-
-
-def located(index: str | Path, name: str) -> tuple[ShardSet, np.ndarray]:
-    """Return the data set of an index and the numbers of the samples of its shard `name`.
-
-    Raises: InputError where the index has no such shard.
-    """
-    shards = ShardSet(index)
-    names = [shard["name"] for shard in shards.shards]
-    if name not in names:
-        raise InputError(f"{index}: no shard {name!r}, expected one of {names}")
-    place = names.index(name)
-    start = sum(shard["samples"] for shard in shards.shards[:place])
-    return shards, np.arange(start, start + shards.shards[place]["samples"])
+        rows = {(row["subtype"], row["model"]): number for number, row in enumerate(read_table(self.motion))}
+        levels = {snr: number for number, snr in enumerate(self.snrs_db)}
+        keys = zip(facts.subtype.tolist(), facts.model.tolist(), facts.snr_db.tolist(), strict=True)
+        try:
+            places = [rows[subtype, model] * len(levels) + levels[snr] for subtype, model, snr in keys]
+        except KeyError as error:
+            raise InputError(f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}") from None
+        return reduced.read(self.path, size, len(rows) * len(levels))[np.array(places, np.int64)]
 
 
 def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source: Reduced | None = None) -> int:
@@ -148,17 +121,23 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
     """
     if isinstance(size, bool) or not isinstance(size, int) or size < 8:
         raise InputError(f"settings: size is {size!r}, expected a whole number of pixels >= 8")
-    shards, numbers = located(index, name)
+    shards = ShardSet(index)
+    names = [shard["name"] for shard in shards.shards]
+    if name not in names:
+        raise InputError(f"{index}: no shard {name!r}, expected one of {names}")
+    ends = np.cumsum([shard["samples"] for shard in shards.shards])
+    end, count = ends[names.index(name)], shards.shards[names.index(name)]["samples"]
+    numbers = np.arange(end - count, end)
     # Decoding checks the images, so the records are read without a second check.
     facts = facts_of(ShardSet(index, check=False), numbers)
     if source:
         views = source.images(facts, size)
     else:
-        views = np.empty((len(numbers), len(shards.columns()), size, size), dtype=np.uint8)
+        views = np.empty((count, len(shards.columns()), size, size), dtype=np.uint8)
         for row, number in enumerate(numbers):
             views[row] = shards.images(number, size)
     samples.write(out, views, facts, shards.spectra)
-    return len(numbers)
+    return count
 
 
 class ShardSamples(samples.Samples):

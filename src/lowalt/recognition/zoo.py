@@ -20,7 +20,7 @@ from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import EIGHT, ModelFile
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import Trained, load
-from lowalt.recognition.samples import Samples, ViewSamples
+from lowalt.recognition.samples import Samples
 
 ZOO = Path("results/zoo")
 """Where entries lie, from the folder of the checkout."""
@@ -34,28 +34,28 @@ def names(zoo: Path = ZOO) -> list[str]:
     return sorted(path.stem for path in zoo.glob("*.safetensors"))
 
 
-def opened(given: str | Path, zoo: Path = ZOO, own: str = "") -> tuple[Trained, dict]:
+def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Trained, dict]:
     """Return a trained model and how its images are made of signals ({network, spectra, images}; {} where unknown).
 
-    given: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo; own: the user's
+    model: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo; trusted: the user's
     FILE.py:FUNCTION for a model whose backbone is such code.
     Raises: InputError naming the entries there are, or the fault of the file.
     """
-    path = Path(given)
+    path = Path(model)
     if path.suffix == "" and not path.is_file():
-        path = zoo / f"{given}.safetensors"
-        if str(given) not in names(zoo):
-            raise InputError(f"model {str(given)!r}: not a file, and {zoo} has {names(zoo)}")
+        path = zoo / f"{model}.safetensors"
+        if str(model) not in names(zoo):
+            raise InputError(f"model {str(model)!r}: not a file, and {zoo} has {names(zoo)}")
     if path.suffix != ".safetensors":
-        return load(path, own), {}
+        return load(path, trusted), {}
     content = model_file.read(path)
-    return model_file.trained(content, path, own), content.input
+    return model_file.trained(content, path, trusted), content.input
 
 
-def small(content: ModelFile, own: str = "") -> ModelFile:
-    """Return a model with its trained matrices in 8 bits; own: as in `opened`."""
-    found = model_file.trained(content, "model", own)
-    matrices = {name for name, value in found.model.named_parameters() if value.ndim > 1 and not value.is_complex()}
+def small(content: ModelFile, trusted: str = "") -> ModelFile:
+    """Return a model with its trained matrices in 8 bits; trusted: as in `opened`."""
+    exact = model_file.trained(content, "model", trusted)
+    matrices = {name for name, value in exact.model.named_parameters() if value.ndim > 1 and not value.is_complex()}
     return replace(content, tensors=rounded(content.tensors, matrices), weights=EIGHT)
 
 
@@ -66,21 +66,23 @@ def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 
     probability.
     """
     machine, everything = Machine(torch.device("cpu"), "fp32"), np.arange(len(samples.facts))
-    one, other = (probabilities(model.model, samples, everything, machine, batch) for model in (exact, entry))
-    labels = samples.facts.label
+    as_trained, rounded_off = (
+        probabilities(model.model, samples, everything, machine, batch) for model in (exact, entry)
+    )
+    guesses, changed_guesses, labels = as_trained.argmax(1), rounded_off.argmax(1), samples.facts.label
     return {
         "samples": len(labels),
-        "exact_percent": 100 * float(np.mean(one.argmax(1) == labels)),
-        "percent": 100 * float(np.mean(other.argmax(1) == labels)),
-        "changed": int(np.sum(one.argmax(1) != other.argmax(1))),
-        "largest_change": float(np.abs(one - other).max()),
+        "exact_percent": 100 * float(np.mean(guesses == labels)),
+        "percent": 100 * float(np.mean(changed_guesses == labels)),
+        "changed": int(np.sum(guesses != changed_guesses)),
+        "largest_change": float(np.abs(as_trained - rounded_off).max()),
     }
 
 
-def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, own: str = "") -> dict:
+def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = "") -> dict:
     """Write NAME.safetensors and NAME.md into the zoo and return the measurements.
 
-    model: model.pt of a training; samples: its validation fold; own: as in `opened`.
+    model: model.pt of a training; samples: its validation fold; trusted: as in `opened`.
     Raises: InputError for a name that is no plain file name, samples that are not the validation fold of the training,
     an entry of 1 MB or more, or one that loses accuracy.
     """
@@ -89,21 +91,21 @@ def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, own: 
     content = model_file.of_run(model)
     if content.identity.get("samples", {}).get("validation") != samples.sha256():
         raise InputError(f"{model}: was validated on other samples, expected the validation fold of its own run")
-    return kept(content, model, samples, name, zoo, own)
+    return kept(content, model, samples, name, zoo, trusted)
 
 
 def kept(
-    content: ModelFile, model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, own: str = ""
+    content: ModelFile, model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = ""
 ) -> dict:  # fmt: skip
     """Write a model's content in 8 bits as NAME.safetensors and NAME.md and return the measurements, as `entry` does.
 
     samples: those that both sets of weights answer. Raises: InputError as `entry`, for size and accuracy.
     """
-    reduced = small(content, own)
+    reduced = small(content, trusted)
     size = len(model_file.packed(reduced))
     if size >= LARGEST_BYTES:
         raise InputError(f"--model: {size} bytes in 8 bits, expected less than {LARGEST_BYTES}")
-    exact, answering = (model_file.trained(each, model, own) for each in (content, reduced))
+    exact, answering = (model_file.trained(each, model, trusted) for each in (content, reduced))
     measured = held_against(exact, answering, samples)
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
@@ -125,14 +127,15 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--name", required=True, help="name of the entry, such as default-seen")
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
     name_backbone(line)
-    given = line.parse_args(arguments)
-    found = load(given.model, given.backbone)
-    samples = ViewSamples(given.views, found.scheme.columns, folds(found.protocol, "validation"))
-    if samples.size != found.size:
-        raise InputError(f"--views: size {samples.size}, the model sees {found.size}")
-    measured = entry(given.model, samples, given.name, given.out, given.backbone)
+    options = line.parse_args(arguments)
+    from lowalt.recognition.sources import Source
+
+    trained = load(options.model, options.backbone)
+    pairs = folds(trained.protocol, "validation")
+    samples = Source(views=options.views).samples(trained.scheme.columns, pairs, trained.size)
+    measured = entry(options.model, samples, options.name, options.out, options.backbone)
     print(
-        f"{given.name}: {(given.out / given.name).with_suffix('.safetensors').stat().st_size} bytes, validation "
+        f"{options.name}: {(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, validation "
         f"{measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in 8 bits, "
         f"{measured['changed']} of {measured['samples']} answers differ"
     )

@@ -103,16 +103,17 @@ def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder
     """
     from lowalt.recognition.checkpoint import identity
     from lowalt.recognition.inference import Machine
-    from lowalt.recognition.recipe import seeded
-    from lowalt.recognition.training import Trainer
+    from lowalt.recognition.recipe import check, seeded
+    from lowalt.recognition.training import Trainer, TrainingRun
 
     keys = ("recordings", name, seed)
     seeded(block["seed"], keys, block["training"]["threads"])
     model, scheme = recogniser(block)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    own = {key: block[key] for key in ("seed", "training", "augmentation")} | {"classes": CATEGORIES}
-    machine, run = Machine.here(block["training"]["precision"]), identity(twin=name, seed=seed, settings=block)
-    trainer = Trainer(model, windows, scheme.columns, own, keys, run, folder, machine)
+    own = {key: block[key] for key in ("seed", "augmentation")}
+    own |= {"training": check(block["training"]), "classes": CATEGORIES}
+    run = TrainingRun(keys, identity(twin=name, seed=seed, settings=block), Path(folder))
+    trainer = Trainer(model, windows, scheme.columns, own, run, Machine.here(block["training"]["precision"]))
     trainer.fit()
     weights = trainer.best_weights
     trainer.finish({

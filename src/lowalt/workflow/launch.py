@@ -41,14 +41,11 @@ class Launch:
 
     @property
     def words(self) -> list[str]:
-        """The words between `python -m` and the training's module; none for one process, which chooses its GPU
-        itself."""
+        """The words between `python -m` and the training's module; none for one process."""
         if self.nodes > 1:
             return ["lowalt.recognition.nodes", str(self.nodes), str(self.per_node)]
         if self.processes > 1:
-            count = str(self.processes)
-            torchrun = ["torch.distributed.run", "--standalone", "--nproc-per-node", count, "-m"]
-            return ["lowalt.recognition.gpus", count, *torchrun]
+            return ["torch.distributed.run", "--standalone", "--nproc-per-node", str(self.processes), "-m"]
         return []
 
     @property
