@@ -72,8 +72,6 @@ def fault(record: dict) -> str | None:
         return f"figures.wing_station is {f['wing_station']}, expected between 0 (nose) and 1 (tail)"
     if "boom_spacing" in f and f["boom_spacing"] >= size:
         return f"figures.boom_spacing is {f['boom_spacing']:.4g} m, expected less than the span of {size} m"
-    if record["points"] <= (count or 0) * max(f.get("blade_count", 0), f.get("tail_blade_count", 0)):
-        return f"points is {record['points']}, expected more than one for each blade"
     return None
 
 

@@ -155,7 +155,7 @@ def _gait_facts(record: dict, names: tuple[str, ...], track: np.ndarray, rate_hz
     return {"stance_foot_speed_mps": stance_speed_mps(track, rate_hz, speed_mps, feet=feet)}
 
 
-def check_record(merged: dict, extra: dict, where: str) -> dict:
+def check_record(merged: dict, where: str) -> dict:
     """Return the merged record of a built-in walk or run, checked, with the defaults of `stature_m` (the published
     height), `rate_hz` (400 frames a second) and `points` (one a node).
 

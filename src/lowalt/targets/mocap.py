@@ -30,7 +30,7 @@ LONG = 20
 """A recording that is more times longer than the cycle used is told so: it may hold other motions."""
 
 
-def check_record(merged: dict, extra: dict, where: str) -> dict:
+def check_record(merged: dict, where: str) -> dict:
     """Return the merged record of a recording after checking it and filling in defaults.
 
     Defaults: the rate that the file says, or CMU's 120 Hz; scaled to the published height; nodes accelerate by at most
