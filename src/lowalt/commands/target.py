@@ -17,7 +17,7 @@ from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
 from lowalt.targets.draft import chosen, drafted, refuse_miscount, row_lines
-from lowalt.targets.guesses import UNUSUAL, USUAL_M, box_of
+from lowalt.targets.guesses import UNUSUAL, USUAL_M
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import MOVING_KIND, body_axes
@@ -194,8 +194,8 @@ def _draft(
         raise
     frame = body_axes(found.front, found.up)
     extent = np.abs(frame @ (found.high - found.low))
-    hubs = np.array([frame[:2] @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
-    wheel = max((float(np.subtract(*box_of(group)[::-1]).max()) for group in groups), default=None)
+    hubs = np.array([frame[:2] @ group.centre for group in groups]).reshape(-1, 2)
+    wheel = max((float(group.extent.max()) for group in groups), default=None)
     lines = [] if row else row_lines(category, extent, hubs, wheel, table)
     given_axes = " ".join(axis for axis in ("up", "front") if getattr(given, axis))
     return drafted(found, name, file, lines, groups, given_axes)

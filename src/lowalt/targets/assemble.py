@@ -52,9 +52,7 @@ def allot(parts: list[Part], count: int, moving_share: float, where: str) -> lis
     body = next(index for index, part in enumerate(parts) if part.kind == "body")
     counts[body] += count - sum(counts)
     if counts[body] < 1:
-        raise InputError(
-            f"{where}: {count} points for {len(parts)} parts leave none for the body, expected more"
-        )
+        raise InputError(f"{where}: {count} points for {len(parts)} parts leave none for the body, expected more")
     return counts
 
 

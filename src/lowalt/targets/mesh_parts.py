@@ -53,7 +53,7 @@ def surface(part: dict, record: dict, inputs_dir: Path) -> Mesh:
             matrix["xyz".index(item["mirror"])] *= -1
         for turn in turns if isinstance(turns, list) else [turns]:
             matrix = portable.product(rotation(turn["axis"], np.radians(turn["deg"])), matrix)
-        meshes.append(mesh.mapped(matrix, np.array(item.get("move", [0.0, 0, 0]))))
+        meshes.append(mesh.mapped(matrix).moved(item.get("move", [0.0, 0, 0])))
     return joined(meshes)
 
 

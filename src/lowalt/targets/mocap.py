@@ -37,24 +37,17 @@ def check_record(merged: dict, where: str) -> dict:
     1500 m/s2; the ends of the cycle differ by at most 0.15 m. `first_frame` and `last_frame` count from 1 and are both
     used; None means the last frame of the file.
 
-    `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    if extra["motion"].lower().endswith(".amc") and "skeleton" not in extra:
-        raise InputError(f"{where}: skeleton is missing, expected the .asf of {extra['motion']}")
+    if merged["motion"].lower().endswith(".amc") and "skeleton" not in merged:
+        raise InputError(f"{where}: skeleton is missing, expected the .asf of {merged['motion']}")
     if like(merged) != "Pedestrian":
         raise InputError(f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or mesh")
-    defaults = {
-        "first_frame": 1,
-        "last_frame": None,
-        "scale": "published",
-        "max_acceleration_mps2": 1500,
-        "max_mismatch_m": 0.15,
-    }
+    defaults = {"first_frame": 1, "last_frame": None, "scale": "published", "max_acceleration_mps2": 1500,
+                "max_mismatch_m": 0.15}  # fmt: skip
     result = defaults | merged | {"points": len(NODES)}
-    for key in ("skeleton", "motion"):
-        if key in result:
-            check_file_name(result[key], f"{where}: {key}")
+    for name in record_files(result):
+        check_file_name(name, f"{where}: file")
     first, last = result["first_frame"], result["last_frame"]
     if last is not None and last <= first:
         raise InputError(f"{where}: first_frame {first}, last_frame {last}, expected frame numbers in order")

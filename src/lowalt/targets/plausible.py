@@ -28,8 +28,8 @@ def _wheel_faults(wheel: Pool, low: float, high: float) -> Iterator[str]:
     lowest, highest = wheel.points.min(axis=0), wheel.points.max(axis=0)
     centre, (width, length, height) = (lowest[2] + highest[2]) / 2, highest - lowest
     if centre > (low + high) / 2:
-        yield (f"its centre lies {centre - low:.3g} m above the lowest point of a body {high - low:.3g} m high, expected "
-               "the lower half: is `up` reversed?")  # fmt: skip
+        yield (f"its centre lies {centre - low:.3g} m above the lowest point of a body {high - low:.3g} m high, "
+               "expected the lower half: is `up` reversed?")  # fmt: skip
     if abs(wheel.axis[0]) < ACROSS:
         yield f"its axis is {np.round(wheel.axis, 3).tolist()} (right, front, up), expected right or left"
     if width > ROUND * min(length, height):

@@ -37,9 +37,7 @@ def fault(record: dict) -> str | None:
     table = record["published"]
     axle = f["front_overhang"] + f["wheel_base"]
     if axle >= table["len_m"]:
-        return (
-            f"figures front_overhang + wheel_base are {axle:.4g} m, expected less than the {table['len_m']} m length"
-        )
+        return f"figures front_overhang + wheel_base are {axle:.4g} m, expected less than the {table['len_m']} m length"
     if f["track"] >= table["wid_m"]:
         return f"figures.track is {f['track']:.4g} m, expected less than the {table['wid_m']} m width"
     return None if record["model"] == "bus" else _profile_fault(f, table)
