@@ -15,7 +15,7 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.sampling import face_normals, sample_surface, thin
+from lowalt.targets.sampling import face_normals, sample_faces, thin
 from lowalt.targets.surfaces import Surface, inside, merged
 
 CANDIDATES_PER_POINT = 12
@@ -86,7 +86,8 @@ def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.nd
     points the one farthest from the hinge alone, so that the others lie along it.
     """
     whole = merged(part.shells)
-    points, normals = sample_surface(whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng)
+    points, face = sample_faces(whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng)
+    normals = face_normals(whole.vertices, whole.faces[face])[0]
     tips, facing = _tips(whole)
     if part.kind == "rotor" and count < 2 * len(tips):
         farthest = portable.norm(tips - np.array(part.hinge)).argmax()

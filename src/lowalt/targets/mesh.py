@@ -20,12 +20,12 @@ from lowalt.targets import vehicle
 from lowalt.targets.assemble import Part, allot, cloud_of_parts, sample_part
 from lowalt.targets.builtin import checksum
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.input_files import record_files
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut_parts, hinged, pool_of, refuse_shared
 from lowalt.targets.mesh_record import body_axes, check_record, ordered_parts
 from lowalt.targets.mesh_size import sized
 from lowalt.targets.plausible import refuse_implausible
+from lowalt.targets.record_schema import record_files
 from lowalt.targets.sampling import thin
 
 __all__ = ["check_record", "mesh_cloud"]

@@ -10,7 +10,6 @@ from lowalt.config.classes import like
 from lowalt.files.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.cloud import MOST_TURNING_PARTS
-from lowalt.targets.input_files import check_file_name, record_files
 
 SIZES = ("motor diagonal", "length", "width", "height", "largest extent")
 ALL_AXES = "length, width and height"
@@ -93,6 +92,4 @@ def check_record(merged: dict, where: str) -> dict:
     size, sizes = result.get("size_is"), (ALL_AXES,) if of_vehicle else SIZES
     if size not in sizes:
         raise InputError(f"{where}: size_is is {size!r}, expected one of {sizes} for a {category}")
-    for name in record_files(result):
-        check_file_name(name, f"{where}: file")
     return result

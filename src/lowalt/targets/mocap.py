@@ -16,11 +16,11 @@ from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
-from lowalt.targets.input_files import check_file_name, record_files
 from lowalt.targets.mocap_cycle import closed, find_cycle, refuse_short, refuse_strange_rate
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import moved, read_bvh, read_joints, to_nodes
 from lowalt.targets.mocap_motion import Motion, front, nodes_m, posed, refuse_glitches
+from lowalt.targets.record_schema import record_files
 from lowalt.targets.skeleton import NODES, node_cloud, stature_m
 
 CMU_HZ = 120
@@ -46,8 +46,6 @@ def check_record(merged: dict, where: str) -> dict:
     defaults = {"first_frame": 1, "last_frame": None, "scale": "published", "max_acceleration_mps2": 1500,
                 "max_mismatch_m": 0.15}  # fmt: skip
     result = defaults | merged | {"points": len(NODES)}
-    for name in record_files(result):
-        check_file_name(name, f"{where}: file")
     first, last = result["first_frame"], result["last_frame"]
     if last is not None and last <= first:
         raise InputError(f"{where}: first_frame {first}, last_frame {last}, expected frame numbers in order")

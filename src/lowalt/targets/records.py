@@ -14,8 +14,8 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
-from lowalt.targets.input_files import record_files
 from lowalt.targets.make import SOURCES, source_module
+from lowalt.targets.record_schema import check_file_name, record_files
 
 COMMON_KEYS = record_schema.keys(record_schema.COMMON)
 """Keys every record may have; `source` it must have. Each source adds its own."""
@@ -168,6 +168,8 @@ def merge(row: dict, record: dict, where: str) -> dict:
     _check_like(merged, where)
     if unknown := sorted(set(record.get("row_from", {})) - set(row)):
         raise InputError(f"{where}: row_from names {unknown}, expected columns of the table of targets")
+    for name in record_files(merged):
+        check_file_name(name, where)
     return source_module(source).check_record(merged, where)
 
 
