@@ -6,17 +6,13 @@ import json
 from lowalt.config.classes import like
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.targets import bird, uav, vehicle
+from lowalt.targets import bird, record_schema, uav, vehicle
 from lowalt.targets.assemble import assemble
 from lowalt.targets.cloud import Cloud
 
 MODULES = {"UAV": uav, "Bird": bird, "Vehicle": vehicle}
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "1": 1.0}
 """Units a figure may have; "1" is a ratio or a count."""
-
-KEYS = {"UAV": "coaxial", "Bird": "flap", "Vehicle": "wheel_size"}
-"""The key that only targets like this have."""
-SIZES = {"UAV": uav.SIZES, "Bird": ("bill tip to tail tip",), "Vehicle": ("length, width and height",)}
 
 
 def _figure(figure: list, kind: str, sources: dict, where: str) -> dict:
@@ -38,17 +34,22 @@ def check_record(merged: dict, where: str) -> dict:
 
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    category = like(merged)
-    if category not in MODULES:
+    category, name = like(merged), merged["model"]
+    models = {known: model for known, model in record_schema.schema()["models"].items() if model["like"] == category}
+    if not models:
         raise InputError(f"{where}: source is 'builtin', which has no {category} model; expected gait or mocap")
-    if others := set(merged) & (set(KEYS.values()) - {KEYS[category]}):
-        raise InputError(f"{where}: {sorted(others)} are not for a {category}, expected {KEYS[category]!r} at most")
-    layouts = MODULES[category].FIGURES
-    if merged["model"] not in layouts:
-        raise InputError(f"{where}: model is {merged['model']!r}, expected one of {sorted(layouts)}")
-    if merged["size_is"] not in SIZES[category]:
-        raise InputError(f"{where}: size_is is {merged['size_is']!r}, expected one of {SIZES[category]}")
-    kinds, figures = layouts[merged["model"]], merged.get("figures", {})
+    if name not in models:
+        raise InputError(f"{where}: model is {name!r}, expected one of {sorted(models)}")
+    model, rotors = models[name], merged["published"]["n_rotors_or_wings"]
+    if others := sorted({"coaxial", "flap", "wheel_size"} & set(merged) - set(model.get("keys", []))):
+        raise InputError(f"{where}: {others} are not for model {name}, expected {model.get('keys', [])} at most")
+    if merged["size_is"] not in model["size_is"]:
+        raise InputError(
+            f"{where}: size_is is {merged['size_is']!r}, expected one of {model['size_is']} of model {name}"
+        )
+    if rotors not in model.get("rotors", [rotors]):
+        raise InputError(f"{where}: model is {name}, which has {model['rotors']} rotors, not the row's {rotors}")
+    kinds, figures = record_schema.figures(name), merged.get("figures", {})
     if merged["size_is"] == "body diagonal":
         kinds = kinds | {"motor_diagonal": "length"}
     if wrong := sorted(set(kinds) ^ set(figures)):

@@ -45,53 +45,36 @@ def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, row_m:
     )
 
 
-def _published_m(record: dict) -> np.ndarray:
-    """Return the published sizes (3,) m along right, front and up; a single published size stands three times."""
-    table = record["published"]
-    if record["size_is"] == ALL_AXES:
-        return np.array([table["wid_m"], table["len_m"], table["hgt_m"]])
-    return np.full(3, table["size_m"])
-
-
 def _bounds(parts: dict[str, Pool]) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and the highest coordinates (3,) of all parts' points."""
     low = np.min([pool.points.min(axis=0) for pool in parts.values()], axis=0)
     return low, np.max([pool.points.max(axis=0) for pool in parts.values()], axis=0)
 
 
-def measured_m(size_is: str, parts: dict[str, Pool], kinds: dict[str, str]) -> float:
-    """Return the size (m) that `size_is` names; the pools are in body axes.
-
-    Raises: InputError where `size_is` is the motor diagonal and there are fewer than two rotors.
-    """
-    extent = np.subtract(*_bounds(parts)[::-1])
-    if size_is == "motor diagonal":
-        hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
-        if len(hubs) < 2:
-            raise InputError(f"size_is is 'motor diagonal' for {len(hubs)} rotors, expected at least two")
-        return float(portable.norm(hubs[:, None] - hubs[None]).max())
-    return float({"width": extent[0], "length": extent[1], "height": extent[2]}.get(size_is, extent.max()))
-
-
 def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[np.ndarray, dict]:
     """Return the scale factors (3,) along right, front and up, and the facts about sizes for the cloud's record.
 
     The mesh is compared with the published size even where the record asks for no scaling, to find a wrong unit.
-    Raises: InputError where mesh and published size differ by more than the record's limit.
+    Raises: InputError where mesh and published size differ by more than the record's limit, or where `size_is` is the
+    motor diagonal and there are fewer than two rotors.
     """
-    extent, wanted, where = np.subtract(*_bounds(parts)[::-1]), _published_m(record), record["subtype"]
-    size, whole = extent, float(extent.max())
-    if record["size_is"] != ALL_AXES:
-        try:
-            size = np.full(3, measured_m(record["size_is"], parts, kinds))
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
-        if record["size_is"] == "motor diagonal":
+    extent, size_is, where = np.subtract(*_bounds(parts)[::-1]), record["size_is"], record["subtype"]
+    row, whole = record["published"], float(extent.max())
+    if size_is == ALL_AXES:
+        size, wanted = extent, np.array([row["wid_m"], row["len_m"], row["hgt_m"]])
+    else:
+        measured = {"width": extent[0], "length": extent[1], "height": extent[2]}.get(size_is, whole)
+        if size_is == "motor diagonal":
+            hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
+            if len(hubs) < 2:
+                raise InputError(f"{where}: size_is is {size_is!r} for {len(hubs)} rotors, expected at least two")
+            measured = portable.norm(hubs[:, None] - hubs[None]).max()
             # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not show a wrong unit.
             # Other sizes are the mesh's own: a gull's span may be more than `limit` times its length.
-            _refuse_size(record, "the whole mesh", whole, wanted[0], size[0])
+            _refuse_size(record, "the whole mesh", whole, row["size_m"], measured)
+        size, wanted = np.full(3, measured), np.full(3, row["size_m"])
     for axis in range(3):
-        _refuse_size(record, f"the mesh ({record['size_is']})", size[axis], wanted[axis])
+        _refuse_size(record, f"the mesh ({size_is})", size[axis], wanted[axis])
     for name, pool in parts.items():
         largest = float(np.ptp(pool.points, axis=0).max())
         if kinds[name] != "body" and largest < whole / SMALLEST_PART:

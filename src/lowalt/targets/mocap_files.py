@@ -108,19 +108,21 @@ def read_skeleton(path: str | Path) -> Skeleton:
     return Skeleton(bones, axes, dofs, unit_m)
 
 
-def _lines(path: Path, last: int | None) -> tuple[list[tuple[int, list[str]]], bool]:
-    """Return (frame number, words) of every line of data up to frame `last`, later lines are not read; and whether the
-    file says before its first frame that its angles are in radians.
+def _frames(
+    path: Path, skeleton: Skeleton, first: int, last: int | None
+) -> tuple[dict[int, dict[str, list[float]]], bool]:
+    """Return the numbers of each node by frame, `first` to `last` by the file's own numbers, and whether the file says
+    before its first frame that its angles are in radians. A clip cut out of a longer one may begin at any frame.
 
-    A clip cut out of a longer one may begin at any frame.
+    Raises: InputError naming file and frame, as `read_motion`.
     """
-    result, frame, radians = [], None, False
+    frames: dict[int, dict[str, list[float]]] = {}
+    frame, radians = None, False
     for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
         words = line.split("#", 1)[0].split()
         if not words or words[0].startswith(":"):
             radians |= frame is None and words[:1] != [] and words[0].upper() == ":RADIANS"
-            continue
-        if len(words) == 1 and words[0].isdecimal():
+        elif len(words) == 1 and words[0].isdecimal():
             number = int(words[0])
             if last is not None and number > last:
                 break
@@ -129,9 +131,12 @@ def _lines(path: Path, last: int | None) -> tuple[list[tuple[int, list[str]]], b
             frame = number
         elif frame is None:
             raise InputError(f"{path}: {' '.join(words)[:60]!r} stands before frame 1, expected an AMC motion")
-        else:
-            result.append((frame, words))
-    return result, radians
+        elif frame >= first:
+            values = frames.setdefault(frame, {})
+            if words[0] in values:
+                raise InputError(f"{path}: frame {frame} has {words[0]} twice, expected each node once")
+            values[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
+    return frames, radians
 
 
 def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
@@ -159,14 +164,7 @@ def read_motion(
     finite number, a node twice, an all-zero root, a frame equal to the one before it, fewer than two frames left.
     """
     path = existing(path, "motion file")
-    frames: dict[int, dict[str, list[float]]] = {}
-    lines, radians = _lines(path, last)
-    for frame, words in lines:
-        if frame >= first:
-            values = frames.setdefault(frame, {})
-            if words[0] in values:
-                raise InputError(f"{path}: frame {frame} has {words[0]} twice, expected each node once")
-            values[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
+    frames, radians = _frames(path, skeleton, first, last)
     first = max(first, min(frames, default=first))
     count = (max(frames) if frames else 0) - first + 1
     if count < 2 or (last is not None and max(frames) < last):

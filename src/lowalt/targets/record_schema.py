@@ -1,4 +1,4 @@
-"""The schema of a target's record: which keys each source knows, their types and meaning, the files that a record names.
+"""The schema of a target's record: which keys each source knows, their types and meaning; the files that a record has.
 
 The page of the keys is written from it as `docs/site_pages.py` makes the site.
 """
@@ -6,7 +6,6 @@ The page of the keys is written from it as `docs/site_pages.py` makes the site.
 import functools
 from pathlib import Path, PureWindowsPath
 
-from lowalt.config.schema import faults
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 
@@ -32,7 +31,8 @@ _INSIDE = {
 
 @functools.cache
 def schema() -> dict:
-    """Return the whole schema: `$defs`, and under `sources` a JSON schema for each source and for COMMON."""
+    """Return the whole schema: `$defs`, under `sources` a JSON schema for each source and for COMMON, and the built-in
+    `models` with sets of their `figures`."""
     return load_yaml(PATH)
 
 
@@ -46,8 +46,17 @@ def check(section: str, record: dict, where: str) -> None:
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
+    from lowalt.config.schema import faults  # slow to import, and a cloud is made without it
+
     if found := faults(record, {"$defs": schema()["$defs"], **schema()["sources"][section]}, "record"):
         raise InputError(f"{where}: {found[0]}")
+
+
+def figures(model: str) -> dict[str, str]:
+    """Return the figures that a built-in model needs by name, each a length, ratio, offset, count or whole number."""
+    sets = [schema()["figures"][item] if isinstance(item, str) else item
+            for item in schema()["models"][model]["figures"]]  # fmt: skip
+    return {name: kind for each in sets for name, kind in each.items()}
 
 
 def record_files(record: dict) -> list[str]:
@@ -84,4 +93,14 @@ def page(content: dict) -> str:
                 raise InputError(f"schema of records: {name} has no description, expected one line of meaning")
             lines.append(f"| `{name}`{' (needed)' * (name in section.get('required', []))} | {key['description']} |")
         lines.append("")
-    return "\n".join(lines)
+    lines += [
+        "## Built-in models (`model`)",
+        "",
+        "| model | like | size_is | keys | figures |",
+        "|---|---|---|---|---|",
+    ]
+    for name, model in content["models"].items():
+        cells = [", ".join(model.get(key, [])) for key in ("size_is", "keys")]
+        needed = ", ".join(f"`{figure}` ({kind})" for figure, kind in figures(name).items())
+        lines.append(f"| {name} | {model['like']} | {' | '.join(cells)} | {needed} |")
+    return "\n".join([*lines, ""])

@@ -184,6 +184,18 @@ def _check_like(merged: dict, where: str) -> None:
         raise InputError(f"{where}: the table of targets has no {empty}, expected m/s for a target like a {kind}")
 
 
+def estimates(record: dict) -> tuple[int, int]:
+    """Return how many figures of a merged record, and cells of a row of its own, are estimates, and how many there are.
+
+    A cell that the record's `row_from` does not name is an estimate; the cells of a published row do not count.
+    """
+    row, named = record.get("published"), record.get("row_from", {})
+    own_row = row is not None and row["idx"] is None
+    sources = [named.get(column, "estimate") for column in _NUMBERS if own_row and row[column] is not None]
+    sources += [entry["source"] for entry in record.get("figures", {}).values()]
+    return sources.count("estimate"), len(sources)
+
+
 def source_files(record: dict, inputs: str | Path | None) -> list[str]:
     """Return the paths of the user's files that a merged record names, inside the folder `inputs`.
 
