@@ -45,7 +45,6 @@ shards.recipe: command
 shards.sigmf: --index, --out
 shards.upload: --index, --repository
 targets.__main__: --settings, --out
-targets.dimensions: --table, --records, --out
 targets.download: --out
 targets.gallery: --clouds, --out
 targets.occluders: --settings, --out

@@ -31,7 +31,9 @@ def test_the_table_of_schemes_holds_every_row_of_the_paper():
         published = {(row["protocol"], row["scheme"]) for row in csv.DictReader(file)}
     ours = {(protocol, entry.name) for entry in table.values() for protocol in entry.protocols}
     assert published <= ours
-    assert table["ABC:VRP+TRP+VT"].columns == [station * len(NAMES) + image for station in range(3) for image in range(3)]
+    assert table["ABC:VRP+TRP+VT"].columns == [
+        station * len(NAMES) + image for station in range(3) for image in range(3)
+    ]
     assert table["B:VRP+TRP+VT"].columns == [len(NAMES) + image for image in range(3)]
     assert table["A:VT"].columns == [2]
     assert schemes.named("config/schemes.csv", "abc-vit-b-16-mean-fusion", "ABC").backbone == "vit_base_patch16_224"

@@ -8,6 +8,7 @@ import yaml
 
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, source_files
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -63,7 +64,7 @@ def test_a_later_file_replaces_whole_records(tmp_path, written):
         ({"flap": {"speed": 3}}, r"Crow: flap: unknown key\(s\) \['speed'\]"),
         ({"flap": {"mean_deg": "up"}}, r"Crow: flap\.mean_deg: value 'up', expected type number"),
         ({"figures": {"length": [46, "cm", "reference"]}}, r"Crow: figures \[.*missing or unknown"),
-        ({"coaxial": True}, r"Crow: \['coaxial'\] are not for a Bird"),
+        ({"coaxial": True}, r"Crow: \['coaxial'\] are not for model bird, expected \['flap'\] at most"),
     ],
 )
 def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, message):
@@ -125,21 +126,21 @@ def test_impossible_shapes_are_refused(tmp_path, written, name, figure, value, m
 
 def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written):
     quad = written["Type-A Firefighting UAV"]
-    with pytest.raises(InputError, match=r"model is tanker, which has 4 rotors, expected one of 6"):
+    with pytest.raises(InputError, match="model is tanker, expected n_rotors_or_wings 4 in its row, not 6"):
         load(tmp_path, {"DJI Matrice 600 Pro": quad})
-    with pytest.raises(InputError, match=r"coaxial is True, expected it with model cabin or tanker only, not folding"):
+    with pytest.raises(InputError, match=r"\['coaxial'\] are not for model folding, expected \[\] at most"):
         load(tmp_path, {"DJI Mini 2": written["DJI Mini 2"] | {"coaxial": True}})
     lifted = {"size_is": "span over ducts", "figures": {**quad["figures"]}}
     del lifted["figures"]["motor_diagonal"]
-    with pytest.raises(InputError, match=r"size_is is 'span over ducts', expected model ducted, not tanker"):
+    with pytest.raises(InputError, match=r"size_is is 'span over ducts', expected one of .* with model tanker"):
         load(tmp_path, {"Type-A Firefighting UAV": quad | lifted})
 
 
 def test_too_few_points_for_the_parts_are_refused(tmp_path, written):
-    with pytest.raises(InputError, match="points is 8, expected more than one for each of 8 blades"):
-        load(tmp_path, {"DJI Mini 2": written["DJI Mini 2"] | {"points": 8}})
-    with pytest.raises(InputError, match="points is 4, expected at least one for each of 5 parts"):
-        load(tmp_path, {"Owl": written["Owl"] | {"points": 4}})
+    for name, points in (("DJI Mini 2", 8), ("Owl", 4)):
+        record = load(tmp_path, {name: written[name] | {"points": points}})[name]
+        with pytest.raises(InputError, match=f"{name}: {points} points for 5 parts leave none for the body"):
+            make(record, None, 1)
 
 
 def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):

@@ -4,7 +4,7 @@ Axes: front +y, right +x, up +z, metres. The origin lies at the wing's quarter c
 cabin, or in the middle of the envelope. A plane's wing span, a helicopter's rotor diameter and a balloon's diameter are
 the published size. `records.schema.yaml` lists the figures of each layout: `wing_station` is where the quarter chord
 lies, in body lengths from the nose; `wing_height` its height over the body's middle, in body heights; `tail_arm` and
-`tail_rotor_arm` are how far the tail plane and the tail rotor lie behind the main rotor's hub, `tail_rotor_drop` how far
+`tail_rotor_arm` are how far tail plane and tail rotor lie behind the main rotor's hub, `tail_rotor_drop` how far
 the tail rotor lies below it. Plain factors below only round or join shells.
 """
 

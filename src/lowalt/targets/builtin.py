@@ -43,14 +43,14 @@ def check_record(merged: dict, where: str) -> dict:
     model, rotors = models[name], merged["published"]["n_rotors_or_wings"]
     if others := sorted({"coaxial", "flap", "wheel_size"} & set(merged) - set(model.get("keys", []))):
         raise InputError(f"{where}: {others} are not for model {name}, expected {model.get('keys', [])} at most")
-    if merged["size_is"] not in model["size_is"]:
-        raise InputError(
-            f"{where}: size_is is {merged['size_is']!r}, expected one of {model['size_is']} of model {name}"
-        )
+    size_is, possible = merged["size_is"], model["size_is"]
+    if size_is not in possible:
+        raise InputError(f"{where}: size_is is {size_is!r}, expected one of {possible} with model {name}")
     if rotors not in model.get("rotors", [rotors]):
-        raise InputError(f"{where}: model is {name}, which has {model['rotors']} rotors, not the row's {rotors}")
+        number = " or ".join(map(str, model["rotors"]))
+        raise InputError(f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not {rotors}")
     kinds, figures = record_schema.figures(name), merged.get("figures", {})
-    if merged["size_is"] == "body diagonal":
+    if size_is == "body diagonal":
         kinds = kinds | {"motor_diagonal": "length"}
     if wrong := sorted(set(kinds) ^ set(figures)):
         raise InputError(f"{where}: figures {wrong} missing or unknown, expected exactly {sorted(kinds)}")
