@@ -169,25 +169,25 @@ def _size(values: np.ndarray) -> str:
     return " x ".join(f"{value:.4g}" for value in values)
 
 
-def described(found: Inspection, most: int = 30) -> str:
+def described(inspection: Inspection, most: int = 30) -> str:
     """Return an inspection as text, at most `most` components, the largest and those with a guess first."""
-    low, high = (np.round(corner, 4).tolist() for corner in (found.low, found.high))
+    low, high = (np.round(corner, 4).tolist() for corner in (inspection.low, inspection.high))
     lines = [
-        f"{found.path}: {found.triangles} triangles, {len(found.components)} connected components",
-        f"category {found.category} (give --category where it is another)",
-        f"unit     {found.unit} ({found.unit_from})",
-        f"extent   {_size(found.high - found.low)} m along x, y, z, from {low} to {high}",
-        f"up       {found.up} (unless given, guessed from rotors or the smallest extent; the sign is unknown)",
-        f"front    {found.front} (unless given, guessed; the sign is unknown)",
+        f"{inspection.path}: {inspection.triangles} triangles, {len(inspection.components)} connected components",
+        f"category {inspection.category} (give --category where it is another)",
+        f"unit     {inspection.unit} ({inspection.unit_from})",
+        f"extent   {_size(inspection.high - inspection.low)} m along x, y, z, from {low} to {high}",
+        f"up       {inspection.up} (unless given, guessed from rotors or the smallest extent; the sign is unknown)",
+        f"front    {inspection.front} (unless given, guessed; the sign is unknown)",
     ]
-    if found.cut:
-        lines.append(f"half     it ends flat along {found.cut}, as one half of a target does")
-    if found.category == "Bird":
-        lines.append(f"wings    may begin {found.shoulder_m:.4g} m right and left of the middle")
+    if inspection.cut:
+        lines.append(f"half     it ends flat along {inspection.cut}, as one half of a target does")
+    if inspection.category == "Bird":
+        lines.append(f"wings    may begin {inspection.shoulder_m:.4g} m right and left of the middle")
     lines += ["", "named pieces (for `geometry:`)"]
-    lines += [f"  {name!r}: {count} triangles, {_size(extent)} m" for name, count, extent in found.pieces]
+    lines += [f"  {name!r}: {count} triangles, {_size(extent)} m" for name, count, extent in inspection.pieces]
     lines += ["", "connected components (for `region:` with `whole: true`)"]
-    ranked = sorted(enumerate(found.components, 1), key=lambda item: (not item[1].guess, -item[1].extent.max()))
+    ranked = sorted(enumerate(inspection.components, 1), key=lambda item: (not item[1].guess, -item[1].extent.max()))
     for number, part in ranked[:most]:
         guess, surface = f"  may be a {part.guess}" * bool(part.guess), "closed" if part.closed else "open"
         lines.append(f"  {number} {part.piece!r}: {part.triangles} triangles, {_size(part.extent)} m at "
