@@ -9,7 +9,7 @@ import yaml
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.targets.make import make
-from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, source_files
+from lowalt.targets.records import load_records, load_table, merge, missing_inputs, read_records, source_files
 
 CONFIG = Path(__file__).parents[1] / "config"
 TABLE = CONFIG / "targets.csv"
@@ -111,7 +111,7 @@ def test_wrong_figures_are_refused(tmp_path, written, figure, message):
         ("Wild goose", "neck", [0.7, 1, "estimate"], r"add up to 1\.06 of the length"),
         ("Owl", "wrist", [1.2, 1, "estimate"], r"figures\.wrist is 1\.2, expected 0\.1 to 0\.9"),
         ("Owl", "span", [10, "cm", "reference"], r"figures\.span is 0\.1 m"),
-        ("Audi A6L 2019", "wheel_base", [4.5, "m", "maker"], r"are 5\.41 m, expected less than the length, 5\.0 m"),
+        ("Audi A6L 2019", "wheel_base", [4.5, "m", "maker"], r"are 5\.41 m, expected less than the 5\.0 m length"),
         ("Audi A6L 2019", "track", [2, "m", "maker"], r"figures\.track is 2 m"),
         ("Audi A6L 2019", "roof_rear", [0.3, 1, "estimate"], r"expected rising from 0\.18 to 1"),
         ("Audi A6L 2019", "hood_height", [0.9, 1, "estimate"], r"expected rising and below 1"),
@@ -184,6 +184,18 @@ def test_wrong_tables_are_refused(tmp_path, old, new, message):
     (tmp_path / "table.csv").write_text(TABLE.read_text().replace(old, new))
     with pytest.raises(InputError, match=message):
         load_table(tmp_path / "table.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("/abs/m.amc", "inside the folder"), ("../m.amc", "inside the folder"), ("C:m.amc", "inside the folder"),
+     ("m{1}.amc", "expected a name without"), ("m\n.amc", "expected a name without")],
+)  # fmt: skip
+def test_a_file_outside_the_folder_or_of_a_name_that_the_workflow_cannot_pass_on_is_refused(name, words):
+    row = load_table(TABLE)["Walking Pedestrian 1"]
+    for files in ({"skeleton": "s.asf", "motion": name}, {"skeleton": name, "motion": "m.amc"}):
+        with pytest.raises(InputError, match=rf"here: file is .*{words}"):
+            merge(row, {"source": "mocap", **files}, "here")
 
 
 def test_slugs_are_file_names_and_unique():
