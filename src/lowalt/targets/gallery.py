@@ -1,4 +1,4 @@
-"""Gallery: all clouds in one picture, each in a panel of its own, coloured by part; each category begins a row."""
+"""Gallery: all clouds in one picture, each in a panel of its own, coloured by part."""
 
 import argparse
 from itertools import pairwise
@@ -89,16 +89,15 @@ def _panel(axes, cloud: Cloud, aspect: float) -> None:
 
 
 def figure(clouds: list[Cloud]):
-    """Return the matplotlib figure: every cloud fills its panel, each category begins a row."""
+    """Return the matplotlib figure: every cloud fills its panel, in the order given."""
     from matplotlib.figure import Figure
 
     rows: list[tuple[float, list[Cloud]]] = []
-    for category in dict.fromkeys(cloud.category for cloud in clouds):
-        members = [cloud for cloud in clouds if cloud.category == category]
+    for first in range(0, len(clouds), COLUMNS):
+        members = clouds[first : first + COLUMNS]
         spans = np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members])
-        # Every panel of a category has the same shape, that of its tallest cloud.
-        aspect = float(np.clip((spans[:, 1] / spans[:, 0]).max(), 0.3, 1.3))
-        rows += [(aspect, members[first : first + COLUMNS]) for first in range(0, len(members), COLUMNS)]
+        # Every panel of a row has the same shape, that of its tallest cloud.
+        rows.append((float(np.clip((spans[:, 1] / spans[:, 0]).max(), 0.3, 1.3)), members))
     heights = [2.6 * aspect + 0.45 for aspect, _ in rows]
     result = Figure(figsize=(2.7 * COLUMNS, sum(heights)), dpi=DPI, layout="constrained")
     grid = result.add_gridspec(len(rows), COLUMNS, height_ratios=heights)
