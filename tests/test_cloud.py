@@ -8,7 +8,6 @@ import pytest
 
 from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, check, read, write
-from lowalt.targets.validate import main as validate
 
 RECORD = {"subtype": "Test craft", "category": "UAV", "source": "builtin", "checksum": "0" * 64}
 
@@ -110,11 +109,3 @@ def test_common_tools_open_the_file(tmp_path):
     with np.load(tmp_path / "a.npz", allow_pickle=False) as data:
         assert data["points"].dtype == np.float64 and data["part"].dtype == np.int64
         assert json.loads(str(data["record"])) == RECORD
-
-
-def test_validator_counts_the_wrong_files(tmp_path, capsys):
-    write(tmp_path / "a.npz", craft())
-    (tmp_path / "b.npz").write_text("no archive")
-    assert validate([str(tmp_path / "a.npz"), str(tmp_path / "b.npz")]) == 1
-    out = capsys.readouterr().out
-    assert "5 points" in out and "1 rotor" in out and "normals on 80%" in out and "wrong:" in out

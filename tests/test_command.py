@@ -39,7 +39,6 @@ shards.card: --index, --config
 shards.manifest write: --run, --manifest
 shards.sigmf: --index, --out
 targets.__main__: --settings, --out
-targets.dimensions: --table, --records, --out
 targets.download: --out
 targets.gallery: --clouds, --out
 targets.occluders: --settings, --out

@@ -141,7 +141,7 @@ extra = {"unit": "m", "up": "z", "front": "y", "size_is": "length",
          "parts": {"body": {"kind": "body", "meshes": [{"file": "big.stl"}]}}}
 record = {"source": "mesh", "subtype": "Crow", "category": "Bird", "published": {"size_m": 2.0}, "points": 169,
           "rcs_m2_per_point": 1.0, **extra}
-cloud = mesh_cloud(check_record(record, extra, "Crow"), sys.argv[1], 1)
+cloud = mesh_cloud(check_record(record, "Crow"), sys.argv[1], 1)
 # Not ru_maxrss, which begins with the memory of the process that started this one.
 print(len(cloud.points), int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1]) // 1024)
 """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError
-from lowalt.targets.input_files import record_files
+from lowalt.targets.record_schema import record_files
 from lowalt.targets.records import read_records
 from meshes import TABLE, made, plain
 from real_inputs import FOLDER, needs_inputs

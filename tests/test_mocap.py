@@ -181,8 +181,7 @@ def test_bad_skeletons_are_refused_by_file(files, old, new, names):
 @pytest.mark.parametrize(
     ("changes", "names"),
     [
-        ({"motion": "/abs/m.amc"}, "inside the folder"), ({"skeleton": "../s.asf"}, "inside the folder"),
-        ({"motion": "m{1}.amc"}, "expected a name without"), ({"max_mismatch_m": 0}, "max_mismatch_m: value 0"),
+        ({"max_mismatch_m": 0}, "max_mismatch_m: value 0"),
         ({"first_frame": 10, "last_frame": 11}, r"2 frames, 0.0167 s, expected at least 72"),
         ({"last_frame": 60}, "60 frames"),
         ({"first_frame": 0}, "first_frame"),

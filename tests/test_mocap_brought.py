@@ -98,7 +98,7 @@ def test_legs_of_a_bvh_are_those_of_the_amc_it_was_made_of():
     extra = {"motion": "131_01.bvh", "max_mismatch_m": 0.4}
     record = {"subtype": "A", "category": "Pedestrian", "published": PUBLISHED, "source": "mocap", "points": 30,
               "rcs_m2_per_point": 1.0}  # fmt: skip
-    cloud = mocap.mocap_cloud(mocap.check_record(record | extra, extra, "a"), folder, 1)
+    cloud = mocap.mocap_cloud(mocap.check_record(record | extra, "a"), folder, 1)
     assert np.ptp(cloud.points[:, 2]) == pytest.approx(1.75, rel=0.1)
 
 
@@ -127,7 +127,7 @@ def test_joint_positions_of_a_walk_make_the_walk(order, files, tmp_path):
     extra = {"motion": "walk.npz", "scale": "none", "rate_hz": 120}
     record = {"subtype": "A", "category": "Pedestrian", "published": PUBLISHED, "source": "mocap", "points": 30,
               "rcs_m2_per_point": 1.0}  # fmt: skip
-    cloud = mocap.mocap_cloud(mocap.check_record(record | extra, extra, "a"), tmp_path, 1)
+    cloud = mocap.mocap_cloud(mocap.check_record(record | extra, "a"), tmp_path, 1)
     same = cloud_of(files, scale="none")
     assert cloud.record["track_speed_mps"] == pytest.approx(same.record["track_speed_mps"], rel=0.02)
     assert len(cloud.track) == len(same.track)
@@ -188,4 +188,4 @@ def test_an_array_of_joints_that_is_wrong_is_refused_by_name(arrays, words, tmp_
     record = {"subtype": "A", "category": "Pedestrian", "published": PUBLISHED, "source": "mocap", "points": 30,
               "rcs_m2_per_point": 1.0}  # fmt: skip
     with pytest.raises(InputError, match=rf"a\.npz: .*{words}"):
-        mocap.mocap_cloud(mocap.check_record(record | extra, extra, "a"), tmp_path, 1)
+        mocap.mocap_cloud(mocap.check_record(record | extra, "a"), tmp_path, 1)

@@ -6,7 +6,8 @@ import pytest
 import yaml
 
 from lowalt.files.errors import InputError
-from lowalt.targets import bird, builtin_record, document, record_schema, uav, vehicle
+from lowalt.targets import bird, record_schema, uav
+from lowalt.targets.builtin import MODULES
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import ALL_AXES, SIZES
 from lowalt.targets.records import SOURCES, load_table, merge
@@ -18,23 +19,27 @@ SCHEMA = record_schema.schema()
 
 def test_sections_are_the_sources_and_their_keys_those_of_the_code():
     assert set(SCHEMA["sources"]) == {record_schema.COMMON, *SOURCES}
-    assert set(builtin_record._OWN.values()) < set(record_schema.keys("builtin"))
+    models = SCHEMA["models"]
+    assert {model["like"] for model in models.values()} == set(MODULES)
+    assert {name for name, model in models.items() if model["like"] == "UAV"} == set(uav.LAYOUTS)
+    assert {key for model in models.values() for key in model.get("keys", [])} < set(record_schema.keys("builtin"))
+    kinds = {kind for name in models for kind in record_schema.figures(name).values()}
+    assert kinds == {"length", "ratio", "offset", "count", "whole"}
     definitions = SCHEMA["$defs"]
     assert definitions["unit"]["anyOf"][0]["enum"] == list(UNITS_M)
     assert set(definitions["flap"]["properties"]) == set(bird.FLAP)
     mesh = SCHEMA["sources"]["mesh"]["properties"]
     assert mesh["size_is"]["enum"] == [*SIZES, ALL_AXES]
-    words = SCHEMA["sources"]["builtin"]["properties"]
-    for module in (uav, bird, vehicle):
-        assert all(layout in words["model"]["description"] for layout in module.FIGURES)
-    assert all(size in words["size_is"]["description"] for size in uav.SIZES)
 
 
-def test_the_page_of_keys_describes_every_key():
-    page = document.page()
+def test_the_page_of_keys_describes_every_key_and_every_figure():
+    page = record_schema.page(SCHEMA)
     for section in SCHEMA["sources"].values():
         for name, key in section["properties"].items():
             assert f"| `{name}`" in page and key["description"] in page
+    for name in SCHEMA["models"]:
+        assert f"| {name} |" in page
+        assert all(f"`{figure}` ({kind})" in page for figure, kind in record_schema.figures(name).items())
 
 
 def test_pictures_and_files_that_the_page_names_are_there():
@@ -47,11 +52,10 @@ def test_pictures_and_files_that_the_page_names_are_there():
         assert (ROOT / name).is_file(), name
 
 
-def test_a_key_without_meaning_is_refused(monkeypatch):
-    bare = {"$defs": SCHEMA["$defs"], "sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
-    monkeypatch.setattr(document, "schema", lambda: bare)
+def test_a_key_without_meaning_is_refused():
+    bare = SCHEMA | {"sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
     with pytest.raises(InputError, match="gait has no description"):
-        document.page()
+        record_schema.page(bare)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import yaml
 
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
-from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, source_files
+from lowalt.targets.make import make
+from lowalt.targets.records import load_records, load_table, merge, missing_inputs, read_records, source_files
 
 CONFIG = Path(__file__).parents[1] / "config"
 TABLE = CONFIG / "targets.csv"
@@ -63,7 +64,7 @@ def test_a_later_file_replaces_whole_records(tmp_path, written):
         ({"flap": {"speed": 3}}, r"Crow: flap: unknown key\(s\) \['speed'\]"),
         ({"flap": {"mean_deg": "up"}}, r"Crow: flap\.mean_deg: value 'up', expected type number"),
         ({"figures": {"length": [46, "cm", "reference"]}}, r"Crow: figures \[.*missing or unknown"),
-        ({"coaxial": True}, r"Crow: \['coaxial'\] are not for a Bird"),
+        ({"coaxial": True}, r"Crow: \['coaxial'\] are not for model bird, expected \['flap'\] at most"),
     ],
 )
 def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, message):
@@ -110,7 +111,7 @@ def test_wrong_figures_are_refused(tmp_path, written, figure, message):
         ("Wild goose", "neck", [0.7, 1, "estimate"], r"add up to 1\.06 of the length"),
         ("Owl", "wrist", [1.2, 1, "estimate"], r"figures\.wrist is 1\.2, expected 0\.1 to 0\.9"),
         ("Owl", "span", [10, "cm", "reference"], r"figures\.span is 0\.1 m"),
-        ("Audi A6L 2019", "wheel_base", [4.5, "m", "maker"], r"are 5\.41 m, expected less than the length, 5\.0 m"),
+        ("Audi A6L 2019", "wheel_base", [4.5, "m", "maker"], r"are 5\.41 m, expected less than the 5\.0 m length"),
         ("Audi A6L 2019", "track", [2, "m", "maker"], r"figures\.track is 2 m"),
         ("Audi A6L 2019", "roof_rear", [0.3, 1, "estimate"], r"expected rising from 0\.18 to 1"),
         ("Audi A6L 2019", "hood_height", [0.9, 1, "estimate"], r"expected rising and below 1"),
@@ -125,21 +126,21 @@ def test_impossible_shapes_are_refused(tmp_path, written, name, figure, value, m
 
 def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written):
     quad = written["Type-A Firefighting UAV"]
-    with pytest.raises(InputError, match=r"model is tanker, which has 4 rotors, expected one of 6"):
+    with pytest.raises(InputError, match="model is tanker, expected n_rotors_or_wings 4 in its row, not 6"):
         load(tmp_path, {"DJI Matrice 600 Pro": quad})
-    with pytest.raises(InputError, match=r"coaxial is True, expected it with model cabin or tanker only, not folding"):
+    with pytest.raises(InputError, match=r"\['coaxial'\] are not for model folding, expected \[\] at most"):
         load(tmp_path, {"DJI Mini 2": written["DJI Mini 2"] | {"coaxial": True}})
     lifted = {"size_is": "span over ducts", "figures": {**quad["figures"]}}
     del lifted["figures"]["motor_diagonal"]
-    with pytest.raises(InputError, match=r"size_is is 'span over ducts', expected model ducted, not tanker"):
+    with pytest.raises(InputError, match=r"size_is is 'span over ducts', expected one of .* with model tanker"):
         load(tmp_path, {"Type-A Firefighting UAV": quad | lifted})
 
 
 def test_too_few_points_for_the_parts_are_refused(tmp_path, written):
-    with pytest.raises(InputError, match="points is 8, expected more than one for each of 8 blades"):
-        load(tmp_path, {"DJI Mini 2": written["DJI Mini 2"] | {"points": 8}})
-    with pytest.raises(InputError, match="points is 4, expected at least one for each of 5 parts"):
-        load(tmp_path, {"Owl": written["Owl"] | {"points": 4}})
+    for name, points in (("DJI Mini 2", 8), ("Owl", 4)):
+        record = load(tmp_path, {name: written[name] | {"points": points}})[name]
+        with pytest.raises(InputError, match=f"{name}: {points} points for 5 parts leave none for the body"):
+            make(record, None, 1)
 
 
 def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
@@ -183,6 +184,18 @@ def test_wrong_tables_are_refused(tmp_path, old, new, message):
     (tmp_path / "table.csv").write_text(TABLE.read_text().replace(old, new))
     with pytest.raises(InputError, match=message):
         load_table(tmp_path / "table.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("/abs/m.amc", "inside the folder"), ("../m.amc", "inside the folder"), ("C:m.amc", "inside the folder"),
+     ("m{1}.amc", "expected a name without"), ("m\n.amc", "expected a name without")],
+)  # fmt: skip
+def test_a_file_outside_the_folder_or_of_a_name_that_the_workflow_cannot_pass_on_is_refused(name, words):
+    row = load_table(TABLE)["Walking Pedestrian 1"]
+    for files in ({"skeleton": "s.asf", "motion": name}, {"skeleton": name, "motion": "m.amc"}):
+        with pytest.raises(InputError, match=rf"here: file is .*{words}"):
+            merge(row, {"source": "mocap", **files}, "here")
 
 
 def test_slugs_are_file_names_and_unique():

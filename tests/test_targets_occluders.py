@@ -8,7 +8,7 @@ import pytest
 from builtin_records import RECORDS
 from lowalt.files.errors import InputError
 from lowalt.targets import occluders
-from lowalt.targets.builtin_record import MODULES
+from lowalt.targets.builtin import MODULES
 from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, box
 

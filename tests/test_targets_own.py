@@ -152,32 +152,6 @@ def test_a_car_without_wheels_is_asked_for_them_then_made_and_shown_with_a_warni
     assert made.with_suffix(".png").exists() and read(made).kinds == ("body",)
 
 
-def test_lengths_may_be_in_the_file_s_unit(tmp_path):
-    craft(False, 1000).export(tmp_path / "craft.stl")
-    row = load_table(ROOT / "config/targets.csv")["DJI Inspire 2"]
-    clouds = []
-    for lengths, factor in (("m", 0.001), ("file", 1.0)):
-        parts: dict = {"body": {"kind": "body", "meshes": [{"file": "craft.stl", "move": [0, 0, 10 * factor]}]}}
-        for index, (x, y) in enumerate(np.array(HUBS) * 1000):
-            corners = [
-                [factor * (x - 70), factor * (y - 10), factor * 55],
-                [factor * (x + 70), factor * (y + 10), None],
-            ]
-            parts[f"rotor {index}"] = {
-                "kind": "rotor", "region": {"box": corners, "whole": True},
-                "hinge": [float(factor * x), float(factor * y), 60 * factor], "axis": [0, 0, 1],
-            }  # fmt: skip
-        record = {"source": "mesh", "unit": "mm", "up": "z", "front": "x", "size_is": "motor diagonal", "parts": parts,
-                  "lengths": lengths}  # fmt: skip
-        merged = merge(row, record, "here")
-        assert merge(row, record | {"lengths": "m", "parts": merged["parts"]}, "here")["parts"] == merged["parts"]
-        clouds.append(make(merged, tmp_path, 1))
-    one, other = clouds
-    np.testing.assert_allclose(one.points, other.points, atol=1e-9)
-    np.testing.assert_allclose(one.hinges[1:], other.hinges[1:], atol=1e-9)
-    assert len(one.kinds) == 5
-
-
 def test_axes_are_guessed_from_the_extents():
     assert guessed_axes(np.array([1.8, 1.5, 4.5]), "Vehicle") == ("y", "z")
     assert guessed_axes(np.array([0.3, 0.3, 0.1]), "UAV") == ("z", "x")

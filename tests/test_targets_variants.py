@@ -6,8 +6,7 @@ import pytest
 from builtin_records import NAMES, RECORDS, TABLE, WRITTEN
 from lowalt.files.errors import InputError
 from lowalt.targets.assemble import allot
-from lowalt.targets.builtin import builtin_cloud
-from lowalt.targets.builtin_record import MODULES
+from lowalt.targets.builtin import MODULES, builtin_cloud
 from lowalt.targets.records import merge
 
 
@@ -20,7 +19,7 @@ def test_allotment_gives_moving_parts_their_share_in_whole_blades():
     for name in NAMES:
         record = RECORDS[name]
         parts, _ = MODULES[record["category"]].parts(record)
-        counts = allot(parts, record["points"], record["moving_share"])
+        counts = allot(parts, record["points"], record["moving_share"], name)
         assert sum(counts) == record["points"]
         moving = sum(count for part, count in zip(parts, counts, strict=True) if part.kind != "body")
         blades = sum(part.copies for part in parts if part.kind != "body")
@@ -30,9 +29,9 @@ def test_allotment_gives_moving_parts_their_share_in_whole_blades():
 
 def test_a_count_that_leaves_no_body_is_refused():
     parts, _ = MODULES["UAV"].parts(RECORDS["DJI Mini 2"])
-    with pytest.raises(InputError, match="15 points for 5 parts leave none for the body"):
-        allot(parts, 15, 0.99)
-    assert allot(parts, 9, 0.4) == [1, 2, 2, 2, 2]
+    with pytest.raises(InputError, match="mini: 15 points for 5 parts leave none for the body"):
+        allot(parts, 15, 0.99, "mini")
+    assert allot(parts, 9, 0.4, "mini") == [1, 2, 2, 2, 2]
 
 
 @pytest.mark.parametrize("points", [20, 1000])

@@ -75,5 +75,5 @@ def cloud_of(folder: Path, **changes) -> Cloud:
     extra = {key: value for key, value in extra.items() if value is not None}
     record |= {"published": extra.pop("published", PUBLISHED)}
     record_schema.check("mocap", extra, "record")
-    record = mocap.check_record(record | extra, extra, "record")
+    record = mocap.check_record(record | extra, "record")
     return check(mocap.mocap_cloud(record, folder, 3), "cloud")

@@ -5,7 +5,7 @@
 
 rule cloud:
     input:
-        code=code("lowalt.targets"),
+        code=code("lowalt.targets", *SOURCE_MODULES),
         files=products.record_files,
     output:
         "results/{run}/clouds/{subtype}.npz",

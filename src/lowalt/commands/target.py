@@ -15,13 +15,12 @@ from lowalt.files.atomic import existing, replacing, slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
-from lowalt.targets.dimensions import estimates
 from lowalt.targets.draft import chosen, drafted, refuse_miscount, row_lines
-from lowalt.targets.guesses import UNUSUAL, USUAL_M, box_of
+from lowalt.targets.guesses import UNUSUAL, USUAL_M
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import MOVING_KIND, body_axes
-from lowalt.targets.records import load_table, merge, read_records, with_row
+from lowalt.targets.records import estimates, load_table, merge, read_records, with_row
 from lowalt.targets.robot_files import is_description, read_robot
 from lowalt.targets.robots import category_of, drafted_robot, parts_of, write_parts
 
@@ -184,8 +183,8 @@ def _draft(
         raise
     frame = body_axes(seen.front, seen.up)
     extent = np.abs(frame @ (seen.high - seen.low))
-    hubs = np.array([frame[:2] @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
-    wheel = max((float(np.subtract(*box_of(group)[::-1]).max()) for group in groups), default=None)
+    hubs = np.array([frame[:2] @ group.centre for group in groups]).reshape(-1, 2)
+    wheel = max((float(group.extent.max()) for group in groups), default=None)
     lines = [] if row else row_lines(category, extent, hubs, wheel, table)
     named_axes = " ".join(axis for axis in ("up", "front") if getattr(options, axis))
     return drafted(seen, name, file, lines, groups, named_axes)

@@ -1,23 +1,15 @@
 """Command line of the stage: one subtype's record in, its calibration point cloud out."""
 
-import os
-from pathlib import Path
-
-from lowalt.config.command import parser, pick, run
+from lowalt.config.command import run
 from lowalt.targets.cloud import write
-from lowalt.targets.make import make
+from lowalt.targets.make import make, options
 
 
 def main(arguments: list[str]) -> None:
     """Write one cloud."""
-    line = parser("lowalt.targets", "One subtype's record to its calibration point cloud.")
-    folder = os.environ.get("LOWALT_INPUTS")
-    help_text = "folder of the meshes and recordings the record names (default: $LOWALT_INPUTS)"
-    line.add_argument("--inputs", type=Path, default=folder and Path(folder), help=help_text)
-    line.add_argument("--out", required=True, type=Path, help="cloud file to write (.npz)")
-    given = line.parse_args(arguments)
-    seed, record = pick(given.settings, "seed", "record")
-    write(given.out, make(record, given.inputs, seed))
+    about = "One subtype's record to its calibration point cloud."
+    record, inputs, seed, out = options("lowalt.targets", about, arguments)
+    write(out, make(record, inputs, seed))
 
 
 if __name__ == "__main__":

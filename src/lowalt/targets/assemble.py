@@ -15,7 +15,7 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.sampling import face_normals, sample_surface, thin
+from lowalt.targets.sampling import face_normals, sample_faces, thin
 from lowalt.targets.surfaces import Surface, inside, merged
 
 CANDIDATES_PER_POINT = 12
@@ -41,18 +41,18 @@ class Part:
     cuts: tuple[Surface, ...] = ()
 
 
-def allot(parts: list[Part], count: int, moving_share: float) -> list[int]:
+def allot(parts: list[Part], count: int, moving_share: float, where: str) -> list[int]:
     """Return the number of points of each part, whole copies each, `count` in total; the rule is the module's.
 
-    Raises: InputError where `count` leaves the body without a point.
+    Raises: InputError naming `where` if `count` leaves the body without a point.
     """
     weights = np.array([0.0 if part.kind == "body" else part.weight for part in parts])
-    wanted = count * moving_share * weights / max(float(portable.total(weights)), 1e-300)
-    counts = [part.copies * max(1, round(want / part.copies)) for part, want in zip(parts, wanted, strict=True)]
-    bodies = [index for index, part in enumerate(parts) if part.kind == "body"]
-    counts[bodies[0]] = count - sum(value for index, value in enumerate(counts) if index != bodies[0])
-    if counts[bodies[0]] < 1:
-        raise InputError(f"{count} points for {len(parts)} parts leave none for the body, expected more points")
+    shares = count * moving_share * weights / max(float(portable.total(weights)), 1e-300)
+    counts = [part.copies * max(1, round(share / part.copies)) for part, share in zip(parts, shares, strict=True)]
+    body = next(index for index, part in enumerate(parts) if part.kind == "body")
+    counts[body] += count - sum(counts)
+    if counts[body] < 1:
+        raise InputError(f"{where}: {count} points for {len(parts)} parts leave none for the body, expected more")
     return counts
 
 
@@ -86,7 +86,8 @@ def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.nd
     points the one farthest from the hinge alone, so that the others lie along it.
     """
     whole = merged(part.shells)
-    points, normals = sample_surface(whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng)
+    points, face = sample_faces(whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng)
+    normals = face_normals(whole.vertices, whole.faces[face])[0]
     tips, facing = _tips(whole)
     if part.kind == "rotor" and count < 2 * len(tips):
         farthest = portable.norm(tips - np.array(part.hinge)).argmax()
@@ -107,36 +108,34 @@ def turn(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + sine * cross + (1 - cosine) * portable.product(cross, cross)
 
 
-def assemble(parts: list[Part], record: dict, moving_share: float, rng: np.random.Generator) -> Cloud:
-    """Return the cloud of `parts` with record["points"] points and record["rcs_m2_per_point"] each.
+def cloud_of_parts(parts: list[Part], samples: list[tuple[np.ndarray, np.ndarray]], record: dict) -> Cloud:
+    """Return the cloud of parts from the points and normals (N, 3) of each; the record gets counts and extents."""
+    counts = [len(points) for points, _ in samples]
+    points = np.concatenate([points for points, _ in samples])
+    names = tuple(part.name for part in parts)
+    facts = {"points_by_part": dict(zip(names, counts, strict=True)), "extent_m": np.ptp(points, axis=0).tolist()}
+    return Cloud(
+        points=points, normals=np.concatenate([normals for _, normals in samples]),
+        part=np.repeat(np.arange(len(parts)), counts), kinds=tuple(part.kind for part in parts), names=names,
+        parents=np.array([part.parent for part in parts], np.int64),
+        hinges=np.array([part.hinge for part in parts], float), axes=np.array([part.axis for part in parts], float),
+        rcs_m2=np.full(len(points), float(record["rcs_m2_per_point"])), record=json.loads(json.dumps(record | facts)),
+    )  # fmt: skip
+
+
+def assemble(parts: list[Part], record: dict, rng: np.random.Generator) -> Cloud:
+    """Return the cloud of `parts` with record["points"] points, of which moving parts get record["moving_share"].
 
     Raises: InputError where there are too few points for the parts.
     """
-    counts = allot(parts, record["points"], moving_share)
-    points, normals, owner = [], [], []
-    for index, (part, count) in enumerate(zip(parts, counts, strict=True)):
-        one, facing = sample_part(part, count // part.copies, rng)
+    counts, samples = allot(parts, record["points"], record["moving_share"], record["subtype"]), []
+    for part, count in zip(parts, counts, strict=True):
+        points, normals = sample_part(part, count // part.copies, rng)
+        turned = []
         for copy in range(part.copies):
             matrix = np.eye(3) if copy == 0 else turn(np.array(part.axis), 2 * np.pi * copy / part.copies)
             centre = np.zeros(3) if copy == 0 else np.array(part.hinge)
-            points.append(portable.applied(matrix, one - centre) + centre)
-            normals.append(portable.applied(matrix, facing))
-        owner.append(np.full(count, index))
-    points = np.concatenate(points)
-    record = record | {
-        "moving_share": moving_share,
-        "points_by_part": {part.name: count for part, count in zip(parts, counts, strict=True)},
-        "extent_m": [float(value) for value in np.ptp(points, axis=0)],
-    }
-    return Cloud(
-        points=points,
-        normals=np.concatenate(normals),
-        part=np.concatenate(owner),
-        kinds=tuple(part.kind for part in parts),
-        names=tuple(part.name for part in parts),
-        parents=np.array([part.parent for part in parts], np.int64),
-        hinges=np.array([part.hinge for part in parts], float),
-        axes=np.array([part.axis for part in parts], float),
-        rcs_m2=np.full(len(points), float(record["rcs_m2_per_point"])),
-        record=json.loads(json.dumps(record)),
-    )
+            turned.append((portable.applied(matrix, points - centre) + centre, portable.applied(matrix, normals)))
+        samples.append((np.concatenate([points for points, _ in turned]),
+                        np.concatenate([normals for _, normals in turned])))  # fmt: skip
+    return cloud_of_parts(parts, samples, record)

@@ -1,7 +1,11 @@
 """Built-in bird models: body with head, bill and tail, and two wings of two hinged segments each.
 
 Axes: front +y, right +x, up +z, metres; the origin lies half-way between bill tip and tail tip, wings flat.
-A positive angle about either hinge raises the wing's tip, on both sides.
+A positive angle about either hinge raises the wing's tip, on both sides. Of the figures `length` (bill tip to tail tip)
+and `span`, those of the living bird, only the ratio is used, since the published size sets the length. Ratios are
+relative to the length, with three exceptions: `wing_chord` is relative to half the span, `wrist` is the place of the
+second hinge along half the span, `tip_chord` is the chord at the tip over that at the root. `fingers` is the number of
+slotted primaries at the tip.
 """
 
 import math
@@ -10,18 +14,6 @@ import numpy as np
 
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import Surface, ellipsoid, foil, hull, loft, superellipse, tube
-
-FIGURES = {
-    "bird": {
-        "length": "length", "span": "length", "bill": "ratio", "bill_depth": "ratio", "head": "ratio", "neck": "offset",
-        "body_width": "ratio", "tail": "ratio", "tail_spread": "ratio", "wing_chord": "ratio", "wrist": "ratio",
-        "tip_chord": "ratio", "fingers": "whole",
-    }
-}  # fmt: skip
-"""Figures of a bird. `length` (bill tip to tail tip) and `span` are those of the living bird; only their ratio is used,
-since the published size sets the length. Ratios are relative to the length, with three exceptions: `wing_chord` is
-relative to half the span, `wrist` is the place of the second hinge along half the span, `tip_chord` is the chord at the
-tip over that at the root. `fingers` is the number of slotted primaries at the tip."""
 
 FLAP = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fold_lag_deg": 90.0}
 """Default wing beat: shoulder mean + amplitude cos(2 pi F t), outer segment fold_amplitude cos(2 pi F t - fold_lag)."""
@@ -39,8 +31,6 @@ def fault(record: dict) -> str | None:
         return f"figures.span is {f['span']:.3g} m, expected more than twice the body's width"
     if not 0.1 <= f["wrist"] <= 0.9:
         return f"figures.wrist is {f['wrist']}, expected 0.1 to 0.9 of the wing"
-    if record["points"] < 5:
-        return f"points is {record['points']}, expected at least one for each of 5 parts"
     return None
 
 

@@ -1,17 +1,66 @@
-"""Built-in models: the step from a checked record to its cloud."""
+"""Built-in models: the check of a record's figures with their units and sources, and the step to its cloud."""
 
 import hashlib
 import json
 
-import numpy as np
-
 from lowalt.config.classes import like
+from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
+from lowalt.targets import bird, record_schema, uav, vehicle
 from lowalt.targets.assemble import assemble
-from lowalt.targets.builtin_record import MODULES, check_record
 from lowalt.targets.cloud import Cloud
 
-__all__ = ["builtin_cloud", "check_record"]
+MODULES = {"UAV": uav, "Bird": bird, "Vehicle": vehicle}
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "1": 1.0}
+"""Units a figure may have; "1" is a ratio or a count."""
+
+
+def _figure(figure: list, kind: str, sources: dict, where: str) -> dict:
+    """Return the figure [value, unit, source] as a record: value, unit, source and the value in SI."""
+    value, unit, source = figure[0], str(figure[1]), figure[2]
+    units = [name for name in UNITS if (name != "1") == (kind == "length")]
+    if unit not in units:
+        raise InputError(f"{where}: unit is {unit!r}, expected one of {units}")
+    least = 0 if kind in ("whole", "offset") else 1e-9
+    if not least <= value < 1e5 or (kind in ("count", "whole") and not float(value).is_integer()):
+        raise InputError(f"{where}: value is {value!r}, expected a positive number fit for a {kind}")
+    if source != "estimate" and source not in sources:
+        raise InputError(f"{where}: source is {source!r}, expected 'estimate' or one of {sorted(sources)}")
+    return {"value": value, "unit": unit, "source": source, "si": value * UNITS[unit]}
+
+
+def check_record(merged: dict, where: str) -> dict:
+    """Return the merged record with its figures resolved to SI units, checked.
+
+    Raises: InputError naming `where`, the key, the value and what was expected.
+    """
+    category, name = like(merged), merged["model"]
+    models = {known: model for known, model in record_schema.schema()["models"].items() if model["like"] == category}
+    if not models:
+        raise InputError(f"{where}: source is 'builtin', which has no {category} model; expected gait or mocap")
+    if name not in models:
+        raise InputError(f"{where}: model is {name!r}, expected one of {sorted(models)}")
+    model, rotors = models[name], merged["published"]["n_rotors_or_wings"]
+    if others := sorted({"coaxial", "flap", "wheel_size"} & set(merged) - set(model.get("keys", []))):
+        raise InputError(f"{where}: {others} are not for model {name}, expected {model.get('keys', [])} at most")
+    size_is, possible = merged["size_is"], model["size_is"]
+    if size_is not in possible:
+        raise InputError(f"{where}: size_is is {size_is!r}, expected one of {possible} with model {name}")
+    if rotors not in model.get("rotors", [rotors]):
+        number = " or ".join(map(str, model["rotors"]))
+        raise InputError(f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not {rotors}")
+    kinds, figures = record_schema.figures(name), merged.get("figures", {})
+    if size_is == "body diagonal":
+        kinds = kinds | {"motor_diagonal": "length"}
+    if wrong := sorted(set(kinds) ^ set(figures)):
+        raise InputError(f"{where}: figures {wrong} missing or unknown, expected exactly {sorted(kinds)}")
+    sources, share = merged.get("sources", {}), merged.get("moving_share", MODULES[category].MOVING_SHARE)
+    resolved = {name: _figure(figure, kinds[name], sources, f"{where}: figures.{name}")
+                for name, figure in figures.items()}  # fmt: skip
+    result = merged | {"figures": resolved, "moving_share": share}
+    if fault := MODULES[category].fault(result):
+        raise InputError(f"{where}: {fault}")
+    return result
 
 
 def checksum(record: dict) -> str:
@@ -26,6 +75,4 @@ def builtin_cloud(record: dict, seed: int) -> Cloud:
     """
     parts, facts = MODULES[like(record)].parts(record)
     full = record | facts | {"checksum": checksum(record), "seed": seed}
-    cloud = assemble(parts, full, record["moving_share"], stream(seed, "cloud", record["subtype"]))
-    assert np.isfinite(cloud.points).all()
-    return cloud
+    return assemble(parts, full, stream(seed, "cloud", record["subtype"]))

@@ -1,4 +1,4 @@
-"""The calibration point cloud (CPC): the one file that passes from targets to motion, and its validator.
+"""The calibration point cloud (CPC): the one file that passes from targets to motion, and what it must hold.
 
 A cloud is a NumPy archive (.npz): it keeps float64 exactly, holds several arrays of different shape in one
 file, and NumPy, MATLAB (scipy.io) and Julia open it without our code. Frame: metres, body-centred, front +y,
@@ -73,8 +73,8 @@ class Cloud:
     @property
     def rate_factors(self) -> np.ndarray:
         """How many times the rate of its motion model each part turns, (P,): 1 where the record says nothing else."""
-        given = self.record.get("rate_factors", {})
-        return np.array([float(given.get(name, 1.0)) for name in self.names])
+        factors = self.record.get("rate_factors", {})
+        return np.array([float(factors.get(name, 1.0)) for name in self.names])
 
     def parts_of(self, kind: str) -> list[int]:
         """Indices of the parts of one kind, in the cloud's order."""
@@ -112,82 +112,58 @@ def _check_points(cloud: Cloud) -> None:
     """Raise InputError where an array has the wrong shape or a point's numbers are out of range."""
     count, parts = len(cloud.points), len(cloud.kinds)
     _need(count > 0, "points is empty, expected at least one point")
-    for name, shape in {
-        "points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
-        "parents": (parts,), "hinges": (parts, 3), "axes": (parts, 3),
-    }.items():  # fmt: skip
+    shapes = {"points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
+              "parents": (parts,), "hinges": (parts, 3), "axes": (parts, 3)}  # fmt: skip
+    for name, shape in shapes.items():
         array = getattr(cloud, name)
         _need(np.shape(array) == shape, f"{name} has shape {np.shape(array)}, expected {shape}")
         numbers = "iu" if name in ("part", "parents") else "iuf"
         _need(array.dtype.kind in numbers, f"{name} has values of type {array.dtype}, expected numbers")
     _need(_near(cloud.points), f"points has a coordinate that is no number within {LARGEST_M:g} m")
-    good_rcs = ((cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)).all()
-    _need(bool(good_rcs), f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2")
+    good_rcs = bool(((cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)).all())
+    _need(good_rcs, f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2")
     lengths = np.linalg.norm(cloud.normals, axis=1)
-    _need(
-        bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all()),
-        "normals has a vector of length other than 1 or NaN",
-    )
+    good_normals = bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all())
+    _need(good_normals, "normals has a vector of length other than 1 or NaN")
 
 
 def _check_parts(cloud: Cloud) -> None:
     """Raise InputError where a part's name, kind, parent, hinge or axis is wrong."""
-    parts = len(cloud.kinds)
-    _need(
-        len(set(cloud.names)) == parts == len(cloud.names),
-        f"names {cloud.names}, expected {parts} unique names",
-    )
+    count = len(cloud.kinds)
+    unique = len(set(cloud.names)) == count == len(cloud.names)
+    _need(unique, f"names {cloud.names}, expected {count} unique names")
     _need(set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}")
-    _need(cloud.part.min() >= 0 and cloud.part.max() < parts, f"part names a part outside 0..{parts - 1}")
-    for index, kind in enumerate(cloud.kinds):
-        _need(
-            -1 <= cloud.parents[index] < index,
-            f"parents[{index}] is {cloud.parents[index]}, expected an earlier part or -1",
-        )
+    _need(cloud.part.min() >= 0 and cloud.part.max() < count, f"part names a part outside 0..{count - 1}")
+    for index, (kind, name, parent) in enumerate(zip(cloud.kinds, cloud.names, cloud.parents, strict=True)):
+        _need(-1 <= parent < index, f"parents[{index}] is {parent}, expected an earlier part or -1")
         if kind in ("rotor", "wing", "wheel"):
             length = np.linalg.norm(cloud.axes[index])
-            _need(
-                abs(length - 1) < 1e-12,
-                f"axes[{index}] ({cloud.names[index]}) has length {length}, expected 1",
-            )
-            _need(
-                _near(cloud.hinges[index]),
-                f"hinges[{index}] ({cloud.names[index]}) is no place within {LARGEST_M:g} m",
-            )
+            _need(abs(length - 1) < 1e-12, f"axes[{index}] ({name}) has length {length}, expected 1")
+            _need(_near(cloud.hinges[index]), f"hinges[{index}] ({name}) is no place within {LARGEST_M:g} m")
 
 
 def _check_record(cloud: Cloud) -> None:
-    """Raise InputError where the record lacks a fact or names an unknown class."""
+    """Raise InputError where the record lacks a fact, names an unknown class or has rates of parts that do not turn."""
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     _need(not missing, f"record lacks {sorted(missing)}")
-    _need(not (fault := _rate_fault(cloud)), f"rate_factors: {fault}")
     classes.like(cloud.record)
+    factors = cloud.record.get("rate_factors", {})
+    _need(isinstance(factors, dict), f"rate_factors: {factors!r}, expected numbers by the parts' names")
+    turning = [name for name, kind in zip(cloud.names, cloud.kinds, strict=True) if kind in ("rotor", "wheel")]
+    strange = sorted(set(factors) - set(turning))
+    _need(not strange, f"rate_factors: {strange} are no parts that turn, expected some of {turning}")
+    good = all(isinstance(value, (int, float)) and 0 <= value <= LARGEST_RATE_FACTOR for value in factors.values())
+    _need(good, f"rate_factors: {factors}, expected numbers from 0 to {LARGEST_RATE_FACTOR}")
 
 
 def _check_nodes(cloud: Cloud) -> None:
     """Raise InputError where the track of a recording does not fit its nodes."""
-    count = len(cloud.points)
-    _need(cloud.track.ndim == 3 and cloud.track.shape[1:] == (count, 3) and len(cloud.track) >= 2,
-         f"track has shape {cloud.track.shape}, expected (frames >= 2, {count}, 3)")  # fmt: skip
+    count, shape = len(cloud.points), cloud.track.shape
+    fits = len(shape) == 3 and shape[1:] == (count, 3) and shape[0] >= 2
+    _need(fits, f"track has shape {shape}, expected (frames >= 2, {count}, 3)")
     _need(_near(cloud.track), f"track has a coordinate that is no number within {LARGEST_M:g} m")
-    _need(
-        cloud.record.get("track_rate_hz", 0) > 0,
-        "record.track_rate_hz is missing, expected a positive rate",
-    )
+    _need(cloud.record.get("track_rate_hz", 0) > 0, "record.track_rate_hz is missing, expected a positive rate")
     _need(list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node")
-
-
-def _rate_fault(cloud: Cloud) -> str | None:
-    """Return the fault of a cloud's rate factors, or None."""
-    given = cloud.record.get("rate_factors", {})
-    if not isinstance(given, dict):
-        return f"{given!r}, expected numbers by the parts' names"
-    turning = [name for name, kind in zip(cloud.names, cloud.kinds, strict=True) if kind in ("rotor", "wheel")]
-    strange = sorted(set(given) - set(turning))
-    if strange:
-        return f"{strange} are no parts that turn, expected some of {turning}"
-    good = all(isinstance(value, (int, float)) and 0 <= value <= LARGEST_RATE_FACTOR for value in given.values())
-    return None if good else f"{given}, expected numbers from 0 to {LARGEST_RATE_FACTOR}"
 
 
 def extent(cloud: Cloud) -> float:

@@ -76,8 +76,8 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, type=Path, help="folder of inputs; files go to its cmu/")
     line.add_argument("--base", default=OFFICIAL, help="address of the folder of subjects")
     line.add_argument("names", nargs="*", help="SS/SS.asf or SS/SS_TT.amc; all by default")
-    given = line.parse_args(arguments)
-    fetch_each(given.names or SHA256, lambda name: fetch(name, given.out, given.base))
+    options = line.parse_args(arguments)
+    fetch_each(options.names or SHA256, lambda name: fetch(name, options.out, options.base))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import yaml
 from lowalt.config.classes import AIRBORNE
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
-from lowalt.targets.guesses import TURNING, Component, box_of
+from lowalt.targets.guesses import TURNING, Group
 from lowalt.targets.inspection import Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND, body_axes
 
@@ -19,23 +19,23 @@ MARGIN = 0.02
 CONFIRM = "  # GUESSED, please confirm"
 
 
+def record_text(about: list[str], subtype: str, row: list[str], settings: dict[str, str], parts: list[str]) -> str:
+    """Return a record file's text for a mesh: what it is about, then the subtype with a row of its own, settings and
+    parts, each line of `row` and `parts` as it stands in the file."""
+    lines = [*(f"# {line}" for line in about), f"{yaml.safe_dump(subtype).splitlines()[0]}:", "  source: mesh", *row]
+    lines += [*(f"  {key}: {value}" for key, value in settings.items()), "  parts:", *parts]
+    return "\n".join(lines) + "\n"
+
+
 def _numbers(values: np.ndarray) -> str:
     """Numbers as a YAML list with five digits."""
     return "[" + ", ".join(f"{value:.5g}" for value in values) + "]"
 
 
-def _region(group: list[Component]) -> str:
-    """YAML text of a box around components, wider by MARGIN."""
-    low, high = box_of(group)
-    slack = MARGIN * float((high - low).max())
-    return f"{{box: [{_numbers(low - slack)}, {_numbers(high + slack)}], whole: true}}"
-
-
-def _place(group: list[Component], found: Inspection) -> str:
+def _place(group: Group, inspection: Inspection) -> str:
     """Return the place of a group on the target in words: front or rear, left or right."""
-    middle = (found.low + found.high) / 2
-    centre = np.mean(box_of(group), axis=0) - middle
-    right, front, _ = body_axes(found.front, found.up)
+    centre = group.centre - (inspection.low + inspection.high) / 2
+    right, front, _ = body_axes(inspection.front, inspection.up)
     return f"{'front' if centre @ front >= 0 else 'rear'} {'right' if centre @ right >= 0 else 'left'}"
 
 
@@ -78,21 +78,21 @@ def row_lines(
     return [f"  row: {{{listed}}}{CONFIRM}: sizes are the file's, rates and speeds those of {near['name']}"]
 
 
-def _wings(found: Inspection) -> list[str]:
+def _wings(inspection: Inspection) -> list[str]:
     """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle."""
-    front, up = "xyz".index(found.front[-1]), "xyz".index(found.up[-1])
+    front, up = "xyz".index(inspection.front[-1]), "xyz".index(inspection.up[-1])
     right = 3 - front - up
-    sign = body_axes(found.front, found.up)[0, right]
-    middle, lines = (found.low + found.high)[right] / 2, []
+    sign = body_axes(inspection.front, inspection.up)[0, right]
+    middle, lines = (inspection.low + inspection.high)[right] / 2, []
     for name, side in (("left wing", -sign), ("right wing", sign)):
-        out = side * (found.points[:, right] - middle)
-        root = found.points[(out > found.shoulder_m) & (out < 1.3 * found.shoulder_m)]
-        hinge = np.median(root, axis=0) if len(root) else (found.low + found.high) / 2
-        hinge[right] = middle + side * found.shoulder_m
+        out = side * (inspection.points[:, right] - middle)
+        root = inspection.points[(out > inspection.shoulder_m) & (out < 1.3 * inspection.shoulder_m)]
+        hinge = np.median(root, axis=0) if len(root) else (inspection.low + inspection.high) / 2
+        hinge[right] = middle + side * inspection.shoulder_m
         corners = [["null"] * 3, ["null"] * 3]
         corners[0 if side > 0 else 1][right] = f"{hinge[right]:.5g}"
         # Tail feathers may spread as wide as the wing's root, behind it.
-        along = found.points[out > 0.4 * out.max(), front]
+        along = inspection.points[out > 0.4 * out.max(), front]
         slack = 0.25 * np.ptp(along)
         corners[0][front], corners[1][front] = f"{along.min() - slack:.5g}", f"{along.max() + slack:.5g}"
         box = ", ".join("[" + ", ".join(corner) + "]" for corner in corners)
@@ -108,41 +108,39 @@ def alternating(hubs: np.ndarray) -> list[str]:
     return [("ccw", "cw")[int(place) % 2] for place in np.argsort(order, kind="stable")]
 
 
-def refuse_miscount(found: Inspection, groups: list[list[Component]], count: int | None, picture: str) -> None:
+def refuse_miscount(inspection: Inspection, groups: list[Group], count: int | None, picture: str) -> None:
     """Refuse a target whose rotors or wheels are not as many as they should be; where that is not known, names must
     tell them.
 
     Raises: InputError naming what was found, the numbered picture and the option to write.
     """
-    kind = MOVING_KIND[found.category]
+    kind = MOVING_KIND[inspection.category]
     named = len({len(group) for group in groups}) == 1  # else some blades may be taken for rotors
     named &= all(TURNING[kind].search(part.piece) for group in groups for part in group)
     if kind == "wing" or (named if count is None else len(groups) == count):
         return
     unknown = f"--{kind}s {len(groups)} where that is all" if groups else f"at least one, or --{kind}s 0"
     raise InputError(
-        f"{found.path}: {len(groups)} {kind}s found, expected {unknown if count is None else count}; otherwise name "
-        f"each {kind}'s pieces as numbered in {picture}, such as --moving 3 5+6 7 9. A {kind} that has no number is "
-        "joined to the body: separate it first"
+        f"{inspection.path}: {len(groups)} {kind}s found, expected {unknown if count is None else count}; otherwise "
+        f"name each {kind}'s pieces as numbered in {picture}, such as --moving 3 5+6 7 9. A {kind} that has no number "
+        "is joined to the body: separate it first"
     )
 
 
-def chosen(found: Inspection, words: list[str]) -> list[list[Component]]:
+def chosen(inspection: Inspection, words: list[str]) -> list[Group]:
     """Return the groups of components that words such as 5+6 number, from 1 in the order of an inspection.
 
     Raises: InputError naming the word that is no such number.
     """
-    groups = []
+    most = len(inspection.components)
     for word in words:
-        numbers = word.split("+")
-        if not all(one.isdecimal() and 1 <= int(one) <= len(found.components) for one in numbers):
-            raise InputError(f"--moving is {word!r}, expected numbers from 1 to {len(found.components)} joined by +")
-        groups.append([found.components[int(one) - 1] for one in numbers])
-    return groups
+        if not all(number.isdecimal() and 1 <= int(number) <= most for number in word.split("+")):
+            raise InputError(f"--moving is {word!r}, expected numbers from 1 to {most} joined by +")
+    return [Group(inspection.components[int(number) - 1] for number in word.split("+")) for word in words]
 
 
 def drafted(
-    found: Inspection, subtype: str, file: str, row: list[str], groups: list[list[Component]], given: str = ""
+    inspection: Inspection, subtype: str, file: str, row: list[str], groups: list[Group], given: str = ""
 ) -> str:
     """Return a record file's text for a subtype, from an inspected mesh.
 
@@ -150,35 +148,31 @@ def drafted(
     that move, `given` says which of "up" and "front" the user gave. Lines that end in CONFIRM hold guesses. Boxes take
     moving parts out of the body; a bird's wings are the surface farther out than `shoulder_m`.
     """
-    category = found.category
-    kind = MOVING_KIND[category]
-    unit = "" if found.unit_from != "guessed from the size" else CONFIRM
+    category, kind = inspection.category, MOVING_KIND[inspection.category]
     groups = sorted(groups, key=lambda group: group[0].centre.tolist())
-    frame = body_axes(found.front, found.up)[:2]
-    hubs = np.array([frame @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
+    frame = body_axes(inspection.front, inspection.up)[:2]
+    hubs = np.array([frame @ group.centre for group in groups]).reshape(-1, 2)
     marks = {name: "" if name in given else f"{CONFIRM}: {axis[-1]} or -{axis[-1]}"
-             for name, axis in (("up", found.up), ("front", found.front))}  # fmt: skip
-    lines = [
-        f"# Drafted from {file}. Lengths are in metres along the file's axes.",
-        "# Confirm each line that is marked, then remove the mark.",
-        f"{yaml.safe_dump(subtype).splitlines()[0]}:",
-        "  source: mesh",
-        *row,
-        f"  unit: {found.unit}{unit}",
-        f"  up: {found.up}{marks['up']}",
-        f"  front: {found.front}{marks['front']}",
-        f"  size_is: {size_word(category, found.high - found.low, hubs)}",
-        "  licence: unknown  # the licence of the mesh",
-        "  parts:",
+             for name, axis in (("up", inspection.up), ("front", inspection.front))}  # fmt: skip
+    parts = [
         f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
+        *(_wings(inspection) if category == "Bird" else []),
     ]
-    if category == "Bird":
-        lines += _wings(found)
     names: dict[str, int] = {}
     for group, sense in zip(groups, alternating(hubs), strict=True):
-        place = f"{_place(group, found)} {kind}"
+        place = f"{_place(group, inspection)} {kind}"
         names[place] = names.get(place, 0) + 1
         name = place if names[place] == 1 else f"{place} {names[place]}"
+        slack = MARGIN * float(group.extent.max())
+        box = f"[{_numbers(group.low - slack)}, {_numbers(group.high + slack)}]"
         turn = f", sense: {sense}" * (kind == "rotor")
-        lines.append(f"    {name}: {{kind: {kind}, region: {_region(group)}{turn}}}{CONFIRM}")
-    return "\n".join(lines) + "\n"
+        parts.append(f"    {name}: {{kind: {kind}, region: {{box: {box}, whole: true}}{turn}}}{CONFIRM}")
+    about = [f"Drafted from {file}. Lengths are in metres along the file's axes.",
+             "Confirm each line that is marked, then remove the mark."]  # fmt: skip
+    settings = {
+        "unit": f"{inspection.unit}{CONFIRM * (inspection.unit_from == 'guessed from the size')}",
+        "up": f"{inspection.up}{marks['up']}", "front": f"{inspection.front}{marks['front']}",
+        "size_is": size_word(category, inspection.high - inspection.low, hubs),
+        "licence": "unknown  # the licence of the mesh",
+    }  # fmt: skip
+    return record_text(about, subtype, row, settings, parts)

@@ -58,7 +58,6 @@ def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
 
 def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.ndarray:
     """Return every bone's global rotation (F, 31, 3, 3); `leg(phase)` and `arm(phase)` give the right side's."""
-    result = np.empty((len(phase), len(NODES), 3, 3))
     pelvis = product(rotation("z", trunk["turn"]), rotation("y", trunk["list"]))
     chest = product(rotation("z", trunk["twist"]), rotation("x", -trunk["lean"]))
     turned = {"root": pelvis}
@@ -81,9 +80,7 @@ def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.
         turned[side + "humerus"] = product(chest, rotation("x", shoulder))
         for name in ("radius", "wrist", "hand", "fingers", "thumb"):
             turned[side + name] = product(chest, rotation("x", shoulder + elbow))
-    for index, name in enumerate(NODES):
-        result[:, index] = turned[name]
-    return result
+    return np.stack([turned[name] for name in NODES], axis=1)
 
 
 def cycle_m(kind: str, stature_m: float, speed_mps: float, frames: int) -> tuple[np.ndarray, float, float]:
@@ -147,19 +144,10 @@ def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], floa
     return track - [0, 0, middle], names, duration, stride
 
 
-def _gait_facts(record: dict, names: tuple[str, ...], track: np.ndarray, rate_hz: float, speed_mps: float) -> dict:
-    """The record's entries for feet, or for wheels, which turn with the speed whatever `motion.cadence` is."""
-    if record["gait"] == "cycle":
-        return {"cadence": "tied"}
-    feet = FEET if names == NODES else [number for number, name in enumerate(names) if name.endswith("paw")]
-    return {"stance_foot_speed_mps": stance_speed_mps(track, rate_hz, speed_mps, feet=feet)}
-
-
-def check_record(merged: dict, extra: dict, where: str) -> dict:
+def check_record(merged: dict, where: str) -> dict:
     """Return the merged record of a built-in walk or run, checked, with the defaults of `stature_m` (the published
     height), `rate_hz` (400 frames a second) and `points` (one a node).
 
-    `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
     if like(merged) != "Pedestrian":
@@ -186,11 +174,15 @@ def gait_cloud(record: dict, seed: int) -> Cloud:
     duration = _cycle(record, 2)[2]
     # A cycle has a whole number of frames and keeps its duration, so the frame rate is adjusted a little.
     track, names, duration, stride = _cycle(record, max(2, round(duration * record["rate_hz"])))
-    rate = len(track) / duration
+    rate, speed = len(track) / duration, stride / duration
     facts = {
-        "track_rate_hz": rate, "cycle_s": duration, "stride_m": stride, "track_speed_mps": stride / duration,
+        "track_rate_hz": rate, "cycle_s": duration, "stride_m": stride, "track_speed_mps": speed,
         "cadence_steps_per_min": 120 / duration, "origin_height_m": float(-track[..., 2].min()),
-        **_gait_facts(record, names, track, rate, stride / duration),
         "checksum": hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest(), "seed": seed,
     }  # fmt: skip
+    if record["gait"] == "cycle":
+        facts["cadence"] = "tied"  # wheels turn with the speed whatever `motion.cadence` is
+    else:
+        feet = FEET if names == NODES else [number for number, name in enumerate(names) if name.endswith("paw")]
+        facts["stance_foot_speed_mps"] = stance_speed_mps(track, rate, speed, feet=feet)
     return node_cloud(track, record | facts, names)

@@ -1,4 +1,4 @@
-"""Gallery: all clouds in one picture, coloured by part: each category in a row at one scale, then each cloud alone."""
+"""Gallery: all clouds in one picture, each in a panel of its own, coloured by part."""
 
 import argparse
 from itertools import pairwise
@@ -46,9 +46,8 @@ def colours(cloud: Cloud) -> np.ndarray:
     """
     from matplotlib.colors import to_rgba
 
-    names = [
-        BODY_COLOUR if kind == "body" else PART_COLOURS[i % len(PART_COLOURS)] for i, kind in enumerate(cloud.kinds)
-    ]
+    names = [BODY_COLOUR if kind == "body" else PART_COLOURS[part % len(PART_COLOURS)]
+             for part, kind in enumerate(cloud.kinds)]  # fmt: skip
     result = np.array([to_rgba(name) for name in names])[cloud.part]
     toward = cloud.normals @ axes_of(cloud.like)[2]
     # A comparison with NaN is false, so points without a normal stay opaque.
@@ -62,18 +61,7 @@ def bones(names: tuple[str, ...]) -> list[tuple[int, int]]:
         return [(node, parent) for node, parent in enumerate(PARENTS) if parent >= 0]
     numbers = {name: number for number, name in enumerate(names)}
     chains = [chain for chain in (*cyclist.CHAINS, *quadruped.CHAINS) if set(chain) <= set(numbers)]
-    return [(numbers[one], numbers[other]) for chain in chains for one, other in pairwise(chain)]
-
-
-def draw(axes, cloud: Cloud, size: float, shift: float = 0.0) -> None:
-    """Draw one cloud into matplotlib axes in metres, `shift` (m) to the right, nearer points in front."""
-    seen = shown(cloud)
-    order = np.argsort(seen[:, 2])
-    # Bones between nodes show which nodes belong together.
-    for bone in bones(cloud.names):
-        x, y = seen[list(bone), :2].T
-        axes.plot(x + shift, y, color="#a1a1aa", linewidth=0.3 * size**0.5, zorder=0)
-    axes.scatter(seen[order, 0] + shift, seen[order, 1], c=colours(cloud)[order], s=size, linewidths=0)
+    return [(numbers[start], numbers[end]) for chain in chains for start, end in pairwise(chain)]
 
 
 def caption(cloud: Cloud) -> str:
@@ -84,27 +72,16 @@ def caption(cloud: Cloud) -> str:
     return f"{cloud.subtype}\n{len(cloud.points)} points, {source}{closes}, {size} m"
 
 
-def _lineup(axes, clouds: list[Cloud]) -> None:
-    """All clouds of a category side by side at one scale, with a bar of a round length."""
-    widths = np.array([np.ptp(shown(cloud)[:, 0]) for cloud in clouds])
-    gap = 0.12 * widths.mean()
-    middles = np.cumsum(widths + gap) - widths / 2
-    for cloud, middle in zip(clouds, middles, strict=True):
-        draw(axes, cloud, float(np.clip(200 / len(cloud.points), 1.6, 6)), middle)
-    low = min(shown(cloud)[:, 1].min() for cloud in clouds)
-    bar = 10 ** np.floor(np.log10(widths.max()))
-    axes.plot([0, bar], [low - gap, low - gap], color="black", linewidth=1.2)
-    axes.text(bar, low - gap, f"  {bar:g} m", va="center", fontsize=7)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    axes.set_title(f"{clouds[0].category}: one scale", fontsize=9, loc="left")
-
-
 def _panel(axes, cloud: Cloud, aspect: float) -> None:
-    """One cloud filling its panel, which is `aspect` times as high as wide."""
-    width, height = np.ptp(shown(cloud), axis=0)[:2]
-    half = max(width, height / aspect) / 2 * 1.06
-    draw(axes, cloud, float(np.clip(1400 / len(cloud.points), 5, 22)))
+    """Draw a cloud that fills its panel, `aspect` times as high as wide, with bones and the nearer points in front."""
+    seen = shown(cloud)
+    width, height = np.ptp(seen, axis=0)[:2]
+    half, size = max(width, height / aspect) / 2 * 1.06, float(np.clip(1400 / len(cloud.points), 5, 22))
+    # Bones between nodes show which nodes belong together.
+    for bone in bones(cloud.names):
+        axes.plot(*seen[list(bone), :2].T, color="#a1a1aa", linewidth=0.3 * size**0.5, zorder=0)
+    order = np.argsort(seen[:, 2])
+    axes.scatter(*seen[order, :2].T, c=colours(cloud)[order], s=size, linewidths=0)
     axes.set(xlim=(-half, half), ylim=(-half * aspect, half * aspect), xticks=[], yticks=[], aspect="equal")
     axes.set_title(caption(cloud), fontsize=7)
     for spine in axes.spines.values():
@@ -112,27 +89,21 @@ def _panel(axes, cloud: Cloud, aspect: float) -> None:
 
 
 def figure(clouds: list[Cloud]):
-    """Return the matplotlib figure: for each category a line-up at one scale, then every cloud filling its panel."""
+    """Return the matplotlib figure: every cloud fills its panel, in the order given."""
     from matplotlib.figure import Figure
 
-    named = dict.fromkeys(cloud.category for cloud in clouds)
-    groups = [[cloud for cloud in clouds if cloud.category == name] for name in named]
-    rows = [-(-len(members) // COLUMNS) for members in groups]
-    spans = [np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members]) for members in groups]
-    # Every panel of a category has the same shape, that of its tallest cloud.
-    aspects = [float(np.clip((span[:, 1] / span[:, 0]).max(), 0.3, 1.3)) for span in spans]
-    lineups = [min(3.0, 2.7 * COLUMNS * span[:, 1].max() / span[:, 0].sum()) + 0.5 for span in spans]
-    panels = [2.6 * aspect + 0.45 for aspect in aspects]
-    heights = [top + panel * count for top, panel, count in zip(lineups, panels, rows, strict=True)]
+    rows: list[tuple[float, list[Cloud]]] = []
+    for first in range(0, len(clouds), COLUMNS):
+        members = clouds[first : first + COLUMNS]
+        spans = np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members])
+        # Every panel of a row has the same shape, that of its tallest cloud.
+        rows.append((float(np.clip((spans[:, 1] / spans[:, 0]).max(), 0.3, 1.3)), members))
+    heights = [2.6 * aspect + 0.45 for aspect, _ in rows]
     result = Figure(figsize=(2.7 * COLUMNS, sum(heights)), dpi=DPI, layout="constrained")
-    blocks = result.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for block, members, count, top, panel, aspect in zip(
-        blocks, groups, rows, lineups, panels, aspects, strict=True
-    ):  # fmt: skip
-        grid = block.add_gridspec(count + 1, COLUMNS, height_ratios=[top] + [panel] * count)
-        _lineup(block.add_subplot(grid[0, :]), members)
-        for index, cloud in enumerate(members):
-            _panel(block.add_subplot(grid[1 + index // COLUMNS, index % COLUMNS]), cloud, aspect)
+    grid = result.add_gridspec(len(rows), COLUMNS, height_ratios=heights)
+    for row, (aspect, members) in enumerate(rows):
+        for column, cloud in enumerate(members):
+            _panel(result.add_subplot(grid[row, column]), cloud, aspect)
     return result
 
 
@@ -141,10 +112,10 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser(prog="python -m lowalt.targets.gallery", description=__doc__)
     line.add_argument("--clouds", required=True, nargs="+", type=Path, help="cloud files")
     line.add_argument("--out", required=True, type=Path, help="picture to write (.png)")
-    given = line.parse_args(arguments)
-    picture = figure([read(path) for path in given.clouds])
+    options = line.parse_args(arguments)
+    picture = figure([read(path) for path in options.clouds])
     settle(picture, DPI)
-    with replacing(given.out) as temporary:
+    with replacing(options.out) as temporary:
         # The file holds no version or date, so that equal clouds give equal bytes.
         picture.savefig(temporary, metadata={"Software": None})
 

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -16,10 +17,8 @@ USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
 UNUSUAL = 20
 """A target of a row of its own is at most so many times smaller or larger than that."""
 
-
 ALIKE = 0.1
 """Pieces whose extents differ by at most this share are of one kind, such as the four propellers of a craft."""
-
 
 FLAT = 0.35
 """Largest thickness of a propeller divided by its length."""
@@ -48,10 +47,8 @@ LONG = 0.75
 TOUCH = 0.1
 """Boxes nearer than twice this share of the larger one's length belong together: the hub lies between two blades."""
 
-
 ROUND = 0.12
 """The two extents of a wheel across its axis differ by at most this share."""
-
 
 _ROTOR = r"(?:(?<![a-z])|main|tail)(?:rotor(?!craft)|prop(?!ul|ert)|blade|fan(?![a-z])|puller|pusher)"
 TURNING = {
@@ -93,6 +90,18 @@ class Component:
     def centre(self) -> np.ndarray:
         """Middle (3,) in m of the extents."""
         return (self.low + self.high) / 2
+
+
+class Group(tuple[Component, ...]):
+    """Components that may be one moving part, such as the blades of a rotor; sizes as those of a component."""
+
+    low = property(lambda self: np.min([part.low for part in self], axis=0))
+    high = property(lambda self: np.max([part.high for part in self], axis=0))
+    extent = property(lambda self: self.high - self.low)
+    centre = property(lambda self: (self.low + self.high) / 2)
+    triangles = property(lambda self: sum(part.triangles for part in self))
+    area = property(lambda self: sum(part.area for part in self))
+    middle = property(lambda self: sum(part.area * part.middle for part in self) / self.area)
 
 
 def guessed_unit(size: float, category: str, wanted_m: float | None = None) -> str:
@@ -160,60 +169,45 @@ def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right
     return "xyz"[order[0]], "xyz"[front]
 
 
-def box_of(group: Sequence[Component]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and highest corners (3,) of a group of components."""
-    return np.min([part.low for part in group], axis=0), np.max([part.high for part in group], axis=0)
-
-
-def _size(group: Sequence[Component]) -> np.ndarray:
-    """Extents (3,) of a group."""
-    return np.subtract(*box_of(group)[::-1])
-
-
-def _alike(one: Sequence[Component], other: Sequence[Component]) -> bool:
-    """Return whether two groups have the same three sizes in any order, to within ALIKE, or as many triangles and as
-    large a surface: propellers at other angles have other boxes."""
-    a, b = np.sort(_size(one)), np.sort(_size(other))
-    counts, areas = ([sum(getattr(part, name) for part in group) for group in (one, other)]
-                     for name in ("triangles", "area"))  # fmt: skip
-    copies = counts[0] == counts[1] and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
+def _alike(first: Component | Group, second: Component | Group) -> bool:
+    """Return whether two have the same three sizes in any order, to within ALIKE, or as many triangles and as large a
+    surface: propellers at other angles have other boxes."""
+    a, b, areas = np.sort(first.extent), np.sort(second.extent), (first.area, second.area)
+    copies = first.triangles == second.triangles and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
     return copies or bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
 
 
-def _one_hub(one: Component, other: Component, up: int, touching: bool) -> bool:
+def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bool:
     """Return whether two components turn about one hub: one lies about the middle of the other, as a spinner does, and
     they are no pair of coaxial rotors. `touching`: whether long blades that touch, not discs, are of one rotor too."""
-    away, radius = np.abs(one.centre - other.centre), max(one.extent.max(), other.extent.max()) / 2
-    same = _alike([one], [other])
-    if same and away[up] > 2 * max(one.extent[up], other.extent[up]):
+    away, radius = np.abs(first.centre - second.centre), max(first.extent.max(), second.extent.max()) / 2
+    same = _alike(first, second)
+    if same and away[up] > 2 * max(first.extent[up], second.extent[up]):
         return False
     slack = TOUCH * 2 * radius
-    near = bool((one.low - slack <= other.high + slack).all() and (other.low - slack <= one.high + slack).all())
-    long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (one, other))
+    near = bool((np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack).all())
+    long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (first, second))
     away[up] = 0
     return near and (float(np.linalg.norm(away)) <= radius / 2 or (touching and same and long))
 
 
-def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list[list[Component]]:
+def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list[Group]:
     """Return components about one hub as one group each, such as the two blades of a propeller (`_one_hub`)."""
-    groups: list[list[Component]] = []
+    groups: list[Group] = []
     for part in parts:
         near = [group for group in groups if any(_one_hub(part, other, up, touching) for other in group)]
-        groups = [group for group in groups if group not in near] + [[part, *(one for group in near for one in group)]]
+        groups = [group for group in groups if group not in near] + [Group((part, *chain.from_iterable(near)))]
     return groups
 
 
-def _is_rotor(group: Sequence[Component], axes: Sequence[int], whole: np.ndarray) -> bool:
+def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
     """Whether a group is flat along one of the axes, wide enough, and lies about one hub."""
-    extent, (low, high) = _size(group), box_of(group)
-    area = np.array([part.area for part in group])
-    middle = (np.array([part.middle for part in group]) * area[:, None]).sum(axis=0) / area.sum()
     # By their names a helicopter's main rotor may be as wide as all of it, and its tail rotor small.
     least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
     for axis in axes:
-        across = np.delete(extent, axis).max()
-        off = np.linalg.norm(np.delete(middle - (low + high) / 2, axis))
-        flat, wide = extent[axis] < FLAT * across, least * whole.max() <= across < most * whole.max()
+        across = np.delete(group.extent, axis).max()
+        off = np.linalg.norm(np.delete(group.middle - group.centre, axis))
+        flat, wide = group.extent[axis] < FLAT * across, least * whole.max() <= across < most * whole.max()
         if flat and wide and not off > OFF_CENTRE * across / 2:  # a middle that is not known is no fault
             return True
     return False
@@ -221,7 +215,7 @@ def _is_rotor(group: Sequence[Component], axes: Sequence[int], whole: np.ndarray
 
 def rotors(
     parts: Sequence[Component], ups: Sequence[int], whole: np.ndarray, count: int | None
-) -> tuple[int, list[list[Component]]]:
+) -> tuple[int, list[Group]]:
     """Return the axis upwards and the groups of components that may be rotors: `count` of them, or none.
 
     Pieces that their names call rotors come first, whatever their axes, then sets of alike flat groups that lie about
@@ -229,80 +223,78 @@ def rotors(
     point up, the likeliest first; at least three alike groups are needed where no name tells.
     """
     named = [part for part in parts if TURNING["rotor"].search(part.piece)]
-    # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
-    alone = [clusters(named, ups[0], touching=False), *(_bladed(named, ups[0], count) if count else [])]
-    for groups in alone if count else [clusters(named, ups[0])]:
+    for groups in _grouped(named, ups[0], count):
         good = [group for group in groups if _is_rotor(group, range(3), whole)]
         if good and (count is None or len(good) == count):
             return ups[0], good
+    several = len({part.piece for part in parts}) > 1
+    able = [part for part in parts if not (several and FIXED.search(part.piece))]
     for up in ups if count is None or count > 2 else ():  # two alike pieces may be two blades, or skids
-        flat = [part for part in parts if part.extent[up] < FLAT * np.delete(part.extent, up).max()]
-        flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
-        flat = (
-            [part for part in flat if not FIXED.search(part.piece)] if len({part.piece for part in parts}) > 1 else flat
-        )
-        sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
-        sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in sets]
-        found = _alike_set(sets, up, whole, count)
-        if len(found) > 2:
-            return up, found
+        across = [np.delete(part.extent, up).max() for part in able]
+        flat = [part for part, width in zip(able, across, strict=True)
+                if part.extent[up] < FLAT * width and width > 0.04 * whole.max()]  # fmt: skip
+        sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in _grouped(flat, up, count)]
+        alike = _alike_set(sets, up, whole, count)
+        if len(alike) > 2:
+            return up, alike
     return ups[0], []
 
 
-def _bladed(parts: Sequence[Component], up: int, count: int) -> list[list[list[Component]]]:
-    """Sets of `count` groups of as many alike blades each, those whose middles are nearest to one another."""
-    sets = []
-    for index, part in enumerate(parts):
-        same = [other for other in parts if _alike([part], [other])]
+def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[list[Group]]:
+    """Return the ways to group components about hubs: those near one another, and where the number is known also
+    `count` groups of as many alike blades each, those whose middles are nearest."""
+    # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
+    ways = [clusters(parts, up, touching=not count)]
+    for index, part in enumerate(parts if count else ()):
+        same = [other for other in parts if _alike(part, other)]
         blades, rest = divmod(len(same), count)
         if rest or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
             continue
         places = np.delete(np.array([other.centre for other in same]), up, axis=1)
         label = fcluster(linkage(places, "average"), count, "maxclust")
-        groups = [[other for other, its in zip(same, label, strict=True) if its == one] for one in np.unique(label)]
+        groups = [Group(other for other, at in zip(same, label, strict=True) if at == hub) for hub in np.unique(label)]
         if [len(group) for group in groups] == [blades] * count:
-            sets.append(groups)
-    return sets
+            ways.append(groups)
+    return ways
 
 
-def _alike_set(
-    choices: list[list[list[Component]]], up: int, whole: np.ndarray, count: int | None
-) -> list[list[Component]]:
-    """The set of alike groups at one height that is farthest out, of `count` groups or of several; slender pieces
-    that all point at the middle and reach near it are arms."""
-    found: list[tuple[float, list[list[Component]]]] = []
+def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: int | None) -> list[Group]:
+    """The set of alike groups at one height that is farthest out, of `count` groups or of several, without arms."""
+    best: tuple[float, list[Group]] = (0.0, [])
     for groups in choices:
         for group in groups:
-            height = np.mean(box_of(group), axis=0)[up]
             same = [other for other in groups if _alike(group, other)]
-            level = [other for other in same if abs(np.mean(box_of(other), axis=0)[up] - height) < 0.1 * whole.max()]
-            for one in (level, same):
-                if len(one) == count if count else one is level and len(one) >= 2:
-                    hubs = np.delete(np.array([np.mean(box_of(member), axis=0) for member in one]), up, axis=1)
-                    away = hubs - hubs.mean(axis=0)
-                    reach = np.linalg.norm(away, axis=1)
-                    along = np.array([np.delete(member[0].along, up) for member in one])
-                    radial = np.abs((along * away).sum(axis=1)) > RADIAL * reach
-                    slender = [len(member) == 1 and member[0].slender < SLENDER for member in one]
-                    inward = (
-                        reach - np.array([np.linalg.norm(np.delete(_size(member), up)) / 2 for member in one])
-                        < INWARD * reach
-                    )
-                    if not (radial & slender & inward).all():
-                        found.append((float(reach.mean()), one))
-    return max(found, key=lambda item: item[0], default=(0.0, []))[1]
+            level = [other for other in same if abs(other.centre[up] - group.centre[up]) < 0.1 * whole.max()]
+            for alike in (level, same) if count else (level,):
+                away = np.delete(np.array([member.centre for member in alike]), up, axis=1)
+                reach = np.linalg.norm(away - away.mean(axis=0), axis=1)
+                enough = len(alike) == count if count else len(alike) >= 2
+                if enough and reach.mean() > best[0] and not _are_arms(alike, up):
+                    best = float(reach.mean()), alike
+    return best[1]
 
 
-def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[list[Component]]:
+def _are_arms(groups: list[Group], up: int) -> bool:
+    """Whether all groups are slender pieces that point at the middle between them and reach near it."""
+    centres, extents = (np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1)
+                        for name in ("centre", "extent"))  # fmt: skip
+    away = centres - centres.mean(axis=0)
+    reach = np.linalg.norm(away, axis=1)
+    along = np.array([np.delete(group[0].along, up) for group in groups])
+    radial = np.abs((along * away).sum(axis=1)) > RADIAL * reach
+    slender = [len(group) == 1 and group[0].slender < SLENDER for group in groups]
+    return bool((radial & slender & (reach - np.linalg.norm(extents, axis=1) / 2 < INWARD * reach)).all())
+
+
+def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
     """Return the groups of components that may be wheels: those that their names call so, else the largest set of at
     least two alike round ones."""
     named = [part for part in parts if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I)]
-    groups = [group for group in clusters(named, int(whole.argmin()), False) if _round(_size(group), whole)]
+    groups = [group for group in clusters(named, int(whole.argmin()), False) if _round(group.extent, whole)]
     if len(groups) >= 2:
         return groups
-    able = [[part] for part in parts if _round(part.extent, whole)]
-    sets = [[other for other in able if _alike(one, other)] for one in able]
-    best = max(sets, key=len, default=[])
+    able = [Group([part]) for part in parts if _round(part.extent, whole)]
+    best = max(([other for other in able if _alike(group, other)] for group in able), key=len, default=[])
     return best if len(best) >= 2 else []
 
 

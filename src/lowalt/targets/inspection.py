@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.files.atomic import existing
-from lowalt.targets.guesses import Component, box_of, cut_axis, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
-from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
-from lowalt.targets.mesh_scene import Piece, pieces
+from lowalt.targets.guesses import Component, Group, cut_axis, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
+from lowalt.targets.mesh_files import UNITS_M, Mesh, metres, read_mesh, stated_unit_m
+from lowalt.targets.mesh_polygons import Piece
+from lowalt.targets.mesh_scene import pieces
 
 SLICES = 40
 """Number of slices of a bird from its middle to a wing tip; the height of each is measured."""
@@ -43,7 +44,7 @@ class Inspection:
     category: str = "UAV"
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     owner: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    groups: list[list[Component]] = field(default_factory=list)
+    groups: list[Group] = field(default_factory=list)
     sides_seen: bool = True
     cut: str = ""
 
@@ -62,42 +63,30 @@ class Inspection:
         return float(edges[np.flatnonzero((sizes >= 0.5 * sizes.max(axis=0)).all(axis=1)).max(initial=0) + 1])
 
 
-def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
+def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[Component]:
     """Return the connected components of a repaired mesh, those with the largest extent first.
 
-    `names`: the name of the piece that each component lies in, (C,).
+    named: the pieces of its file, whose unit is `metre` metres; a component has the names of the smallest piece whose
+    box holds it, or none.
     """
+    slack = 1e-5 * np.ptp(mesh.vertices, axis=0).max()
+    boxes = [(piece.vertices.min(axis=0) * metre - slack, piece.vertices.max(axis=0) * metre + slack,
+              ", ".join(piece.names)) for piece in named]  # fmt: skip
     result = []
-    for number in range(len(mesh.closed)):
-        mask = mesh.component == number
-        points = mesh.vertices[mesh.faces[mask]].reshape(-1, 3)
+    for number, closed in enumerate(mesh.closed.tolist()):
+        triangles = mesh.vertices[mesh.faces[mesh.component == number]]
+        points = triangles.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
-        a, b, c = np.moveaxis(points.reshape(-1, 3, 3), 1, 0)
+        a, b, c = np.moveaxis(triangles, 1, 0)
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         middle = (areas[:, None] * (a + b + c)).sum(axis=0) / (3 * max(areas.sum(), 1e-300))
-        closed, area = bool(mesh.closed[number]), float(areas.sum()) / 2
         spread, axes = np.linalg.eigh(np.cov(points.T))
         slender = float(np.sqrt(max(spread[1], 0.0) / max(spread[2], 1e-300)))
-        shape = (middle, area, axes[:, 2], slender)
-        result.append(Component(number, low, high, int(mask.sum()), closed, names[number], "", *shape))
+        around = [(float(np.prod(top - base)), name) for base, top, name in boxes
+                  if (low >= base).all() and (high <= top).all()]  # fmt: skip
+        names, shape = min(around, default=(0.0, ""))[1], (middle, float(areas.sum()) / 2, axes[:, 2], slender)
+        result.append(Component(number, low, high, len(triangles), closed, names, "", *shape))
     return sorted(result, key=lambda part: -float(part.extent.max()))
-
-
-def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
-    """Return for each component the name of the smallest piece whose box holds it, or an empty text where none does."""
-    boxes = [
-        (", ".join(piece.names), piece.vertices.min(axis=0) * metres, piece.vertices.max(axis=0) * metres)
-        for piece in found
-    ]
-    names = []
-    for number in range(len(mesh.closed)):
-        points = mesh.vertices[mesh.faces[mesh.component == number]].reshape(-1, 3)
-        low, high = points.min(axis=0), points.max(axis=0)
-        slack = 1e-5 * np.ptp(mesh.vertices, axis=0).max()
-        inside = [(float(np.prod(top - base + slack)), name) for name, base, top in boxes
-                  if (low >= base - slack).all() and (high <= top + slack).all()]  # fmt: skip
-        names.append(min(inside)[1] if inside else "")
-    return names
 
 
 def _unit_of(path: Path, size: float, size_m: float | None, category: str, row: dict) -> tuple[str | float, str]:
@@ -106,7 +95,7 @@ def _unit_of(path: Path, size: float, size_m: float | None, category: str, row: 
     if size_m is not None:
         return float(f"{size_m / size:.6g}"), "given by the size"
     if stated is not None:
-        return {metres: name for name, metres in UNITS_M.items()}.get(stated, stated), "stated by the file"
+        return {metre: name for name, metre in UNITS_M.items()}.get(stated, stated), "stated by the file"
     wanted = row.get("len_m") if category == "Vehicle" else row.get("size_m")
     return guessed_unit(size, category, wanted), "guessed from the size"
 
@@ -122,52 +111,57 @@ def inspect_mesh(
     guessed from rotors and extents.
     Raises: InputError naming the file and the reason where it cannot be read.
     """
-    path = existing(path, "mesh")
-    found = pieces(path)
-    corners = [piece.vertices for piece in found] or [np.zeros((1, 3))]
-    size = max(float(np.ptp(np.concatenate(corners), axis=0).max()), 1e-12)
-    row = row or {}
+    path, row = existing(path, "mesh"), row or {}
+    named = pieces(path)
+    corners = np.concatenate([piece.vertices for piece in named] or [np.zeros((1, 3))])
+    size = max(float(np.ptp(corners, axis=0).max()), 1e-12)
     unit, source = (unit, "given") if unit is not None else _unit_of(path, size, size_m, category, row)
-    metres = UNITS_M[unit] if isinstance(unit, str) else unit
     mesh = read_mesh(path, unit)
     some = np.unique(np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int))
     points = mesh.vertices[mesh.faces[some]].mean(axis=1)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    parts = components_of(mesh, _piece_names(mesh, found, metres))
-    up, front = (name and "xyz".index(name[-1]) for name in axes)
-    ups = [up] if up is not None else [int(axis) for axis in np.argsort(high - low, kind="stable") if axis != front]
-    groups: list[list[Component]] = []
-    count = row.get("n_rotors_or_wings")
-    if count == 0:
-        pass
-    elif category == "UAV":
-        best, groups = rotors(parts, ups, high - low, count)
-        up = best if up is None and groups else up
-    elif category == "Vehicle":
-        groups = wheels(parts, high - low)
-    right = mirror_axis(points) if category == "Bird" and None in axes else None
-    if category == "Vehicle" and groups:
-        # Wheels are thinnest along their axes.
-        right = int(np.argmin(np.mean([np.subtract(*box_of(group)[::-1]) for group in groups], axis=0)))
-    up = ups[0] if up is None and category == "UAV" else up
-    guessed = guessed_axes(high - low, category, up, None if right in (up, front) else right)
-    seen = category != "Bird" or None not in axes or right is not None
-    if category == "UAV" and groups and axes[0] is None:
-        axis = "xyz".index(guessed[0])
-        hubs = np.mean([np.mean(box_of(group), axis=0) for group in groups], axis=0)
-        # Rotors stand in the upper half; some files have their down axis first.
-        guessed = ("-" * bool(hubs[axis] < (low + high)[axis] / 2 - 1e-9) + guessed[0], guessed[1])
-    cut = cut_axis(mesh, points, [axis for axis in range(3) if axis not in ("xyz".index(guessed[0][-1]), front)])
+    parts = components_of(mesh, named, metres(unit))
+    up, front, groups, sides_seen = _moving(parts, points, (low, high), category, row.get("n_rotors_or_wings"), axes)
+    given_front = axes[1] and axes[1][-1]
+    cut = cut_axis(mesh, points, [axis for axis, name in enumerate("xyz") if name not in (up[-1], given_front)])
     kind = {"UAV": "rotor", "Vehicle": "wheel"}.get(category, "")
-    moving = {part.number for group in groups for part in group}
-    parts = [replace(part, guess=kind if part.number in moving else "") for part in parts]
-    groups = [[next(one for one in parts if one.number == part.number) for part in group] for group in groups]
-    named = [(", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
+    turning = {part.number for group in groups for part in group}
+    listed = [(", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres(unit))
+              for piece in named]  # fmt: skip
     return Inspection(
-        path, unit, source, low, high, len(mesh.faces), axes[0] or guessed[0], axes[1] or guessed[1], named, parts,
-        category, points, mesh.component[some], groups, seen,
-        "" if cut is None else "xyz"[cut],
+        path, unit, source, low, high, len(mesh.faces), up, front, listed,
+        [replace(part, guess=kind if part.number in turning else "") for part in parts],
+        category, points, mesh.component[some], groups, sides_seen, "" if cut is None else "xyz"[cut],
     )  # fmt: skip
+
+
+def _moving(
+    parts: list[Component], points: np.ndarray, box: tuple[np.ndarray, np.ndarray], category: str, count: int | None,
+    axes: tuple[str | None, str | None],
+) -> tuple[str, str, list[Group], bool]:  # fmt: skip
+    """The axes up and front, given or guessed, the groups that may be a moving part each, and whether left and right
+    are given or seen. points (N, 3): on the surface; box: its lowest and highest corners; count: rotors, wheels, or
+    wings."""
+    groups: list[Group] = []
+    low, high = box
+    extent = high - low
+    up, front = (name and "xyz".index(name[-1]) for name in axes)
+    ups = [up] if up is not None else [int(axis) for axis in np.argsort(extent, kind="stable") if axis != front]
+    right = mirror_axis(points) if category == "Bird" and None in axes else None
+    sides_seen = category != "Bird" or None not in axes or right is not None
+    if category == "UAV":
+        up, groups = (ups[0], []) if count == 0 else rotors(parts, ups, extent, count)
+    elif category == "Vehicle" and count != 0:
+        groups = wheels(parts, extent)
+        if groups:  # wheels are thinnest along their axes
+            right = int(np.argmin(np.mean([group.extent for group in groups], axis=0)))
+    upward, forward = guessed_axes(extent, category, up, None if right in (up, front) else right)
+    if category == "UAV" and groups:
+        axis = "xyz".index(upward)
+        # Rotors stand in the upper half; some files have their down axis first.
+        if np.mean([group.centre[axis] for group in groups]) < (low + high)[axis] / 2 - 1e-9:
+            upward = f"-{upward}"
+    return axes[0] or upward, axes[1] or forward, groups, sides_seen
 
 
 def _size(values: np.ndarray) -> str:
@@ -175,36 +169,27 @@ def _size(values: np.ndarray) -> str:
     return " x ".join(f"{value:.4g}" for value in values)
 
 
-def described(found: Inspection, most: int = 30) -> str:
+def described(inspection: Inspection, most: int = 30) -> str:
     """Return an inspection as text, at most `most` components, the largest and those with a guess first."""
+    low, high = (np.round(corner, 4).tolist() for corner in (inspection.low, inspection.high))
     lines = [
-        f"{found.path}: {found.triangles} triangles, {len(found.components)} connected components",
-        f"category {found.category} (give --category where it is another)",
-        f"unit     {found.unit} ({found.unit_from})",
-        f"extent   {_size(found.high - found.low)} m along x, y, z, from {np.round(found.low, 4).tolist()} to "
-        f"{np.round(found.high, 4).tolist()}",
-        f"up       {found.up} (unless given, guessed from rotors or the smallest extent; the sign is unknown)",
-        f"front    {found.front} (unless given, guessed; the sign is unknown)",
-        *([f"half     it ends flat along {found.cut}, as one half of a target does"] if found.cut else []),
-        *(
-            [f"wings    may begin {found.shoulder_m:.4g} m right and left of the middle"]
-            if found.category == "Bird"
-            else []
-        ),
-        "",
-        "named pieces (for `geometry:`)",
-        *(f"  {name!r}: {count} triangles, {_size(extent)} m" for name, count, extent in found.pieces),
-        "",
-        "connected components (for `region:` with `whole: true`)",
+        f"{inspection.path}: {inspection.triangles} triangles, {len(inspection.components)} connected components",
+        f"category {inspection.category} (give --category where it is another)",
+        f"unit     {inspection.unit} ({inspection.unit_from})",
+        f"extent   {_size(inspection.high - inspection.low)} m along x, y, z, from {low} to {high}",
+        f"up       {inspection.up} (unless given, guessed from rotors or the smallest extent; the sign is unknown)",
+        f"front    {inspection.front} (unless given, guessed; the sign is unknown)",
     ]
-    ranked = sorted(found.components, key=lambda part: (not part.guess, -float(part.extent.max())))
-    for part in ranked[:most]:
-        guess = f"  may be a {part.guess}" if part.guess else ""
-        number = found.components.index(part) + 1
-        lines.append(
-            f"  {number} {part.piece!r}: {part.triangles} triangles, {_size(part.extent)} m at "
-            f"{np.round(part.centre, 4).tolist()}, {'closed' if part.closed else 'open'}{guess}"
-        )
-    if len(ranked) > most:
-        lines.append(f"  and {len(ranked) - most} smaller ones")
-    return "\n".join(lines)
+    if inspection.cut:
+        lines.append(f"half     it ends flat along {inspection.cut}, as one half of a target does")
+    if inspection.category == "Bird":
+        lines.append(f"wings    may begin {inspection.shoulder_m:.4g} m right and left of the middle")
+    lines += ["", "named pieces (for `geometry:`)"]
+    lines += [f"  {name!r}: {count} triangles, {_size(extent)} m" for name, count, extent in inspection.pieces]
+    lines += ["", "connected components (for `region:` with `whole: true`)"]
+    ranked = sorted(enumerate(inspection.components, 1), key=lambda item: (not item[1].guess, -item[1].extent.max()))
+    for number, part in ranked[:most]:
+        guess, surface = f"  may be a {part.guess}" * bool(part.guess), "closed" if part.closed else "open"
+        lines.append(f"  {number} {part.piece!r}: {part.triangles} triangles, {_size(part.extent)} m at "
+                     f"{np.round(part.centre, 4).tolist()}, {surface}{guess}")  # fmt: skip
+    return "\n".join([*lines, *([f"  and {len(ranked) - most} smaller ones"] if len(ranked) > most else [])])

@@ -1,9 +1,34 @@
 """A target's calibration point cloud from its record, whatever source the record names."""
 
+import os
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
+from lowalt.config.command import parser, pick
 from lowalt.files.errors import InputError
+from lowalt.machine.environment import INPUTS
 from lowalt.targets.cloud import Cloud, check
+
+SOURCES = ("builtin", "mesh", "mocap", "gait")
+"""What clouds are made from; a source's module has `check_record(merged, where)` and `SOURCE_cloud`."""
+
+
+def source_module(source: str) -> ModuleType:
+    """Return the module of a source. It is imported only here: a built-in cloud does not wait for pymeshlab."""
+    return import_module(f"lowalt.targets.{source}")
+
+
+def refuse_source(record: dict, inputs: Path | None) -> None:
+    """Refuse a record of an unknown source, and one of files where there is no folder of `inputs`.
+
+    Raises: InputError naming the source or the subtype.
+    """
+    source = record.get("source")
+    if source not in SOURCES:
+        raise InputError(f"settings: record.source is {source!r}, expected one of {SOURCES}")
+    if source in ("mesh", "mocap") and inputs is None:
+        raise InputError(f"{record['subtype']}: source {source} needs the folder of real inputs, expected --inputs DIR")
 
 
 def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
@@ -11,29 +36,20 @@ def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
 
     Raises: InputError where the record or an input is wrong, or a folder is needed and none is given.
     """
-    return check(_made(record, inputs, seed), record["subtype"])
+    refuse_source(record, inputs)
+    source = record["source"]
+    of_files = (inputs,) if source in ("mesh", "mocap") else ()
+    cloud_of = getattr(source_module(source), f"{source}_cloud")
+    return check(cloud_of(record, *of_files, seed), record["subtype"])
 
 
-def _made(record: dict, inputs: Path | None, seed: int) -> Cloud:
-    """Return the cloud of a merged record, unchecked; arguments and errors as `make`."""
-    # Each source imports its own modules, so that a built-in cloud does not wait for the import of pymeshlab.
-    source = record.get("source")
-    if source == "builtin":
-        from lowalt.targets.builtin import builtin_cloud
-
-        return builtin_cloud(record, seed)
-    if source == "gait":
-        from lowalt.targets.gait import gait_cloud
-
-        return gait_cloud(record, seed)
-    if source not in ("mesh", "mocap"):
-        raise InputError(f"settings: record.source is {source!r}, expected builtin, mesh, mocap or gait")
-    if inputs is None:
-        raise InputError(f"{record['subtype']}: source {source} needs the folder of real inputs, expected --inputs DIR")
-    if source == "mesh":
-        from lowalt.targets.mesh import mesh_cloud
-
-        return mesh_cloud(record, inputs, seed)
-    from lowalt.targets.mocap import mocap_cloud
-
-    return mocap_cloud(record, inputs, seed)
+def options(module: str, description: str, arguments: list[str]) -> tuple[dict, Path | None, int, Path]:
+    """Return record, folder of inputs, seed and output file of a command line of this stage."""
+    line = parser(module, description)
+    folder = os.environ.get(INPUTS)
+    help_text = f"folder of the meshes and recordings the record names (default: ${INPUTS})"
+    line.add_argument("--inputs", type=Path, default=folder and Path(folder), help=help_text)
+    line.add_argument("--out", required=True, type=Path, help="file to write (.npz)")
+    asked = line.parse_args(arguments)
+    seed, record = pick(asked.settings, "seed", "record")
+    return record, asked.inputs, seed, asked.out

@@ -83,12 +83,12 @@ def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     def name(element: ElementTree.Element, above: list[str]) -> None:
         """Name the geometries below an element by their node, or by the nearest above it that has a name."""
         for child in element:
-            told = [child.get(key) for key in ("name", "id") if child.get(key)] if _name(child) == "node" else []
+            of_node = [child.get(key) for key in ("name", "id") if child.get(key)] if _name(child) == "node" else []
             if _name(child) == "instance_geometry":
                 key = child.get("url", "")[1:]
-                own = elements[key].get("name") if key in elements else None
-                names.setdefault(key, []).extend([*above, *([own] if own else [])])
-            name(child, told or above)
+                of_geometry = elements[key].get("name") if key in elements else None
+                names.setdefault(key, []).extend([*above, *filter(None, [of_geometry])])
+            name(child, of_node or above)
 
     name(root, [])
     return ElementTree.tostring(root), names
@@ -107,7 +107,7 @@ def _cut(element: ElementTree.Element, elements: dict) -> None:
     lists = [np.array((child.text or "").split(), int).reshape(-1, width) for child in element if _name(child) == "p"]
     rows = np.concatenate(lists)
     count = next((child for child in element if _name(child) == "vcount"), None)
-    counts = np.array([len(one) for one in lists] if count is None else (count.text or "").split(), int)
+    counts = np.array([len(polygon) for polygon in lists] if count is None else (count.text or "").split(), int)
     # Corners, not vertices, so that their other numbers (normals, colours) go along.
     faces, _ = triangulated(vertices[rows[:, int(vertex.get("offset", 0))]], counts, np.arange(len(rows)))
     for child in [child for child in element if _name(child) in ("vcount", "p", "ph")]:

@@ -18,6 +18,7 @@ from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import stated_metres
 from lowalt.targets.mesh_obj import stated_unit
 from lowalt.targets.mesh_scene import selected
+from lowalt.targets.surfaces import Surface, merged
 
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
@@ -29,31 +30,19 @@ SAME_UNIT = 1e-6
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """A repaired triangle surface: `vertices` (V, 3) in metres along the file's axes, `faces` (F, 3) in right-hand
-    order, `component` (F,) the number of each face's connected component, `closed` (C,) whether it is watertight."""
+class Mesh(Surface):
+    """A repaired surface in metres along the file's axes: `component` (F,) the number of each face's connected
+    component, `closed` (C,) whether it is watertight."""
 
-    vertices: np.ndarray
-    faces: np.ndarray
     component: np.ndarray
     closed: np.ndarray
-
-    def mapped(self, matrix: np.ndarray, offset: np.ndarray) -> "Mesh":
-        """Return the mesh under x -> matrix @ x + offset; a mirroring matrix turns the faces: normals stay outward."""
-        faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
-        return Mesh(portable.applied(matrix, self.vertices) + offset, faces, self.component, self.closed)
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
     """Return several meshes as one, components numbered on."""
-    vertices = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    components = np.cumsum([0] + [len(mesh.closed) for mesh in meshes[:-1]])
-    return Mesh(
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, vertices, strict=True)]),
-        np.concatenate([mesh.component + start for mesh, start in zip(meshes, components, strict=True)]),
-        np.concatenate([mesh.closed for mesh in meshes]),
-    )
+    whole, first = merged(meshes), np.cumsum([0] + [len(mesh.closed) for mesh in meshes[:-1]])
+    component = np.concatenate([mesh.component + start for mesh, start in zip(meshes, first, strict=True)])
+    return Mesh(whole.vertices, whole.faces, component, np.concatenate([mesh.closed for mesh in meshes]))
 
 
 def metres(unit: str | float) -> float:
@@ -72,16 +61,6 @@ def stated_unit_m(path: Path) -> float | None:
     if kind == ".obj":
         return UNITS_M.get(stated_unit(path))
     return stated_metres(path) if kind == ".dae" else 1.0 if kind == ".glb" else None
-
-
-def _triangles(path: Path, geometry: list[str] | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices (V, 3) in file units and faces (F, 3) of a file, or of the named pieces of its scene."""
-    parts = selected(path, geometry)
-    if not parts:
-        raise InputError(f"{path}: has no triangle, expected a surface")
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
-    return np.concatenate([part.vertices for part in parts]).astype(float), faces.astype(np.int64)
 
 
 def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -124,14 +103,6 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
     return np.array(mesh.vertex_matrix()), np.array(mesh.face_matrix()).astype(np.int64)
 
 
-def components(faces: np.ndarray, vertices: int) -> np.ndarray:
-    """Return each face's connected component (F,), faces that share a vertex being connected."""
-    links = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(vertices, vertices))
-    _, label = connected_components(graph, directed=False)
-    return np.unique(label[faces[:, 0]], return_inverse=True)[1]
-
-
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the edges (E, 2) of triangles (F, 3) by their vertices, one triangle that each bounds, and how many do."""
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
@@ -140,16 +111,20 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return edges[first], first % len(faces), uses
 
 
-def _outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the faces with closed components turned outward, and whether each component is closed (C,)."""
-    count = int(component.max()) + 1
+def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+    """Return a surface with its connected components, faces that share a vertex being connected, and each closed
+    component turned outward."""
+    links = np.concatenate([faces[:, :2], faces[:, 1:]])
+    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(len(vertices), len(vertices)))
+    label = connected_components(graph, directed=False)[1]
+    component = np.unique(label[faces[:, 0]], return_inverse=True)[1]
+    closed = np.ones(int(component.max()) + 1, bool)
     _, face, uses = edges_of(faces)
-    closed = np.ones(count, bool)
     closed[component[face[uses != 2]]] = False
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=count)
+    volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=len(closed))
     inverted = closed & (volume < 0)
-    return np.where(inverted[component][:, None], faces[:, ::-1], faces), closed
+    return Mesh(vertices, np.where(inverted[component][:, None], faces[:, ::-1], faces), component, closed)
 
 
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
@@ -165,7 +140,11 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     path = existing(path, "mesh")
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
-    vertices, faces = _triangles(path, geometry)
+    pieces = selected(path, geometry)
+    if not pieces:
+        raise InputError(f"{path}: has no triangle, expected a surface")
+    whole = merged(pieces)
+    vertices, faces = np.asarray(whole.vertices, float), np.asarray(whole.faces, np.int64)
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
         text = f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record is followed"
@@ -180,6 +159,4 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     vertices, faces = _repaired(vertices, faces)
     if len(faces) < 4:
         raise InputError(f"{path}: {len(faces)} triangles with an area, expected a surface of at least 4")
-    component = components(faces, len(vertices))
-    faces, closed = _outward(vertices, faces, component)
-    return Mesh(vertices, faces, component, closed)
+    return _mesh(vertices, faces)

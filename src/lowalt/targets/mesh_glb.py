@@ -4,16 +4,17 @@ trimesh leaves normalised integers, skins and morphs out; pygltflib hands on the
 reader ends the process on a skin. Source: Khronos, glTF 2.0 (sections 3.6, 3.7, 4.4) and KHR_mesh_quantization.
 """
 
-import base64
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
-from lowalt.targets.mesh_polygons import stripped
+from lowalt.targets.mesh_polygons import Piece, stripped
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -39,34 +40,29 @@ class _Glb:
     def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
         """`count` elements of `width` numbers of a buffer view, as they are stored."""
         view = self.list("bufferViews")[_natural(index)]
-        buffer = self.list("buffers")[_natural(view["buffer"])]
-        data = self.binary
-        if "uri" in buffer:
-            head, _, text = buffer["uri"].partition(";base64,")
-            if not head.startswith("data:"):
-                raise ValueError("its data lies in another file, expected all in one")
-            data = base64.b64decode(text)
-        step = view.get("byteStride") or np.dtype(kind).itemsize * width
-        start, end = _natural(view.get("byteOffset", 0)), _natural(view["byteLength"])
+        if "uri" in self.list("buffers")[_natural(view["buffer"])]:
+            raise ValueError("its data lies in another file, expected all in one")
+        start, length = _natural(view.get("byteOffset", 0)), _natural(view["byteLength"])
+        data, size = self.binary[start : start + length], np.dtype(kind).itemsize
         # NumPy refuses a shape that leaves the bytes of the view.
-        return np.ndarray((count, width), kind, data[start : start + end], offset, (step, np.dtype(kind).itemsize))
+        return np.ndarray((count, width), kind, data, offset, (view.get("byteStride") or size * width, size))
 
     def array(self, index: int) -> np.ndarray:
         """An accessor's numbers (count, width); normalised integers become fractions."""
-        given = self.list("accessors")[_natural(index)]
-        kind, width, count = TYPES[given["componentType"]], WIDTHS[given["type"]], _natural(given["count"])
+        accessor = self.list("accessors")[_natural(index)]
+        kind, width, count = TYPES[accessor["componentType"]], WIDTHS[accessor["type"]], _natural(accessor["count"])
         if count * width > MOST_VALUES:
             raise ValueError(f"an array of {count * width} numbers, expected at most {MOST_VALUES}")
-        if "bufferView" in given:
-            values = self._view(given["bufferView"], kind, width, count, _natural(given.get("byteOffset", 0))).copy()
+        if "bufferView" in accessor:
+            offset = _natural(accessor.get("byteOffset", 0))
+            values = self._view(accessor["bufferView"], kind, width, count, offset).copy()
         else:
             values = np.zeros((count, width), kind)
-        if "sparse" in given:
-            sparse = given["sparse"]
+        if sparse := accessor.get("sparse"):
             at, new = sparse["indices"], sparse["values"]
             rows = self._view(at["bufferView"], TYPES[at["componentType"]], 1, sparse["count"], at.get("byteOffset", 0))
             values[rows[:, 0]] = self._view(new["bufferView"], kind, width, sparse["count"], new.get("byteOffset", 0))
-        if given.get("normalized") and kind != "<f4":
+        if accessor.get("normalized") and kind != "<f4":
             return np.maximum(values / np.iinfo(kind).max, -1.0)
         return values
 
@@ -75,15 +71,15 @@ class _Glb:
         nodes, scenes = self.list("nodes"), self.list("scenes")
         roots = scenes[_natural(self.json.get("scene", 0))].get("nodes", []) if scenes else range(len(nodes))
         inner = set() if scenes else {child for node in nodes for child in node.get("children", [])}
-        found: dict[int, np.ndarray] = {}
+        places: dict[int, np.ndarray] = {}
         waiting = [(root, np.eye(4)) for root in roots if root not in inner]
         while waiting:
             index, above = waiting.pop()
-            if _natural(index) in found:
+            if _natural(index) in places:
                 raise ValueError(f"node {index} hangs on two nodes")
-            found[index] = portable.product(above, _local(nodes[index]))
-            waiting += [(child, found[index]) for child in nodes[index].get("children", [])]
-        return dict(sorted(found.items()))
+            places[index] = portable.product(above, _local(nodes[index]))
+            waiting += [(child, places[index]) for child in nodes[index].get("children", [])]
+        return dict(sorted(places.items()))
 
     def vertices(self, primitive: dict, node: dict, weights: list) -> np.ndarray:
         """A primitive's vertices (V, 3) before they are placed, morphed by the node's or the mesh's weights."""
@@ -103,9 +99,7 @@ class _Glb:
             bind = self.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2).astype(float)
         moves = np.stack([portable.product(places[joint], bind[row]) for row, joint in enumerate(joints)])
         result, total = np.zeros_like(points), np.zeros(len(points))
-        for group in range(4):
-            if f"JOINTS_{group}" not in attributes:
-                break
+        for group in range(sum(name.startswith("JOINTS_") for name in attributes)):
             which, weights = (self.array(attributes[f"{name}_{group}"]) for name in ("JOINTS", "WEIGHTS"))
             for column in range(which.shape[1]):
                 move, weight = moves[which[:, column].astype(int)], weights[:, column].astype(float)
@@ -140,20 +134,14 @@ def _local(node: dict) -> np.ndarray:
     """A node's own place (4, 4): its matrix, or its translation, rotation and scale."""
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
-    place = np.eye(4)
-    x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
-    turn = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    place, turn = np.eye(4), Rotation.from_quat(node.get("rotation", [0, 0, 0, 1])).as_matrix()
     place[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
     place[:3, 3] = node.get("translation", [0, 0, 0])
     return place
 
 
-def read_glb(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
-    """Return names (the node's, the mesh's), vertices (V, 3) and faces (F, 3) of each surface of the scene shown.
+def read_glb(path: Path) -> list[Piece]:
+    """Return each surface of the scene shown, by the names of its node and its mesh.
 
     Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions for a damaged file.
     """
@@ -161,7 +149,7 @@ def read_glb(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]
     for name, word in COMPRESSED.items():
         if name in glb.list("extensionsRequired"):
             raise InputError(f"{path}: is compressed by {word}, expected a plain GLB: export it without compression")
-    places, result, taken = glb.placed(), [], set()
+    places, pieces, taken = glb.placed(), [], set()
     for index, place in places.items():
         node = glb.list("nodes")[index]
         if "mesh" not in node:
@@ -175,13 +163,12 @@ def read_glb(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]
             if "POSITION" not in primitive["attributes"]:
                 continue
             points = glb.vertices(primitive, node, mesh.get("weights", []))
-            faces = glb.faces(primitive, len(points))
+            numbered = (f"{name} {number}",) if len(mesh["primitives"]) > 1 else ()
+            piece = Piece(points, glb.faces(primitive, len(points)), (*numbered, name, shape))
             if "skin" in node and "JOINTS_0" in primitive["attributes"]:
-                points = glb.skinned(points, primitive, glb.list("skins")[_natural(node["skin"])], places)
+                skin = glb.list("skins")[_natural(node["skin"])]
+                piece = replace(piece, vertices=glb.skinned(points, primitive, skin, places))
             else:
-                points = portable.applied(place[:3, :3], points) + place[:3, 3]
-                faces = faces[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else faces
-            if len(faces):
-                more = (f"{name} {number}",) if len(mesh["primitives"]) > 1 else ()
-                result.append(((*more, name, shape), points, faces))
-    return result
+                piece = piece.mapped(place[:3, :3]).moved(place[:3, 3])
+            pieces.append(piece)
+    return pieces

@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.targets.mesh_polygons import triangulated
+from lowalt.targets.mesh_polygons import Piece, triangulated
 
 NAMES = ("o", "g", "usemtl")
 
 
-def read_obj(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
-    """Return names, vertices (V, 3) and faces (F, 3) of each object, group and material of a file.
+def read_obj(path: Path) -> list[Piece]:
+    """Return the surface of each object, group and material of a file.
 
     Raises: InputError naming the file and the line that cannot be read, or the face that has no such vertex.
     """
     places: list[list[float]] = []
     corners: list[int] = []
     counts: list[int] = []
-    owner: list[int] = []
+    owners: list[int] = []
     keys: dict[tuple[str, ...], int] = {}
     now = dict.fromkeys(NAMES, "")
     text = path.read_text(encoding="utf-8-sig", errors="replace").replace("\\\n", " ")
@@ -31,15 +31,14 @@ def read_obj(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]
         word, _, rest = line.strip().partition(" ")
         try:
             if word == "v":
-                places.append([float(value) for value in rest.split()[:3]])
-                if len(places[-1]) != 3:
-                    raise ValueError("fewer than three coordinates")
+                x, y, z = map(float, rest.split()[:3])
+                places.append([x, y, z])
             elif word == "f":
                 face = [int(corner.split("/", 1)[0]) for corner in rest.split("#", 1)[0].split()]
                 # A negative index counts back from the vertices so far.
                 corners += [index - 1 if index > 0 else len(places) + index if index else -1 for index in face]
                 counts.append(len(face))
-                owner.append(keys.setdefault(tuple(now.values()), len(keys)))
+                owners.append(keys.setdefault(tuple(now.values()), len(keys)))
             elif word in NAMES:
                 now[word] = rest.strip()
         except (ValueError, OverflowError) as error:
@@ -47,20 +46,19 @@ def read_obj(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]
     vertices = np.array(places, float).reshape(-1, 3)
     try:
         faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
-    except (InputError, OverflowError) as error:
+    except OverflowError as error:
         raise InputError(f"{path}: {error}") from None
-    of = np.array(owner, int)[polygon]
+    owner, pieces = np.array(owners, int)[polygon], []
     # trimesh's own names of materials, from the last to the first, which records may have.
-    base, result = next((names[0] for names in keys if names[0]), path.name), []
+    base = next((names[0] for names in keys if names[0]), path.name)
     materials = list(dict.fromkeys(names[2] for names in keys))[::-1]
     older = {name: f"{base}_{index}" if index else base for index, name in enumerate(materials)}
     for names, index in keys.items():
-        used, inverse = np.unique(faces[of == index], return_inverse=True)
-        if len(used):
-            known = [name for name in names if name] or [path.name]
-            known += [older[names[2]]] if len(materials) > 1 and older[names[2]] not in {key[0] for key in keys} else []
-            result.append((tuple(dict.fromkeys(known)), vertices[used], inverse.reshape(-1, 3)))
-    return result
+        used, inverse = np.unique(faces[owner == index], return_inverse=True)
+        known = [name for name in names if name] or [path.name]
+        known += [older[names[2]]] if len(materials) > 1 and older[names[2]] not in {key[0] for key in keys} else []
+        pieces.append(Piece(vertices[used], inverse.reshape(-1, 3), tuple(dict.fromkeys(known))))
+    return pieces
 
 
 def stated_unit(path: Path) -> str:
@@ -72,8 +70,8 @@ def stated_unit(path: Path) -> str:
              "in": "inch(?:es)?|in", "ft": "f(?:ee|oo)t|ft"}  # fmt: skip
     with path.open(errors="replace") as file:
         for line, _ in zip(file, range(200), strict=False):
-            found = re.match(r"\s*#.*\bunits?\b\W*(?:(?:in|is|are)\b)?\W*1?\W*([a-z]+)", line, re.IGNORECASE)
-            for unit, pattern in words.items() if found else ():
-                if re.fullmatch(pattern, found[1], re.IGNORECASE):
+            stated = re.match(r"\s*#.*\bunits?\b\W*(?:(?:in|is|are)\b)?\W*1?\W*([a-z]+)", line, re.IGNORECASE)
+            for unit, pattern in words.items() if stated else ():
+                if re.fullmatch(pattern, stated[1], re.IGNORECASE):
                     return unit
     return ""

@@ -1,18 +1,20 @@
 """From repaired meshes to parts: placing, cutting regions, finding hinges. All in metres along the file's axes.
 
 A part is a pool of dense samples of its surface. This module decides which samples belong to which part; `mesh_size`
-scales and moves the target later. Pure functions over arrays.
+scales and moves the target later.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.numerics.matrices import thinnest
-from lowalt.targets.mesh_files import Mesh
+from lowalt.targets.mesh_files import Mesh, joined, read_mesh
 from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation
 
@@ -30,8 +32,8 @@ class Pool:
     component: np.ndarray
     corners: int
     area: float
-    hinge: np.ndarray
-    axis: np.ndarray
+    hinge: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    axis: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
 
     def picked(self, mask: np.ndarray) -> "Pool":
         """Return the samples of a mask (N,), in their order."""
@@ -41,15 +43,18 @@ class Pool:
         )  # fmt: skip
 
 
-def placed(mesh: Mesh, item: dict) -> Mesh:
-    """Return the mesh mirrored, turned and moved as its item of the record says, in that order."""
-    matrix = np.eye(3)
-    if "mirror" in item:
-        matrix["xyz".index(item["mirror"])] *= -1
-    turns = item.get("turn", [])
-    for turn in turns if isinstance(turns, list) else [turns]:
-        matrix = portable.product(rotation(turn["axis"], np.radians(turn["deg"])), matrix)
-    return mesh.mapped(matrix, np.array(item.get("move", [0.0, 0, 0])))
+def surface(part: dict, record: dict, inputs_dir: Path) -> Mesh:
+    """Return the meshes of a part's files as one, each mirrored, turned and moved as the record says, in that order."""
+    meshes = []
+    for item in part["meshes"]:
+        mesh = read_mesh(inputs_dir / item["file"], item.get("unit", record["unit"]), item.get("geometry"))
+        matrix, turns = np.eye(3), item.get("turn", [])
+        if "mirror" in item:
+            matrix["xyz".index(item["mirror"])] *= -1
+        for turn in turns if isinstance(turns, list) else [turns]:
+            matrix = portable.product(rotation(turn["axis"], np.radians(turn["deg"])), matrix)
+        meshes.append(mesh.mapped(matrix).moved(item.get("move", [0.0, 0, 0])))
+    return joined(meshes)
 
 
 def pool_of(mesh: Mesh, count: int, rng: np.random.Generator) -> Pool:
@@ -63,10 +68,8 @@ def pool_of(mesh: Mesh, count: int, rng: np.random.Generator) -> Pool:
     corners = np.unique(np.concatenate([along.argmin(axis=0), along.argmax(axis=0)]))
     face = np.concatenate([corners // 3, face])
     normals, areas = face_normals(mesh.vertices, mesh.faces)
-    return Pool(
-        np.concatenate([along[corners], points]), normals[face], mesh.component[face], len(corners),
-        float(portable.total(areas)), np.full(3, np.nan), np.full(3, np.nan),
-    )  # fmt: skip
+    points, area = np.concatenate([along[corners], points]), float(portable.total(areas))
+    return Pool(points, normals[face], mesh.component[face], len(corners), area)
 
 
 def inside(points: np.ndarray, region: dict) -> np.ndarray:
@@ -111,13 +114,62 @@ def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) 
     Raises: InputError naming `where` and the two parts.
     """
     masks = {name: taken(pool, mesh, region) for name, region in regions.items()}
-    for (one, left), (other, right) in combinations(masks.items(), 2):
+    for (first, left), (second, right) in combinations(masks.items(), 2):
         shared, smaller = int((left & right).sum()), min(int(left.sum()), int(right.sum()))
         if shared > SHARED_LIMIT * smaller:
+            raise InputError(f"{where}: the regions of parts {first!r} and {second!r} take the same surface ({shared} "
+                             f"of {smaller} samples), expected disjoint regions")  # fmt: skip
+
+
+def _made_wheel(part: dict, samples: tuple[np.ndarray, np.ndarray], frame: np.ndarray) -> Pool:
+    """Return the pool of a made wheel at its hinge, in the file's axes, mirrored on the left."""
+    diameter, width, hinge = *_wheel_size(part), np.array(part["hinge"], float)
+    side = np.array([np.sign(portable.dot(frame[0], hinge)) or 1.0, 1, 1])
+    points, normals = (portable.applied(frame.T, array * side) for array in samples)
+    area = np.pi * diameter * (diameter / 2 + width)
+    # `sample_part` puts the points that bound the wheel first, six of them.
+    return Pool(points + hinge, normals, np.zeros(len(points), np.int64), 6, area)
+
+
+def _wheel_size(part: dict) -> tuple[float, float]:
+    """Return diameter and width (m) of a wheel that the record asks to be made."""
+    return part["wheel"]["diameter_m"], part["wheel"]["width_m"]
+
+
+def cut_parts(
+    record: dict, inputs_dir: Path, frame: np.ndarray, sampled: Callable[[Mesh, bool], Pool],
+    wheel: Callable[[float, float], tuple[np.ndarray, np.ndarray]],
+) -> tuple[dict[str, Pool], Mesh]:  # fmt: skip
+    """Return the pool of every part of a checked mesh record by name, the body first, and the mesh of the body.
+
+    sampled: gives the pool of a mesh and whether it is the body; wheel: gives points and normals (N, 3) of a made right
+    wheel at the origin, in body axes, from its diameter and width (m); frame (3, 3): body axes in the file's.
+    Raises: InputError naming the file, or the part whose region holds nothing.
+    """
+    where = record["subtype"]
+    (body_name, body_part), *moving = record["parts"].items()
+    mesh = surface(body_part, record, inputs_dir)
+    body, pools = sampled(mesh, True), {}
+    made = {size: wheel(*size) for size in dict.fromkeys(_wheel_size(part) for _, part in moving if "wheel" in part)}
+    for name, part in moving:
+        if "region" in part:
+            pools[name], body = cut(body, mesh, part["region"])
+        elif "wheel" in part:
+            pools[name] = _made_wheel(part, made[_wheel_size(part)], frame)
+        else:
+            pools[name] = sampled(surface(part, record, inputs_dir), False)
+        if not len(pools[name].points):
+            low, high = ([float(f"{value:.3g}") for value in limit]
+                         for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)))  # fmt: skip
             raise InputError(
-                f"{where}: the regions of parts {one!r} and {other!r} take the same surface ({shared} of {smaller} "
-                "samples), expected disjoint regions"
+                f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface, which "
+                f"reaches from {low} to {high} m; is the unit {record['unit']!r} right?"
             )
+    for region in record["drop"]:
+        body = cut(body, mesh, region)[1]
+    if not len(body.points):
+        raise InputError(f"{where}: regions and drop leave nothing of {body_name}, expected a body")
+    return {body_name: body, **pools}, mesh
 
 
 def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str) -> Pool:
@@ -130,25 +182,20 @@ def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str
     (3,) are the target's, in the file's axes.
     Raises: InputError naming `where` for too few samples to find an axis.
     """
-    right = np.cross(front, up)
-    hinge, axis = part.get("hinge", "found"), part.get("axis", "found")
-    centre = portable.mean(pool.points, 0) if len(pool.points) else np.zeros(3)
+    right, kind = np.cross(front, up), part["kind"]
+    hinge, axis = part.get("hinge", "found"), part.get("axis", {"wheel": right, "wing": front}.get(kind, "found"))
+    centre = portable.mean(pool.points, 0)
     if isinstance(hinge, str):
-        hinge = centre
-        if part["kind"] == "wheel":
-            hinge = (pool.points.min(axis=0) + pool.points.max(axis=0)) / 2
-    hinge = np.array(hinge, float)
-    if "axis" not in part and part["kind"] != "rotor":
-        axis = front if part["kind"] == "wing" else right
+        hinge = (pool.points.min(axis=0) + pool.points.max(axis=0)) / 2 if kind == "wheel" else centre
     if isinstance(axis, str):
         if len(pool.points) < 4:
             raise InputError(f"{where}: {len(pool.points)} samples, expected enough to find an axis")
         axis = thinnest(pool.points - centre)
-    axis = np.array(axis, float)
+    hinge, axis = np.array(hinge, float), np.array(axis, float)
     axis = axis / portable.norm(axis)
-    if part["kind"] == "rotor":
+    if kind == "rotor":
         axis = axis * np.sign(portable.dot(axis, up) or 1) * (-1 if part.get("sense") == "cw" else 1)
-    elif part["kind"] == "wheel":
+    elif kind == "wheel":
         axis = axis * -np.sign(portable.dot(axis, right) or 1)
     else:
         out = portable.dot(centre - hinge, right)

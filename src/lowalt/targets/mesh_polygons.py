@@ -1,9 +1,22 @@
-"""Polygons and strips of triangles as viewers show them: a polygon with a dent is cut by earcut, not as a fan."""
+"""Pieces of mesh files, their polygons and strips of triangles, as viewers show them: a polygon with a dent is cut by
+earcut, not as a fan."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
+from lowalt.targets.surfaces import Surface
+
+
+@dataclass(frozen=True)
+class Piece(Surface):
+    """A named surface as it stands in the file, `vertices` in file units. `names` are all those that it can be chosen
+    by, its own first: a place in the scene and the shape there, or the object, group and material of an OBJ file."""
+
+    names: tuple[str, ...]
+
 
 FLAT = 1e-9
 """A corner dents its polygon where its turn against the polygon's sense is more than this share of the area."""

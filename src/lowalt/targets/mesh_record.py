@@ -1,8 +1,7 @@
 """The keys and values of a mesh record, checked before any file is opened.
 
-All places are along the axes of the mesh file, before scaling, in metres, or with `lengths: file` in the record's
-unit; a checked record has metres. The order of keys and parts changes nothing. `records.schema.yaml` lists the keys
-with their meaning.
+All places are along the axes of the mesh file, before scaling, in metres. The order of keys and parts changes nothing.
+`records.schema.yaml` lists the keys with their meaning.
 """
 
 import numpy as np
@@ -11,8 +10,6 @@ from lowalt.config.classes import like
 from lowalt.files.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.cloud import MOST_TURNING_PARTS
-from lowalt.targets.input_files import check_file_name, record_files
-from lowalt.targets.mesh_files import UNITS_M
 
 SIZES = ("motor diagonal", "length", "width", "height", "largest extent")
 ALL_AXES = "length, width and height"
@@ -43,16 +40,6 @@ def ordered_parts(parts: dict[str, dict]) -> dict[str, dict]:
     return {name: parts[name] for name in result}
 
 
-def _ancestors(name: str, parts: dict[str, dict]) -> list[str]:
-    """The parent of a part, the parent's parent and so on; it ends at a name that occurs twice."""
-    found = [name]
-    while (parent := parts.get(found[-1], {}).get("parent")) is not None:
-        found.append(parent)
-        if found.count(parent) > 1:
-            break
-    return found[1:]
-
-
 def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) -> str | None:
     """Return the fault of a part whose form is right, or None."""
     kind = part["kind"]
@@ -67,45 +54,22 @@ def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) ->
     if "sense" in part and kind != "rotor":
         return "sense is for rotors"
     if "parent" in part:
-        moving = sorted(other for other, found in parts.items() if found["kind"] != "body" and other != name)
+        moving = sorted(other for other in parts if parts[other]["kind"] != "body" and other != name)
         if part["parent"] not in moving:
             return f"parent is {part['parent']!r}, expected one of {moving}"
-        if name in _ancestors(name, parts):
+        above = [part["parent"]]
+        while above[-1] != name and (parent := parts.get(above[-1], {}).get("parent")) not in (None, *above):
+            above.append(parent)
+        if name in above:
             return f"parent is {part['parent']!r}, which hangs on {name!r} itself, expected no circle"
     if isinstance(part.get("axis"), list) and not any(part["axis"]):
         return "axis is zero, expected a direction"
     return None
 
 
-def in_metres(record: dict) -> dict:
-    """Return a record whose hinges, regions and moves are in metres, whatever its key `lengths` says they are in."""
-    if record.get("lengths", "m") == "m":
-        return record
-    unit = record["unit"]
-    factor = UNITS_M[unit] if isinstance(unit, str) else unit
-
-    def scaled(value: object) -> object:
-        """Return lengths times the factor in nested lists and mappings; names and flags stay."""
-        if isinstance(value, dict):
-            return {key: item if key in ("axis", "whole") else scaled(item) for key, item in value.items()}
-        if isinstance(value, list):
-            return [scaled(item) for item in value]
-        return factor * value if isinstance(value, (int, float)) else value
-
-    def part_in_metres(part: dict) -> dict:
-        """Return a part whose hinge, region and moves are in metres."""
-        places = {key: scaled(part[key]) for key in ("region", "hinge") if key in part}
-        meshes = [mesh | {"move": scaled(mesh["move"])} if "move" in mesh else mesh for mesh in part.get("meshes", [])]
-        return part | places | ({"meshes": meshes} if meshes else {})
-
-    parts = {name: part_in_metres(part) for name, part in record["parts"].items()}
-    return record | {"parts": parts, "drop": scaled(record.get("drop", [])), "lengths": "m"}
-
-
-def check_record(merged: dict, extra: dict, where: str) -> dict:
+def check_record(merged: dict, where: str) -> dict:
     """Return the merged record of a mesh, checked, with its defaults.
 
-    `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
     category = like(merged)
@@ -120,18 +84,12 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     if turning > MOST_TURNING_PARTS:
         raise InputError(f"{where}: parts: {turning} rotors or wheels, expected at most {MOST_TURNING_PARTS}")
     for name, part in merged["parts"].items():
-        fault = _part_fault(name, part, merged["parts"], category)
-        if fault:
+        if fault := _part_fault(name, part, merged["parts"], category):
             raise InputError(f"{where}: parts.{name}: {fault}")
-    sizes = (ALL_AXES,) if category == "Vehicle" else SIZES
-    size = merged.get("size_is", ALL_AXES if category == "Vehicle" else None)
+    of_vehicle = {"size_is": ALL_AXES, "wheel_size": "published"} if category == "Vehicle" else {}
+    result = DEFAULTS | {"moving_share": MOVING_SHARE[category]} | of_vehicle | merged
+    result["parts"] = ordered_parts(merged["parts"])
+    size, sizes = result.get("size_is"), (ALL_AXES,) if of_vehicle else SIZES
     if size not in sizes:
         raise InputError(f"{where}: size_is is {size!r}, expected one of {sizes} for a {category}")
-    result = DEFAULTS | {"moving_share": MOVING_SHARE[category]} | merged | {"size_is": size}
-    result["parts"] = ordered_parts(merged["parts"])
-    result = in_metres(result)
-    if category == "Vehicle":
-        result.setdefault("wheel_size", "published")
-    for name in record_files(result):
-        check_file_name(name, f"{where}: file")
     return result

@@ -8,34 +8,20 @@ no target.
 import io
 import logging
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import for_trimesh
 from lowalt.targets.mesh_glb import read_glb
 from lowalt.targets.mesh_obj import read_obj
 from lowalt.targets.mesh_ply import read_ply
+from lowalt.targets.mesh_polygons import Piece
 
 
-@dataclass(frozen=True)
-class Piece:
-    """A named surface as it stands in the file: `vertices` (V, 3) in file units, `faces` (F, 3) in right-hand order.
-
-    `names` are all those that it can be chosen by, its own first: a place in the scene and the shape there, or the
-    object, group and material of an OBJ file.
-    """
-
-    names: tuple[str, ...]
-    vertices: np.ndarray
-    faces: np.ndarray
-
-
-def _scene(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
-    """Names, vertices and faces of the surfaces of an STL or DAE file, by trimesh."""
+def _scene(path: Path) -> list[Piece]:
+    """The surfaces of an STL or DAE file, by trimesh."""
     import trimesh  # slow to import, and only records with a mesh need it
 
     # trimesh logs a traceback of every optional reader that it cannot import; failures are raised below.
@@ -51,12 +37,11 @@ def _scene(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
         place, mesh = np.round(place, 12), scene.geometry[name]
         if not isinstance(mesh, trimesh.Trimesh):
             continue
+        more = next((named for key, named in names.items() if re.fullmatch(re.escape(key) + r"(_\d+)?", name)), [])
+        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), tuple(dict.fromkeys((str(node), name, *more))))
         # Values that are not finite are refused later, by name.
         with np.errstate(invalid="ignore"):
-            vertices = portable.applied(place[:3, :3], mesh.vertices) + place[:3, 3]
-        faces = np.asarray(mesh.faces)[:, :: -1 if np.linalg.det(place[:3, :3]) < 0 else 1]
-        more = next((found for key, found in names.items() if re.fullmatch(re.escape(key) + r"(_\d+)?", name)), [])
-        result.append((tuple(dict.fromkeys((str(node), name, *more))), vertices, faces))
+            result.append(piece.mapped(place[:3, :3]).moved(place[:3, 3]))
     return result
 
 
@@ -67,7 +52,7 @@ def pieces(path: Path) -> list[Piece]:
     """
     read = {".obj": read_obj, ".glb": read_glb, ".ply": read_ply}.get(path.suffix.lower(), _scene)
     try:
-        return [Piece(names, vertices, faces) for names, vertices, faces in read(path) if len(faces)]
+        return [piece for piece in read(path) if len(piece.faces)]
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
@@ -80,10 +65,10 @@ def selected(path: Path, names: list[str] | None) -> list[Piece]:
 
     Raises: InputError naming the file, the names that are not in it and those that are.
     """
-    found = pieces(path)
+    present = pieces(path)
     if names is None:
-        return found
-    known = {name for piece in found for name in piece.names}
+        return present
+    known = {name for piece in present for name in piece.names}
     if lacking := sorted(set(names) - known):
         raise InputError(f"{path}: geometry {lacking} is not in it, expected some of {sorted(known)}")
-    return [piece for piece in found if set(names) & set(piece.names)]
+    return [piece for piece in present if set(names) & set(piece.names)]

@@ -11,49 +11,38 @@ from lowalt.config.classes import like
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets import bird
-from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.mesh_files import UNITS_M, metres
 from lowalt.targets.mesh_parts import Pool
 from lowalt.targets.mesh_record import ALL_AXES
 
 SMALLEST_PART = 25
 """A moving part that is more than so many times smaller than the whole mesh is refused: its unit must be wrong."""
 
-
 SMALLEST_ROTOR_M = 0.01
 """Least diameter of a rotor at the target's final size: the smallest craft sold have propellers of 25 mm."""
 
 
-def _refuse_size(
-    record: dict, what: str, size_m: float, wanted_m: float, low: float, high: float, own_m: float | None = None
-) -> None:
-    """Raise InputError if the size of `what` is below wanted_m / high or above wanted_m / low; all sizes in metres.
+def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, row_m: float | None = None) -> None:
+    """Raise InputError if the size of `what` is more than the record's limit away from `wanted_m`; all in metres.
 
-    The error has the line to write: the unit with which the size fits best, or `own_m` (by default the size) as that of
-    a row of its own.
+    The error has the line to write: the unit with which the size fits best, or the size of a row of its own, `row_m` or
+    by default the size.
     """
-    if low <= wanted_m / max(size_m, 1e-12) <= high:
+    limit, unit = record["scale_limit"], record["unit"]
+    if 1 / limit <= wanted_m / max(size_m, 1e-12) <= limit:
         return
-    unit = record["unit"]
-    own = UNITS_M[unit] if isinstance(unit, str) else unit
-    fits = {name: abs(np.log(size_m / own * metres / wanted_m)) for name, metres in UNITS_M.items()} if size_m else {}
-    best = min(fits, key=fits.get, default="")
-    if best and fits[best] <= np.log(high):
-        way = f"write `unit: {best}`, with which it measures {size_m / own * UNITS_M[best]:.4g} m"
+    numbers = size_m / metres(unit)
+    off = {name: abs(np.log(numbers * unit_m / wanted_m)) for name, unit_m in UNITS_M.items()} if size_m else {}
+    best = min(off, key=off.get, default="")
+    if best and off[best] <= np.log(limit):
+        way = f"write `unit: {best}`, with which it measures {numbers * UNITS_M[best]:.4g} m"
     else:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
-        way = f"no unit fits: give it a row with its own size, `row: {{{key}: {own_m or size_m:.4g}}}`, or another file"
+        way = f"no unit fits: give it a row with its own size, `row: {{{key}: {row_m or size_m:.4g}}}`, or another file"
     raise InputError(
         f"{record['subtype']}: {what} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
         f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit {unit!r} right? {way}"
     )
-
-
-def _published_m(record: dict) -> np.ndarray:
-    """Return the published sizes (3,) m along right, front and up; a single published size stands three times."""
-    table = record["published"]
-    if record["size_is"] == ALL_AXES:
-        return np.array([table["wid_m"], table["len_m"], table["hgt_m"]])
-    return np.full(3, table["size_m"])
 
 
 def _bounds(parts: dict[str, Pool]) -> tuple[np.ndarray, np.ndarray]:
@@ -62,51 +51,38 @@ def _bounds(parts: dict[str, Pool]) -> tuple[np.ndarray, np.ndarray]:
     return low, np.max([pool.points.max(axis=0) for pool in parts.values()], axis=0)
 
 
-def measured_m(size_is: str, parts: dict[str, Pool], kinds: dict[str, str]) -> float:
-    """Return the size (m) that `size_is` names; the pools are in body axes.
-
-    Raises: InputError where `size_is` is the motor diagonal and there are fewer than two rotors.
-    """
-    extent = np.subtract(*_bounds(parts)[::-1])
-    if size_is == "motor diagonal":
-        hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
-        if len(hubs) < 2:
-            raise InputError(f"size_is is 'motor diagonal' for {len(hubs)} rotors, expected at least two")
-        return float(portable.norm(hubs[:, None] - hubs[None]).max())
-    return float({"width": extent[0], "length": extent[1], "height": extent[2]}.get(size_is, extent.max()))
-
-
 def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[np.ndarray, dict]:
     """Return the scale factors (3,) along right, front and up, and the facts about sizes for the cloud's record.
 
     The mesh is compared with the published size even where the record asks for no scaling, to find a wrong unit.
-    Raises: InputError where mesh and published size differ by more than the record's limit.
+    Raises: InputError where mesh and published size differ by more than the record's limit, or where `size_is` is the
+    motor diagonal and there are fewer than two rotors.
     """
-    limit, wanted = record["scale_limit"], _published_m(record)
-    low, high = _bounds(parts)
-    size = high - low
-    if record["size_is"] != ALL_AXES:
-        try:
-            size = np.full(3, measured_m(record["size_is"], parts, kinds))
-        except InputError as error:
-            raise InputError(f"{record['subtype']}: {error}") from None
-        if record["size_is"] == "motor diagonal":
+    extent, size_is, where = np.subtract(*_bounds(parts)[::-1]), record["size_is"], record["subtype"]
+    row, whole = record["published"], float(extent.max())
+    if size_is == ALL_AXES:
+        size, wanted = extent, np.array([row["wid_m"], row["len_m"], row["hgt_m"]])
+    else:
+        measured = {"width": extent[0], "length": extent[1], "height": extent[2]}.get(size_is, whole)
+        if size_is == "motor diagonal":
+            hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
+            if len(hubs) < 2:
+                raise InputError(f"{where}: size_is is {size_is!r} for {len(hubs)} rotors, expected at least two")
+            measured = portable.norm(hubs[:, None] - hubs[None]).max()
             # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not show a wrong unit.
             # Other sizes are the mesh's own: a gull's span may be more than `limit` times its length.
-            _refuse_size(record, "the whole mesh", float((high - low).max()), wanted[0], 1 / limit, limit, size[0])
+            _refuse_size(record, "the whole mesh", whole, row["size_m"], measured)
+        size, wanted = np.full(3, measured), np.full(3, row["size_m"])
     for axis in range(3):
-        _refuse_size(record, f"the mesh ({record['size_is']})", size[axis], wanted[axis], 1 / limit, limit)
-    whole = float((high - low).max())
+        _refuse_size(record, f"the mesh ({size_is})", size[axis], wanted[axis])
     for name, pool in parts.items():
-        extent = float(np.ptp(pool.points, axis=0).max())
-        if kinds[name] != "body" and extent < whole / SMALLEST_PART:
-            raise InputError(
-                f"{record['subtype']}: part {name} measures {extent:.3g} m in a mesh of {whole:.3g} m, expected at "
-                f"least 1/{SMALLEST_PART} of it; is the unit of its file right?"
-            )
+        largest = float(np.ptp(pool.points, axis=0).max())
+        if kinds[name] != "body" and largest < whole / SMALLEST_PART:
+            raise InputError(f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, expected at "
+                             f"least 1/{SMALLEST_PART} of it; is the unit of its file right?")  # fmt: skip
     ratio = wanted / size
     scale = {"published": ratio, "uniform": np.full(3, ratio[1]), "none": np.ones(3)}[record["scale"]]
-    return scale, {"mesh_extent_m": (high - low).tolist(), "scale_factors": scale.tolist()}
+    return scale, {"mesh_extent_m": extent.tolist(), "scale_factors": scale.tolist()}
 
 
 def _turned_radius(pool: Pool) -> float:
@@ -137,11 +113,10 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
             points = (pool.points - pool.hinge) * (diameter / raw) + hinge
             result[name] = replace(pool, points=points, hinge=hinge)
             facts["wheel_diameter_m"] = diameter
-        if kinds[name] == "rotor" and 2 * _turned_radius(result[name]) < SMALLEST_ROTOR_M:
-            raise InputError(
-                f"{record['subtype']}: rotor {name} has a diameter of {2 * _turned_radius(result[name]):.2g} m at the "
-                f"final size, expected at least {SMALLEST_ROTOR_M} m"
-            )
+        diameter = 2 * _turned_radius(result[name]) if kinds[name] == "rotor" else np.inf
+        if diameter < SMALLEST_ROTOR_M:
+            raise InputError(f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the final size, "
+                             f"expected at least {SMALLEST_ROTOR_M} m")  # fmt: skip
     low, high = _bounds(result)
     middle = (low + high) / 2
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
@@ -151,6 +126,5 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
         facts["origin_height_m"] = float(middle[2] - ground)
     if like(record) == "Bird":
         facts |= {"flap": bird.FLAP | record.get("flap", {}), "wing_span_m": float(high[0] - low[0])}
-    return {
-        name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle) for name, pool in result.items()
-    }, facts
+    return {name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle)
+            for name, pool in result.items()}, facts  # fmt: skip

@@ -16,11 +16,11 @@ from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
-from lowalt.targets.input_files import check_file_name, record_files
 from lowalt.targets.mocap_cycle import closed, find_cycle, refuse_short, refuse_strange_rate
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import moved, read_bvh, read_joints, to_nodes
 from lowalt.targets.mocap_motion import Motion, front, nodes_m, posed, refuse_glitches
+from lowalt.targets.record_schema import record_files
 from lowalt.targets.skeleton import NODES, node_cloud, stature_m
 
 CMU_HZ = 120
@@ -30,31 +30,22 @@ LONG = 20
 """A recording that is more times longer than the cycle used is told so: it may hold other motions."""
 
 
-def check_record(merged: dict, extra: dict, where: str) -> dict:
+def check_record(merged: dict, where: str) -> dict:
     """Return the merged record of a recording after checking it and filling in defaults.
 
     Defaults: the rate that the file says, or CMU's 120 Hz; scaled to the published height; nodes accelerate by at most
     1500 m/s2; the ends of the cycle differ by at most 0.15 m. `first_frame` and `last_frame` count from 1 and are both
     used; None means the last frame of the file.
 
-    `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    if extra["motion"].lower().endswith(".amc") and "skeleton" not in extra:
-        raise InputError(f"{where}: skeleton is missing, expected the .asf of {extra['motion']}")
+    if merged["motion"].lower().endswith(".amc") and "skeleton" not in merged:
+        raise InputError(f"{where}: skeleton is missing, expected the .asf of {merged['motion']}")
     if like(merged) != "Pedestrian":
         raise InputError(f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or mesh")
-    defaults = {
-        "first_frame": 1,
-        "last_frame": None,
-        "scale": "published",
-        "max_acceleration_mps2": 1500,
-        "max_mismatch_m": 0.15,
-    }
+    defaults = {"first_frame": 1, "last_frame": None, "scale": "published", "max_acceleration_mps2": 1500,
+                "max_mismatch_m": 0.15}  # fmt: skip
     result = defaults | merged | {"points": len(NODES)}
-    for key in ("skeleton", "motion"):
-        if key in result:
-            check_file_name(result[key], f"{where}: {key}")
     first, last = result["first_frame"], result["last_frame"]
     if last is not None and last <= first:
         raise InputError(f"{where}: first_frame {first}, last_frame {last}, expected frame numbers in order")

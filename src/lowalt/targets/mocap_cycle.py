@@ -97,8 +97,8 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     longest = (end - start)[good].max()
     best = np.flatnonzero(good & (end - start == longest))
     best = best[np.argmin(distance[best])]
-    found = int(start[best]), int(end[best])
-    return *found, fade, float(portable.norm(state[found[0]] - state[found[1]]) / np.sqrt(len(NODES)))
+    start, end = int(start[best]), int(end[best])
+    return start, end, fade, float(portable.norm(state[start] - state[end]) / np.sqrt(len(NODES)))
 
 
 def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:

@@ -108,19 +108,21 @@ def read_skeleton(path: str | Path) -> Skeleton:
     return Skeleton(bones, axes, dofs, unit_m)
 
 
-def _lines(path: Path, last: int | None) -> tuple[list[tuple[int, list[str]]], bool]:
-    """Return (frame number, words) of every line of data up to frame `last`, later lines are not read; and whether the
-    file says before its first frame that its angles are in radians.
+def _frames(
+    path: Path, skeleton: Skeleton, first: int, last: int | None
+) -> tuple[dict[int, dict[str, list[float]]], bool]:
+    """Return the numbers of each node by frame, `first` to `last` by the file's own numbers, and whether the file says
+    before its first frame that its angles are in radians. A clip cut out of a longer one may begin at any frame.
 
-    A clip cut out of a longer one may begin at any frame.
+    Raises: InputError naming file and frame, as `read_motion`.
     """
-    result, frame, radians = [], None, False
+    frames: dict[int, dict[str, list[float]]] = {}
+    frame, radians = None, False
     for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
         words = line.split("#", 1)[0].split()
         if not words or words[0].startswith(":"):
             radians |= frame is None and words[:1] != [] and words[0].upper() == ":RADIANS"
-            continue
-        if len(words) == 1 and words[0].isdecimal():
+        elif len(words) == 1 and words[0].isdecimal():
             number = int(words[0])
             if last is not None and number > last:
                 break
@@ -129,9 +131,12 @@ def _lines(path: Path, last: int | None) -> tuple[list[tuple[int, list[str]]], b
             frame = number
         elif frame is None:
             raise InputError(f"{path}: {' '.join(words)[:60]!r} stands before frame 1, expected an AMC motion")
-        else:
-            result.append((frame, words))
-    return result, radians
+        elif frame >= first:
+            values = frames.setdefault(frame, {})
+            if words[0] in values:
+                raise InputError(f"{path}: frame {frame} has {words[0]} twice, expected each node once")
+            values[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
+    return frames, radians
 
 
 def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
@@ -142,15 +147,14 @@ def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
     except ValueError:
         values = []
     if not expected or len(values) != expected or not all(map(math.isfinite, values)):
-        raise InputError(
-            f"{where}: {' '.join(words)[:80]!r}, expected a node of the skeleton and {expected} finite numbers"
-        )
+        text = " ".join(words)[:80]
+        raise InputError(f"{where}: {text!r}, expected a node of the skeleton and {expected} finite numbers")
     return values
 
 
 def read_motion(
     path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None
-) -> tuple[dict[str, np.ndarray], int]:  # fmt: skip
+) -> tuple[dict[str, np.ndarray], int]:
     """Return the channels (F, channels) of each node that has any, frames `first` to `last` by the file's own numbers,
     both inclusive, and the number of the first: a file that begins later is read from its first frame.
 
@@ -160,35 +164,26 @@ def read_motion(
     finite number, a node twice, an all-zero root, a frame equal to the one before it, fewer than two frames left.
     """
     path = existing(path, "motion file")
-    frames: dict[int, dict[str, list[float]]] = {}
-    lines, radians = _lines(path, last)
-    for frame, words in lines:
-        if frame >= first:
-            values = frames.setdefault(frame, {})
-            if words[0] in values:
-                raise InputError(f"{path}: frame {frame} has {words[0]} twice, expected each node once")
-            values[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
+    frames, radians = _frames(path, skeleton, first, last)
     first = max(first, min(frames, default=first))
     count = (max(frames) if frames else 0) - first + 1
     if count < 2 or (last is not None and max(frames) < last):
-        found = f"frames up to {max(frames)}" if frames else "no frame in that range"
-        raise InputError(f"{path}: {found}, expected frames {first} to {last or 'the end'}, at least two")
-    if radians:
-        turns = {name: [dof[0] == "r" for dof in dofs] for name, dofs in skeleton.dofs.items()}
-        for values in frames.values():
-            for name, row in values.items():
-                pairs = zip(row, turns[name], strict=True)
-                values[name] = [math.degrees(value) if turn else value for value, turn in pairs]
+        present = f"frames up to {max(frames)}" if frames else "no frame in that range"
+        raise InputError(f"{path}: {present}, expected frames {first} to {last or 'the end'}, at least two")
     needed = [name for name, dofs in skeleton.dofs.items() if dofs]
     for frame in range(first, first + count):
         lacking = [name for name in needed if name not in frames.get(frame, {})]
         if lacking:
             raise InputError(f"{path}: frame {frame} lacks {lacking}, expected all nodes (end it by last_frame)")
     motion = {name: np.array([frames[frame][name] for frame in range(first, first + count)]) for name in needed}
-    empty = np.flatnonzero(~motion["root"].any(axis=1))
+    if radians:
+        for name, values in motion.items():
+            turns = [dof[0] == "r" for dof in skeleton.dofs[name]]
+            values[:, turns] = np.degrees(values[:, turns])
+    empty = first + np.flatnonzero(~motion["root"].any(axis=1))
     if len(empty):
         raise InputError(
-            f"{path}: frame {first + empty[0]} has an all-zero root, expected a tracked one (begin by first_frame)"
+            f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by first_frame)"
         )
     still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
     if still.any():

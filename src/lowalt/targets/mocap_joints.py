@@ -59,24 +59,24 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
             f"{where}: no joint is called a {side}{what}, expected {NAMES[what].split()} among {sorted(joints)[:40]}"
         )
 
-    found = {"root": joints[joint("root")]}
+    places = {"root": joints[joint("root")]}
     for side in "lr":
         ankle = joint("ankle", side)
         toe = joint("toe", side, but=ankle)
-        found |= {f"{side}hipjoint": joints[joint("hip", side)], f"{side}femur": joints[joint("knee", side)],
-                  f"{side}tibia": joints[ankle], f"{side}foot": joints[toe]}  # fmt: skip
-        end = joints.get(f"{toe}/end")
-        found[f"{side}toes"] = joints[toe] + 0.3 * (joints[toe] - joints[ankle]) if end is None else end
         elbow, wrist = joints[joint("elbow", side)], joints[joint("wrist", side)]
-        found |= {f"{side}clavicle": joints[joint("shoulder", side)], f"{side}humerus": elbow, f"{side}radius": wrist}
-        found |= {side + name: wrist + share * (wrist - elbow) for name, share in BEYOND.items()}
+        toes = joints.get(f"{toe}/end", joints[toe] + 0.3 * (joints[toe] - joints[ankle]))
+        limbs = {"hipjoint": joints[joint("hip", side)], "femur": joints[joint("knee", side)], "tibia": joints[ankle],
+                 "foot": joints[toe], "toes": toes, "clavicle": joints[joint("shoulder", side)], "humerus": elbow,
+                 "radius": wrist}  # fmt: skip
+        limbs |= {name: wrist + share * (wrist - elbow) for name, share in BEYOND.items()}
+        places |= {side + name: place for name, place in limbs.items()}
     head = joint("head")
     neck, skull = joints[joint("neck")], joints[head]
     top = joints.get(f"{head}/end", skull + 0.8 * (skull - neck))
     for name, share in (("lowerback", 1 / 3), ("upperback", 2 / 3), ("thorax", 1.0)):
-        found[name] = found["root"] + share * (neck - found["root"])
-    found |= {"lowerneck": (neck + skull) / 2, "upperneck": skull, "head": top}
-    return np.stack([found[name] for name in NODES], axis=1)
+        places[name] = places["root"] + share * (neck - places["root"])
+    places |= {"lowerneck": (neck + skull) / 2, "upperneck": skull, "head": top}
+    return np.stack([places[name] for name in NODES], axis=1)
 
 
 def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str) -> Motion:
@@ -89,7 +89,7 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
     """
     if not np.isfinite(nodes).all() or len(nodes) < 2 or np.abs(nodes).max() > 1e6:
         raise InputError(
-            f"{where}: {len(nodes)} frames with places that are not finite, expected at least two good ones"
+            f"{where}: {len(nodes)} frames with places that are not finite, expected two good ones or more"
         )
     reach = np.mean(nodes[:, NODES.index("head")] - nodes[:, NODES.index("ltibia")], axis=0)
     axis = int(np.abs(reach).argmax())
@@ -132,10 +132,8 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
     try:
         for word in words:
             if word in ("ROOT", "JOINT", "End"):
-                name = next(words) if word != "End" else f"{stack[-1]}/end"
+                name = next(words)  # after End the word Site
                 name = f"{stack[-1]}/end" if word == "End" else name
-                if word == "End":
-                    next(words)
                 joints.append((name, stack[-1] if stack else "", np.zeros(3), []))
                 stack.append(name)
             elif word == "OFFSET":
@@ -144,9 +142,9 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
                 joints[-1][3].extend(next(words) for _ in range(int(next(words))))
             elif word == "}":
                 stack.pop()
-        told = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", data)
-        frames, step = int(told[1]), float(told[2])
-        values = np.array(re.sub(r"#.*", "", data[told.end() :]).split(), float)
+        timing = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", data)
+        frames, step = int(timing[1]), float(timing[2])
+        values = np.array(re.sub(r"#.*", "", data[timing.end() :]).split(), float)
         width = sum(len(channels) for *_, channels in joints)
         if not (frames and 1e-5 <= step <= 1 and len(values) == frames * width and np.isfinite(values).all()):
             raise ValueError(f"{len(values)} finite numbers, expected {frames} frames of {width}, {step} s apart")

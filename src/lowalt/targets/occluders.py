@@ -6,20 +6,19 @@ them. A user's mesh is simplified, and the file holds each point's distance from
 """
 
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.config.classes import like
-from lowalt.config.command import parser, pick, run
+from lowalt.config.command import run
 from lowalt.files.archives import write_arrays
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.machine.environment import INPUTS
 from lowalt.targets.assemble import Part, turn
+from lowalt.targets.make import options, refuse_source
 from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, inside, merged
 
@@ -92,22 +91,17 @@ def from_surfaces(surfaces: list[Surface], offset_m: np.ndarray, closed: np.ndar
     """Return the arrays of one surface a part, in the cloud's order of parts; offset_m: (L,) m; closed: (P,)."""
     whole = merged(surfaces)
     owner = np.repeat(np.arange(len(surfaces)), [len(surface.vertices) for surface in surfaces])
-    return {
-        "vertices": whole.vertices, "vertex_part": owner, "faces": whole.faces.astype(np.int64), "offset_m": offset_m,
-        "closed": closed,
-        "bones": np.zeros((0, 2), np.int64), "radius_m": np.zeros(0),
-    }  # fmt: skip
+    arrays = (whole.vertices, owner, whole.faces.astype(np.int64), offset_m, closed)
+    return dict(zip(ARRAYS, (*arrays, np.zeros((0, 2), np.int64), np.zeros(0)), strict=True))
 
 
 def from_bones(stature_m: float) -> dict[str, np.ndarray]:
     """Return the arrays of a pedestrian's capsules: one along each bone, its radius scaled with the stature."""
+    nodes = range(1, len(NODES))
     radii = [RADII_M[name] if name in RADII_M else RADII_M[name[1:]] for name in NODES[1:]]
-    return {
-        "vertices": np.zeros((0, 3)), "vertex_part": np.zeros(0, np.int64), "faces": np.zeros((0, 3), np.int64),
-        "offset_m": np.zeros(len(NODES)), "closed": np.zeros(len(NODES), bool),
-        "bones": np.array([[PARENTS[i], i] for i in range(1, len(NODES))]),
-        "radius_m": np.array(radii) * (stature_m / STATURE_M),
-    }  # fmt: skip
+    nothing = (np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 3), np.int64))
+    bones = (np.array([[PARENTS[node], node] for node in nodes]), np.array(radii) * (stature_m / STATURE_M))
+    return dict(zip(ARRAYS, (*nothing, np.zeros(len(NODES)), np.zeros(len(NODES), bool), *bones), strict=True))
 
 
 def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
@@ -117,7 +111,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
     """
     source = record.get("source")
     if source == "builtin":
-        from lowalt.targets.builtin_record import MODULES
+        from lowalt.targets.builtin import MODULES
 
         parts = MODULES[like(record)].parts(record)[0]
         surfaces = [part_surface(part) for part in parts]
@@ -129,10 +123,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
         raise InputError(f"{record['subtype']}: gait {record['gait']} has no surfaces, expected no effect `occlusion`")
     if source in ("gait", "mocap"):
         return from_bones(float(record.get("stature_m", record["published"]["hgt_m"])))
-    if source != "mesh":
-        raise InputError(f"settings: record.source is {source!r}, expected builtin, mesh, mocap or gait")
-    if inputs is None:
-        raise InputError(f"{record['subtype']}: source mesh needs the folder of real inputs, expected --inputs DIR")
+    refuse_source(record, inputs)
     from lowalt.targets.occluders_mesh import mesh_surfaces
 
     return from_surfaces(*mesh_surfaces(record, Path(inputs), seed))
@@ -164,14 +155,9 @@ def read_all(paths: Iterable[str | Path]) -> dict[str, dict]:
 
 def main(arguments: list[str]) -> None:
     """Write one target's occluders."""
-    line = parser("lowalt.targets.occluders", "One subtype's record to its opaque surfaces, for self-occlusion.")
-    folder = os.environ.get(INPUTS)
-    help_text = f"folder of the meshes the record names (default: ${INPUTS})"
-    line.add_argument("--inputs", type=Path, default=folder and Path(folder), help=help_text)
-    line.add_argument("--out", required=True, type=Path, help="file to write (.npz)")
-    given = line.parse_args(arguments)
-    seed, record = pick(given.settings, "seed", "record")
-    write(given.out, make(record, given.inputs, seed), record["subtype"])
+    about = "One subtype's record to its opaque surfaces, for self-occlusion."
+    record, inputs, seed, out = options("lowalt.targets.occluders", about, arguments)
+    write(out, make(record, inputs, seed), record["subtype"])
 
 
 if __name__ == "__main__":

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.numerics.streams import stream
-from lowalt.targets import mesh, vehicle
+from lowalt.targets import vehicle
+from lowalt.targets.mesh import mesh_cloud, pools
 from lowalt.targets.mesh_files import Mesh
-from lowalt.targets.mesh_parts import Pool, cut, inside
+from lowalt.targets.mesh_parts import Pool, cut_parts, inside
 from lowalt.targets.mesh_record import body_axes, ordered_parts
 from lowalt.targets.mesh_size import sized
 from lowalt.targets.occluders import GRAIN, longest_edge, quartered
@@ -21,13 +22,13 @@ TRIANGLES = 1500
 """Most triangles a part keeps."""
 
 
-def _pool(found: Mesh, regions: list[dict]) -> Pool:
+def _pool(mesh: Mesh, regions: list[dict]) -> Pool:
     """A mesh as a pool with a "sample" a triangle, at its middle; its corners (F, 9) stand where normals do.
 
     Large triangles are divided first where `regions` cut through them, so that their middles say where they are.
     """
-    corners, component = found.vertices[found.faces], found.component
-    grain = np.ptp(found.vertices, axis=0).max() / GRAIN
+    corners, component = mesh.vertices[mesh.faces], mesh.component
+    grain = np.ptp(mesh.vertices, axis=0).max() / GRAIN
     for region in regions:
         while True:
             within = inside(corners.reshape(-1, 3), region).reshape(-1, 3)
@@ -36,31 +37,24 @@ def _pool(found: Mesh, regions: list[dict]) -> Pool:
                 break
             corners = np.concatenate([corners[~long], quartered(corners[long])])
             component = np.concatenate([component[~long], np.tile(component[long], 4)])
-    return Pool(corners.mean(axis=1), corners.reshape(-1, 9), component, 0, 1.0, np.full(3, np.nan), np.full(3, np.nan))
+    return Pool(corners.mean(axis=1), corners.reshape(-1, 9), component, 0, 1.0)
 
 
-def _triangles(record: dict, inputs: Path, frame: np.ndarray) -> dict[str, np.ndarray]:
+def _wheel(diameter: float, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """The corners (3 F, 3) of a made wheel's triangles, for its points and for its normals."""
+    shape = merged(vehicle.wheel(diameter, width))
+    corners = shape.vertices[shape.faces].reshape(-1, 3)
+    return corners, corners
+
+
+def _triangles(record: dict, inputs: Path) -> dict[str, np.ndarray]:
     """Triangles (F, 3, 3) of every part in body axes and the mesh's own size; a triangle goes where its middle is."""
-    (body_name, body_part), *moving = record["parts"].items()
-    whole = mesh._surface(body_part, record, inputs)
-    regions = [part["region"] for _, part in moving if "region" in part] + record["drop"]
-    body, found = _pool(whole, [region for region in regions if not region.get("whole")]), {}
-    for name, part in moving:
-        if "region" in part:
-            pool, body = cut(body, whole, part["region"])
-        elif "wheel" in part:
-            size = part["wheel"]
-            shape = merged(vehicle.wheel(size["diameter_m"], size["width_m"]))
-            soup = shape.vertices[shape.faces].reshape(-1, 3)
-            soup = mesh._made_wheel(part, (soup, soup), frame).points
-            found[name] = soup.reshape(-1, 9)
-            continue
-        else:
-            pool = _pool(mesh._surface(part, record, inputs), [])
-        found[name] = pool.normals
-    for region in record["drop"]:
-        body = cut(body, whole, region)[1]
-    return {name: corners.reshape(-1, 3, 3) @ frame.T for name, corners in {body_name: body.normals, **found}.items()}
+    frame, parts = body_axes(record["front"], record["up"]), record["parts"]
+    regions = [part["region"] for part in parts.values() if "region" in part] + record["drop"]
+    cutting = [region for region in regions if not region.get("whole")]
+    cut, _ = cut_parts(record, inputs, frame, lambda mesh, is_body: _pool(mesh, cutting if is_body else []), _wheel)
+    return {name: (pool.points if "wheel" in parts[name] else pool.normals).reshape(-1, 3, 3) @ frame.T
+            for name, pool in cut.items()}  # fmt: skip
 
 
 def simplified(triangles: np.ndarray, most: int) -> Surface:
@@ -97,20 +91,15 @@ def mesh_surfaces(record: dict, inputs: Path, seed: int) -> tuple[list[Surface],
     Raises: InputError naming the file or the part and the reason.
     """
     record = record | {"parts": ordered_parts(record["parts"])}
-    cloud = mesh.mesh_cloud(record, inputs, seed)
-    raw, _ = mesh.pools(record, inputs, stream(seed, "cloud", record["subtype"]))
-    kinds = {name: part["kind"] for name, part in record["parts"].items()}
-    final, _ = sized(record, raw, kinds)
-    triangles = _triangles(record, inputs, body_axes(record["front"], record["up"]))
-    surfaces, offsets = [], []
+    cloud = mesh_cloud(record, inputs, seed)
+    raw, _ = pools(record, inputs, stream(seed, "cloud", record["subtype"]))
+    final, _ = sized(record, raw, {name: part["kind"] for name, part in record["parts"].items()})
+    triangles, surfaces, offsets = _triangles(record, inputs), [], []
     for number, name in enumerate(cloud.names):
         # How a part's samples were scaled and moved, recovered from the samples themselves.
         before = np.column_stack([raw[name].points, np.ones(len(raw[name].points))])
         affine = np.linalg.lstsq(before, final[name].points, rcond=None)[0]
-        placed = triangles[name] @ affine[:3] + affine[3]
-        surface = simplified(placed, TRIANGLES)
-        surfaces.append(surface)
-        points = cloud.points[cloud.part == number]
-        offsets.append(deviation_m(surface, points))
+        surfaces.append(simplified(triangles[name] @ affine[:3] + affine[3], TRIANGLES))
+        offsets.append(deviation_m(surfaces[-1], cloud.points[cloud.part == number]))
     clear = 1e-9 * float(np.ptp(cloud.points, axis=0).max())
     return surfaces, np.concatenate(offsets) + clear, np.zeros(len(surfaces), bool)

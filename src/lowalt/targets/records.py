@@ -7,18 +7,16 @@ unit, the frames of a recording) are checked by that source's own `check_record`
 """
 
 import math
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 from lowalt.config.classes import AIRBORNE, classes_of, like
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
-from lowalt.targets.input_files import record_files
+from lowalt.targets.make import SOURCES, source_module
+from lowalt.targets.record_schema import check_file_name, record_files
 
-SOURCES = ("builtin", "mesh", "mocap", "gait")
 COMMON_KEYS = record_schema.keys(record_schema.COMMON)
 """Keys every record may have; `source` it must have. Each source adds its own."""
 
@@ -28,8 +26,9 @@ _NUMBERS = (
     "size_m", "freq_lo_hz", "freq_hi_hz", "vx_abs_max", "vy_abs_max", "vz_abs_max", "len_m", "wid_m", "hgt_m",
     "wheel_diam_m", "speed_lo", "speed_hi",
 )  # fmt: skip
-_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max", "speed_lo", "speed_hi")
-"""Columns of speeds, which may be 0: a craft that hovers, a car that stands."""
+COLUMNS = (*_WORDS, *_WHOLE, *_NUMBERS)
+AIR_SPEEDS, GROUND_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max"), ("speed_lo", "speed_hi")
+"""Columns of speeds of targets in the air and on the ground; they may be 0: a craft hovers, a car stands."""
 
 
 def load_table(path: str | Path) -> dict[str, dict]:
@@ -41,9 +40,8 @@ def load_table(path: str | Path) -> dict[str, dict]:
     rows = read_csv(path, what="table of published targets")
     if not rows:
         raise InputError(f"{path}: no row, expected one row a subtype")
-    columns, expected = list(rows[0]), {*_WORDS, *_WHOLE, *_NUMBERS}
-    if set(columns) != expected:
-        raise InputError(f"{path}: columns {sorted(set(columns) ^ expected)} missing or unknown")
+    if wrong := sorted(set(rows[0]) ^ set(COLUMNS)):
+        raise InputError(f"{path}: columns {wrong} missing or unknown")
     table: dict[str, dict] = {}
     for row in rows:
         name, where = row["name"], f"{path}: {row['name']}"
@@ -51,7 +49,7 @@ def load_table(path: str | Path) -> dict[str, dict]:
             raise InputError(f"{where}: named twice, expected one row a subtype")
         if row["unseen_protocol"] not in ("seen", "unseen"):
             raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
-        table[name] = {column: _cell(where, column, row[column]) for column in columns}
+        table[name] = {column: _cell(where, column, text) for column, text in row.items()}
     try:
         classes_of(table)
     except InputError as error:
@@ -69,8 +67,9 @@ def _cell(where: str, column: str, text: str) -> str | int | float | None:
         value = int(text) if column in _WHOLE else float(text)
     except ValueError:
         value = math.nan
-    least = "a number of at least 0" if column in _SPEEDS else "a positive number"
-    if not (math.isfinite(value) and (value > 0 or (value == 0 and column in _SPEEDS))):
+    may_be_zero = column in (*AIR_SPEEDS, *GROUND_SPEEDS)
+    if not (math.isfinite(value) and (value > 0 or (value == 0 and may_be_zero))):
+        least = "a number of at least 0" if may_be_zero else "a positive number"
         raise InputError(f"{where}: {column} is {text!r}, expected {least}")
     return value
 
@@ -128,13 +127,13 @@ def load_records(
     return {name: _last(row, chosen[name], inputs, fall_back) for name, row in table.items()}
 
 
-def _last(row: dict, given: list[tuple[str, dict]], inputs: str | Path | None, fall_back: bool) -> dict:
+def _last(row: dict, choices: list[tuple[str, dict]], inputs: str | Path | None, fall_back: bool) -> dict:
     """The last of a subtype's records, or with `fall_back` the last whose files are all in the folder."""
-    where, record = given[-1]
-    found = merge(row, record, where)
-    if fall_back and len(given) > 1 and missing_inputs({row["name"]: found}, inputs):
-        return _last(row, given[:-1], inputs, fall_back)
-    return found
+    where, record = choices[-1]
+    merged = merge(row, record, where)
+    if fall_back and len(choices) > 1 and missing_inputs({row["name"]: merged}, inputs):
+        return _last(row, choices[:-1], inputs, fall_back)
+    return merged
 
 
 def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
@@ -142,14 +141,12 @@ def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
 
     Raises: InputError naming `where`, the column and the value that is missing, unknown or no positive number.
     """
-    columns = (*_WORDS, *_WHOLE, *_NUMBERS)
-    known = [column for column in columns if column not in ("name", "idx")]
+    known = [column for column in COLUMNS if column not in ("name", "idx")]
     if not isinstance(cells, dict) or set(cells) - set(known):
         raise InputError(f"{where}: row is {cells!r}, expected cells of the columns {known}")
-    changed = {
-        column: cell if cell is None else _cell(f"{where}: row", column, str(cell)) for column, cell in cells.items()
-    }
-    blank = dict.fromkeys(columns) | {"name": name, "unseen_protocol": "seen", "points_in_published_cloud_approx": 150}
+    changed = {column: None if cell is None else _cell(f"{where}: row", column, str(cell))
+               for column, cell in cells.items()}  # fmt: skip
+    blank = dict.fromkeys(COLUMNS) | {"name": name, "unseen_protocol": "seen", "points_in_published_cloud_approx": 150}
     result = (row or blank) | changed
     if not result["category"] or result["unseen_protocol"] not in ("seen", "unseen"):
         raise InputError(f"{where}: row is {cells!r}, expected a category and unseen_protocol seen or unseen")
@@ -165,17 +162,15 @@ def merge(row: dict, record: dict, where: str) -> dict:
     if source not in SOURCES:
         raise InputError(f"{where}: source is {source!r}, expected one of {SOURCES}")
     merged = {"rcs_m2_per_point": 1.0, "points": row["points_in_published_cloud_approx"], **record}
-    merged |= {
-        "subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row,
-    }  # fmt: skip
+    merged |= {"subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row}
     record_schema.check(record_schema.COMMON, {key: merged[key] for key in COMMON_KEYS if key in merged}, where)
+    record_schema.check(source, {key: value for key, value in record.items() if key not in COMMON_KEYS}, where)
     _check_like(merged, where)
-    unknown = sorted(set(record.get("row_from", {})) - set(row))
-    if unknown:
+    if unknown := sorted(set(record.get("row_from", {})) - set(row)):
         raise InputError(f"{where}: row_from names {unknown}, expected columns of the table of targets")
-    extra = {key: value for key, value in record.items() if key not in COMMON_KEYS}
-    record_schema.check(source, extra, where)
-    return _source(source).check_record(merged, extra, where)
+    for name in record_files(merged):
+        check_file_name(name, where)
+    return source_module(source).check_record(merged, where)
 
 
 def _check_like(merged: dict, where: str) -> None:
@@ -184,15 +179,21 @@ def _check_like(merged: dict, where: str) -> None:
         kind = like(merged)
     except InputError as error:
         raise InputError(f"{where}: {str(error).removeprefix(merged['subtype'] + ': ')}") from None
-    needed = ("vx_abs_max", "vy_abs_max", "vz_abs_max") if kind in AIRBORNE else ("speed_lo", "speed_hi")
-    empty = [column for column in needed if merged["published"][column] is None]
-    if empty:
+    speeds = AIR_SPEEDS if kind in AIRBORNE else GROUND_SPEEDS
+    if empty := [column for column in speeds if merged["published"][column] is None]:
         raise InputError(f"{where}: the table of targets has no {empty}, expected m/s for a target like a {kind}")
 
 
-def _source(name: str) -> ModuleType:
-    """The module of a source; each has `check_record(merged, extra, where)` and `SOURCE_cloud`."""
-    return import_module(f"lowalt.targets.{name}")
+def estimates(record: dict) -> tuple[int, int]:
+    """Return how many figures of a merged record, and cells of a row of its own, are estimates, and how many there are.
+
+    A cell that the record's `row_from` does not name is an estimate; the cells of a published row do not count.
+    """
+    row, named = record.get("published"), record.get("row_from", {})
+    own_row = row is not None and row["idx"] is None
+    sources = [named.get(column, "estimate") for column in _NUMBERS if own_row and row[column] is not None]
+    sources += [entry["source"] for entry in record.get("figures", {}).values()]
+    return sources.count("estimate"), len(sources)
 
 
 def source_files(record: dict, inputs: str | Path | None) -> list[str]:

@@ -1,5 +1,7 @@
-"""What descriptions of robots share: files inside the folder of inputs, surfaces, places and numbers."""
+"""What descriptions of robots share: links and joints, files inside the folder of inputs, surfaces, places, numbers."""
 
+import math
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -13,6 +15,50 @@ from lowalt.targets.mesh_files import SUFFIXES
 from lowalt.targets.mesh_scene import selected
 
 LARGEST_BYTES, MOST_FILES = 16 << 20, 200
+DEEPEST = 50
+"""Most links, frames or models that hang on one another."""
+MOST_TURN = 4 * math.pi
+"""A joint whose range is larger turns without end: a rotor or a wheel."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint that turns about its `hinge` (3,) m and `axis` (3,), `endless` or not; `parent` and `child` are links."""
+
+    name: str
+    parent: str
+    child: str
+    hinge: np.ndarray
+    axis: np.ndarray
+    endless: bool
+
+
+@dataclass
+class Robot:
+    """A description: `surfaces` by link, each a list of triangles (K, 3, 3) m; `fixed` pairs of links, parent first,
+    that do not turn; `joints` that do; `senses` of rotors by joint, seen against the axis."""
+
+    surfaces: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    fixed: list[tuple[str, str]] = field(default_factory=list)
+    joints: list[Joint] = field(default_factory=list)
+    senses: dict[str, str] = field(default_factory=dict)
+
+    def below(self, link: str, others: set[str] = frozenset()) -> list[str]:
+        """A link and all that hang on it, except those in `others` and what hangs on them."""
+        pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
+        links = [link]
+        for name in links:
+            links += [child for parent, child in pairs if parent == name and child not in {*links, *others}]
+        return links
+
+    def turns(
+        self, name: str, links: tuple[str, str], hinge: np.ndarray, axis: np.ndarray,
+        limits: tuple[str | None, str | None],
+    ) -> None:  # fmt: skip
+        """Add a joint that turns two links, parent first: without end where it has no limits (rad), or wide ones."""
+        low, high = limits
+        endless = not (low and high) or float(high) - float(low) > MOST_TURN
+        self.joints.append(Joint(name, *links, hinge, direction(axis), endless))
 
 
 def numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndarray:
@@ -70,8 +116,8 @@ class Files:
         if path.suffix.lower() not in SUFFIXES:
             raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
         unit = (stated_metres(path) or 1.0) if path.suffix.lower() == ".dae" else 1.0
-        found = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
-        triangles = np.concatenate(found or [np.zeros((0, 3, 3))]) * unit * scale
+        pieces = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
+        triangles = np.concatenate(pieces or [np.zeros((0, 3, 3))]) * unit * scale
         return triangles[:, ::-1] if np.prod(scale) < 0 else triangles
 
 

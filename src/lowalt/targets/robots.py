@@ -1,52 +1,19 @@
-"""A robot's own description: which surfaces it has and which of them turn about what.
+"""From a robot's own description to a drafted record: the parts that turn are chosen and written into one GLB.
 
-`robot_files` reads URDF, SDF and MJCF; here the parts that turn are chosen, written into one GLB and drafted. All three
-formats have axes x front, y left, z up, metres.
+`robot_files` reads URDF, SDF and MJCF; all three have axes x front, y left, z up, metres.
 """
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.targets.draft import alternating, row_lines, size_word
+from lowalt.targets.draft import alternating, record_text, row_lines, size_word
 from lowalt.targets.guesses import TURNING
 from lowalt.targets.mesh_files import LARGEST_TRIANGLES
 from lowalt.targets.mesh_record import MOVING_KIND
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint that turns about its `hinge` (3,) m and `axis` (3,), `endless` or not; `parent` and `child` are links."""
-
-    name: str
-    parent: str
-    child: str
-    hinge: np.ndarray
-    axis: np.ndarray
-    endless: bool
-
-
-@dataclass
-class Robot:
-    """A description: `surfaces` by link, each a list of triangles (K, 3, 3) m; `fixed` pairs of links, parent first,
-    that do not turn; `joints` that do; `senses` of rotors by joint, seen against the axis."""
-
-    surfaces: dict[str, list[np.ndarray]] = field(default_factory=dict)
-    fixed: list[tuple[str, str]] = field(default_factory=list)
-    joints: list[Joint] = field(default_factory=list)
-    senses: dict[str, str] = field(default_factory=dict)
-
-    def below(self, link: str, others: set[str] = frozenset()) -> list[str]:
-        """A link and all that hang on it, but for those in `others` and what hangs on them."""
-        pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
-        found = [link]
-        for name in found:
-            found += [child for parent, child in pairs if parent == name and child not in {*found, *others}]
-        return found
+from lowalt.targets.robot_geometry import Joint, Robot
 
 
 def _called(joint: Joint, kind: str) -> bool:
@@ -69,11 +36,11 @@ def category_of(robot: Robot) -> str:
     Raises: InputError where both or neither are there.
     """
     kinds = ("rotor", "wheel")
-    told = [kind for kind in kinds if any(joint.endless and _called(joint, kind) for joint in robot.joints)]
-    told = told or [kind for kind in kinds if any(TURNING[kind].search(link) for link in robot.surfaces)]
-    if len(told) == 1:
-        return "UAV" if told == ["rotor"] else "Vehicle"
-    seen = "both rotors and wheels" if told else "neither rotors nor wheels"
+    named = [kind for kind in kinds if any(joint.endless and _called(joint, kind) for joint in robot.joints)]
+    named = named or [kind for kind in kinds if any(TURNING[kind].search(link) for link in robot.surfaces)]
+    if len(named) == 1:
+        return "UAV" if named == ["rotor"] else "Vehicle"
+    seen = "both rotors and wheels" if named else "neither rotors nor wheels"
     raise InputError(f"its category cannot be seen, the names of its parts tell {seen}: expected --category UAV, "
                      "--category Bird or --category Vehicle")  # fmt: skip
 
@@ -92,11 +59,11 @@ def parts_of(robot: Robot, kind: str) -> tuple[dict[str, Joint], dict[str, np.nd
         joints[name] = joint
         for link in robot.below(joint.child, ends):
             taken.setdefault(link, name)
-    for link, found in robot.surfaces.items():
-        triangles.setdefault(taken.get(link, "body"), []).extend(found)
+    for link, surfaces in robot.surfaces.items():
+        triangles.setdefault(taken.get(link, "body"), []).extend(surfaces)
     if "body" not in triangles:
         raise InputError("no surface is left for the body, expected links that do not turn")
-    parts = {name: np.concatenate(found) for name, found in triangles.items() if found}
+    parts = {name: np.concatenate(surfaces) for name, surfaces in triangles.items() if surfaces}
     return {name: joint for name, joint in joints.items() if name in parts}, parts
 
 
@@ -147,21 +114,12 @@ def drafted_robot(
     target gets a row of its own.
     """
     subtype, source, file = names
-    kind, corners = MOVING_KIND[category], np.concatenate(list(triangles.values())).reshape(-1, 3)
+    corners = np.concatenate(list(triangles.values())).reshape(-1, 3)
     extent = np.ptp(corners, axis=0)[[1, 0, 2]]
     hubs = np.array([joint.hinge[:2] for joint in joints.values()]).reshape(-1, 2)
     across = [float(np.ptp(triangles[name].reshape(-1, 3), axis=0).max()) for name in joints]
-    lines = [
-        f"# Drafted from {source}, whose surfaces {file} holds in metres: x front, y left, z up.",
-        f"{yaml.safe_dump(subtype).splitlines()[0]}:",
-        "  source: mesh",
-        *(row_lines(category, extent, hubs, max(across, default=None), table) if own else []),
-        "  unit: m",
-        "  up: z",
-        "  front: x",
-        f"  size_is: {size_word(category, extent, hubs)}",
-        "  licence: unknown  # the licence of the description",
-        "  parts:",
-        *part_lines(robot, joints, kind, file),
-    ]
-    return "\n".join(lines) + "\n"
+    row = row_lines(category, extent, hubs, max(across, default=None), table) if own else []
+    settings = {"unit": "m", "up": "z", "front": "x", "size_is": size_word(category, extent, hubs),
+                "licence": "unknown  # the licence of the description"}  # fmt: skip
+    about = [f"Drafted from {source}, whose surfaces {file} holds in metres: x front, y left, z up."]
+    return record_text(about, subtype, row, settings, part_lines(robot, joints, MOVING_KIND[category], file))

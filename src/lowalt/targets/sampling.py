@@ -48,17 +48,6 @@ def sample_faces(
     return points, face
 
 
-def sample_surface(
-    vertices: np.ndarray, faces: np.ndarray, count: int, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return `count` points (count, 3) spread over the triangles by area and their unit normals (count, 3).
-
-    Arguments, order and errors are those of `sample_faces`.
-    """
-    points, face = sample_faces(vertices, faces, count, rng)
-    return points, face_normals(vertices, np.asarray(faces)[face])[0]
-
-
 def thin(points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()) -> np.ndarray:
     """Return the indices (count,) of `count` points spread as evenly as can be, in the order they were chosen.
 

@@ -5,7 +5,8 @@ normals (right-hand rule), in the caller's unit. Built-in models consist of seve
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -19,15 +20,15 @@ class Surface:
     vertices: np.ndarray
     faces: np.ndarray
 
-    def moved(self, offset: Iterable[float]) -> "Surface":
+    def moved(self, offset: Iterable[float]) -> Self:
         """Return the surface shifted by `offset` (3,)."""
-        return Surface(self.vertices + np.asarray(offset, float), self.faces)
+        return replace(self, vertices=self.vertices + np.asarray(offset, float))
 
-    def mapped(self, matrix: np.ndarray) -> "Surface":
+    def mapped(self, matrix: np.ndarray) -> Self:
         """Return the surface under a linear map (3, 3); a mirroring map turns the faces, so normals stay outward."""
         matrix = np.asarray(matrix, float)
         faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
-        return Surface(portable.applied(matrix, self.vertices), faces)
+        return replace(self, vertices=portable.applied(matrix, self.vertices), faces=faces)
 
 
 def volume(surface: Surface) -> float:
