@@ -15,7 +15,7 @@ from scipy import ndimage
 from forks import printed
 from lowalt.files.street import PACKAGE, STREET, modules, rooms_imported
 from lowalt.report.figures import house
-from lowalt.scene.catalogue import PLACES
+from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
 GROUND = ("files", "machine", "numerics", "config")
@@ -37,7 +37,7 @@ PROGRAMS = {
     "plain": "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in sys.modules)",
     "scenes": (
         "import os, sys, lowalt.echo.__main__, lowalt.scene.__main__, lowalt.noise.__main__\n"
-        "from lowalt.scene.catalogue import called\n"
+        "from lowalt.scene.effects import called\n"
         f"for scene in {SCENES!r}:\n"
         "    if os.fork() == 0:\n"
         "        called(scene)\n"

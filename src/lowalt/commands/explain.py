@@ -50,39 +50,39 @@ def run(given: argparse.Namespace) -> str:
         raise InputError(
             "--suggest: without --out, expected both" if given.out is None else "--out: expected --suggest"
         )
-    from lowalt.scene import explain, explain_text
+    from lowalt.scene import explanation
 
     inputs = os.environ.get("LOWALT_INPUTS")
     config = overlaid(given.scene)
-    scene = explain.scene_of(config)
+    scene = explanation.scene_of(config)
     stations = scene.network.stations
     first = given.station or stations[0].name
     scene.network.station(first)
     print("lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True)
-    chosen = explain.samples(config, Path(inputs) if inputs else None, given.sample)
+    chosen = explanation.samples(config, Path(inputs) if inputs else None, given.sample)
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
-    findings = [explain.finding(scene, station, sample, clouds) for sample in chosen for station in stations]
+    findings = [explanation.finding(scene, station, sample, clouds) for sample in chosen for station in stations]
     changes = []
     if not given.no_table or given.suggest is not None:
         print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
         names = [station.name for station in stations] if given.model else [first]
-        changes = explain.changes(config, chosen, names, _comparison(config, names, given.model))
+        changes = explanation.changes(config, chosen, names, _comparison(config, names, given.model))
     if given.out is not None:
         overlay: dict = {}
         for path in given.scene:
             overlay = merge(overlay, load_yaml(path))
         with replacing(given.out) as temporary:
-            temporary.write_text(explain_text.suggested(overlay, changes, given.suggest))
+            temporary.write_text(explanation.suggested(overlay, changes, given.suggest))
     if given.json:
         return as_json({
             "run": config["run"], "findings": [finding._asdict() for finding in findings],
             "changes": [change._asdict() for change in changes],
         })  # fmt: skip
-    lines = explain_text.verdict(findings)
+    lines = explanation.verdict(findings)
     if changes and not given.no_table:
-        lines += ["", *explain_text.effects_table(changes, given.sources)]
+        lines += ["", *explanation.effects_table(changes, given.sources)]
     for finding in findings if given.levels else []:
-        lines += ["", *explain_text.level_lines(finding)]
+        lines += ["", *explanation.level_lines(finding)]
     return "\n".join(lines)
 
 
