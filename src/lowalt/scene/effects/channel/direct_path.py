@@ -18,7 +18,7 @@ SOURCE = (
 )
 DEFAULTS = {"loss_db": 0.0}
 
-MONOSTATIC = "background_channel", "transmit_leakage"
+MONOSTATIC = "background_channel", "interference", "transmit_leakage"
 """Effects that are modelled for a station that hears itself only."""
 
 

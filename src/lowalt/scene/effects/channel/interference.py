@@ -1,10 +1,10 @@
 """Other stations' signals in a receiver: from mast to mast and by the target, with data that the receiver lacks.
 
-A station hears every other one; a link hears all stations except its sender, and so the transmitter next to its own
-receiver. Where sub-bands overlap (`guard_subcarriers` below 0) the other station's subcarriers arrive at their full
-level, elsewhere its leakage does. Division by the receiver's own data makes both noise: of the powers |Y_m|^2 of M
-subcarriers every range cell gets sum_m |Y_m|^2 / M^2. All beams point at the same target. Symbols follow each other
-without a pause; a signal later than the cyclic prefix, or early by a clock's error, brings part of another symbol.
+A station hears every other one. Where sub-bands overlap (`guard_subcarriers` below 0) the other station's subcarriers
+arrive at their full level, elsewhere its leakage does. Division by the receiver's own data makes both noise: of the
+powers |Y_m|^2 of M subcarriers every range cell gets sum_m |Y_m|^2 / M^2. All beams point at the same target. Symbols
+follow each other without a pause; a signal later than the cyclic prefix, or early by a clock's error, brings part of
+another symbol.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import CheckedScene
@@ -24,70 +24,49 @@ from lowalt.scene.waveform import prefix_length_s, windowed
 SOURCE = (
     "3GPP TS 38.104, 6.6.3 (adjacent channel leakage ratio of base stations, 45 dB below 7 GHz; here the same at any "
     "distance in frequency); H. T. Friis 1946 (from mast to mast); M. Braun, OFDM Radar Algorithms in Mobile "
-    "Communication Networks, KIT 2014, ch. 4 and 5 (other nodes as noise); 80 dB to the own transmitter: estimate"
+    "Communication Networks, KIT 2014, ch. 4 and 5 (other nodes as noise)"
 )
-DEFAULTS = {"leakage_db": 45.0, "loss_db": 0.0, "isolation_db": 80.0, "sigma_ppm": 0.017, "sigma_s": 2e-8}
+DEFAULTS = {"leakage_db": 45.0, "loss_db": 0.0, "sigma_ppm": 0.017, "sigma_s": 2e-8}
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a single station, or clocks that `link_offset` contradicts."""
-    if len(stations(scene.network)) < 2:
+    """Raise InputError for a single station."""
+    if len(scene.network.stations) < 2:
         raise InputError("effects.interference: the network has one station, expected at least two")
-    clocks = scene.effects.get("link_offset", settings)
-    for key in ("sigma_ppm", "sigma_s"):
-        if clocks[key] != settings[key]:
-            raise InputError(
-                f"effects.interference.{key}: {settings[key]}, expected {clocks[key]} as in effects.link_offset"
-            )
-
-
-def stations(network: Network) -> list[Station]:
-    """Return the network's stations without its links."""
-    return [station for station in network.stations if station.transmitter is None]
 
 
 def arrivals(settings: dict, sample: SceneSample, sends: Station) -> list[tuple[np.ndarray, float]]:
     """Return the ways of a station's signal to the receiver: from mast to mast, and by the target.
 
     Each is its response (N or 1, M) on the receiver's subcarriers, as if the whole sub-band were the sender's, and its
-    delay (s). The receiver's own transmitter reaches it by `isolation_db` instead of from mast to mast.
+    delay (s).
     """
-    view, network = sample.view, sample.view.network
-    hears = replace(view.station.receiver or view.station, frequency_hz=view.station.frequency_hz)
+    view, hears = sample.view, sample.view.station
     there = replace(sends, frequency_hz=hears.frequency_hz)
-    if sends.name == hears.name:
-        seen, delay_s = view.of(hears), 0.0
-        level = np.sqrt(network.power) * 10 ** (-settings["isolation_db"] / 20)
-        direct = np.full(network.subcarriers, level, np.complex128)
-    else:
-        seen = view.of(replace(hears, name=f"{sends.name}-{hears.name}", transmitter=there, receiver=hears))
-        direct, delay_s = crossing(view, there, hears)
-        direct = direct * 10 ** (-settings["loss_db"] / 20)
+    seen = view.of(replace(hears, name=f"{sends.name}-{hears.name}", transmitter=there, receiver=hears))
+    direct, delay_s = crossing(view, there, hears)
     by_target_s = float(seen.ways_m(view.origin_m)) / SPEED_OF_LIGHT
-    return [(direct[None], delay_s), (sample.direct_echo(seen), by_target_s)]
+    return [(direct[None] * 10 ** (-settings["loss_db"] / 20), delay_s), (sample.direct_echo(seen), by_target_s)]
 
 
 def heard(settings: dict, sample: SceneSample) -> np.ndarray:
     """Return the time samples (N, M) of all other stations' signals.
 
-    Their data and leakage are drawn by receiver, their clocks and oscillators by look, as `link_offset` draws them.
+    Their data and leakage are drawn by receiver, their clocks and oscillators by look.
     """
     view, network, total = sample.view, sample.view.network, 0.0
-    errors, known = of_stations(settings, network, sample.draws("link_offset")), view.station.transmitter
-    clock = errors[(view.station.receiver or view.station).name]
-    # `link_offset` will move all samples of a link by its sender's offsets less the receiver's.
-    moved = errors[known.name] if known is not None and "link_offset" in sample.settings else clock
+    errors = of_stations(settings, network, sample.draws("link_offset"))
     prefix_s = prefix_length_s(sample.settings.get("cyclic_prefix", {}).get("prefix_s"), network)
     step_hz, middle, count = network.subcarrier_spacing_hz, network.subcarriers // 2, network.subcarriers
     number, rate_hz = np.arange(count), count * step_hz
-    for sends in stations(network):
-        if sends.name == (known or view.station).name:
+    for sends in network.stations:
+        if sends.name == view.station.name:
             continue
-        ppm, shift_s = (theirs - ours for theirs, ours in zip(errors[sends.name], moved, strict=True))
+        ppm, shift_s = np.subtract(errors[sends.name], errors[view.station.name])
         ramp, data = np.exp(-2j * np.pi * (number - middle) * step_hz * shift_s), sent(settings, sample, sends)
         samples = 0.0
         for response, delay_s in arrivals(settings, sample, sends):
-            late_s = delay_s + errors[sends.name][1] - clock[1]
+            late_s = delay_s + shift_s
             late = min(np.ceil(late_s * rate_hz), 0) + max(np.ceil((late_s - prefix_s) * rate_hz), 0)
             samples = samples + windowed(network, prefix_s, response * ramp, int(np.clip(late, -count, count)), data)
         turn_hz = 1e-6 * ppm * (view.station.frequency_hz + middle * step_hz)
