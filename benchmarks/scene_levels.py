@@ -20,7 +20,7 @@ import numpy as np
 from lowalt.config.layers import load
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.files.csv_tables import write_csv
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.effects import called

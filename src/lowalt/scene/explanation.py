@@ -18,7 +18,7 @@ import yaml
 from lowalt.config.network import Network, Station, masts_m
 from lowalt.config.plan import motion_block
 from lowalt.files.errors import InputError
-from lowalt.motion.sample import region_polygon
+from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.scene.chain import SceneSample, received_signal

@@ -51,9 +51,9 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
         sign = 1.0 - 2.0 * ((count - 1) % 2) * abs(lobe - 2.0 * np.rint(0.5 * lobe))
         off = turns - 0.5 * lobe
         off = off if abs(off) > 1e-30 else 1e-30
-        _, one = phasor(off)
+        _, single = phasor(off)
         _, every = phasor(count * off)
-        gain[i] *= sign * every / one
+        gain[i] *= sign * every / single
 
 
 @INNER_VECTOR
