@@ -61,12 +61,13 @@ def run(given: argparse.Namespace) -> str:
     print("lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True)
     chosen = explanation.samples(config, Path(inputs) if inputs else None, given.sample)
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
-    findings = [explanation.finding(scene, station, sample, clouds) for sample in chosen for station in stations]
+    listed = given.levels or given.json
+    findings = [explanation.finding(scene, end, sample, clouds, listed) for sample in chosen for end in stations]
     changes = []
     if not given.no_table or given.suggest is not None:
         print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
         names = [station.name for station in stations] if given.model else [first]
-        changes = explanation.changes(config, chosen, names, _comparison(config, names, given.model))
+        changes = explanation.changes(config, chosen, names, _shown(config, names, given.model))
     if given.out is not None:
         overlay: dict = {}
         for path in given.scene:
@@ -86,22 +87,18 @@ def run(given: argparse.Namespace) -> str:
     return "\n".join(lines)
 
 
-def _comparison(
-    config: dict, stations: list[str], model: Path | None
-) -> Callable[[np.ndarray, np.ndarray], dict[str, float]]:  # fmt: skip
-    """What two sets of signals (K, stations, N) differ in as images, and in the answers of a trained model."""
+def _shown(config: dict, stations: list[str], model: Path | None) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
+    """The function that turns signals (K, stations, N) into pixels, and into the answers of a trained model."""
     from dataclasses import replace
 
     from lowalt.config.network import Network
     from lowalt.tiles import Renderer
 
-    visible = 8
     network = Network.from_settings(config["network"])
     blocks = {key: config[key] for key in ("network", "spectra", "images")}
     whole = Renderer.from_settings(blocks)
     seen = replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
-    answered = None
     if model is not None:
         from lowalt.recognition.one_sample import answer
         from lowalt.recognition.zoo import opened
@@ -110,20 +107,14 @@ def _comparison(
 
         trained, _ = opened(model)
 
-        def answered(tile: np.ndarray) -> str:
-            """The most probable class of a tile."""
-            shares = answer(trained, split(tile, len(named(config["spectra"]))), blocks, "--model")
-            return max(shares, key=shares.__getitem__)
-
-    def compare(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
-        """Shares of pixels whose index differs by more than 8 of 255, and of answers that differ."""
-        pairs = [
-            [renderer.tile(signals.astype(np.complex64)) for signals in pair]
-            for pair in zip(before, after, strict=True)
-        ]
-        result = {"pixels": float(np.mean([abs(a.astype(int) - b) > visible for a, b in pairs]))}
-        if answered is not None:
-            result["answers"] = float(np.mean([answered(a) != answered(b) for a, b in pairs]))
+    def shown(signals: np.ndarray) -> dict[str, np.ndarray]:
+        """Indices of all pixels, and the most probable class of each sample."""
+        tiles = [renderer.tile(each.astype(np.complex64)) for each in signals]
+        result = {"pixels": np.array(tiles, int)}
+        if model is not None:
+            images = len(named(config["spectra"]))
+            shares = [answer(trained, split(tile, images), blocks, "--model") for tile in tiles]
+            result["answers"] = np.array([max(each, key=each.__getitem__) for each in shares])
         return result
 
-    return compare
+    return shown

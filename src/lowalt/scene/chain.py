@@ -123,24 +123,28 @@ class SceneSample:
 
     def _samples(self, view: View) -> np.ndarray:
         """Time samples (N, M) of a view's target whose points move within symbols, or are later than the prefix."""
-        count, delays_s, weights = self.scene.network.subcarriers, np.zeros(1), np.ones((1, 1))
+        delays_s, weights = np.zeros(1), np.ones((1, self.scene.network.subcarriers))
         for instants in offered(self.channel, "instants").values():
             delays_s, weights = instants(view)
         # The instants of a symbol stand together, as symbols of their own.
         moved = view.at((view.times_s[:, None] + delays_s).reshape(-1))
         factor, paths = self.routes(view, self.paths(view)), self.paths(moved)
-        late, samples = np.zeros(view.places.shape[:2], np.int64), 0.0
+        late, network = np.zeros(view.places.shape[:2], np.int64), self.scene.network
         for late_samples in offered(self.channel, "late_samples").values():
             late = late_samples(view)
-        prefix_s = waveform.prefix_length_s(self.settings.get("cyclic_prefix", {}).get("prefix_s"), self.scene.network)
+        prefix_s = waveform.prefix_length_s(self.settings.get("cyclic_prefix", {}).get("prefix_s"), network)
+
+        def on_air(name: str) -> np.ndarray:
+            """The subcarriers on the air at every instant of each symbol."""
+            return np.repeat(self.on_air(name), len(delays_s), axis=0)
+
+        samples = np.zeros((len(moved.times_s), network.subcarriers), np.complex128)
         # Points that lose equally many samples of the window share one response.
-        for lost in np.unique(late):
+        for lost in np.unique(late).tolist():
             some = np.repeat(factor * (late == lost), len(delays_s), axis=-2)
-            samples = samples + waveform.windowed(
-                self.scene.network, prefix_s, response(moved, paths, some, **self._waves), int(lost),
-                lambda name: np.repeat(self.on_air(name), len(delays_s), axis=0),
-            )  # fmt: skip
-        return np.einsum("nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), count), weights)
+            echo = response(moved, paths, some, **self._waves)
+            samples += waveform.windowed(network, prefix_s, echo, lost, on_air)
+        return np.einsum("nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), -1), weights)
 
     def _standing(self, name: str, echo: np.ndarray) -> np.ndarray:
         """Time samples (N, M) of an effect's echoes (N, M), which do not move within a symbol."""
@@ -164,7 +168,7 @@ class SceneSample:
             total = sum(still.values(), sum(map(self.echo, self.targets())))
             if not unknown and not self.receiver and not offered(self.transmitter, "aired"):
                 return total
-            samples = waveform.transmit(total, self.on_air("waveform"))
+            samples = waveform.transmit(total, self.look.aired)
         samples = sum(unknown, samples)
         for name, receive in offered(self.receiver, "receive").items():
             samples = receive(samples, self.look, self.draws(name))

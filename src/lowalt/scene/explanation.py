@@ -38,6 +38,8 @@ CANCELLERS = (
 """Cancellers that a verdict compares."""
 CLOSE_CELLS = 1
 """Range cells by which a chosen cell may be beside the target's and still hold it."""
+VISIBLE = 8
+"""Difference of pixels, of 255, from which they count as changed."""
 FOUND = 0.9
 """Share of symbols from which a target counts as found."""
 
@@ -73,7 +75,7 @@ class Change(NamedTuple):
     """What leaving an effect out, or adding it, changes.
 
     signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
-    more: what the caller's function says of the signals (images, answers); ms: processor time that the effect takes a
+    more: shares of what becomes of the signals (pixels, answers) that differ; ms: processor time that the effect takes a
     sample and station, a median; also: what else had to change for the scene to fit; refused: why the effect was not
     tried.
     """
@@ -133,8 +135,13 @@ def scene_of(config: dict) -> Scene:
     return Scene(network, config["seed"], config["echo"]["tolerance"], effects).at_snr(snrs[(len(snrs) - 1) // 2])
 
 
-def finding(scene: Scene, station: Station, explained: ExplainedSample, clouds: dict[str, Cloud]) -> Finding:
-    """Return whether a sample's target is found at a station, and how loud it is against all else."""
+def finding(
+    scene: Scene, station: Station, explained: ExplainedSample, clouds: dict[str, Cloud], listed: bool = False
+) -> Finding:
+    """Return whether a sample's target is found at a station, how loud it is against all else, and its levels if asked.
+
+    listed: whether levels are wanted, which take as long as a sample.
+    """
     cloud, row, surfaces = explained
     sample = SceneSample(scene, observe(scene, station, cloud, row, surfaces), clouds)
     target_cell, empty = sample.own_cell(), sample.without_target()
@@ -156,7 +163,7 @@ def finding(scene: Scene, station: Station, explained: ExplainedSample, clouds: 
     return Finding(
         row["category"], row["subtype"], row["model"], station.name, range_m,
         _right(sample, sample.detection, target_cell), float(over_db), otherwise,
-        levels(sample.view, scene.effects, sample.power),
+        levels(sample.view, scene.effects, sample.power) if listed else [],
     )  # fmt: skip
 
 
@@ -170,15 +177,16 @@ def _right(sample: SceneSample, detection: Sequence[NamedEffect], target_cell: n
 
 def changes(
     config: dict, chosen: list[ExplainedSample], station_names: Sequence[str],
-    compare: Callable[[np.ndarray, np.ndarray], dict[str, float]],
+    shown: Callable[[np.ndarray], dict[str, np.ndarray]],
 ) -> list[Change]:  # fmt: skip
     """Return what each effect of the catalogue changes at some stations, those that the scene names first.
 
-    compare: says of the signals (K, stations, N) of all samples, as the scene has them and changed, what else differs.
+    shown: returns what becomes of the signals (K, stations, N) of all samples by name: pixels of images, answers of a
+    network.
     """
     named = [effect.name for effect in scene_of(config).effects]
     signals, cells, times_ms = _received(config, station_names, chosen)
-    result = []
+    before, result = shown(signals), []
     for name in [*named, *(name for name in PLACES if name not in config["effects"])]:
         place, inside = PLACES[name], name in named
         try:
@@ -191,8 +199,16 @@ def changes(
         # A kernel's first call compiles it: one sample's time is then far off, and the median is not.
         ms = float(np.median(new_times_ms - times_ms)) * (-1.0 if inside else 1.0)
         shares = float(np.mean(moved)), float(np.mean(cells != new_cells))
-        result.append(Change(name, place, inside, *shares, compare(signals, new_signals), ms, also))
+        after = shown(new_signals)
+        more = {kind: _differing(before[kind], after[kind]) for kind in before}
+        result.append(Change(name, place, inside, *shares, more, ms, also))
     return result
+
+
+def _differing(before: np.ndarray, after: np.ndarray) -> float:
+    """Share of entries that differ: numbers by more than VISIBLE, texts at all."""
+    differs = abs(before - after) > VISIBLE if before.dtype.kind == "i" else before != after
+    return float(np.mean(differs))
 
 
 def _changed(config: dict, name: str) -> tuple[dict, str]:

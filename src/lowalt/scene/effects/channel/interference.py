@@ -54,7 +54,8 @@ def heard(settings: dict, sample: SceneSample) -> np.ndarray:
 
     Their data and leakage are drawn by receiver, their clocks and oscillators by look.
     """
-    view, network, total = sample.view, sample.view.network, 0.0
+    view, network = sample.view, sample.view.network
+    total = np.zeros((network.symbols, network.subcarriers), np.complex128)
     errors = of_stations(settings, network, sample.draws("link_offset"))
     prefix_s = prefix_length_s(sample.settings.get("cyclic_prefix", {}).get("prefix_s"), network)
     step_hz, middle, count = network.subcarrier_spacing_hz, network.subcarriers // 2, network.subcarriers
@@ -64,14 +65,14 @@ def heard(settings: dict, sample: SceneSample) -> np.ndarray:
             continue
         ppm, shift_s = np.subtract(errors[sends.name], errors[view.station.name])
         ramp, data = np.exp(-2j * np.pi * (number - middle) * step_hz * shift_s), sent(settings, sample, sends)
-        samples = 0.0
+        samples = np.zeros_like(total)
         for response, delay_s in arrivals(settings, sample, sends):
             late_s = delay_s + shift_s
             late = min(np.ceil(late_s * rate_hz), 0) + max(np.ceil((late_s - prefix_s) * rate_hz), 0)
-            samples = samples + windowed(network, prefix_s, response * ramp, int(np.clip(late, -count, count)), data)
+            samples += windowed(network, prefix_s, response * ramp, int(np.clip(late, -count, count)), data)
         turn_hz = 1e-6 * ppm * (view.station.frequency_hz + middle * step_hz)
         within = np.exp(2j * np.pi * turn_hz * number / rate_hz)
-        total = total + samples * within * np.exp(2j * np.pi * turn_hz * view.times_s)[:, None]
+        total += samples * within * np.exp(2j * np.pi * turn_hz * view.times_s)[:, None]
     return total
 
 
