@@ -217,20 +217,11 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
 
 def positions(cloud: Cloud, row: dict, times_s: np.ndarray) -> np.ndarray:
     """Return every point's position (N, L, 3) in metres, global frame; arguments and errors as `poses`."""
-    return placed(cloud, *poses(cloud, row, times_s))
-
-
-def placed(cloud: Cloud, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
-    """Return every point's position (N, L, 3) in metres under the poses of its parts; shapes as `Poses`."""
+    rotation, translation = poses(cloud, row, times_s)
     if "node" in cloud.kinds:
         return translation
-    return rotated(rotation, cloud.points, cloud.part) + translation[:, cloud.part]
-
-
-def rotated(rotation: np.ndarray, vectors: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Return rotation[n, part[l]] @ vectors[l] for all n and l, part by part: (N, L, 3)."""
-    result = np.empty((len(rotation), len(vectors), 3))
-    for index in np.unique(part):
-        mine = part == index
-        result[:, mine] = vectors[mine] @ rotation[:, index].swapaxes(1, 2)
+    result = translation[:, cloud.part]
+    for part in np.unique(cloud.part):
+        mine = cloud.part == part
+        result[:, mine] += cloud.points[mine] @ rotation[:, part].swapaxes(1, 2)
     return result

@@ -75,9 +75,8 @@ class Change(NamedTuple):
     """What leaving an effect out, or adding it, changes.
 
     signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
-    more: shares of what becomes of the signals (pixels, answers) that differ; ms: processor time that the effect takes a
-    sample and station, a median; also: what else had to change for the scene to fit; refused: why the effect was not
-    tried.
+    more: shares of what becomes of the signals (pixels, answers) that differ; ms: processor time that the effect takes
+    a sample and station, a median; also: what else had to change for the scene to fit; refused: why it was not tried.
     """
 
     effect: str

@@ -9,7 +9,7 @@ the effect is then dropped. `check(settings, scene)` raises InputError where the
 |---|---|---|
 | motion | `perturb(settings, cloud, row, times_s, rng)` | `Perturbation` of the motion of `row` at `times_s` (N,) |
 | transmitter | `sampling(settings, network, rng)` | `Sampling`: when symbols are sent, which are received |
-| | `regridded(settings, signal, sampling, network)` | even signal (N,) of the received symbols |
+| | `regridded(settings, signal, timing, network)` | even signal (N,) of the received symbols |
 | | `data(settings, symbols, subcarriers, rng)` | data (N, M) of mean power one |
 | | `aired(settings, data)` | subcarriers (N, M) on the air for these data |
 | | `range_cells(settings, response)` | range cells of responses (N, M) whose subcarriers are known in part |

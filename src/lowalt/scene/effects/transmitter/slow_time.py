@@ -69,7 +69,7 @@ def sampling(settings: dict, network: Network, rng: np.random.Generator) -> Samp
     return Sampling(network.times_s + settings["jitter_s"] * late, present)
 
 
-def regridded(settings: dict, signal: np.ndarray, sampling: Sampling, network: Network) -> np.ndarray:
+def regridded(settings: dict, signal: np.ndarray, timing: Sampling, network: Network) -> np.ndarray:
     """Return the evenly spaced signal (N,) made of received symbols `signal` (K,), K of them present.
 
     zero: each symbol at its nominal instant, zeros in the gaps. nudft: the evenly spaced signal whose N Fourier
@@ -77,8 +77,8 @@ def regridded(settings: dict, signal: np.ndarray, sampling: Sampling, network: N
     """
     if settings["regrid"] == "nudft":
         frequency = np.fft.fftfreq(network.symbols, network.symbol_interval_s)
-        times_s = sampling.times_s[sampling.present]
+        times_s = timing.times_s[timing.present]
         return np.fft.ifft(np.exp(-2j * np.pi * np.outer(frequency, times_s)) @ signal)
     result = np.zeros(network.symbols, np.complex128)
-    result[sampling.present] = signal
+    result[timing.present] = signal
     return result
