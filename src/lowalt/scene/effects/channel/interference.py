@@ -19,6 +19,7 @@ from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
 from lowalt.scene.effects.receiver.offsets import of_stations
+from lowalt.scene.set_noise import white
 from lowalt.scene.waveform import prefix_length_s, windowed
 
 SOURCE = (
@@ -90,8 +91,8 @@ def sent(settings: dict, sample: SceneSample, sends: Station) -> Callable[[str],
         """Those of the "waveform", or of the symbols before and after, the "previous" and the "next waveform"."""
         result = np.zeros((network.symbols, network.subcarriers), np.complex128)
         if len(whole) < network.subcarriers:
-            noise = sample.draws(f"leakage of {sends.name}, {symbol}").standard_normal((*result.shape, 2))
-            result = 10 ** (-settings["leakage_db"] / 20) * np.sqrt(0.5) * noise.view(np.complex128)[..., 0]
+            rng, power = sample.draws(f"leakage of {sends.name}, {symbol}"), 10 ** (-settings["leakage_db"] / 10)
+            result = white(rng, power, result.shape)
         if len(whole):
             result[:, whole] = sample.on_air(f"{symbol} of {sends.name}")[:, whole - first]
         return result
