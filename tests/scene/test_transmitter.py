@@ -103,10 +103,10 @@ def test_lateness_is_drawn_again_from_the_name_of_a_sample():
         (comb_pilots, {"offset": 4}, "offset"),
         (slow_time, {"jitter_s": 2.5e-3}, "jitter_s"),
         (slow_time, {"downlink": 1e-6, "tdd_period_s": 1.0}, "downlink"),
-        (slow_time, {"regrid": "zero"}, "regrid"),
+        (slow_time, {"regrid": "zero"}, "gaps"),
     ],
 )
 def test_settings_that_no_station_can_have_are_refused_by_name(effect, changes, said):
-    levels = (3.0,) if said == "regrid" else (math.inf,)
+    levels = (3.0,) if said == "gaps" else (math.inf,)
     with pytest.raises(InputError, match=said):
         effect.check(effect.DEFAULTS | changes, CheckedScene(network(), {}, levels))

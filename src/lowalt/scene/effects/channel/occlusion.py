@@ -66,7 +66,7 @@ def hidden(view: View, parts: Collection[int], known: np.ndarray | None = None) 
     """
     surfaces, cloud, place_m = _surfaces(view), view.cloud, np.asarray(view.station.position_m, np.float64)
     result = np.zeros(view.places.shape[:2], np.bool_) if known is None else known.copy()
-    if view.nodes:
+    if "node" in cloud.kinds:
         hidden_by_bones(surfaces, place_m, view.places, result)
         return result
     # Rays start a little off the point's own surface: along its normal, or toward the station where it has none.
