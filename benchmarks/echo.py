@@ -30,7 +30,7 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.measure import echo_cost as cost
 from lowalt.motion import poses, write_table
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.records import load_table

@@ -14,7 +14,7 @@ import numpy as np
 
 from lowalt.config.layers import load
 from lowalt.files.csv_tables import write_csv
-from lowalt.scene.explain import Finding, finding, samples, scene_of
+from lowalt.scene.explanation import Finding, finding, samples, scene_of
 from lowalt.targets.records import records_of
 
 COLUMNS = ("scene", "class", "samples", "right_percent", "least_percent", "over_rest_db")

@@ -20,15 +20,14 @@ import numpy as np
 from lowalt.config.layers import load
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.files.csv_tables import write_csv
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.numerics.streams import stream
-from lowalt.scene.catalogue import called
-from lowalt.scene.chain import received_signal
+from lowalt.scene.chain import SceneSample, received_signal
+from lowalt.scene.effects import called
 from lowalt.scene.effects.channel import mean_cross_section
-from lowalt.scene.explain import samples
+from lowalt.scene.explanation import samples
 from lowalt.scene.levels import Level, levels
 from lowalt.scene.observe import Scene, observe, with_cross_sections
-from lowalt.scene.protocols import PointsBeams, SamplesTime, SetsCrossSections, ShapesElements, WeighsPoints
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 
@@ -36,8 +35,8 @@ COLUMNS = ("scene", "station", "level", "value", "unit")
 TARGET_COLUMNS = ("subtype", "stated_dbsm", "added_dbsm", "simulated_dbsm", "simulated_less_stated_db",
                   "standard_error_db", "range_cells_db", "beams_db")  # fmt: skip
 SAMPLE = "DJI Mavic 3 Pro", 0
-OWN = (SetsCrossSections, ShapesElements, WeighsPoints, PointsBeams, SamplesTime)
-"""Protocols of the effects that act on the target's own echo on the direct path."""
+OWN = "cross_sections", "element", "visible", "beams", "sampling"
+"""Functions of the effects that act on the target's own echo on the direct path."""
 
 
 def scene_levels(root: Path, name: str) -> tuple[str, list[Level]]:
@@ -47,14 +46,15 @@ def scene_levels(root: Path, name: str) -> tuple[str, list[Level]]:
     config["targets"]["table"] = str(root / config["targets"]["table"])
     config["targets"]["records"] = [str(root / path) for path in config["targets"]["records"]]
     network, every = Network.from_settings(config["network"]), called(config["effects"])
-    alone = tuple(one for one in every if one.place == "motion" or isinstance(one.module, OWN))
+    alone = tuple(
+        effect for effect in every if effect.place == "motion" or any(hasattr(effect.module, name) for name in OWN)
+    )
     sample = samples(config, None, [SAMPLE])[0]
     links = [station for station in network.stations if station.transmitter is not None]
     station = (links or network.stations)[0]
     scene = Scene(network, config["seed"], None, alone)
-    view = observe(scene, station, with_cross_sections(scene, sample.cloud), sample.row, sample.occluders)
-    power = received_signal(scene, station, sample.cloud, sample.row, sample.occluders).power
-    return station.name, levels(view, {one.name: one for one in every}, power)
+    view = observe(scene, station, *sample)
+    return station.name, levels(view, every, SceneSample(scene, view).power)
 
 
 def target_records(root: Path) -> tuple[dict, dict]:

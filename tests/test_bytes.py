@@ -19,7 +19,7 @@ import hashlib, json, sys
 import numpy as np
 from lowalt.config.layers import load
 from lowalt.numerics.streams import stream
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.noise.chunk import noisy_signals
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from emulation import run
-from lowalt.scene.catalogue import PLACES
+from lowalt.scene.effects import PLACES
 
 CLOSE = 2e-7
 """Largest difference, relative to the largest value: three units in the last place of float32."""
@@ -13,7 +13,7 @@ PROBE = """
 import sys
 import numpy as np
 from lowalt.config.layers import load
-from lowalt.scene.catalogue import PLACES
+from lowalt.scene.effects import PLACES
 from lowalt.shards.dataset import Dataset
 from lowalt.targets.occluders import make
 from lowalt.targets.records import records_of

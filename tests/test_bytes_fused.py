@@ -18,7 +18,7 @@ llvm = pytest.importorskip("llvmlite.binding")
 # The stages whose stored values are not rounded afterwards from a bound, as the echo's are.
 MODULES = (
     "numerics.exact.arithmetic", "numerics.exact.sines", "echo.rounding.nearest", "echo.rounding.sums",
-    "motion.kernels", "numerics.normals", "spectra.sliding", "tiles.filters", "tiles.huffman",
+    "motion.pose_kernels", "numerics.normals", "spectra.sliding", "tiles.filters", "tiles.huffman",
     "tiles.huffman_code", "tiles.pixels", "tiles.resample",
 )  # fmt: skip
 LOOSE = re.compile(
@@ -28,8 +28,8 @@ LIBRARY = re.compile(r"call .*@(?:llvm\.|numba_)?(?:sin|cos|tan|exp|log|pow|hypo
 FUSED = re.compile(r"\b(?:fn?madd|fn?msub|fmla|fmls)\b")
 LINE, TABLE = "float32[::1]", "float32[:, ::1]"
 SIGNATURES = {
-    ("motion.kernels", "_product"): "float64[:, ::1], float64[:, ::1], float64[:, ::1]",
-    ("motion.kernels", "_sines"): "float64[::1], float64[::1], float64[::1]",
+    ("motion.pose_kernels", "_product"): "float64[:, ::1], float64[:, ::1], float64[:, ::1]",
+    ("motion.pose_kernels", "_sines"): "float64[::1], float64[::1], float64[::1]",
     ("numerics.normals", "fill"): "uint64[::1], float64, float64[:, ::1], float64[:, ::1]",
     ("spectra.sliding", "fourier_magnitudes"): f"{LINE}, {LINE}, int64, int64, {LINE}, {LINE}, {TABLE}",
     ("spectra.sliding", "transfer"): f"{LINE}, {LINE}, int64, {TABLE}, {TABLE}, {LINE}, {TABLE}",
@@ -38,7 +38,7 @@ SIGNATURES = {
     ("tiles.resample", "across_rows"): f"{TABLE}, int64[:, ::1], {TABLE}, {TABLE}",
 }
 """Kernels with much floating-point work, and the types that their stages give them."""
-FREE = (("motion.kernels", "_product"), ("tiles.resample", "along_rows"), ("tiles.resample", "across_rows"))
+FREE = (("motion.pose_kernels", "_product"), ("tiles.resample", "along_rows"), ("tiles.resample", "across_rows"))
 """Those of them that hold no memory of their own: their code has nothing in it that only x86-64 knows."""
 
 

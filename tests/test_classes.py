@@ -114,7 +114,7 @@ def test_a_class_of_its_own_needs_to_know_what_it_is_like():
 
 
 def test_heights_are_looked_up_by_subtype_then_class_then_what_it_is_like():
-    from lowalt.motion.sample import heights
+    from lowalt.motion.drawing import heights
 
     block = {"height_m": {"UAV": [1, 2], "Plane": [3, 4], "Glider": [5, 6]}}
     assert heights(block, "Glider", "Plane", "UAV") == [5, 6]

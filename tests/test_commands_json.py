@@ -15,7 +15,7 @@ from lowalt.commands.command_line import as_json
 from lowalt.config.layers import load, plain
 from lowalt.files.atomic import replacing
 from lowalt.report.figures import inspection, target
-from lowalt.scene.catalogue import PLACES
+from lowalt.scene.effects import PLACES
 from lowalt.tiles.render import Renderer
 from lowalt.workflow.board import Board, Job
 from lowalt.workflow.status import FOLDER, PLANNED_JOBS
@@ -70,7 +70,7 @@ def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_s
 
 def test_explain_answers_with_findings_and_changes(answer, capsys, tmp_path):
     overlay, mine = tmp_path / "scene.yaml", tmp_path / "mine.yaml"
-    effects = "effects: {iq_imbalance: {}, adc: {bits: 24, clip: false}}"
+    effects = "effects: {iq_imbalance: {}, adc: {bits: 24, backoff_db: 40.0}}"
     overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
     scene = ["explain", str(overlay), "--sample", "Crow:3"]
     model = str(ROOT / "results/zoo/default-unseen.safetensors")
@@ -94,11 +94,12 @@ def test_a_wrong_cell_changes_the_symbols_that_hold_another_cell(answer, tmp_pat
     overlay = tmp_path / "scene.yaml"
     overlay.write_text(
         "network: {symbols: 32}\nspectra: {vrp: {window: 16}}\n"
-        "effects: {cell_error: {probability: 0.4, spread_cells: 9, mode: fixed}}\n"
+        "effects: {cell_error: {probability: 0.4, spread_cells: 60}}\n"
     )
     found, _ = answer("explain", str(overlay), "--sample", "Crow:3", "--station", "A")
     right = found["findings"][0]["right"]
-    assert 0.3 < right < 0.9 and found["changes"][0]["cells"] == pytest.approx(1 - right)
+    # An error of one cell still holds the target.
+    assert 0.3 < right < 0.9 and found["changes"][0]["cells"] == pytest.approx(1 - right, abs=0.1)
 
 
 def test_spectra_answers_with_the_size_of_each(answer, capsys):

@@ -57,7 +57,7 @@ sys.path.insert(0, "tests/support")
 import numpy as np
 from scenes import target
 from lowalt.config.network import Network, Station
-from lowalt.scene.catalogue import called
+from lowalt.scene.effects import called
 from lowalt.scene.chain import received_signal
 from lowalt.scene.observe import Scene
 from lowalt.motion.table import NUMBERS

@@ -166,7 +166,7 @@ def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_
     line, source = [line for line in found.splitlines() if line.startswith("dc_offset")]
     assert float(re.fullmatch(r"dc_offset +named +(\S+)%( +\S+%)+ +-?\d+\.\d", line)[1]) > 1
     assert "ch. 2" in source
-    program = "from lowalt.scene.catalogue import PLACES\nprint(*PLACES)"
+    program = "from lowalt.scene.effects import PLACES\nprint(*PLACES)"
     names = python("-c", program).split()
     # Its place in the chain is the last of the receiver's, before detection begins.
     assert names.index("adc") + 1 == names.index("dc_offset") == names.index("canceller") - 1

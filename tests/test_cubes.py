@@ -219,7 +219,7 @@ def test_images_of_cells_ask_for_a_band_with_enough_cells_and_speeds_for_all_sym
     ("change", "words"),
     [
         ({"shards": {"kind": "signal"}}, "shards.kind 'signal'"),
-        ({"effects": {"slow_time": {"regrid": "linear"}}}, "slow_time.regrid: 'linear'"),
+        ({"effects": {"slow_time": {"regrid": "nudft"}}}, "slow_time.regrid: 'nudft'"),
     ],
 )
 def test_cells_are_refused_where_no_stage_makes_them(dataset, change, words):

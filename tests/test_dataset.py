@@ -222,7 +222,7 @@ def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
 
 
 def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(dataset, tmp_path, capsys):
-    config = configuration(effects={"occlusion": {"strength": 1.0}})
+    config = configuration(effects={"occlusion": {}})
     config["targets"]["select"] = ["DJI Mini 2"]
     config["motion"] |= {"models": 4, "models_per_chunk": 4}
     config["noise"] = {"snr_db": [13]}

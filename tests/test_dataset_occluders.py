@@ -20,7 +20,7 @@ def config_of(*subtypes: str, **effects: dict) -> dict:
 
 
 def test_a_scene_that_hides_points_is_made_with_the_surfaces_that_its_run_would_read(tmp_path):
-    config = config_of("DJI Mini 2", "Walking Pedestrian 5", occlusion={"strength": 1.0})
+    config = config_of("DJI Mini 2", "Walking Pedestrian 5", occlusion={})
     records = records_of(config["targets"], None)
     for number, name in enumerate(config["targets"]["select"]):
         occluders.write(tmp_path / f"{number}.npz", occluders.make(records[name], None, config["seed"]), name)

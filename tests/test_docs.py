@@ -17,7 +17,7 @@ from lowalt.__main__ import main
 from lowalt.config import schema_page
 from lowalt.config.layers import load
 from lowalt.files.errors import InputError
-from lowalt.scene.catalogue import PLACES
+from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md")])

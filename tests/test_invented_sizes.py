@@ -10,8 +10,8 @@ from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion import poses, read_table, write_table
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.motion.poses import positions
-from lowalt.motion.sample import draw, region_polygon
 from lowalt.numerics.streams import stream
 from lowalt.shards.record import record, row_of
 from lowalt.targets.cloud import cloud_of, extent, scaled

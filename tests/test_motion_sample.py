@@ -9,8 +9,8 @@ from builtin_records import CONFIG, TABLE
 from lowalt.config.classes import AIRBORNE
 from lowalt.files.errors import InputError
 from lowalt.motion import positions, read_table, write_table
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.motion.rotations import attitude
-from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
 from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud

@@ -10,7 +10,7 @@ from lowalt.config.layers import load_yaml
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, positions
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.motion.table import NUMBERS
 from lowalt.numerics.streams import stream
 from lowalt.spectra import Spectra, trp, vrp

@@ -9,7 +9,7 @@ from lowalt.config.layers import load_yaml, merge
 from lowalt.config.network import Network, as_far_as
 from lowalt.config.plan import Plan, snrs_of
 from lowalt.files.errors import InputError
-from lowalt.motion.sample import masts_in_reach
+from lowalt.motion.drawing import masts_in_reach
 from lowalt.shards.dataset import Dataset
 from test_workflow import ROOT
 

@@ -17,7 +17,7 @@ from lowalt.recognition.__main__ import main
 from lowalt.recognition.ahead import Augmented
 from lowalt.recognition.made import DatasetSamples, opened, stations_of
 from lowalt.recognition.views import ShardSamples
-from lowalt.scene import chunk
+from lowalt.scene import chain
 from lowalt.shards import maker
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
@@ -141,7 +141,7 @@ def test_only_the_stations_that_a_scheme_sees_are_computed(run, effects, monkeyp
         return counted
 
     monkeypatch.setattr(maker, "clean_signals", heard(maker.clean_signals, lambda given: given[1]))
-    monkeypatch.setattr(chunk, "scene_signals", heard(chunk.scene_signals, lambda given: [given[1]]))
+    monkeypatch.setattr(chain, "scene_signals", heard(chain.scene_signals, lambda given: [given[1]]))
     dataset.maker.echo["effects"] = effects
     row = dataset.row(dataset.place(3))
     whole = dataset.maker.signal(row, 8.0)

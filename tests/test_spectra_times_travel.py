@@ -9,8 +9,8 @@ from lowalt.config.layers import canonical
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.motion import write_table
-from lowalt.scene.catalogue import called
 from lowalt.scene.checks import check
+from lowalt.scene.effects import called
 from lowalt.scene.lateness import lateness, timed
 from lowalt.scene.observe import Scene, observe
 from lowalt.shards import ShardSet
@@ -80,7 +80,7 @@ def test_the_tiles_stage_draws_the_instants_of_its_motion_table(dataset, tmp_pat
 
 
 def test_a_signal_that_was_made_even_is_refused(dataset):
-    even = {"slow_time": FRAMES["slow_time"] | {"regrid": "hold"}}
-    with pytest.raises(InputError, match=r"slow_time.regrid: 'hold'.*expected 'zero'"):
+    even = {"slow_time": FRAMES["slow_time"] | {"regrid": "nudft"}}
+    with pytest.raises(InputError, match=r"slow_time.regrid: 'nudft'.*expected 'zero'"):
         check(json.loads(json.dumps(dataset.config | {"effects": even})))
     check(json.loads(json.dumps(dataset.config)))

@@ -12,7 +12,7 @@ from lowalt.config.layers import load
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.motion import poses, positions
-from lowalt.motion.sample import draw
+from lowalt.motion.drawing import draw
 from lowalt.numerics import portable
 from lowalt.numerics.streams import stream
 from lowalt.report.figures.motion_strip import motion_strip, view_of

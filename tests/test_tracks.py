@@ -17,7 +17,7 @@ from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion import positions, read_table, write_table
 from lowalt.motion.__main__ import main as motion
-from lowalt.motion.sample import region_polygon
+from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import TURN_RADPS, Cell, model_rows
 from lowalt.shards.dataset import Dataset, Place

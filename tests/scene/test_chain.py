@@ -12,8 +12,8 @@ from lowalt.echo import echo_signal
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
-from lowalt.scene.catalogue import ORDER, PLACES, called, dotted
 from lowalt.scene.chain import SceneSample, received_signal
+from lowalt.scene.effects import PLACES, called, dotted
 from lowalt.scene.observe import observe
 from lowalt.scene.response import response
 from scenes import A, network, scene, target, view_of
@@ -21,6 +21,11 @@ from scenes import A, network, scene, target, view_of
 
 def data_of(name, radio):
     return waveform.qpsk(stream(5, "effect", name, "Thing", 3, "A"), radio.symbols, radio.subcarriers)
+
+
+def sample_of(effects, cloud, row):
+    asked = scene(effects)
+    return SceneSample(asked, observe(asked, A, cloud, row))
 
 
 def strongest(responses):
@@ -87,17 +92,16 @@ def test_effects_without_strength_change_no_bit():
 def test_adding_an_effect_moves_no_other_draw():
     cloud, row = target(np.random.default_rng(4))
     noise, land = {"receiver_noise": {"noise_figure_db": 60.0}}, {"clutter": {}}
-    noisy, cluttered, both = (SceneSample(scene(effects), A, cloud, row) for effects in (noise, land, noise | land))
+    noisy, cluttered, both = (sample_of(effects, cloud, row) for effects in (noise, land, noise | land))
     echo = np.fft.ifft(noisy.direct, axis=1)
     assert abs((both.cells - cluttered.cells) - (noisy.cells - echo)).max() < 1e-9 * abs(noisy.cells).max()
     assert abs(noisy.cells - echo).max() > 0.1 * abs(echo).max()
 
 
 def test_the_catalogue_names_every_module_with_defaults_and_imports_none_that_is_not_called():
-    for entry in ORDER:
-        place, _, name = entry.partition("/")
+    for name, place in PLACES.items():
         module = importlib.import_module(dotted(name))
-        assert isinstance(module.DEFAULTS, dict) and module.SOURCE and PLACES[name] == place
+        assert isinstance(module.DEFAULTS, dict) and module.SOURCE and f".{place}." in module.__name__
     for name in list(sys.modules):
         if name.startswith("lowalt.scene.effects.receiver."):
             del sys.modules[name]
@@ -116,8 +120,9 @@ def test_unknown_effects_and_parameters_are_named():
 
 def test_a_sample_without_its_target_keeps_its_noise_and_land():
     cloud, row = target(np.random.default_rng(6))
-    whole = SceneSample(scene({"receiver_noise": {}, "clutter": {}}), A, cloud, row)
-    echo = SceneSample(scene({"squint": {}}), A, cloud, row)
+    whole, echo = (
+        sample_of(effects, cloud, row) for effects in ({"receiver_noise": {}, "clutter": {}}, {"squint": {}})
+    )
     empty = whole.without_target()
     difference = whole.cells - empty.cells
     alone = np.fft.ifft(echo.direct, axis=1)

@@ -28,7 +28,7 @@ from lowalt.scene.effects.channel import (
 )
 from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
-from scenes import A, B, link, linked, target
+from scenes import A, B, link, linked, seen_by, target
 
 LINK = link()
 
@@ -37,7 +37,7 @@ def seen(station=A, cloud=None, radio=None, element=None, **changes) -> View:
     """The small target as a station or a link sees it."""
     made, row = target(np.random.default_rng(1))
     radio = radio or linked()
-    return View(radio, station, cloud or made, row | changes, radio.times_s, radio.times_s, element=element)
+    return seen_by(radio, station, cloud or made, row | changes, element=element)
 
 
 def facing(count: int, kinds=("body", "rotor")):

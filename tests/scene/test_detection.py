@@ -16,7 +16,7 @@ from lowalt.scene.waveform import Look
 from scenes import A, network
 
 RADIO = network(symbols=200, subcarriers=64)
-KINDS = [{"kind": "mean"}, {"kind": "pulse", "order": 2}, {"kind": "exponential"}, {"kind": "clutter"}]
+KINDS = [{"kind": "mean"}, {"kind": "pulse", "order": 2}, {"kind": "clutter"}]
 SPEED_MPS = 299_792_458.0 / 4.9e9 / 4 / 2.5e-3
 """Largest radial speed that does not fold."""
 
@@ -33,8 +33,14 @@ def filtered(changes, cells):
 def test_a_canceller_leaves_nothing_of_what_stands_still_and_keeps_the_level_of_noise(changes):
     still = np.broadcast_to(normals(1, 64), (200, 64))
     assert abs(filtered(changes, still)).max() < 1e-9
-    # A recursive filter's first symbols hold less noise.
-    assert np.mean(abs(filtered(changes, normals(2, 200, 500))) ** 2) == pytest.approx(1.0, rel=0.06)
+    assert np.mean(abs(filtered(changes, normals(2, 200, 500))) ** 2) == pytest.approx(1.0, rel=0.02)
+
+
+def loss_db(changes, speed_mps):
+    """By how much a filter weakens a steady echo of this radial speed, the median over the look's symbols."""
+    turns = 2 * speed_mps * 4.9e9 / 299_792_458.0 * 2.5e-3
+    left = filtered(changes, np.exp(2j * np.pi * turns * np.arange(200))[:, None])
+    return -10 * np.log10(np.median(abs(left) ** 2))
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -44,7 +50,7 @@ def test_a_pulse_canceller_weakens_a_steady_echo_as_its_response_says(order):
     for speed_mps in (0.3, 1.0, 3.0):
         turns = speed_mps / SPEED_MPS / 2
         truth = 10 * np.log10(gain / (2 * np.sin(np.pi * turns)) ** (2 * order))
-        found = canceller.loss_db(canceller.DEFAULTS | {"kind": "pulse", "order": order}, RADIO, speed_mps)
+        found = loss_db({"kind": "pulse", "order": order}, speed_mps)
         assert found == pytest.approx(truth, abs=1e-6)
 
 
@@ -72,11 +78,10 @@ def test_the_clutter_filter_leaves_windblown_land_its_depth_below_what_it_was(de
 
 def test_the_clutter_filter_spares_targets_beyond_its_notch_which_grows_with_wind_and_depth():
     def loss(wind_mps, depth_db, speed_mps):
-        settings = canceller.DEFAULTS | {"kind": "clutter", "wind_mps": wind_mps, "depth_db": depth_db}
-        return canceller.loss_db(settings, RADIO, speed_mps)
+        return loss_db({"kind": "clutter", "wind_mps": wind_mps, "depth_db": depth_db}, speed_mps)
 
     assert abs(loss(1.0, 50.0, 2.0)) < 1.0 and loss(1.0, 50.0, 0.3) > 20
-    pulse = canceller.loss_db(canceller.DEFAULTS | {"kind": "pulse", "order": 2}, RADIO, 1.2)
+    pulse = loss_db({"kind": "pulse", "order": 2}, 1.2)
     assert loss(1.0, 50.0, 1.2) < 3.0 < 10.0 < pulse
     kept = [
         canceller.land(200, 4.9e9, 2.5e-3, wind, depth).shape[1]
@@ -136,7 +141,6 @@ def test_a_track_from_the_aim_follows_its_target_past_louder_echoes_and_the_end_
         found = chosen({}, cells, seed=seed)
         # A range error of a cell: the first symbols may lie outside the gate, and later ones do not.
         assert (found == place)[20:].mean() > 0.97
-    assert (chosen({"start": "strongest"}, cells) == 40).all()
 
 
 def test_the_range_error_is_drawn_once_a_look_and_moves_the_gate():
@@ -153,29 +157,19 @@ def test_symbols_without_a_detection_take_the_predicted_cell():
     assert abs(found - place)[120:140].max() <= 1 and (found == place)[140:].mean() > 0.95
 
 
-@pytest.mark.parametrize("cfar", ["ca", "os"])
-def test_noise_exceeds_the_threshold_as_often_as_asked(cfar):
-    settings = detector.DEFAULTS | {"cfar": cfar, "false_alarm": 0.01}
+def test_noise_exceeds_the_threshold_as_often_as_asked():
+    settings = detector.DEFAULTS | {"false_alarm": 0.01}
     power = abs(normals(7, 1000, 64)) ** 2
     assert detector.exceeds(settings, power).mean() == pytest.approx(0.01, rel=0.15)
 
 
-@pytest.mark.parametrize("cfar", ["ca", "os"])
-def test_a_threshold_is_that_of_the_cells_about_it_as_sorted_one_by_one(cfar):
-    settings = detector.DEFAULTS | {"cfar": cfar, "guard": 1, "training": 4, "rank": 0.75, "false_alarm": 0.1}
+def test_a_threshold_is_that_of_the_cells_about_it_one_by_one():
+    settings = detector.DEFAULTS | {"guard": 1, "training": 4, "false_alarm": 0.1}
     power = abs(normals(8, 6, 64)) ** 2
-    scale = detector.factor(cfar, 8, 6, 0.1)
+    scale = detector.factor(8, 0.1)
     for n, m in np.ndindex(power.shape):
         about = [power[n, (m + side * k) % 64] for side in (-1, 1) for k in range(2, 6)]
-        noise = np.mean(about) if cfar == "ca" else sorted(about)[5]
-        assert detector.exceeds(settings, power)[n, m] == (power[n, m] > scale * noise)
-
-
-def test_without_a_gate_the_strongest_detection_of_all_cells_is_taken():
-    cells, _ = crossing()
-    assert (chosen({"gate_cells": None}, cells) == 40).all()
-    cells[50:60] = 0.0
-    assert (chosen({"gate_cells": None}, cells) == 40).all()
+        assert detector.exceeds(settings, power)[n, m] == (power[n, m] > scale * np.mean(about))
 
 
 def test_a_gate_or_training_cells_round_all_ranges_are_refused():
@@ -194,12 +188,6 @@ def test_wrong_cells_are_as_many_and_as_far_as_asked():
     off = (cell_error.choose(settings, right, cells, None, stream(1, "e")) - 3 + 8) % 16 - 8
     share = np.array([(off == step).mean() for step in range(-3, 4)])
     np.testing.assert_allclose(share, [0, 1 / 16, 1 / 16, 0.75, 1 / 16, 1 / 16, 0], atol=0.01)
-    settings["probability"] = 1.0
-    fixed = settings | {"mode": "fixed", "spread_cells": -4}
-    fixed = cell_error.choose(fixed, right, cells, None, stream(1, "e"))
-    assert (fixed == 15).all()
-    look = cell_error.choose(settings | {"hold": "look"}, right, cells, None, stream(1, "e"))
-    assert len(set(look)) == 1 and look[0] != 3
 
 
 @pytest.mark.parametrize("effect", [canceller, detector, cell_error])

@@ -51,7 +51,7 @@ def test_a_late_window_makes_echoes_nearer():
 def test_a_carrier_offset_moves_every_line_and_leaks_as_summed_sample_by_sample():
     look = look_of(network(symbols=3))
     samples = waveform.transmit(echo(look, 2e-6), look.aired)
-    settings = carrier_offset.DEFAULTS | {"fixed_hz": 700.0, "sigma_ppm": 0.0}
+    settings = carrier_offset.DEFAULTS | {"fixed_ppm": 700e6 / look.oscillator_hz, "sigma_ppm": 0.0}
     found = carrier_offset.receive(settings, samples, look, stream(2, "x"))
     for n, i in np.ndindex(samples.shape):
         turn = np.exp(2j * np.pi * 700.0 * (n * 2.5e-3 + i * look.sample_s))
@@ -134,9 +134,8 @@ def test_a_converter_errs_as_uniform_steps_do_and_clips():
     found = adc.receive(adc.DEFAULTS | {"bits": 10}, samples, look_of(network()), None)
     step = adc.full_scale(samples, 12.0) * 2**-9
     assert np.mean(abs(found - samples) ** 2) == pytest.approx(step**2 / 6, rel=0.1)
-    coarse, clipped = adc.quantise(np.array([0.1, 0.9, 3.0, -3.0]) + 0j, 2, 1.0)
-    assert coarse.real.tolist() == [0.25, 0.75, 0.75, -0.75] and clipped == 2
-    assert adc.quantise(np.array([3.0]) + 0j, 2, 1.0, clip=False)[0].real[0] == 3.25
+    coarse = adc.quantise(np.array([0.1, 0.9, 3.0, -3.0]) + 0j, 2, 1.0)
+    assert coarse.real.tolist() == [0.25, 0.75, 0.75, -0.75]
     assert not adc.receive(adc.DEFAULTS, np.zeros((2, 4), complex), None, None).any()
 
 
@@ -225,7 +224,6 @@ BLOCK = {
 @pytest.mark.parametrize(
     ("effects", "said"),
     [
-        ({"timing_offset": {"fixed_s": {"Z": 1e-9}}}, "'Z'"),
         ({"timing_offset": {"sigma_s": 1e-6}}, "prefix_slack_s"),
         ({"clock_offset": {"fixed_ppm": 1.0}}, "prefix_slack_s"),
         ({"clock_offset": {"sigma_ppm": 0.01}, "carrier_offset": {}}, "sigma_ppm"),

@@ -11,7 +11,7 @@ from lowalt.scene.effects.channel import occlusion
 from lowalt.scene.rays import hidden_by_bones
 from lowalt.scene.view import View
 from lowalt.targets.surfaces import ellipsoid
-from scenes import A, link, linked, network, target
+from scenes import A, link, linked, network, seen_by, target
 
 KINDS, NAMES = ("body", "rotor", "rotor"), ("body", "rotor 0", "rotor 1")
 AXES = np.array([[np.nan] * 3, [0.0, 0.6, 0.8], [0.0, 0.0, 1.0]])
@@ -34,9 +34,7 @@ def among_triangles(closed: bool, station=A, points: int = 60, count: int = 80, 
         "offset_m": np.full(points, 0.02),
     }  # fmt: skip
     radio = linked(symbols=37)
-    return View(
-        radio, station, cloud, row | {"phase_1_rad": 1.1} | changes, radio.times_s, radio.times_s, occluders=surfaces
-    )
+    return seen_by(radio, station, cloud, row | {"phase_1_rad": 1.1} | changes, occluders=surfaces)
 
 
 def one_by_one(view: View, parts) -> np.ndarray:
@@ -73,23 +71,22 @@ def test_points_are_hidden_as_by_every_ray_against_every_triangle(closed, place)
     rest, blades = one_by_one(view, (0,)), one_by_one(view, (1, 2)) & ~one_by_one(view, (0,))
     assert 0.05 < rest.mean() < 0.9 and blades.mean() > 0.02
     assert len(np.unique(rest, axis=0)) > 15
-    settings = {"strength": 0.9, "blades": "bent"}
-    behind = 1 - 0.9 * (1 - occlusion.through_blades(view))
-    assert 0.1 < behind < 1
-    np.testing.assert_allclose(
-        occlusion.visible(settings, view), np.where(rest, 0.1, np.where(blades, behind, 1.0)), rtol=1e-12
-    )
-    opaque, clear = (occlusion.visible(settings | {"blades": kind}, view) for kind in ("opaque", "transparent"))
-    np.testing.assert_allclose(opaque, np.where(rest | blades, 0.1, 1.0), rtol=1e-12)
-    np.testing.assert_allclose(clear, np.where(rest, 0.1, 1.0), rtol=1e-12)
+    behind = occlusion.through_blades(view)
+    assert 0.05 < behind < 1
+    bent, opaque, clear = (occlusion.visible({"blades": kind}, view) for kind in ("bent", "opaque", "transparent"))
+    np.testing.assert_allclose(bent, np.where(rest, 0.0, np.where(blades, behind, 1.0)), rtol=1e-12)
+    np.testing.assert_array_equal(opaque, np.where(rest | blades, 0.0, 1.0))
+    np.testing.assert_array_equal(clear, np.where(rest, 0.0, 1.0))
 
 
 def test_each_way_of_a_link_has_the_root_of_its_ends_factor():
     view = among_triangles(True, link())
     ends = [one_by_one(end, range(3)) for end in view.ends()]
     assert (ends[0] != ends[1]).any()
-    found = occlusion.visible({"strength": 0.75, "blades": "opaque"}, view)
-    np.testing.assert_allclose(found, 0.5 ** ends[0] * 0.5 ** ends[1], rtol=1e-12)
+    found = occlusion.visible({"blades": "opaque"}, view)
+    np.testing.assert_array_equal(found, np.where(ends[0] | ends[1], 0.0, 1.0))
+    bent, *ways = (occlusion.visible(occlusion.DEFAULTS, end) for end in (view, *view.ends()))
+    np.testing.assert_allclose(bent, np.sqrt(ways[0] * ways[1]), rtol=1e-12)
 
 
 def test_a_convex_body_hides_just_what_looks_away():
@@ -103,7 +100,7 @@ def test_a_convex_body_hides_just_what_looks_away():
         "subtype": "Thing", "vertices": sphere.vertices, "faces": sphere.faces, "closed": np.ones(2, bool),
         "vertex_part": np.zeros(len(sphere.vertices), int), "offset_m": np.full(len(middle), 1e-9),
     }  # fmt: skip
-    view = View(network(), A, cloud, row, np.zeros(1), network().times_s, occluders=surfaces)
+    view = seen_by(network(), A, cloud, row, np.zeros(1), occluders=surfaces)
     away = np.einsum("nli,nli->nl", view.normals, np.array(A.position_m) - view.places) < 0
     np.testing.assert_array_equal(occlusion.visible(occlusion.DEFAULTS, view), np.where(away, 0.0, 1.0))
 

@@ -3,10 +3,11 @@
 import numpy as np
 
 from lowalt.config.network import Network, Station
+from lowalt.echo import Rigid
 from lowalt.motion.table import NUMBERS
-from lowalt.scene.catalogue import called
+from lowalt.scene.effects import called
 from lowalt.scene.observe import Scene
-from lowalt.scene.view import Beams, View
+from lowalt.scene.view import Beams, Perturbations, View, located
 from lowalt.targets.cloud import Cloud
 
 A = Station("A", (0.0, 0.0, 10.0), 0.3, 4.9e9)
@@ -68,9 +69,20 @@ def view_of(radio: Network, places: np.ndarray, rcs_m2: np.ndarray, aim_m, stati
     )  # fmt: skip
     beams = Beams(radio.symbol_interval_s * np.arange(len(aims)), aims)
     names = {end.name for end in radio.stations} | {"A", "B"}
-    view = View(radio, station or radio.stations[0], cloud, {}, times_s, times_s, beams=dict.fromkeys(names, beams))
-    view.__dict__["places"] = places
-    return view
+    still = Rigid(np.eye(3) + np.zeros((len(places), 1, 1, 1)), np.zeros((len(places), 1, 3)), cloud.points, cloud.part)
+    return View(
+        radio, station or radio.stations[0], cloud, {}, times_s, still, places, Perturbations(times_s, ()), aims[0],
+        dict.fromkeys(names, beams),
+    )  # fmt: skip
+
+
+def seen_by(
+    radio: Network, station: Station, cloud: Cloud, row: dict, times_s: np.ndarray | None = None, **facts
+) -> View:
+    """The view of a target in motion, whose origin at the first symbol the beams point at."""
+    times_s, moved = radio.times_s if times_s is None else times_s, Perturbations(radio.times_s, ())
+    origin_m = np.array([row["x_m"], row["y_m"], row["z_m"]])
+    return View(radio, station, cloud, row, times_s, *located(cloud, row, times_s, moved), moved, origin_m, **facts)
 
 
 def drifting(rng: np.random.Generator, middle_m, symbols: int = 5, points: int = 11, size_m: float = 0.7) -> np.ndarray:

@@ -7,7 +7,7 @@ from pathlib import Path
 from lowalt.config.command import Refusing, refusing
 from lowalt.machine.environment import prepare
 from lowalt.config.plan import PART, PIECE
-from lowalt.scene.catalogue import dotted
+from lowalt.scene.effects import dotted
 from lowalt.workflow import mends, options, space
 from lowalt.files.shipped import located, shipped
 from lowalt.workflow.products import PRESETS, TABLES, Products

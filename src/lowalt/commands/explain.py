@@ -19,9 +19,6 @@ from lowalt.spectra.catalogue import named
 from lowalt.targets.records import records_of
 from lowalt.workflow.space import cubes_sentence, cubes_size
 
-VISIBLE = 8
-"""Levels of 255 by which a pixel differs visibly."""
-
 
 def _sample(text: str) -> tuple[str, int]:
     """Subtype and motion model of a text such as "Crow:3"."""
@@ -56,35 +53,36 @@ def run(options: argparse.Namespace) -> Answer:
         raise InputError(
             "--suggest: without --out, expected both" if options.out is None else "--out: expected --suggest"
         )
-    from lowalt.scene import explain, explain_text
+    from lowalt.scene import explanation
 
     inputs = Path(os.environ["LOWALT_INPUTS"]) if os.environ.get("LOWALT_INPUTS") else None
     config = overlaid(options.scene)
     size = _size(config, inputs)
-    scene = explain.scene_of(config)
+    scene = explanation.scene_of(config)
     stations = scene.network.stations
     first = options.station or stations[0].name
     scene.network.station(first)
     print("lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True)
-    chosen = explain.samples(config, inputs, options.sample)
+    chosen = explanation.samples(config, inputs, options.sample)
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
-    findings = [explain.finding(scene, station, sample, clouds) for sample in chosen for station in stations]
+    listed = options.levels or options.json
+    findings = [explanation.finding(scene, end, sample, clouds, listed) for sample in chosen for end in stations]
     changes = []
     if not options.no_table or options.suggest is not None:
         print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
         names = [station.name for station in stations] if options.model else [first]
-        changes = explain.changes(config, chosen, names, _comparison(config, names, options.model))
+        changes = explanation.changes(config, chosen, names, _shown(config, names, options.model))
     if options.out is not None:
         overlay: dict = {}
         for path in options.scene:
             overlay = merge(overlay, load_yaml(path))
         with replacing(options.out) as temporary:
-            temporary.write_text(explain_text.suggested(overlay, changes, options.suggest))
-    lines = [*([cubes_sentence(size), ""] if size else []), *explain_text.verdict(findings)]
+            temporary.write_text(explanation.suggested(overlay, changes, options.suggest))
+    lines = [*([cubes_sentence(size), ""] if size else []), *explanation.verdict(findings)]
     if changes and not options.no_table:
-        lines += ["", *explain_text.effects_table(changes, options.sources)]
+        lines += ["", *explanation.effects_table(changes, options.sources)]
     for finding in findings if options.levels else []:
-        lines += ["", *explain_text.level_lines(finding)]
+        lines += ["", *explanation.level_lines(finding)]
     facts = {"findings": [row._asdict() for row in findings], "changes": [row._asdict() for row in changes]}
     return Answer({"run": config["run"], **({"shards": size} if size else {}), **facts}, "\n".join(lines))
 
@@ -97,10 +95,8 @@ def _size(config: dict, inputs: Path | None) -> dict:
     return cubes_size(config, Plan.of(config, {name: record["published"] for name, record in records.items()}))
 
 
-def _comparison(
-    config: dict, stations: list[str], model: Path | None
-) -> Callable[[np.ndarray, np.ndarray], dict[str, float]]:  # fmt: skip
-    """What two sets of signals (K, stations, N) differ in as images, and in the answers of a trained model."""
+def _shown(config: dict, stations: list[str], model: Path | None) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
+    """The function that turns signals (K, stations, N) into pixels, and into the answers of a trained model."""
     from lowalt.config.network import Network
     from lowalt.tiles import Renderer
 
@@ -108,31 +104,21 @@ def _comparison(
     whole, network = Renderer.from_settings(blocks), Network.from_settings(config["network"])
     seen = dataclasses.replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
-    answered = _answering(model, blocks) if model else None
+    if model is not None:
+        from lowalt.recognition.one_sample import answer
+        from lowalt.recognition.zoo import opened
+        from lowalt.tiles import split
 
-    def differing(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
-        """Shares of pixels whose index differs by more than VISIBLE of 255, and of answers that differ."""
-        first, second = ([renderer.tile(sample.astype(np.complex64)) for sample in many] for many in (before, after))
-        shares = {"pixels": float(np.mean(abs(np.subtract(first, second, dtype=int)) > VISIBLE))}
-        if answered is not None:
-            pairs = zip(map(answered, first), map(answered, second), strict=True)
-            shares["answers"] = float(np.mean([name != other for name, other in pairs]))
-        return shares
+        trained, _ = opened(model)
 
-    return differing
+    def shown(signals: np.ndarray) -> dict[str, np.ndarray]:
+        """Indices of all pixels, and the most probable class of each sample."""
+        tiles = [renderer.tile(each.astype(np.complex64)) for each in signals]
+        result = {"pixels": np.array(tiles, int)}
+        if model is not None:
+            images = len(named(config["spectra"]))
+            shares = [answer(trained, split(tile, images), blocks, "--model") for tile in tiles]
+            result["answers"] = np.array([max(each, key=each.__getitem__) for each in shares])
+        return result
 
-
-def _answering(model: Path, blocks: dict) -> Callable[[np.ndarray], str]:
-    """The function that returns the class a trained model finds most probable for a tile."""
-    from lowalt.recognition.one_sample import answer
-    from lowalt.recognition.zoo import opened
-    from lowalt.tiles import split
-
-    (trained, _), spectra = opened(model), len(named(blocks["spectra"]))
-
-    def answered(tile: np.ndarray) -> str:
-        """The most probable class of a tile."""
-        shares = answer(trained, split(tile, spectra), blocks, "--model")
-        return max(shares, key=shares.__getitem__)
-
-    return answered
+    return shown

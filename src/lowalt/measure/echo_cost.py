@@ -27,7 +27,7 @@ from lowalt.machine.timing import in_turn
 from lowalt.measure import echo_baselines
 from lowalt.measure.fifty_digits import cells_mp, places_mp
 from lowalt.motion import poses
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud, read
 

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 
 from lowalt.config.command import parser, pick, run
-from lowalt.motion.sample import region_polygon
+from lowalt.motion.drawing import region_polygon
 from lowalt.motion.table import write_table
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
@@ -23,23 +23,23 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--first", type=int, required=True, help="first row of each subtype")
     options.add_argument("--count", type=int, required=True, help="rows of each subtype")
     options.add_argument("--out", required=True, help="motion table to write (.csv)")
-    given = options.parse_args(arguments)
-    seed, masts_m, motion, published = pick(given.settings, "seed", "masts_m", "motion", "published")
+    asked = options.parse_args(arguments)
+    seed, masts_m, motion, published = pick(asked.settings, "seed", "masts_m", "motion", "published")
     masts_m = np.array(masts_m, dtype=float).reshape(-1, 2)
     corners = region_polygon(masts_m, motion["region"]["polygon_m"])
-    clouds = [read(path) for path in given.clouds]
+    clouds = [read(path) for path in asked.clouds]
     rows, looks, path = [], motion.get("looks", 1), path_of(motion, corners, masts_m)
-    for model in range(given.first // looks, (given.first + given.count) // looks):
+    for model in range(asked.first // looks, (asked.first + asked.count) // looks):
         drawn = [
             model_rows(seed, cloud, published[cloud.subtype], masts_m, corners, motion, model, path) for cloud in clouds
         ]
         rows += [
-            {**row, "group": given.group, "model": model * looks + look}
+            {**row, "group": asked.group, "model": model * looks + look}
             for look, of_subtypes in enumerate(zip(*drawn, strict=True))
             for row in of_subtypes
         ]
-    write_table(given.out, rows)
-    print(f"{given.out}: {len(rows)} rows", file=sys.stderr)
+    write_table(asked.out, rows)
+    print(f"{asked.out}: {len(rows)} rows", file=sys.stderr)
 
 
 if __name__ == "__main__":

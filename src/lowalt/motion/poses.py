@@ -1,7 +1,7 @@
 """Poses: where each rigid part of a target stands at each symbol, in closed form from the initial pose.
 
 Angles are beta_0 + 2 pi F t, never a product of many small rotations, so nothing drifts however long the look. All
-poses have the same bits on every processor: sines and products are those of `kernels` and `portable`.
+poses have the same bits on every processor: sines and products are those of `pose_kernels` and `portable`.
 """
 
 from typing import NamedTuple
@@ -84,22 +84,24 @@ def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.
 
 
 def _perturbed(
-    cloud: Cloud, angles: dict[str, np.ndarray], phases: dict[int, tuple[str, float]], more: dict[int, np.ndarray]
+    cloud: Cloud, angles: dict[str, np.ndarray], phases: dict[int, tuple[str, float]], added: dict[int, np.ndarray]
 ) -> None:
-    """Give each part of `more` an angle of its own: the angle it had plus more[part] (N,) rad.
+    """Give each part of `added` an angle of its own: the angle it had plus added[part] (N,) rad.
 
     Raises: InputError naming the parts that do not move.
     """
-    still = sorted(set(more) - set(phases))
+    still = sorted(set(added) - set(phases))
     if still:
         raise InputError(f"motion of {cloud.subtype}: angles added to parts {still}, expected some of {sorted(phases)}")
-    for part, angle in more.items():
+    for part, angle in added.items():
         name, phase = phases[part]
         angles[f"{name} {part}"] = angles[name] + angle
         phases[part] = f"{name} {part}", phase
 
 
-def _series(cloud: Cloud, row: dict, times_s: np.ndarray, more: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _series(
+    cloud: Cloud, row: dict, times_s: np.ndarray, added: dict[int, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
     """Functions of time (N, K) and matrices (K, P, 4, 4) whose sum over K of products is every part's motion.
 
     A turn by angle a about a hinge is A + cos(a) B + sin(a) C; the motion of a part on a moving part is a product of
@@ -107,22 +109,22 @@ def _series(cloud: Cloud, row: dict, times_s: np.ndarray, more: dict[int, np.nda
     motion is not included.
     """
     angles, phases = _angles(cloud, row, times_s)
-    _perturbed(cloud, angles, phases, more)
-    one: tuple[str, ...] = ()
-    columns = {one: np.ones(len(times_s))}
+    _perturbed(cloud, angles, phases, added)
+    constant: tuple[str, ...] = ()
+    columns = {constant: np.ones(len(times_s))}
     for name in dict.fromkeys(name for name, _ in phases.values()):
         columns["sin " + name,], columns["cos " + name,] = compiled().sines_cosines(angles[name])
     moving = list(phases)
     still, cosine, sine = _hinged(cloud.axes[moving], cloud.hinges[moving])
     s, c = compiled().sines_cosines(np.array([phase for _, phase in phases.values()], dtype=np.float64))
     s, c = s[:, None, None], c[:, None, None]
-    own = np.stack([still, c * cosine + s * sine, c * sine - s * cosine])
+    turning = np.stack([still, c * cosine + s * sine, c * sine - s * cosine])
     terms: list[tuple[list[tuple[str, ...]], np.ndarray]] = []
     for part, parent in enumerate(cloud.parents):
-        names, matrices = [one], np.eye(4)[None]
+        names, matrices = [constant], np.eye(4)[None]
         if part in phases:
-            names = [one, ("cos " + phases[part][0],), ("sin " + phases[part][0],)]
-            matrices = own[:, moving.index(part)]
+            names = [constant, ("cos " + phases[part][0],), ("sin " + phases[part][0],)]
+            matrices = turning[:, moving.index(part)]
         if parent >= 0:
             before, carrier = terms[parent]
             for outer in before:
@@ -142,7 +144,7 @@ def _series(cloud: Cloud, row: dict, times_s: np.ndarray, more: dict[int, np.nda
 def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
     """Attitudes (N, 3, 3) of the row's yaw, pitch and roll with `tilt_rad` (N, 3) added; order as `attitude`."""
     yaw, pitch, roll = (
-        row[name] + more for name, more in zip(("yaw_rad", "pitch_rad", "roll_rad"), tilt_rad.T, strict=True)
+        row[name] + added for name, added in zip(("yaw_rad", "pitch_rad", "roll_rad"), tilt_rad.T, strict=True)
     )
     right, front, up = np.eye(3)
     return product(product(rodrigues(up, yaw), rodrigues(right, pitch)), rodrigues(front, roll))
@@ -178,7 +180,7 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
     Source: paper Eqs. 17 to 20 and 22, Rodrigues' formula.
     """
     times_s = np.asarray(times_s, dtype=np.float64)
-    more, offset, tilt = perturbation or Perturbation()
+    added, offset, tilt = perturbation or Perturbation()
     body = attitude(row["yaw_rad"], row["pitch_rad"], row["roll_rad"])
     origin = np.array([row["x_m"], row["y_m"], row["z_m"]])
     velocity = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
@@ -195,13 +197,13 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
         turned, body = _attitudes(row, tilt), np.eye(3)
     count, parts = len(times_s), len(cloud.kinds)
     if "node" in cloud.kinds:
-        _perturbed(cloud, {}, {}, more or {})
+        _perturbed(cloud, {}, {}, added or {})
         translation = _track(cloud, row, times_s, body)
         if tilt is not None:
             translation = applied(turned[:, None], translation)
         translation += path[:, None]
         return Poses(np.broadcast_to(np.zeros(()), (count, parts, 3, 3)), translation)
-    functions, matrices = _series(cloud, row, times_s, more or {})
+    functions, matrices = _series(cloud, row, times_s, added or {})
     matrices = product(body, matrices[..., :3, :])
     terms = functions.shape[1]
     rotation = compiled().product(functions, matrices[..., :3].reshape(terms, -1)).reshape(count, parts, 3, 3)
@@ -215,20 +217,11 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
 
 def positions(cloud: Cloud, row: dict, times_s: np.ndarray) -> np.ndarray:
     """Return every point's position (N, L, 3) in metres, global frame; arguments and errors as `poses`."""
-    return placed(cloud, *poses(cloud, row, times_s))
-
-
-def placed(cloud: Cloud, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
-    """Return every point's position (N, L, 3) in metres under the poses of its parts; shapes as `Poses`."""
+    rotation, translation = poses(cloud, row, times_s)
     if "node" in cloud.kinds:
         return translation
-    return rotated(rotation, cloud.points, cloud.part) + translation[:, cloud.part]
-
-
-def rotated(rotation: np.ndarray, vectors: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Return rotation[n, part[l]] @ vectors[l] for all n and l, part by part: (N, L, 3)."""
-    result = np.empty((len(rotation), len(vectors), 3))
-    for index in np.unique(part):
-        mine = part == index
-        result[:, mine] = vectors[mine] @ rotation[:, index].swapaxes(1, 2)
+    result = translation[:, cloud.part]
+    for part in np.unique(cloud.part):
+        mine = cloud.part == part
+        result[:, mine] += cloud.points[mine] @ rotation[:, part].swapaxes(1, 2)
     return result

@@ -1,6 +1,6 @@
 """Rotations: the angle that a rate reaches at a time, and the matrices of turns about axes.
 
-All of them have the same bits on every processor: sines and products are those of `kernels` and `portable`.
+All of them have the same bits on every processor: sines and products are those of `pose_kernels` and `portable`.
 """
 
 import numpy as np
@@ -11,9 +11,9 @@ from lowalt.numerics.portable import product
 
 def compiled():
     """Return the module of compiled functions, imported at the first call: other stages start without numba."""
-    from lowalt.motion import kernels
+    from lowalt.motion import pose_kernels
 
-    return kernels
+    return pose_kernels
 
 
 def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:

@@ -32,8 +32,8 @@ def write_table(path: str | Path, rows: list[dict]) -> None:
 
     Rows of targets with drawn sizes all have the key SCALE, those of tracks the keys TRACK and PATH.
     """
-    more = _further(rows[0] if rows else ())
-    write_csv(path, (*COLUMNS, *more), (_cells(row, (*NUMBERS, *more)) for row in rows))
+    further = _further(rows[0] if rows else ())
+    write_csv(path, (*COLUMNS, *further), (_cells(row, (*NUMBERS, *further)) for row in rows))
 
 
 def _further(names: Collection[str]) -> tuple[str, ...]:

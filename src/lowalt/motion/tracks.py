@@ -11,8 +11,8 @@ import numpy as np
 
 from lowalt.config.classes import AIRBORNE
 from lowalt.files.errors import InputError
+from lowalt.motion.drawing import draw, follow_speed, heights, place
 from lowalt.motion.rotations import turns
-from lowalt.motion.sample import draw, follow_speed, heights, place
 from lowalt.motion.table import PATH, SCALE
 from lowalt.numerics import portable
 from lowalt.numerics.streams import stream
@@ -106,7 +106,7 @@ def drawn_path(
     here, velocity = np.array([row["x_m"], row["y_m"]]), np.array([row["vx_mps"], row["vy_mps"]])
     height, climb, heading = row["z_m"], 0.0, row["yaw_rad"]
     climb = _climb(height, row["vz_mps"], row["vz_mps"], heights_m, 0.0, look_s)
-    found = [(*here, height, *velocity, climb, heading)]
+    starts = [(*here, height, *velocity, climb, heading)]
     for _ in range(looks):
         for attempt in range(21):
             rate = rng.uniform(-TURN_RADPS, TURN_RADPS) if attempt < 20 else _way_back(cell, here, velocity)
@@ -116,8 +116,8 @@ def drawn_path(
         here, velocity, heading = places[-1], velocities[-1], heading + rate * look_s
         later = _climb(height, climb, climb, heights_m, look_s, look_s)
         height, climb = height + look_s * (climb + later) / 2, later
-        found.append((*here, height, *velocity, climb, heading))
-    nodes = np.array(found)
+        starts.append((*here, height, *velocity, climb, heading))
+    nodes = np.array(starts)
     return LookStarts(nodes[:, :3], nodes[:, 3:6], nodes[:, 6])
 
 

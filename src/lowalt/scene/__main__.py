@@ -9,8 +9,8 @@ from lowalt.config.network import Network
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
-from lowalt.scene.catalogue import called
-from lowalt.scene.chunk import scene_signals
+from lowalt.scene.chain import scene_signals
+from lowalt.scene.effects import called
 from lowalt.scene.observe import Scene
 from lowalt.targets.cloud import read
 
@@ -31,24 +31,23 @@ def main(arguments: list[str]) -> None:
     options.add_argument(
         "--power", nargs="+", required=True, help="the echoes' own mean powers to write (.npy), likewise: (models,) W"
     )
-    given = options.parse_args(arguments)
-    for name, files in (("--out", given.out), ("--power", given.power)):
-        if len(files) != len(given.station):
-            raise InputError(f"{name}: {len(files)} files, expected one for each of the stations {given.station}")
-    snrs = given.settings.pop("snr_db", None)
+    asked = options.parse_args(arguments)
+    for name, files in (("--out", asked.out), ("--power", asked.power)):
+        if len(files) != len(asked.station):
+            raise InputError(f"{name}: {len(files)} files, expected one for each of the stations {asked.station}")
+    snrs = asked.settings.pop("snr_db", None)
     snrs = None if snrs is None else [float(snr) for snr in snrs]
-    seed, block, tolerance, effects = pick(given.settings, "seed", "network", "tolerance", "effects")
+    seed, block, tolerance, effects = pick(asked.settings, "seed", "network", "tolerance", "effects")
     scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
-    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
+    clouds = {cloud.subtype: cloud for cloud in map(read, asked.clouds)}
     occluders = {}
-    if given.occluders:
+    if asked.occluders:
         from lowalt.targets.occluders import read_all
 
-        occluders = read_all(given.occluders)
-    rows = read_table(given.motion)
-    found = [scene_signals(scene, station, clouds, rows, occluders, snrs) for station in given.station]
-    for files in zip(zip(given.out, given.power, strict=True), found, strict=True):
-        for path, values in zip(*files, strict=True):
+        occluders = read_all(asked.occluders)
+    rows = read_table(asked.motion)
+    for station, *paths in zip(asked.station, asked.out, asked.power, strict=True):
+        for path, values in zip(paths, scene_signals(scene, station, clouds, rows, occluders, snrs), strict=True):
             with replacing(path) as temporary:
                 np.save(temporary, values)
             print(f"{path}: {len(values)} models", file=sys.stderr)

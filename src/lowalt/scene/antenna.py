@@ -7,7 +7,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from lowalt.config.network import Station
-from lowalt.machine.jit import VECTOR
+from lowalt.machine.jit import VECTOR, kernel
 
 
 class Element(NamedTuple):
@@ -17,32 +17,6 @@ class Element(NamedTuple):
     width_deg: float = 65.0
     back_db: float = 30.0
     downtilt_deg: float = 0.0
-
-
-def pattern_db(element: Element, azimuth_deg: np.ndarray, zenith_deg: np.ndarray) -> np.ndarray:
-    """Return the gain (dBi) at azimuths and zenith angles from the element's own boresight (0, 90); any shape.
-
-    Source: 3GPP TR 38.901, Table 7.3-1.
-    """
-    up = np.minimum(12.0 * ((zenith_deg - 90.0) / element.width_deg) ** 2, element.back_db)
-    across = np.minimum(12.0 * (azimuth_deg / element.width_deg) ** 2, element.back_db)
-    return element.gain_dbi - np.minimum(up + across, element.back_db)
-
-
-def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
-    """Return the power gain (...) toward places (..., 3) m.
-
-    The panel stays vertical; the downtilt turns the element's boresight.
-    """
-    away = np.asarray(places, np.float64) - np.asarray(station.position_m)
-    # Coordinates of a view's points stand together in memory, and are taken one by one.
-    x, y, z = away[..., 0], away[..., 1], away[..., 2]
-    across = station.horizontal
-    front, side, tilt = across[1] * x - across[0] * y, across[0] * x + across[1] * y, np.radians(element.downtilt_deg)
-    ahead, up = np.cos(tilt) * front - np.sin(tilt) * z, np.sin(tilt) * front + np.cos(tilt) * z
-    azimuth = angle(side, ahead)
-    zenith = angle(np.sqrt(ahead * ahead + side * side), up)
-    return np.exp(np.log(10.0) / 10.0 * pattern_db(element, np.degrees(azimuth), np.degrees(zenith)))
 
 
 # arctan(t) / t as a polynomial of t^2, t up to tan(pi / 8), to rounding.
@@ -56,30 +30,65 @@ _ARCTANGENT = chebyshev.Chebyshev(
 _A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7, _A8, _A9, _A10, _A11 = np.pad(_ARCTANGENT, (0, 12 - len(_ARCTANGENT))).tolist()
 
 
-def angle(y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return arctan2(y, x) (rad) to rounding, any shape, in a sixth of NumPy's time; 0 where both are 0."""
-    y, x = np.asarray(y, np.float64, order="C"), np.asarray(x, np.float64, order="C")
-    result = np.empty(y.shape)
-    _angles(y.reshape(-1), x.reshape(-1), result.reshape(-1))
-    return result
+_SCALAR = kernel(forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})
+"""As VECTOR, and copied into the loop that calls it."""
+
+
+@_SCALAR
+def _angle(y, x):
+    """The angle (rad) of x + j y to rounding, 0 where both are 0."""
+    a, b = abs(x), abs(y)
+    small, large = min(a, b), max(max(a, b), 1e-300)
+    # From tan(pi / 8) on, pi / 4 minus the angle is computed.
+    far = small > _EIGHTH * large
+    t = (large - small) / (large + small) if far else small / large
+    z = t * t
+    turn = (((((_A11 * z + _A10) * z + _A9) * z + _A8) * z + _A7) * z + _A6) * z + _A5
+    turn = t * (((((turn * z + _A4) * z + _A3) * z + _A2) * z + _A1) * z + _A0)
+    turn = 0.25 * math.pi - turn if far else turn
+    turn = 0.5 * math.pi - turn if b > a else turn
+    turn = math.pi - turn if x < 0.0 else turn
+    return -turn if y < 0.0 else turn
+
+
+@_SCALAR
+def pattern_db(element, azimuth_deg, zenith_deg):
+    """Return the gain (dBi) at an azimuth and a zenith angle from the element's own boresight (0, 90).
+
+    Source: 3GPP TR 38.901, Table 7.3-1.
+    """
+    up = min(12.0 * ((zenith_deg - 90.0) / element.width_deg) ** 2, element.back_db)
+    across = min(12.0 * (azimuth_deg / element.width_deg) ** 2, element.back_db)
+    return element.gain_dbi - min(up + across, element.back_db)
 
 
 @VECTOR
-def _angles(y, x, result):
-    """Fill result (K,) with the angles of x + j y, both (K,)."""
-    for i in range(np.uint64(len(y))):
-        a, b = abs(x[i]), abs(y[i])
-        small, large = min(a, b), max(max(a, b), 1e-300)
-        # From tan(pi / 8) on, pi / 4 minus the angle is computed.
-        far = small > _EIGHTH * large
-        t = (large - small) / (large + small) if far else small / large
-        z = t * t
-        turn = (((((_A11 * z + _A10) * z + _A9) * z + _A8) * z + _A7) * z + _A6) * z + _A5
-        turn = t * (((((turn * z + _A4) * z + _A3) * z + _A2) * z + _A1) * z + _A0)
-        turn = 0.25 * math.pi - turn if far else turn
-        turn = 0.5 * math.pi - turn if b > a else turn
-        turn = math.pi - turn if x[i] < 0.0 else turn
-        result[i] = -turn if y[i] < 0.0 else turn
+def _gains_db(element, station, across, tilt, places, result):
+    """Fill result (N, L) with the gains (dBi) toward places (N, 3, L) m; across: the array's axis; tilt: (cos, sin)."""
+    degrees = 180.0 / math.pi
+    for n in range(len(places)):
+        xs, ys, zs, row = places[n, 0], places[n, 1], places[n, 2], result[n]
+        for i in range(np.uint64(len(row))):
+            x, y, z = xs[i] - station[0], ys[i] - station[1], zs[i] - station[2]
+            front, side = across[1] * x - across[0] * y, across[0] * x + across[1] * y
+            ahead, up = tilt[0] * front - tilt[1] * z, tilt[1] * front + tilt[0] * z
+            zenith = _angle(np.sqrt(ahead * ahead + side * side), up)
+            row[i] = pattern_db(element, degrees * _angle(side, ahead), degrees * zenith)
+
+
+def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
+    """Return the power gain (...) toward places (..., 3) m.
+
+    The panel stays vertical; the downtilt turns the element's boresight.
+    """
+    places = np.asarray(places, np.float64)
+    points = places if places.ndim == 3 else places.reshape(1, -1, 3)
+    tilt, result = np.radians(element.downtilt_deg), np.empty(points.shape[:2])
+    _gains_db(
+        Element(*map(float, element)), np.array(station.position_m, np.float64), station.horizontal,
+        (np.cos(tilt), np.sin(tilt)), np.ascontiguousarray(points.swapaxes(1, 2)), result,
+    )  # fmt: skip
+    return np.exp(np.log(10.0) / 10.0 * result).reshape(places.shape[:-1])
 
 
 def array_sum(count: int, x: np.ndarray) -> np.ndarray:

@@ -1,12 +1,11 @@
 """One sample at one station: signal = detect(receive(transmit(sum of responses))).
 
 In a scene with effects on the motion only, the echo engine gives the signal. Otherwise every effect that the scene
-names acts in the order of the catalogue. What no effect asks for is left out whole: symbols without a receiver effect,
-time samples without anything that reaches into them.
+names acts in the order of `effects.LISTED`. What no effect asks for is left out whole: symbols without a receiver
+effect, time samples without anything that reaches into them.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from copy import copy
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -17,16 +16,17 @@ from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo import echo_signal
 from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.machine.memory import keep_freed_arrays
+from lowalt.machine.progress import reported
 from lowalt.numerics.power import rms
-from lowalt.scene import protocols, waveform
-from lowalt.scene.arrivals import Physics, arriving
-from lowalt.scene.catalogue import BY_END, NamedEffect, placed, providing
-from lowalt.scene.listening import Listening
-from lowalt.scene.observe import Scene, ends_of, observe, with_cross_sections
+from lowalt.scene import waveform
+from lowalt.scene.effects import PLACE_ORDER, NamedEffect, offered, placed
+from lowalt.scene.observe import Scene, observe
 from lowalt.scene.response import ImagePath, response
 from lowalt.scene.view import View
-from lowalt.scene.waveform import Look
-from lowalt.targets.cloud import Cloud
+from lowalt.targets.cloud import Cloud, cloud_of
+
+BY_END = ("line_of_sight",)
+"""Effects that act on each way of a link as the station at its end draws them for its own look."""
 
 
 class Received(NamedTuple):
@@ -43,107 +43,57 @@ class Received(NamedTuple):
 
 
 class SceneSample:
-    """One motion model seen at one station of a scene, and what each step of the chain makes of it.
+    """One motion model seen at one station of a scene, and what each step of the chain makes of it."""
 
-    row: of the motion table; occluders: the target's surfaces, for self-occlusion; clouds: those of other subtypes, for
-    companions. Raises: InputError naming the sample that cannot be computed.
-    """
+    def __init__(self, scene: Scene, view: View, clouds: Mapping[str, Cloud] | None = None, power: float | None = None):
+        """Take a view of the sample in the scene (`observe`), and clouds by subtype, for companions.
 
-    def __init__(
-        self, scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None,
-        clouds: Mapping[str, Cloud] | None = None,
-    ):  # fmt: skip
-        self.scene, self.station, self.cloud, self.row = scene, station, with_cross_sections(scene, cloud), row
-        self.clouds = clouds or {}
-        self.view = observe(scene, station, self.cloud, row, occluders)
-        self.draws = partial(scene.drawn, row, station)
-        fixed = providing(scene.effects, protocols.SetsCrossSections)
-        beyond = [effect for effect in scene.effects if effect.place != "motion" and effect not in fixed]
+        power: to which set SNRs refer (W), None for that of the target's own echo.
+        """
+        self.scene, self.view, self.clouds, self._power = scene, view, clouds or {}, power
+        self.draws = partial(scene.drawn, view.row, view.station)
         self.transmitter, self.channel, self.receiver, self.detection = (
-            placed(beyond, place) for place in ("transmitter", "channel", "receiver", "detection")
+            placed(scene.effects, place) for place in PLACE_ORDER[1:]
         )
-        self.names = frozenset(effect.name for effect in beyond)
-        by_name = {effect.name: effect for effect in beyond}
-        self.physics = Physics(
-            "squint" in self.names,
-            "wavefront" in self.names,
-            by_name.get("symbol_motion"),
-            by_name.get("cyclic_prefix"),
-        )
-        self.share = 1.0
-        """Factor on the amplitudes of the target's own points."""
+        self.settings = {effect.name: effect.settings for effect in scene.effects}
+        self._waves = {name: name in self.settings for name in ("squint", "wavefront")}
         self._factors: dict[tuple[View, str], np.ndarray] = {}
 
-    @cached_property
-    def data(self) -> np.ndarray:
-        """The data (N, M) that the receiver knows."""
-        return self._drawn_data("waveform")
-
-    @cached_property
-    def aired(self) -> np.ndarray:
-        """The subcarriers (N, M) on the air."""
-        return self._amplified(self.data)
-
-    @property
-    def plain(self) -> bool:
-        """Whether the sample is that of the echo stage: nothing acts beyond the motion."""
-        return not self.names and self.station.transmitter is None
-
-    def weight(self, view: View, names: Iterable[str] | None = None) -> np.ndarray:
+    def weight(self, view: View, names: Collection[str] | None = None) -> np.ndarray:
         """Return the product (N, L) of the factors of all effects, or those named, on the points of a view."""
-        result = np.full(view.places.shape[:2], self.share if view.row is self.row else 1.0)
-        for effect in providing(self.channel, protocols.WeighsPoints):
-            if names is None or effect.name in names:
-                result *= self._factor(effect, view)
+        result = np.ones(view.places.shape[:2])
+        for name, visible in offered(self.channel, "visible").items():
+            if names is not None and name not in names:
+                continue
+            if (view, name) not in self._factors:
+                ends = [(end, end.station) for end in view.ends()] if name in BY_END else [(view, self.view.station)]
+                each = [visible(end, self.scene.drawn(view.row, station, name)) for end, station in ends]
+                self._factors[view, name] = each[0] if len(each) == 1 else np.sqrt(each[0] * each[1])
+            result *= self._factors[view, name]
         return result
 
-    def _factor(self, effect: NamedEffect, view: View) -> np.ndarray:
-        """The factor (N, L) or (N, 1) of one effect, computed once a view."""
-        if (view, effect.name) not in self._factors:
-            visible, settings = effect.module.visible, effect.settings
-            if view.station.transmitter is not None and effect.name in BY_END:
-                out, back = (
-                    visible(settings, end, self.scene.drawn(view.row, end.station, effect.name)) for end in view.ends()
-                )
-                factor = np.sqrt(out * back)
-            else:
-                factor = visible(settings, view, self.scene.drawn(view.row, self.station, effect.name))
-            self._factors[view, effect.name] = factor
-        return self._factors[view, effect.name]
-
-    def every_path(self, view: View) -> list[ImagePath]:
-        """Return all paths but the direct one; on a link those of its receiver, each with its sender's."""
-        adding = providing(self.channel, protocols.AddsPaths)
-        ends = [
-            [path for effect in adding for path in effect.module.paths(effect.settings, end)] for end in view.ends()
-        ]
-        if len(ends) == 2:
-            ends[0] = [there._replace(sender=here) for here, there in zip(*ends, strict=True)]
-        return ends[0]
-
     def paths(self, view: View) -> list[ImagePath]:
-        """Return those paths that carry anything in the look: most facades reflect nothing of it."""
-        return [path for path in self.every_path(view) if _carries(path)]
+        """Return all paths but the direct one; on a link those of its receiver, each with its sender's."""
+        adding = offered(self.channel, "paths").values()
+        ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
+        if len(ends) == 1:
+            return ends[0]
+        return [there._replace(sender=here) for here, there in zip(*ends, strict=True)]
 
     def routes(self, view: View, paths: list[ImagePath]) -> np.ndarray:
         """Return the factor on the points' amplitudes, (N, L), or (R, R, N, L) where the scene tells routes apart."""
-        telling = providing(self.channel, protocols.WeighsRoutes)
-        if not telling or not paths:
-            return self.weight(view)
-        return telling[0].module.routes(telling[0].settings, view, paths, self.weight)
+        for routes in offered(self.channel, "routes").values() if paths else ():
+            return routes(view, paths, self.weight)
+        return self.weight(view)
 
     def targets(self) -> list[View]:
         """Return the view of the target and of every companion, under the same beams at the same instants."""
-        result = [self.view]
-        for effect in providing(self.channel, protocols.AddsTargets):
-            rng = self.scene.stream(effect.name, self.row)
-            found = effect.module.companions(effect.settings, self.cloud, self.row, self.clouds, rng)
-            beams = {end.name: self.view.beams_of(end) for end in ends_of(self.scene.network, self.station)}
-            for cloud, row in found:
-                own = cloud if cloud is self.cloud else with_cross_sections(self.scene, cloud)
-                occluders = self.view.occluders if cloud is self.cloud else None
-                view = observe(self.scene, self.station, own, row, occluders)
-                result.append(replace(view, times_s=self.view.times_s, sampling=self.view.sampling, beams=beams))
+        view, result = self.view, [self.view]
+        for name, companions in offered(self.channel, "companions").items():
+            cloud = self.clouds.get(view.cloud.subtype, view.cloud)
+            for other, row in companions(cloud, view.row, self.clouds, self.scene.stream(name, view.row)):
+                occluders = view.occluders if other is cloud else None
+                result.append(observe(self.scene, view.station, other, row, occluders, beside=view))
         return result
 
     @cached_property
@@ -151,131 +101,123 @@ class SceneSample:
         """The target's subcarriers (N, M) on the direct path, by plane waves of one frequency."""
         return response(self.view, (), self.weight(self.view))
 
-    def reference(self) -> float:
-        """Return the mean |Y_bin|^2 (W) of the target's echo alone, to which set SNRs refer."""
+    @cached_property
+    def power(self) -> float:
+        """Mean |Y_bin|^2 (W) of the target's echo alone on the direct path, to which set SNRs refer."""
+        if self._power is not None:
+            return self._power
         cells = waveform.range_cells(self.direct)
         return arriving_power(np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0])
 
+    def direct_echo(self, view: View) -> np.ndarray:
+        """Return the subcarriers (N, M) of the target on the direct path, by waves as the scene names them."""
+        return response(view, (), self.weight(view), **self._waves)
+
     def echo(self, view: View) -> np.ndarray:
         """Return the subcarriers (N, M) of a view's target on all paths, without what reaches into symbols."""
-        paths, bent = self.paths(view), self.physics.squint or self.physics.wavefront
-        if view is self.view and not paths and not bent:
+        # Most facades reflect nothing in a whole look.
+        paths = [path for path in self.paths(view) if np.any(path.coefficient) and np.any(path.outward.coefficient)]
+        if view is self.view and not paths and not any(self._waves.values()):
             return self.direct
-        return self.physics.response(view, paths, self.routes(view, paths))
+        return response(view, paths, self.routes(view, paths), **self._waves)
+
+    def _samples(self, view: View) -> np.ndarray:
+        """Time samples (N, M) of a view's target whose points move within symbols, or are later than the prefix."""
+        delays_s, weights = np.zeros(1), np.ones((1, self.scene.network.subcarriers))
+        for instants in offered(self.channel, "instants").values():
+            delays_s, weights = instants(view)
+        # The instants of a symbol stand together, as symbols of their own.
+        moved = view.at((view.times_s[:, None] + delays_s).reshape(-1))
+        factor, paths = self.routes(view, self.paths(view)), self.paths(moved)
+        late, network = np.zeros(view.places.shape[:2], np.int64), self.scene.network
+        for late_samples in offered(self.channel, "late_samples").values():
+            late = late_samples(view)
+        prefix_s = waveform.prefix_length_s(self.settings.get("cyclic_prefix", {}).get("prefix_s"), network)
+
+        def on_air(name: str) -> np.ndarray:
+            """The subcarriers on the air at every instant of each symbol."""
+            return np.repeat(self.on_air(name), len(delays_s), axis=0)
+
+        samples = np.zeros((len(moved.times_s), network.subcarriers), np.complex128)
+        # Points that lose equally many samples of the window share one response.
+        for lost in np.unique(late).tolist():
+            some = np.repeat(factor * (late == lost), len(delays_s), axis=-2)
+            echo = response(moved, paths, some, **self._waves)
+            samples += waveform.windowed(network, prefix_s, echo, lost, on_air)
+        return np.einsum("nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), -1), weights)
+
+    def _standing(self, name: str, echo: np.ndarray) -> np.ndarray:
+        """Time samples (N, M) of an effect's echoes (N, M), which do not move within a symbol."""
+        for convolved in offered(self.channel, "convolved").values():
+            offset = offered(self.channel, "offset_cells").get(name, lambda view: 0.0)
+            return convolved(self.scene.network, echo, self.on_air, offset(self.view))
+        return waveform.transmit(echo, self.on_air("waveform"))
 
     def arrived(self) -> np.ndarray:
         """Return the response (N, M) of all echoes as the receiver's own data reveal it, behind the receiver's effects.
 
         Where nothing acts on time samples there are none.
         """
-        adding = providing(self.channel, protocols.AddsEchoes)
-        added = [each.module.scatter(each.settings, self.view, self.draws(each.name)) for each in adding]
-        unknown = self._unknown()
-        if self.physics.within_symbols:
-            symbols = self.aired, self._amplified(self._drawn_data("previous waveform"))
-            samples = sum(self._samples(view, symbols) for view in self.targets())
-            for effect, echo in zip(adding, added, strict=True):
-                samples += self._standing(echo, _offset_cells(effect, self.view), symbols)
+        scattering = offered(self.channel, "scatter").items()
+        still = {name: scatter(self.view, self.draws(name)) for name, scatter in scattering}
+        unknown = [heard(self) for heard in offered(self.channel, "heard").values()]
+        if offered(self.channel, "instants") or offered(self.channel, "late_samples"):
+            samples = sum(map(self._samples, self.targets()))
+            samples = sum((self._standing(*each) for each in still.items()), samples)
         else:
-            total = sum(added, sum(map(self.echo, self.targets())))
-            if unknown is None and not self.receiver and not providing(self.transmitter, protocols.ChangesWaveform):
+            total = sum(still.values(), sum(map(self.echo, self.targets())))
+            if not unknown and not self.receiver and not offered(self.transmitter, "aired"):
                 return total
-            samples = waveform.transmit(total, self.aired)
-        if unknown is not None:
-            samples += unknown
-        look = self.look
-        for effect in self.receiver:
-            samples = effect.module.receive(effect.settings, samples, look, self.draws(effect.name))
-        return waveform.demodulate(samples, self.data)
-
-    def _samples(self, view: View, symbols: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Time samples (N, M) of a view's target with what reaches into symbols."""
-        kept = [number for number, path in enumerate(self.every_path(view)) if _carries(path)]
-
-        def paths_of(moved: View) -> list[ImagePath]:
-            """The same paths at other instants."""
-            every = self.every_path(moved)
-            return [every[number] for number in kept]
-
-        return arriving(self.physics, view, self.routes(view, paths_of(view)), paths_of, symbols)
-
-    def _standing(self, echo: np.ndarray, offset: float, symbols: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Time samples (N, M) of echoes (N, M) that do not move within a symbol, cut by the prefix at their cells."""
-        prefix = self.physics.cyclic_prefix
-        if prefix is None:
-            return waveform.transmit(echo, symbols[0])
-        return prefix.module.convolved(prefix.settings, self.scene.network, echo, symbols, offset)
-
-    def _unknown(self) -> np.ndarray | None:
-        """Time samples (N, M) of signals that the receiver does not know, None where there are none."""
-        facts = Listening(
-            self.view,
-            self.names,
-            self.draws,
-            lambda name: self._amplified(self._drawn_data(name)),
-            self.direct_seen,
-        )
-        heard = [
-            effect.module.heard(effect.settings, facts) for effect in providing(self.channel, protocols.AddsSignals)
-        ]
-        heard = [samples for samples in heard if samples is not None]
-        return sum(heard[1:], heard[0]) if heard else None
-
-    def direct_seen(self, view: View) -> np.ndarray:
-        """Return the subcarriers (N, M) of the target on the direct path with squint and spherical waves as named."""
-        return self.physics.response(view, [], self.weight(view))
+            samples = waveform.transmit(total, self.look.aired)
+        samples = sum(unknown, samples)
+        for name, receive in offered(self.receiver, "receive").items():
+            samples = receive(samples, self.look, self.draws(name))
+        return waveform.demodulate(samples, self.look.data)
 
     @cached_property
-    def power(self) -> float:
-        """`reference`, which the look and noise at set SNRs ask for."""
-        return self.reference()
-
-    @cached_property
-    def look(self) -> Look:
+    def look(self) -> waveform.Look:
         """The look as receiver and detection know it."""
-        ends = self.station.transmitter or self.station, self.station
-        ways_m = sum(float(np.linalg.norm(self.view.aim_m - np.asarray(end.position_m))) for end in ends)
-        return Look(
-            self.scene.network, self.station, self.data, self.aired, self.view.times_s, self.power,
-            ways_m / SPEED_OF_LIGHT,
-        )  # fmt: skip
+        view, delay_s = self.view, float(self.view.ways_m(self.view.aim_m)) / SPEED_OF_LIGHT
+        data = self._data("waveform"), self.on_air("waveform")
+        return waveform.Look(self.scene.network, view.station, *data, view.times_s, self.power, delay_s)
 
     @cached_property
     def cells(self) -> np.ndarray:
         """The range cells (N, M) of the received symbols behind the receiver, before detection."""
-        total, picking = self.arrived(), providing(self.transmitter, protocols.PicksSubcarriers)
-        cells = picking[0].module.range_cells(picking[0].settings, total) if picking else waveform.range_cells(total)
-        return cells if self.view.sampling is None else cells[self.view.sampling.present]
+        picking = offered(self.transmitter, "range_cells")
+        range_cells = next(iter(picking.values()), waveform.range_cells)
+        return self._received(range_cells(self.arrived()))
 
     def filtered(self, detection: Sequence[NamedEffect]) -> np.ndarray:
         """Return the range cells (N, M) behind the filters of these detection effects."""
         cells = self.cells
-        for effect in providing(detection, protocols.FiltersCells):
-            cells = effect.module.process(effect.settings, cells, self.look, self.draws(effect.name))
+        for name, process in offered(detection, "process").items():
+            cells = process(cells, self.look, self.draws(name))
         return cells
 
     def chosen(self, detection: Sequence[NamedEffect], cells: np.ndarray) -> np.ndarray:
         """Return the cells (N,) that these detection effects choose of range cells (N, M): else the strongest."""
         result = abs(cells).argmax(axis=1)
-        for effect in providing(detection, protocols.ChoosesCells):
-            result = effect.module.choose(effect.settings, result, cells, self.look, self.draws(effect.name))
+        for name, choose in offered(detection, "choose").items():
+            result = choose(result, cells, self.look, self.draws(name))
         return result
 
     def received(self) -> Received:
         """Return the sample's signal, the chosen range cells and the reference power."""
-        if self.plain:
+        view, sampling = self.view, self.view.sampling
+        beyond = [effect for effect in self.scene.effects if not hasattr(effect.module, "cross_sections")]
+        if view.station.transmitter is None and all(effect.place == "motion" for effect in beyond):
             echo = echo_signal(
-                self.scene.network, self.station, self.view.motion, self.cloud.rcs_m2, self.view.aim_m,
-                self.scene.tolerance, sample=self.name,
+                self.scene.network, view.station, view.motion, view.cloud.rcs_m2, view.aim_m, self.scene.tolerance,
+                sample=self.name,
             )  # fmt: skip
             return Received(echo.signal, echo.cell, arriving_power(echo.signal))
         cells = self.filtered(self.detection)
         chosen = self.chosen(self.detection, cells)
         signal = cells[np.arange(len(cells)), chosen]
-        sampling = self.view.sampling
         if sampling is not None:
-            timing = providing(self.transmitter, protocols.SamplesTime)[0]
-            signal = timing.module.regridded(timing.settings, signal, sampling, self.scene.network)
+            for regridded in offered(self.transmitter, "regridded").values():
+                signal = regridded(signal, sampling, self.scene.network)
             every = np.full(len(sampling.times_s), -1)
             every[sampling.present] = chosen
             chosen = every
@@ -283,36 +225,40 @@ class SceneSample:
 
     def without_target(self) -> "SceneSample":
         """Return the same sample, with the same draws and noise level, whose target reflects nothing."""
-        result, power = copy(self), self.power
-        result.__dict__ = {name: value for name, value in self.__dict__.items() if name not in ("cells", "direct")}
-        result.share, result.power = 0.0, power
-        return result
+        dark = replace(self.view.cloud, rcs_m2=np.zeros_like(self.view.cloud.rcs_m2))
+        return SceneSample(self.scene, replace(self.view, cloud=dark), self.clouds, self.power)
 
     def own_cell(self) -> np.ndarray:
         """Return the range cell (N,) of the target's middle at each received symbol, on the direct path."""
-        ends = self.station.transmitter or self.station, self.station
-        middle = self.view.places.mean(axis=1)
-        ways_m = sum(np.linalg.norm(middle - np.asarray(end.position_m), axis=1) for end in ends)
+        ways_m = self.view.ways_m(self.view.places.mean(axis=1))
         cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
-        return cells if self.view.sampling is None else cells[self.view.sampling.present]
+        return self._received(cells)
+
+    def _received(self, symbols: np.ndarray) -> np.ndarray:
+        """Those of the symbols (N, ...) that are received."""
+        return symbols if self.view.sampling is None else symbols[self.view.sampling.present]
 
     @property
     def name(self) -> str:
         """The sample as messages name it."""
-        return f"{self.row['subtype']}, model {self.row['model']}, station {self.station.name}"
+        row = self.view.row
+        return f"{row['subtype']}, model {row['model']}, station {self.view.station.name}"
 
-    def _drawn_data(self, name: str) -> np.ndarray:
+    def _data(self, name: str) -> np.ndarray:
         """The data (N, M) of the stream of this name: QPSK unless an effect chooses them."""
-        shape, rng = (self.scene.network.symbols, self.scene.network.subcarriers), self.draws(name)
-        choosing = providing(self.transmitter, protocols.DrawsData)
-        if not choosing:
-            return waveform.qpsk(rng, *shape)
-        return choosing[0].module.data(choosing[0].settings, *shape, rng)
+        network = self.scene.network
+        for draw in offered(self.transmitter, "data").values():
+            return draw(network.symbols, network.subcarriers, self.draws(name))
+        return waveform.qpsk(self.draws(name), network.symbols, network.subcarriers)
 
-    def _amplified(self, data: np.ndarray) -> np.ndarray:
-        """The subcarriers (N, M) on the air for these data, after all amplifier effects."""
-        for effect in providing(self.transmitter, protocols.ChangesWaveform):
-            data = effect.module.aired(effect.settings, data)
+    def on_air(self, name: str) -> np.ndarray:
+        """Return the subcarriers (N, M) on the air whose data come of the stream of this name.
+
+        They are the "waveform", the "previous waveform", the "next waveform", or those of another station.
+        """
+        data = self._data(name)
+        for aired in offered(self.transmitter, "aired").values():
+            data = aired(data)
         return data
 
 
@@ -323,16 +269,33 @@ def received_signal(
 ) -> Received:  # fmt: skip
     """Return the signal at `station` of the motion model `row` (motion table) under the scene's effects.
 
-    occluders: the target's surfaces, for self-occlusion; clouds: those of other subtypes, for companions.
+    occluders: the target's surfaces, for self-occlusion; clouds: those of all subtypes, for companions.
     Raises: InputError naming the sample that cannot be computed.
     """
     keep_freed_arrays()
-    return SceneSample(scene, station, cloud, row, occluders, clouds).received()
+    return SceneSample(scene, observe(scene, station, cloud, row, occluders), clouds).received()
 
 
-def _carries(path: ImagePath) -> bool:
-    """Whether a path carries anything in the look, both ways of a link."""
-    return bool(np.any(path.coefficient) and np.any((path.sender or path).coefficient))
+def scene_signals(
+    scene: Scene, name: str, clouds: Mapping[str, Cloud], rows: list[dict], occluders: dict[str, dict] | None = None,
+    snrs: list[float] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.
+
+    clouds: by subtype, companions' too; occluders: each subtype's surfaces, where the scene hides points behind them;
+    snrs (dB): signals are (models, snrs, N), with noise in all range cells, where the scene has `cell_noise`.
+    Raises: InputError naming the sample where a subtype has no cloud or cannot be computed with.
+    """
+    station, occluders = scene.network.station(name), occluders or {}
+    levels = [scene] if snrs is None else [scene.at_snr(snr) for snr in snrs]
+    result = np.empty((len(rows), len(levels), scene.network.symbols), np.complex64)
+    power = np.empty(len(rows))
+    for index, row in enumerate(reported(rows, len(rows), "models")):
+        cloud, surfaces = cloud_of(clouds, row), occluders.get(row["subtype"])
+        for place, level in enumerate(levels):
+            received = received_signal(level, station, cloud, row, surfaces, clouds)
+            result[index, place], power[index] = received.signal, received.power
+    return result[:, 0] if snrs is None else result, power
 
 
 def arriving_power(signal: np.ndarray) -> float:
@@ -341,9 +304,3 @@ def arriving_power(signal: np.ndarray) -> float:
     The noise level is then the same with and without effects.
     """
     return rms(signal.astype(np.complex64)) ** 2
-
-
-def _offset_cells(effect: NamedEffect, view: View) -> float:
-    """How far an effect's echoes stand beyond their range cells' centres, in cells."""
-    offset: Callable[[View], float] = getattr(effect.module, "offset_cells", lambda view: 0.0)
-    return offset(view)

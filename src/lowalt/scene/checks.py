@@ -5,7 +5,7 @@ from typing import NamedTuple
 from lowalt.config.network import Network
 from lowalt.config.plan import snrs_of
 from lowalt.files.errors import InputError
-from lowalt.scene.catalogue import called
+from lowalt.scene.effects import called
 
 STILL = ("clutter", "background_channel", "transmit_leakage", "direct_path")
 """Effects that add something that stands still."""

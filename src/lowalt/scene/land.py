@@ -15,17 +15,15 @@ import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo.radar import radar
-from lowalt.machine.jit import kernel
-from lowalt.scene.antenna import Element, gain
-from lowalt.scene.phasor import phasor
+from lowalt.scene import antenna
+from lowalt.scene.antenna import Element
 from lowalt.scene.response import cosines
+from lowalt.scene.response_loops import row_sum
 
 OFFSET = 0.25
 """Distance of a patch from the centre of its range cell, in cells."""
 NODES = 6
 """Ellipses of a range cell, at the nodes of Gauss and Legendre."""
-STRIP = 256
-"""Patches that pass through the loop together."""
 
 
 class Land(NamedTuple):
@@ -131,7 +129,7 @@ def land(network: Network, station: Station, reach_m: float, element: Element | 
     weight = area * (step * 2.0 * np.pi / counts)[ring]
     weight *= np.sqrt(heights[0] * heights[1] / (r[0] * r[1])) / (r[0] * r[1]) ** 2
     if element is not None:
-        weight *= gain(element, ends[0], points) * gain(element, ends[1], points)
+        weight *= antenna.gain(element, ends[0], points) * antenna.gain(element, ends[1], points)
     apart = float(np.sum((places[0] - places[1]) ** 2))
     slow = np.sqrt(np.clip(0.5 + (r[0] ** 2 + r[1] ** 2 - apart) / (4.0 * r[0] * r[1]), 0.0, 1.0))
     seen = np.stack([cosines(end, points).T for end in (ends if station.transmitter else ends[1:])])
@@ -143,27 +141,6 @@ def land(network: Network, station: Station, reach_m: float, element: Element | 
         counts = counts // 2
     first = np.concatenate([np.zeros(1, int), np.cumsum(counts.reshape(-1, nodes).sum(axis=1))[:-1]])[: len(lit)]
     return Land(lit, first, cells, weight, seen, slow)
-
-
-@kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, _nrt=False)
-def _lit(seen, aimed, quarter_beam, counts, work, lit):
-    """Multiply lit (K,) by the squared array sums at direction cosines seen (2, K) under a beam at aimed (2,).
-
-    A row's sum is U_{N-1}(cos(pi (x - x0) / 2)); quarter_beam: a quarter of the frequency over the carrier; work:
-    (3, STRIP).
-    """
-    cosine, older, total = work[0], work[1], work[2]
-    for first in range(0, len(lit), STRIP):
-        size = min(STRIP, len(lit) - first)
-        for axis in range(2):
-            for i in range(np.uint64(size)):
-                cosine[i], _ = phasor(quarter_beam * (seen[axis, first + i] - aimed[axis]))
-                older[i], total[i] = 0.0, 1.0
-            for _ in range(counts[axis] - 1):
-                for i in range(np.uint64(size)):
-                    older[i], total[i] = total[i], 2.0 * cosine[i] * total[i] - older[i]
-            for i in range(np.uint64(size)):
-                lit[first + i] *= total[i] * total[i]
 
 
 def cell_power(
@@ -180,7 +157,10 @@ def cell_power(
     power, slow, lit = np.zeros(held.cells), np.ones(held.cells), held.weight.copy()
     aims = [cosines(end, aim_m) for end, aim_m in zip((station.transmitter or station, station), aims_m, strict=True)]
     for end, counts in enumerate((network.transmit, network.receive)):
-        _lit(held.seen[-end], aims[end], 0.25 * radio.kappa, counts, np.empty((3, STRIP)), lit)
+        gain = np.ones(len(lit))
+        for axis in range(2):
+            row_sum(held.seen[-end][axis], radio.kappa, radio.kappa, aims[end][axis], counts[axis], gain)
+        lit *= gain * gain
     if len(lit):
         power[held.cell] = np.add.reduceat(lit, held.first)
         slowed = np.add.reduceat(lit * held.slow, held.first)

@@ -6,10 +6,16 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.numerics.streams import stream
-from lowalt.scene import protocols
-from lowalt.scene.catalogue import LOOK_WIDE, PAIR_WIDE, SHARED_STREAMS, NamedEffect, placed, providing
-from lowalt.scene.view import View
+from lowalt.scene.effects import NamedEffect, offered, placed
+from lowalt.scene.view import Perturbations, View, located
 from lowalt.targets.cloud import Cloud
+
+SHARED_STREAMS = {"clock_offset": "oscillator", "carrier_offset": "oscillator"}
+"""Random streams of effects that draw the same error of one oscillator."""
+LOOK_WIDE = ("link_offset",)
+"""Effects past the motion whose draws are the same for all stations of a look."""
+PAIR_WIDE = ("fluctuation",)
+"""Effects whose draws are the same for both directions of a link."""
 
 
 @dataclass(frozen=True)
@@ -21,11 +27,11 @@ class Scene:
     tolerance: float | None
     effects: tuple[NamedEffect, ...]
 
-    def stream(self, name: str, row: dict, *more: str) -> np.random.Generator:
+    def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
         # Noise at one SNR does not depend on noise at another.
         levels = [effect.settings["snr_db"] for effect in self.effects if effect.name == name == "cell_noise"]
-        return stream(self.seed, "effect", name, row["subtype"], row["model"], *more, *filter(None, levels))
+        return stream(self.seed, "effect", name, row["subtype"], row["model"], *ends, *filter(None, levels))
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
         """Return the stream of an effect at a station, from its start: one for the look where its draws belong to it.
@@ -45,46 +51,49 @@ class Scene:
             effect._replace(settings=effect.settings | {"snr_db": snr_db}) if effect.name == "cell_noise" else effect
             for effect in self.effects
         ]
-        return replace(self, effects=tuple(effect for effect in changed if not effect.module.idle(effect.settings)))
+        return replace(self, effects=tuple(effect for effect in changed if not effect.idle))
 
 
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     """Return the cloud with the cross sections that the scene gives its points."""
     wavelength_m = SPEED_OF_LIGHT / scene.network.carrier_hz
-    for effect in providing(scene.effects, protocols.SetsCrossSections):
-        cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud, wavelength_m))
+    for cross_sections in offered(scene.effects, "cross_sections").values():
+        cloud = replace(cloud, rcs_m2=cross_sections(cloud, wavelength_m))
     return cloud
 
 
-def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> View:
-    """Return the view of a sample with the scene's motion effects drawn; their draws do not depend on the station."""
-    times_s = scene.network.times_s
-    grid_s = np.append(times_s, len(times_s) * scene.network.symbol_interval_s)
-    sampling = None
-    for effect in providing(scene.effects, protocols.SamplesTime):
-        draws = scene.stream(effect.name, row, station.name)
-        sampling = effect.module.sampling(effect.settings, scene.network, draws)
-        times_s = sampling.times_s
-    moved = tuple(
-        effect.module.perturb(effect.settings, cloud, row, grid_s, scene.stream(effect.name, row))
-        for effect in placed(scene.effects, "motion")
+def observe(
+    scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None, beside: View | None = None
+) -> View:
+    """Return the view of a sample with the scene's motion effects drawn; their draws do not depend on the station.
+
+    The view's cloud has the cross sections of the scene. occluders: the target's surfaces; beside: the view of the
+    labelled target, whose instants and beams a companion shares.
+    """
+    network, cloud = scene.network, with_cross_sections(scene, cloud)
+    grid_s = np.append(network.times_s, len(network.times_s) * network.symbol_interval_s)
+    perturbing = offered(placed(scene.effects, "motion"), "perturb")
+    moved = Perturbations(
+        grid_s, tuple(perturb(cloud, row, grid_s, scene.stream(name, row)) for name, perturb in perturbing.items())
     )
-    shaped = [effect.module.element(effect.settings) for effect in providing(scene.effects, protocols.ShapesElements)]
+    if beside is not None:
+        motion, places = located(cloud, row, beside.times_s, moved)
+        return replace(beside, cloud=cloud, row=row, motion=motion, places=places, moved=moved, occluders=occluders)
+    times_s, sampling = network.times_s, None
+    for name, sample in offered(scene.effects, "sampling").items():
+        sampling = sample(network, scene.stream(name, row, station.name))
+        times_s = sampling.times_s
+    motion, places = located(cloud, row, times_s, moved)
+    element = next((element() for element in offered(scene.effects, "element").values()), None)
+    origin_m = np.array([row["x_m"], row["y_m"], row["z_m"]])
     view = View(
-        scene.network, station, cloud, row, times_s, grid_s, moved, occluders, shaped[0] if shaped else None, None,
-        sampling,
+        network, station, cloud, row, times_s, motion, places, moved, origin_m, element=element, occluders=occluders,
+        sampling=sampling,
     )  # fmt: skip
-    for effect in providing(scene.effects, protocols.PointsBeams):
-        beams = {
-            end.name: effect.module.beams(effect.settings, view.of(end), scene.stream(effect.name, row, end.name))
-            for end in ends_of(scene.network, station)
-        }
-        view = replace(view, beams=beams)
+    # The ends of a link of another network are not among this one's stations.
+    ends = [*network.stations, *filter(None, (station.transmitter, station.receiver, station))]
+    stations = {end.name: end for end in ends if end.transmitter is None}
+    for name, beams in offered(scene.effects, "beams").items():
+        drawn = {end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations.values()}
+        view = replace(view, beams=drawn)
     return view
-
-
-def ends_of(network: Network, station: Station) -> list[Station]:
-    """All stations of the network that are not links, and those of `station`."""
-    own = [station] if station.transmitter is None else [station.transmitter, station.receiver]
-    others = [each for each in network.stations if each.transmitter is None]
-    return list({each.name: each for each in [*others, *own]}.values())

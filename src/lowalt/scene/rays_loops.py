@@ -23,15 +23,15 @@ def _relative(rotation, translation, place, symbols, pair, pose):
     """Fill pose (15, STRIP) for some symbols: turn and shift of part q as part p sees it, and the station there."""
     p, q = pair
     for k in range(STRIP):
-        mine, theirs, own = rotation[symbols[k], p], rotation[symbols[k], q], translation[symbols[k], p]
-        shift = translation[symbols[k], q]
+        turn_p, turn_q, from_p = rotation[symbols[k], p], rotation[symbols[k], q], translation[symbols[k], p]
+        from_q = translation[symbols[k], q]
         # A pose's matrix is a rotation: its inverse is its transpose.
         for i in range(3):
-            a, b, c = mine[0, i], mine[1, i], mine[2, i]
+            a, b, c = turn_p[0, i], turn_p[1, i], turn_p[2, i]
             for j in range(3):
-                pose[3 * i + j, k] = a * theirs[0, j] + b * theirs[1, j] + c * theirs[2, j]
-            pose[9 + i, k] = a * (shift[0] - own[0]) + b * (shift[1] - own[1]) + c * (shift[2] - own[2])
-            pose[12 + i, k] = a * (place[0] - own[0]) + b * (place[1] - own[1]) + c * (place[2] - own[2])
+                pose[3 * i + j, k] = a * turn_q[0, j] + b * turn_q[1, j] + c * turn_q[2, j]
+            pose[9 + i, k] = a * (from_q[0] - from_p[0]) + b * (from_q[1] - from_p[1]) + c * (from_q[2] - from_p[2])
+            pose[12 + i, k] = a * (place[0] - from_p[0]) + b * (place[1] - from_p[1]) + c * (place[2] - from_p[2])
 
 
 @INNER_ORDERED

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.special import jv
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
 from lowalt.scene import response_loops, spherical
-from lowalt.scene.geometry import ball
 from lowalt.scene.view import View
 
 ERROR = 1e-11
@@ -36,6 +36,11 @@ class ImagePath(NamedTuple):
     station_m: np.ndarray | None = None
     sender: "ImagePath | None" = None
 
+    @property
+    def outward(self) -> "ImagePath":
+        """The path out to the points."""
+        return self.sender or self
+
 
 def response(
     view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float = 1.0, *, squint: bool = False,
@@ -51,24 +56,24 @@ def response(
     Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
     network, station = view.network, view.station
-    seen, strength = [ImagePath(view.places), *paths], _amplitudes(view, factor)
-    ends = [(station, network.receive, seen)]
+    every, strength = [ImagePath(view.places), *paths], _amplitudes(view, factor)
+    ends = [_end(view, station, network.receive, every, (squint, wavefront))]
     same = station.transmitter is None and network.transmit == network.receive
     if not same:
-        sender = station.transmitter or station
-        ends.insert(0, (sender, network.transmit, [path.sender or path for path in seen]))
-    arrays = [_end(view, *end, (squint, wavefront)) for end in ends]
-    reach = ball(_planes(view.places), np.empty((len(view.times_s), 3)))
+        outward = [path.outward for path in every]
+        ends.insert(0, _end(view, station.transmitter or station, network.transmit, outward, (squint, wavefront)))
+    out, back = ends[0], ends[-1]
+    points = back.places[0]
+    reach = float(np.sqrt(np.square(points - points.mean(axis=2, keepdims=True)).sum(axis=1).max()))
     if squint:
         # Ranges then count to the arrays' middles, whose directions to the points differ.
-        aperture = max(array.spacing * _half_diagonal(array.counts) for array in arrays)
-        nearest = min(float(array.centre.min()) for array in arrays) - reach
+        aperture = max(end.spacing * _half_diagonal(end.counts) for end in ends)
+        nearest = min(float(end.centre.min()) for end in ends) - reach
         reach += 2.0 * aperture * min(reach / nearest if nearest > 0 else 1.0, 1.0)
     # A power of sqrt(2), so that a few tables serve all samples.
     reach = 2.0 ** (np.ceil(2 * np.log2(max(reach, 1e-3))) / 2)
     band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
-    to_nodes, to_band = tables(len(arrays[0].kappas), float(2.0 * reach * band_m), network.subcarriers)
-    out, back = arrays[0], arrays[-1]
+    to_nodes, to_band = tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers)
     nodes, orders = len(out.kappas), len(to_nodes) // len(out.kappas)
     result = np.empty((len(out.places), len(back.places), len(view.times_s), nodes, 2, orders))
     fault = response_loops.moments(out, back, same, strength, reach, result)
@@ -81,27 +86,18 @@ def response(
         if same and b < a:
             continue
         weight = 2.0 if same and a != b else 1.0
-        own = weight * (result[a, b, :, :, 0] + 1j * result[a, b, :, :, 1]).reshape(len(view.times_s), -1)
+        moments = weight * (result[a, b, :, :, 0] + 1j * result[a, b, :, :, 1]).reshape(len(view.times_s), -1)
         range_m = out.centre[a] + back.centre[b]
-        spectrum = np.ascontiguousarray((own @ to_nodes) @ to_band)
+        spectrum = np.ascontiguousarray((moments @ to_nodes) @ to_band)
         response_loops.add_turned(spectrum, -out.turns * range_m, -range_m * band_m / network.subcarriers, total)
     return total
 
 
 def _amplitudes(view: View, factor: np.ndarray | float) -> np.ndarray:
     """Amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance, a0 lambda sqrt(sigma) / (4 pi)^1.5."""
-    network = view.network
-    elements = float(np.prod(network.transmit) * np.prod(network.receive))
-    wavelength = SPEED_OF_LIGHT / network.carrier_hz
-    scale = np.sqrt(network.power / elements) * wavelength / (4.0 * np.pi) ** 1.5
-    strength = scale * np.sqrt(view.cloud.rcs_m2) * np.asarray(factor, np.float64)
+    strength = radar(view.network, view.station).scale * np.sqrt(view.cloud.rcs_m2) * np.asarray(factor, np.float64)
     strength = strength.reshape((1,) * (4 - strength.ndim) + strength.shape)
     return np.ascontiguousarray(np.broadcast_to(strength, (*strength.shape[:2], *view.places.shape[:2])))
-
-
-def _planes(places: np.ndarray) -> np.ndarray:
-    """Places (N, L, 3) as (N, 3, L), in one block of memory."""
-    return np.ascontiguousarray(np.swapaxes(places, 1, 2), np.float64)
 
 
 def _half_diagonal(counts: np.ndarray) -> float:
@@ -122,24 +118,20 @@ def _end(
     """One end's array and paths as the loops take them; physics: squint and wavefront."""
     network, (squint, wavefront) = view.network, physics
     # On a link, all frequencies are those of the signal, which is the transmitter's.
-    carrier, lowest = network.carrier_hz, view.station.frequency_hz
-    centre_hz = lowest + 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz
-    beams = view.beams_of(station)
+    radio, beams = radar(network, view.station), view.beams_of(station)
     # An instant that is a multiple of the update must not fall before it by rounding.
     current = np.searchsorted(beams.starts_s, view.times_s + 1e-9, side="right") - 1
-    images = np.stack([_planes(path.places) for path in paths])
+    images = np.stack([np.ascontiguousarray(path.places.swapaxes(1, 2), np.float64) for path in paths])
     coefficient = np.stack([
         np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths
     ])  # fmt: skip
-    # An image keeps all distances, so the mean of the images is as far from them as the points' mean is from these.
-    centres = np.empty((len(paths), len(view.times_s), 3))
-    for image, centre in zip(images, centres, strict=True):
-        ball(image, centre)
+    mast_m = np.array(station.position_m, np.float64)
     end = response_loops.End(
-        np.array(station.position_m, np.float64), station.horizontal[:2].copy(), np.array(counts),
-        SPEED_OF_LIGHT / (2.0 * carrier), lowest / carrier, frequencies(network, view.station, squint), squint,
-        centre_hz / SPEED_OF_LIGHT, cosines(station, beams.aims_m)[current], images, coefficient,
-        np.linalg.norm(centres - np.asarray(station.position_m), axis=2), np.empty((0, 0, 0, 0), np.complex128),
+        mast_m, station.horizontal[:2].copy(), np.array(counts), SPEED_OF_LIGHT / (2.0 * network.carrier_hz),
+        radio.kappa, frequencies(network, view.station, squint), squint, radio.centre_hz / SPEED_OF_LIGHT,
+        cosines(station, beams.aims_m)[current], images, coefficient,
+        # An image keeps all distances, so the images' mean is as far from them as the points' mean is from these.
+        np.linalg.norm(images.mean(axis=3) - mast_m, axis=2), np.empty((0, 0, 0, 0), np.complex128),
     )  # fmt: skip
     return end._replace(gains=spherical.gains(end, ERROR)) if wavefront else end
 
@@ -150,7 +142,7 @@ def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
     Elements' paths relative to the array's middle decide how many are needed. Without squint, arrays work at the lowest
     subcarrier's frequency alone.
     """
-    lowest = station.frequency_hz / network.carrier_hz
+    lowest = radar(network, station).kappa
     half = 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz / network.carrier_hz
     if not squint or half == 0.0:
         return np.array([lowest])

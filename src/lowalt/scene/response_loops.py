@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.machine.jit import INNER_VECTOR, kernel
+from lowalt.machine.jit import INNER_VECTOR, VECTOR, kernel
 from lowalt.scene.phasor import phasor
 
 CHUNK = 128
@@ -38,15 +38,22 @@ class End(NamedTuple):
     gains: np.ndarray
 
 
-@INNER_VECTOR
-def _row_sum(cosine, kappa, beam, aim, count, gain):
-    """Multiply gain (L,) by U_{N-1}(cos(pi (kappa x - beam x0) / 2)), the sum of N elements about their middle."""
+@VECTOR
+def row_sum(cosine, kappa, beam, aim, count, gain):
+    """Multiply gain (L,) by the sum of `count` elements in a row about their middle, sin(N pi x / 2) / sin(pi x / 2).
+
+    x = kappa times the direction cosine (L,), less beam times that of the aim; elements are half a wavelength apart.
+    """
     for i in range(np.uint64(len(gain))):
-        c, _ = phasor(0.25 * (kappa * cosine[i] - beam * aim))
-        older, total = 0.0, 1.0
-        for _ in range(count - 1):
-            older, total = total, 2.0 * c * total - older
-        gain[i] *= total
+        turns = 0.25 * (kappa * cosine[i] - beam * aim)
+        # Off the nearest grating lobe both sines keep all their digits; in an even row every second lobe is negative.
+        lobe = np.rint(2.0 * turns)
+        sign = 1.0 - 2.0 * ((count - 1) % 2) * abs(lobe - 2.0 * np.rint(0.5 * lobe))
+        off = turns - 0.5 * lobe
+        off = off if abs(off) > 1e-30 else 1e-30
+        _, single = phasor(off)
+        _, every = phasor(count * off)
+        gain[i] *= sign * every / single
 
 
 @INNER_VECTOR
@@ -85,8 +92,8 @@ def _one_way(end, path, n, work, factors, excess):
             continue
         for i in range(np.uint64(len(gain))):
             gain[i] = 1.0
-        _row_sum(across, end.kappas[q], end.beam, aims[0], end.counts[0], gain)
-        _row_sum(up, end.kappas[q], end.beam, aims[1], end.counts[1], gain)
+        row_sum(across, end.kappas[q], end.beam, aims[0], end.counts[0], gain)
+        row_sum(up, end.kappas[q], end.beam, aims[1], end.counts[1], gain)
         for i in range(np.uint64(len(gain))):
             real[i], imag[i] = factors[0, 0, i] * gain[i], factors[0, 1, i] * gain[i]
     return clear
@@ -156,9 +163,9 @@ def moments(out, back, same, strength, reach, result):
             for b in range(a if same else 0, ways_back):
                 homeward, excess = (there[b], excess_there[b]) if same else (home[b], excess_home[b])
                 result[a, b, n] = 0.0
-                own = strength[a % strength.shape[0], b % strength.shape[1], n]
+                amplitudes = strength[a % strength.shape[0], b % strength.shape[1], n]
                 factors, ranges = (there[a], homeward), (excess_there[a], excess)
-                _add_moments(factors, own, ranges, reach, table, parts, result[a, b, n])
+                _add_moments(factors, amplitudes, ranges, reach, table, parts, result[a, b, n])
     return 0
 
 

@@ -23,7 +23,7 @@ def behind_canceller(noise: np.ndarray, canceller: dict) -> np.ndarray:
     been there before. A pulse canceller shapes it as |2 sin(pi f T_r)|^(2 k) over the noise gain C(2 k, k).
     Source: M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2.
     """
-    from lowalt.scene.catalogue import called
+    from lowalt.scene.effects import called
 
     for effect in called({"canceller": canceller}):
         noise = effect.module.filtered(effect.settings, noise[:, None])[:, 0]

@@ -1,19 +1,16 @@
-"""One moving target as one station sees it: poses, places and normals, each computed when first needed."""
+"""One moving target as one station sees it: where its parts and points stand at each instant, where beams point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo import Rigid
+from lowalt.machine.jit import VECTOR
 from lowalt.motion.poses import Perturbation, poses
 from lowalt.scene.antenna import Element, gain
-from lowalt.scene.geometry import carry
-from lowalt.scene.perturbations import at_times, summed
-from lowalt.scene.sampling import Sampling
 from lowalt.targets.cloud import Cloud
 
 
@@ -24,74 +21,115 @@ class Beams(NamedTuple):
     aims_m: np.ndarray
 
 
+class Sampling(NamedTuple):
+    """times_s: (N,) s, start of each symbol; present: (N,) bool, which symbols are received."""
+
+    times_s: np.ndarray
+    present: np.ndarray
+
+
+class Perturbations(NamedTuple):
+    """Changes of a target's motion by several effects, each given at grid_s (G,) s."""
+
+    grid_s: np.ndarray
+    changes: tuple[Perturbation, ...]
+
+    def at(self, times_s: np.ndarray) -> Perturbation | None:
+        """Return their sum at times_s (K,) s, linear between the instants given and exact on them; None for none."""
+        if not self.changes:
+            return None
+        angles: dict[int, np.ndarray] = {}
+        for change in self.changes:
+            for part, angle in (change.angle_rad or {}).items():
+                angles[part] = angles.get(part, 0.0) + np.interp(times_s, self.grid_s, angle)
+        return Perturbation(angles, self._total("offset_m", times_s), self._total("tilt_rad", times_s))
+
+    def _total(self, name: str, times_s: np.ndarray) -> np.ndarray | None:
+        """The sum (K, 3) of those of the changes' tables (G, 3) that there are, None for none."""
+        tables = [table for change in self.changes if (table := getattr(change, name)) is not None]
+        columns = [[np.interp(times_s, self.grid_s, column) for column in table.T] for table in tables]
+        return sum(np.stack(each, axis=1) for each in columns) if columns else None
+
+
+@VECTOR
+def _carry(rotation, translation, vectors, part, result):
+    """Fill result (N, 3, L) with rotation (N, P, 3, 3) times vectors (3, L) plus translation (N, P, 3), by part."""
+    # Points of a part stand next to each other.
+    first = 0
+    while first < len(part):
+        p, last = part[first], first + 1
+        while last < len(part) and part[last] == p:
+            last += 1
+        for n in range(len(result)):
+            for axis in range(3):
+                turn, row, shift = rotation[n, p, axis], result[n, axis], translation[n, p, axis]
+                a, b, c = turn[0], turn[1], turn[2]
+                for i in range(np.uint64(first), np.uint64(last)):
+                    row[i] = a * vectors[0, i] + b * vectors[1, i] + c * vectors[2, i] + shift
+        first = last
+
+
+def _carried(vectors: np.ndarray, motion: Rigid, translation: np.ndarray) -> np.ndarray:
+    """Vectors (L, 3) of the parts' own frames in the global frame, moved by translation (N, P, 3) m: (N, L, 3).
+
+    Coordinates of a symbol's points stand together in memory, (N, 3, L).
+    """
+    result = np.empty((len(motion.rotation), 3, len(vectors)))
+    part = np.asarray(motion.part, np.int64)
+    _carry(*map(np.ascontiguousarray, (motion.rotation, translation, vectors.T)), part, result)
+    return result.swapaxes(1, 2)
+
+
+def located(cloud: Cloud, row: dict, times_s: np.ndarray, moved: Perturbations) -> tuple[Rigid, np.ndarray]:
+    """Return the poses of a target's parts and the places (N, L, 3) m of its points at times_s (N,) s, global frame.
+
+    The nodes of a recording have places but no attitude. Raises: InputError as `lowalt.motion.poses.poses`.
+    """
+    motion = Rigid(*poses(cloud, row, times_s, moved.at(times_s)), cloud.points, cloud.part)
+    if "node" in cloud.kinds:
+        return motion, np.ascontiguousarray(motion.translation.swapaxes(1, 2)).swapaxes(1, 2)
+    return motion, _carried(cloud.points, motion, motion.translation)
+
+
 @dataclass(frozen=True, eq=False)
 class View:
-    """A target's motion as one station sees it.
-
-    row: its row of the motion table; times_s: (N,) s; perturbations: those of the motion effects, given at `grid_s`
-    (G,) s, which spans the look and one symbol more; occluders: a target's surfaces (see `occlusion`) or None.
-    """
+    """A target's motion as one station sees it."""
 
     network: Network
     station: Station
     cloud: Cloud
     row: dict
+    """The target's row of the motion table."""
     times_s: np.ndarray
-    grid_s: np.ndarray
-    perturbations: tuple[Perturbation, ...] = ()
-    occluders: dict | None = field(default=None, repr=False)
+    """(N,) s."""
+    motion: Rigid
+    """Poses of all parts: rotation (N, P, 3, 3), translation (N, P, 3) m, with the cloud's points."""
+    places: np.ndarray
+    """Every point's place (N, L, 3) m, global frame."""
+    moved: Perturbations
+    """What the motion effects add to the target's motion."""
+    origin_m: np.ndarray
+    """(3,) m, the labelled target's origin at the first symbol: beams point there, or as `beams` says."""
+    beams: Mapping[str, Beams] = field(default_factory=dict)
+    """Where stations' beams point, by their names."""
     element: Element | None = None
     """The antenna elements' pattern, None for isotropic ones."""
-    beams: Mapping[str, Beams] | None = None
-    """Where each station's beams point, by its name; None for the target's origin at the first symbol."""
+    occluders: dict | None = field(default=None, repr=False)
+    """The target's surfaces (see `occlusion`)."""
     sampling: Sampling | None = None
     """Instants of all symbols and which are received, None for all at n T_r."""
 
-    @cached_property
-    def motion(self) -> Rigid:
-        """Poses of all parts: rotation (N, P, 3, 3), translation (N, P, 3) m, with the cloud's points."""
-        moved = summed([at_times(item, self.grid_s, self.times_s) for item in self.perturbations])
-        return Rigid(*poses(self.cloud, self.row, self.times_s, moved), self.cloud.points, self.cloud.part)
-
-    @cached_property
-    def places(self) -> np.ndarray:
-        """Every point's place (N, L, 3) in metres, global frame."""
-        if self.nodes:
-            return np.ascontiguousarray(self.motion.translation.swapaxes(1, 2)).swapaxes(1, 2)
-        return self._carried(self.cloud.points, self.motion.translation)
-
-    @cached_property
+    @property
     def normals(self) -> np.ndarray:
         """Every point's unit normal (N, L, 3), global frame, NaN where unknown."""
-        if self.nodes:
+        if "node" in self.cloud.kinds:
             return np.full(self.places.shape, np.nan)
-        return self._carried(self.cloud.normals, np.zeros_like(self.motion.translation))
-
-    def _carried(self, vectors: np.ndarray, translation: np.ndarray) -> np.ndarray:
-        """Vectors (L, 3) of the parts' own frames in the global frame, (N, L, 3), moved by translation (N, P, 3) m."""
-        result = np.empty((len(self.times_s), 3, len(vectors)))
-        rotation = np.ascontiguousarray(self.motion.rotation)
-        carry(
-            rotation, np.ascontiguousarray(translation), np.ascontiguousarray(vectors.T),
-            np.asarray(self.cloud.part, np.int64), result,
-        )  # fmt: skip
-        return result.swapaxes(1, 2)
-
-    @property
-    def nodes(self) -> bool:
-        """Whether the points are the nodes of a recording, which have places but no attitude."""
-        return "node" in self.cloud.kinds
-
-    @property
-    def origin_m(self) -> np.ndarray:
-        """The target's origin at the first symbol, (3,) m."""
-        return np.array([self.row["x_m"], self.row["y_m"], self.row["z_m"]])
+        return _carried(self.cloud.normals, self.motion, np.zeros_like(self.motion.translation))
 
     def beams_of(self, station: Station) -> Beams:
         """Return where a station's beams point; of a link, where its receiver's do."""
-        if self.beams is None:
-            return Beams(np.zeros(1), self.origin_m[None])
-        return self.beams[(station.receiver or station).name]
+        name = (station.receiver or station).name
+        return self.beams.get(name) or Beams(np.zeros(1), self.origin_m[None])
 
     def aim_of(self, station: Station) -> np.ndarray:
         """Return where a station's beams point at first, (3,) m."""
@@ -102,34 +140,30 @@ class View:
         """Where the receiver's beams point at first, (3,) m: without pointing errors the target's origin."""
         return self.aim_of(self.station)
 
-    @cached_property
-    def element_gain(self) -> np.ndarray:
-        """The element's power gain (N, L) toward the points."""
-        return gain(self.element, self.station, self.places)
+    @property
+    def masts_m(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places of the sender and the receiver, (3,) m each; those of a station are one."""
+        sender = self.station.transmitter or self.station
+        return np.asarray(sender.position_m), np.asarray(self.station.position_m)
+
+    def ways_m(self, places: np.ndarray) -> np.ndarray:
+        """Return the way from the sender by places (..., 3) m to the receiver, (...) m."""
+        return sum(np.linalg.norm(places - mast_m, axis=-1) for mast_m in self.masts_m)
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
         """Return the element's amplitude gain toward images (N, L, 3) over that toward the points, (N, L) or 1."""
         if self.element is None:
             return 1.0
-        return np.sqrt(gain(self.element, self.station, images) / self.element_gain)
+        return np.sqrt(gain(self.element, self.station, images) / gain(self.element, self.station, self.places))
 
     def at(self, times_s: np.ndarray) -> "View":
         """Return the same target seen at other times (K,) s of the look."""
-        return replace(self, times_s=times_s)
-
-    def at_rows(self, rows: np.ndarray) -> "View":
-        """Return the same target seen at the symbols `rows` (K,) alone, with what is known of its places."""
-        return self.at(self.times_s[rows])._knowing(places=self.places[rows])
+        motion, places = located(self.cloud, self.row, times_s, self.moved)
+        return replace(self, times_s=times_s, motion=motion, places=places)
 
     def of(self, station: Station) -> "View":
         """Return the same target, at the same instants and under the same beams, as another station hears it."""
-        # The motion does not depend on the station.
-        return replace(self, station=station)._knowing(motion=self.motion, places=self.places)
-
-    def _knowing(self, **known: object) -> "View":
-        """This new view, with values of its cached properties."""
-        self.__dict__.update(known)
-        return self
+        return replace(self, station=station)
 
     def seen_from(self, place_m: np.ndarray, sender_m: np.ndarray | None = None) -> "View":
         """Return the same target, at the same instants and under the same beams, seen from another place (3,) m.
@@ -144,8 +178,8 @@ class View:
 
     def ends(self) -> list["View"]:
         """Return the target as the sender and as the receiver of a link see it alone; a station's own view is both."""
-        own = self.station
-        if own.transmitter is None:
+        link = self.station
+        if link.transmitter is None:
             return [self]
-        hears = replace(own, name=own.receiver.name, transmitter=None, receiver=None)
-        return [self.of(own.transmitter), self.of(hears)]
+        hears = replace(link, name=link.receiver.name, transmitter=None, receiver=None)
+        return [self.of(link.transmitter), self.of(hears)]

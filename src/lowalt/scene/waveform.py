@@ -4,6 +4,7 @@ Samples are the complex baseband around the station's local oscillator, which st
 (3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,6 +15,8 @@ from lowalt.config.network import Network, Station
 
 QPSK = np.sqrt(0.5) * np.array([1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j])
 """The four data symbols, of unit modulus."""
+NORMAL_PREFIX = 144 / 2048
+"""Length of NR's normal cyclic prefix, in useful symbol lengths (3GPP TS 38.211, 5.3.1)."""
 
 
 def qpsk(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray:
@@ -47,6 +50,29 @@ def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
 def range_cells(response: np.ndarray) -> np.ndarray:
     """Return the range cells (N, M) of frequency responses (N, M), the inverse transform over subcarriers."""
     return fft.ifft(response, axis=-1)
+
+
+def prefix_length_s(prefix_s: float | None, network: Network) -> float:
+    """Return the cyclic prefix's length (s): the given one, or NR's normal prefix."""
+    return NORMAL_PREFIX / network.subcarrier_spacing_hz if prefix_s is None else prefix_s
+
+
+def windowed(
+    network: Network, prefix_s: float, response: np.ndarray, late: int, on_air: Callable[[str], np.ndarray]
+) -> np.ndarray:
+    """Return the time samples (N, M) of a response (N, M) whose first `late` samples are still the previous symbol's.
+
+    late: negative where the last samples are the next symbol's already; on_air: subcarriers (N, M) on the air in the
+    "waveform", the "previous waveform" and the "next waveform". The previous symbol ends a prefix before the window.
+    """
+    samples, count = transmit(response, on_air("waveform")), network.subcarriers
+    baseband_hz = (np.arange(count) - count // 2) * network.subcarrier_spacing_hz
+    turn = np.exp(2j * np.pi * baseband_hz * prefix_s)
+    if late > 0:
+        samples[:, :late] = transmit(response * turn, on_air("previous waveform"))[:, :late]
+    if late < 0:
+        samples[:, late:] = transmit(response * turn.conj(), on_air("next waveform"))[:, late:]
+    return samples
 
 
 @dataclass(frozen=True)

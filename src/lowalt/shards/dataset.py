@@ -21,7 +21,7 @@ from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
-from lowalt.motion.sample import region_polygon
+from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker

@@ -102,8 +102,8 @@ class Maker:
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:
             return clean_signals(self.network, names, self.clouds, [row], tolerance)[:, 0], None
-        from lowalt.scene.catalogue import called
-        from lowalt.scene.chunk import scene_signals
+        from lowalt.scene.chain import scene_signals
+        from lowalt.scene.effects import called
         from lowalt.scene.observe import Scene
 
         scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))

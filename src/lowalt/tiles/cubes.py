@@ -11,9 +11,9 @@ from lowalt.config.command import pick
 from lowalt.config.network import Network, Station
 from lowalt.noise.awgn import add_noise
 from lowalt.numerics.streams import stream
-from lowalt.scene.catalogue import called
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.observe import Scene
+from lowalt.scene.effects import called
+from lowalt.scene.observe import Scene, observe
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud, cloud_of
@@ -80,9 +80,8 @@ class Cubes:
     def _computed(self, row: dict, snr_db: float, station: Station) -> tuple:
         """Compute `_seen`."""
         scene = self.scene.at_snr(snr_db) if self.every_cell else self.scene
-        sample = SceneSample(
-            scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"]), self.clouds
-        )
+        view = observe(scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"]))
+        sample = SceneSample(scene, view, self.clouds)
         received, sampling = sample.received(), sample.view.sampling
         there = slice(None) if sampling is None else sampling.present
         cells = np.zeros((len(received.cell), self.scene.network.subcarriers), np.complex128)
@@ -95,7 +94,7 @@ class Cubes:
 
 def truth(sample: SceneSample) -> np.ndarray:
     """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each symbol, (N, 4)."""
-    station, middle = sample.station, sample.view.places.mean(axis=1)
+    station, middle = sample.view.station, sample.view.places.mean(axis=1)
     moved = np.gradient(middle, sample.view.times_s, axis=0, edge_order=2)
     ends = [station] if station.transmitter is None else [station, station.transmitter]
     ways = [middle - np.asarray(end.position_m) for end in ends]

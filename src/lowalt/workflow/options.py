@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lowalt.scene.catalogue import dotted
+from lowalt.scene.effects import dotted
 from lowalt.scene.lateness import timed
 from lowalt.spectra.catalogue import of_cells
 

@@ -10,7 +10,7 @@ from lowalt.config.layers import canonical
 from lowalt.config.network import as_far_as, masts_m
 from lowalt.config.plan import Chunk, motion_block
 from lowalt.files.shipped import as_named
-from lowalt.motion.sample import masts_in_reach
+from lowalt.motion.drawing import masts_in_reach
 from lowalt.scene.lateness import timed
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra.catalogue import of_cells

@@ -14,7 +14,7 @@ from lowalt.echo import Rigid, echo_signal
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.motion import poses, positions
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.drawing import draw, region_polygon
 from lowalt.numerics.streams import stream
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png

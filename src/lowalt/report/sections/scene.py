@@ -12,14 +12,14 @@ def values(run: ReportedRun) -> dict:
     if not run.config["effects"]:
         return {"lines": []}
     # The effects' modules are loaded only for runs that have some.
-    from lowalt.scene import explain, explain_text
+    from lowalt.scene import explanation
 
     inputs = run.config["inputs"] or os.environ.get("LOWALT_INPUTS")
     try:
-        scene, chosen = explain.scene_of(run.config), explain.samples(run.config, inputs and Path(inputs), [])
+        scene, chosen = explanation.scene_of(run.config), explanation.samples(run.config, inputs and Path(inputs), [])
     except InputError as error:
         # Show the page without the verdict where, for example, the recordings have been moved.
         return {"lines": [f"not explained: {error}"]}
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
-    findings = [explain.finding(scene, end, sample, clouds) for sample in chosen for end in scene.network.stations]
-    return {"lines": explain_text.verdict(findings)}
+    findings = [explanation.finding(scene, end, sample, clouds) for sample in chosen for end in scene.network.stations]
+    return {"lines": explanation.verdict(findings)}

@@ -9,7 +9,6 @@ from scipy.special import gammaincinv
 
 from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo.radar import radar
-from lowalt.files.errors import InputError
 from lowalt.scene.antenna import gain
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.crossing import toward
@@ -22,51 +21,35 @@ SOURCE = (
     "without line of sight and with one polarisation, clause 7.6.9 (absolute delay) and, on request, 7.9.5.5 (weak "
     "clusters); arrival angles are those of departure, as agreed in 3GPP RAN1"
 )
-DEFAULTS = {"environment": "UMa", "reference_points": 3, "weak_clusters": False}
+DEFAULTS = {"environment": "UMa", "weak_clusters": False}
 
 PLACES = {
     "UMi": ((6.1996, 0.1558, 15.2697), (12.0487, 2.3261, 0.0157)),
     "UMa": ((10.3370, 0.1317, 68.7778), (16.2253, 1.9218, 2.6142)),
-    "RMa": ((6.2025, 0.0391, 1.2940), (0.0007, 5.0146, 0.0522)),
 }
 """Shape, rate and offset of the gamma laws of a reference point's distance and height (m). Source: Table 7.9.4.2-1."""
+POINTS = 3
+"""Points of reference round a station."""
 WEAK = 360, -25.0
 """Number of weak clusters, of one ray each, and their power over that of the strongest cluster (dB)."""
-HIGHEST_RURAL_GHZ = 7.0
 USUAL = 64
 """Draws whose median is the usual level."""
 
 
-def idle(settings: dict) -> bool:
-    """Return whether there is no reference point."""
-    return settings["reference_points"] == 0
-
-
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for an unknown environment, a rural one at high frequency, or a station in the ground."""
+    """Raise InputError for a station in the ground."""
     above_ground("background_channel", scene.network)
-    if settings["environment"] not in PLACES:
-        raise InputError(
-            f"effects.background_channel.environment: {settings['environment']!r}, expected one of {list(PLACES)}"
-        )
-    highest = max(radar(scene.network, station).centre_hz for station in scene.network.stations) / 1e9
-    if settings["environment"] == "RMa" and highest > HIGHEST_RURAL_GHZ:
-        raise InputError(
-            f"effects.background_channel.environment: RMa is known to {HIGHEST_RURAL_GHZ:g} GHz, expected UMa or UMi "
-            f"at {highest:.3g} GHz"
-        )
 
 
-def reference_points(settings: dict, rng: np.random.Generator) -> np.ndarray:
-    """Return the reference points (R, 3): distance (m), height (m), azimuth (rad); azimuths are equally far apart."""
-    count = settings["reference_points"]
-    uniform = rng.random((2, count))
+def reference_points(environment: str, rng: np.random.Generator) -> np.ndarray:
+    """Return the reference points (3, 3): distance (m), height (m), azimuth (rad); azimuths are equally far apart."""
+    uniform = rng.random((2, POINTS))
     first = 2 * np.pi * (float(rng.random()) - 0.5)
     columns = [
         gammaincinv(shape, drawn) / rate + offset
-        for (shape, rate, offset), drawn in zip(PLACES[settings["environment"]], uniform, strict=True)
+        for (shape, rate, offset), drawn in zip(PLACES[environment], uniform, strict=True)
     ]
-    return np.stack([*columns, first + 2 * np.pi * np.arange(count) / count], axis=1)
+    return np.stack([*columns, first + 2 * np.pi * np.arange(POINTS) / POINTS], axis=1)
 
 
 def drawn(
@@ -75,7 +58,7 @@ def drawn(
     """Return all rays: delays (K,) s, complex amplitudes (K,) for isotropic antennas, unit directions (K, 3)."""
     environment = settings["environment"]
     delays, amplitudes, directions = [], [], []
-    for flat, height, azimuth in reference_points(settings, rng):
+    for flat, height, azimuth in reference_points(environment, rng):
         link = Link(float(flat), float(station.position_m[2]), float(height), ghz)
         large = fast_fading.large_scale(environment, link, rng)
         level = 10 ** ((large.shadow_db - fast_fading.path_loss_db(environment, link)) / 20)
@@ -121,7 +104,7 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
 def usual_power(settings: dict, view: View) -> float:
     """Return the mean power (W) of a subcarrier of the surroundings' echoes, the median of `USUAL` draws."""
     drawn = [scatter(settings, view.at(view.times_s[:1]), np.random.default_rng(number)) for number in range(USUAL)]
-    return float(np.median([np.mean(abs(one) ** 2) for one in drawn]))
+    return float(np.median([np.mean(abs(response) ** 2) for response in drawn]))
 
 
 def _antennas(view: View, direction: np.ndarray) -> np.ndarray:

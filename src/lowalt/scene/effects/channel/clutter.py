@@ -14,9 +14,7 @@ from scipy.special import gamma, gammaincinv, ndtr, ndtri
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
-from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene import land
-from lowalt.scene.antenna import gain
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.effects.channel.windblown import speckle, windblown
 from lowalt.scene.view import View
@@ -30,8 +28,7 @@ SOURCE = (
     "rays; at other angles out of plane, and the spectrum narrowed by cos(beta / 2): estimates"
 )
 DEFAULTS = {
-    "gamma": 0.03, "clutter_to_signal_db": None, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5,
-    "correlation_m": 20.0,
+    "gamma": 0.03, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5, "correlation_m": 20.0,
 }  # fmt: skip
 
 
@@ -47,7 +44,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
         raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
 
 
-def offset_cells(view: View) -> float:
+def offset_cells(settings: dict, view: View) -> float:
     """Return how far all echoes of the land stand beyond the centres of their range cells."""
     return land.OFFSET
 
@@ -82,37 +79,16 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
     return 1.0 / (stable * gamma(1.0 + 1.0 / index))
 
 
-def target_power(view: View) -> float:
-    """Return the mean power (W) of the target in the middle of both beams, over aspects and motion."""
-    elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
-    amplitude = radar(view.network, view.station).scale * elements
-    for end in (view.station.transmitter or view.station, view.station):
-        aim_m = view.aim_of(end)
-        amplitude /= np.linalg.norm(aim_m - np.asarray(end.position_m))
-        if view.element is not None:
-            amplitude *= np.sqrt(gain(view.element, end, aim_m))
-    return float(amplitude**2 * mean_cross_section(view.cloud, SPEED_OF_LIGHT / view.network.carrier_hz))
-
-
-def mean_power(settings: dict, view: View) -> np.ndarray:
-    """Return the mean power (cells,) (W) of the land in every slant-range cell, at the level that settings ask for."""
-    return _land(settings, view)[0]
-
-
-def _land(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Mean power (cells,) (W), and how much each cell's Doppler is slowed."""
+def mean_power(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean power (cells,) (W) of the land in every slant-range cell, and how much its Doppler is slowed."""
     aims_m = np.stack([view.aim_of(view.station.transmitter or view.station), view.aim_m])
-    power, slow = land.cell_power(settings, view.network, view.station, aims_m, view.element)
-    total, wanted_db = power.sum(), settings["clutter_to_signal_db"]
-    if wanted_db is not None and total > 0:
-        power = power * (target_power(view) * 10 ** (wanted_db / 10) / total)
-    return power, slow
+    return land.cell_power(settings, view.network, view.station, aims_m, view.element)
 
 
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
     network, frequency = view.network, radar(view.network, view.station).centre_hz
-    power, slow = _land(settings, view)
+    power, slow = mean_power(settings, view)
     correlation = np.exp(-network.cell_m / settings["correlation_m"]) if settings["correlation_m"] > 0 else 0.0
     uniform = alike(1.0 - rng.random((2, len(power))), correlation)
     lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.motion.sample import AIRBORNE, draw_rates
+from lowalt.motion.drawing import AIRBORNE, draw_rates
 from lowalt.motion.table import NUMBERS
 from lowalt.numerics.streams import stream
 from lowalt.scene.checks import CheckedScene
@@ -118,13 +118,13 @@ def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -
     speed = 0.0
     if flying:
         for axis in "xyz":
-            own = rng.uniform(-1.0, 1.0) * published[f"v{axis}_abs_max"]
+            alone = rng.uniform(-1.0, 1.0) * published[f"v{axis}_abs_max"]
             shared = row[f"v{axis}_mps"] + settings["speed_mps"] * float(rng.standard_normal())
-            mine[f"v{axis}_mps"] = shared if flock else own
+            mine[f"v{axis}_mps"] = shared if flock else alone
     else:
-        own = rng.uniform(published["speed_lo"], published["speed_hi"])
+        alone = rng.uniform(published["speed_lo"], published["speed_hi"])
         shared = math.hypot(row["vx_mps"], row["vy_mps"]) + settings["speed_mps"] * float(rng.standard_normal())
-        speed = max(shared, 0.0) if flock else own
+        speed = max(shared, 0.0) if flock else alone
     if not flock:
         mine["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
     if not flying:

@@ -21,12 +21,7 @@ SOURCE = (
     "ed. 1993, chapter 6; on links: R. E. Kell, On the derivation of bistatic RCS from monostatic measurements, Proc. "
     "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
-DEFAULTS = {"strength": 1.0, "power": 1.0, "blades": "facet"}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether every point shines alike in all directions."""
-    return settings["strength"] == 0
+DEFAULTS = {"power": 1.0, "blades": "facet"}
 
 
 def diffuse(cosine: np.ndarray, power: float) -> np.ndarray:
@@ -95,7 +90,7 @@ def visible(settings: dict, view: View, rng: np.random.Generator | None = None) 
     cloud, known = view.cloud, np.isfinite(view.cloud.normals).all(axis=1)
     if not known.any():
         return np.ones(view.places.shape[:2])
-    places_m = [np.asarray(end.station.position_m) for end in view.ends()]
+    places_m = list(view.masts_m) if view.station.transmitter else [view.masts_m[1]]
     cosines = [aspect_cosine(view, place_m) for place_m in places_m]
     lobes = [diffuse(cosine, settings["power"]) for cosine in cosines]
     lobe = lobes[0] if len(lobes) == 1 else np.sqrt(lobes[0] * lobes[1])
@@ -103,4 +98,4 @@ def visible(settings: dict, view: View, rng: np.random.Generator | None = None) 
         mine = np.flatnonzero(cloud.part == rotor)
         if len(mine) > 1:
             lobe[:, mine] = blade(view, mine, cosines, places_m)
-    return np.where(known, np.sqrt(1.0 - settings["strength"] + settings["strength"] * lobe), 1.0)
+    return np.where(known, np.sqrt(lobe), 1.0)

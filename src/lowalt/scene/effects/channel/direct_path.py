@@ -18,7 +18,7 @@ SOURCE = (
 )
 DEFAULTS = {"loss_db": 0.0}
 
-MONOSTATIC = "background_channel", "transmit_leakage"
+MONOSTATIC = "background_channel", "interference", "transmit_leakage"
 """Effects that are modelled for a station that hears itself only."""
 
 
@@ -36,13 +36,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
         raise InputError(f"effects.direct_path: {refused} are not modelled between two stations, expected none of them")
 
 
-def offset_cells(view: View) -> float:
+def offset_cells(settings: dict, view: View) -> float:
     """Return how far a link's direct path stands beyond the centre of a range cell, -1/2 to 1/2; 0 for a station."""
-    sends = view.station.transmitter
-    if sends is None:
-        return 0.0
-    away = np.linalg.norm(np.asarray(view.station.position_m) - np.asarray(sends.position_m))
-    cells = float(away) / (2 * view.network.cell_m)
+    cells = float(np.linalg.norm(np.subtract(*view.masts_m))) / (2 * view.network.cell_m)
     return cells - round(cells)
 
 

@@ -21,8 +21,6 @@ FAINTEST_DB = 25.0
 """Clusters so far below the strongest are left out."""
 WIDEST_DEG = 104.0, 52.0
 """Largest spreads in azimuth and zenith."""
-STREET_M, ROOF_M = 20.0, 5.0
-"""Width of streets and height of buildings in the country."""
 
 
 class Fading(NamedTuple):
@@ -61,13 +59,9 @@ ENVIRONMENTS = {
         lambda f: (-0.24 * math.log10(1 + f) + 1.54, 0.10 * math.log10(1 + f) + 0.33), 0.35, 7.82,
         (-0.7, 0.0, 0.0, 0.0, -0.5, 0.5), 2.1, 19, 10.0, lambda f: 11.0, 1.273, 1.184, (-7.5, 0.5),
     ),
-    "RMa": Fading(
-        0.5, lambda f: (-7.43, 0.48), lambda f: (0.95, 0.45), 0.30, 8.0, (-0.5, 0.6, -0.04, -0.4, -0.10, 0.42), 1.7, 10,
-        2.0, lambda f: 3.91, 1.090, 0.957, (-8.33, 0.26),
-    ),
 }  # fmt: skip
 """Source: TR 38.901 V19, Tables 7.4.1-1, 7.5-2, 7.5-4, 7.5-6 (notes: UMa below 6 GHz as at 6, UMi below 2 as at 2),
-7.5-7 to 7.5-9 and 7.6.9-1."""
+7.5-7, 7.5-8 and 7.6.9-1."""
 
 
 class Link(NamedTuple):
@@ -105,17 +99,6 @@ class Rays(NamedTuple):
 def path_loss_db(environment: str, link: Link) -> float:
     """Return the path loss (dB) without line of sight, at least that with it. Source: Table 7.4.1-1."""
     lg, f = math.log10(link.range_m), 20 * math.log10(link.ghz)
-    if environment == "RMa":
-        high = max(link.height_m, 0.01)
-        seen = _open_country_db(link.range_m, link.ghz)
-        bend = 2 * math.pi * link.station_m * high * link.ghz * 1e9 / SPEED_OF_LIGHT
-        if link.flat_m > bend:
-            seen = _open_country_db(bend, link.ghz) + 40 * math.log10(link.range_m / bend)
-        mast = math.log10(link.station_m)
-        hidden = 161.04 - 7.1 * math.log10(STREET_M) + 7.5 * math.log10(ROOF_M)
-        hidden -= (24.37 - 3.7 * (ROOF_M / link.station_m) ** 2) * mast
-        hidden += (43.42 - 3.1 * mast) * (lg - 3) + f - (3.2 * math.log10(11.75 * high) ** 2 - 4.97)
-        return max(seen, hidden)
     # The surface's effective height is 1 m, as for points below 13 m.
     bend = 4 * (link.station_m - 1) * max(link.height_m - 1, 0.0) * link.ghz * 1e9 / SPEED_OF_LIGHT
     square = math.log10(max(bend**2 + (link.station_m - link.height_m) ** 2, 1.0))
@@ -126,19 +109,9 @@ def path_loss_db(environment: str, link: Link) -> float:
     return max(seen, 13.54 + 39.08 * lg + f - 0.6 * (link.height_m - 1.5))
 
 
-def _open_country_db(range_m: float, ghz: float) -> float:
-    """Path loss of open country with line of sight before its break."""
-    lg = math.log10(range_m)
-    near = 20 * math.log10(40 * math.pi * range_m * ghz / 3) + min(0.03 * ROOF_M**1.72, 10) * lg
-    return near - min(0.044 * ROOF_M**1.72, 14.77) + 0.002 * math.log10(ROOF_M) * range_m
-
-
 def zenith_spread(environment: str, link: Link) -> tuple[float, float]:
-    """Return the mean of lg(ZSD / 1 degree) and the zenith angles' offset (degrees). Source: Tables 7.5-7 to 7.5-9."""
+    """Return the mean of lg(ZSD / 1 degree) and the zenith angles' offset (degrees). Source: Tables 7.5-7 and 7.5-8."""
     flat, high = link.flat_m, link.height_m
-    if environment == "RMa":
-        turned = math.degrees(math.atan((35 - 3.5) / flat) - math.atan((35 - 1.5) / flat))
-        return max(-1.0, -0.19 * flat / 1000 - 0.01 * (high - 1.5) + 0.28), turned
     if environment == "UMi":
         mean = max(-0.5, -3.1 * flat / 1000 + 0.01 * max(high - link.station_m, 0.0) + 0.2)
         return mean, -(10 ** (-1.5 * math.log10(max(10.0, flat)) + 3.3))
@@ -149,16 +122,16 @@ def zenith_spread(environment: str, link: Link) -> tuple[float, float]:
 
 def large_scale(environment: str, link: Link, rng: np.random.Generator) -> Large:
     """Return a link's spreads and shadowing, correlated as Table 7.5-6 says; positive shadowing means more power."""
-    given = ENVIRONMENTS[environment]
-    ghz = max(link.ghz, given.lowest_ghz)
+    table = ENVIRONMENTS[environment]
+    ghz = max(link.ghz, table.lowest_ghz)
     matrix = np.eye(4)
-    for (row, column), value in zip([(1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2)], given.correlation, strict=True):
+    for (row, column), value in zip([(1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2)], table.correlation, strict=True):
         matrix[row, column] = matrix[column, row] = value
     shadow, delay, azimuth, zenith = np.linalg.cholesky(matrix) @ rng.standard_normal(4)
-    (delay_mean, delay_dev), (azimuth_mean, azimuth_dev) = given.delay_spread(ghz), given.azimuth_spread(ghz)
+    (delay_mean, delay_dev), (azimuth_mean, azimuth_dev) = table.delay_spread(ghz), table.azimuth_spread(ghz)
     wide = min(10 ** (azimuth_mean + azimuth_dev * azimuth), WIDEST_DEG[0])
-    tall = min(10 ** (zenith_spread(environment, link)[0] + given.zenith_deviation * zenith), WIDEST_DEG[1])
-    return Large(10 ** (delay_mean + delay_dev * delay), wide, tall, given.shadow_db * shadow)
+    tall = min(10 ** (zenith_spread(environment, link)[0] + table.zenith_deviation * zenith), WIDEST_DEG[1])
+    return Large(10 ** (delay_mean + delay_dev * delay), wide, tall, table.shadow_db * shadow)
 
 
 def rays(environment: str, link: Link, large: Large, rng: np.random.Generator, clusters: int | None = None) -> Rays:
@@ -167,11 +140,11 @@ def rays(environment: str, link: Link, large: Large, rng: np.random.Generator, c
     clusters: as many clusters of one ray each instead of the table's of 20 rays. Source: clause 7.5, steps 5 to 8,
     Eqs. 7.5-1, 7.5-5, 7.5-9, 7.5-11, 7.5-13, 7.5-14, 7.5-19, 7.5-20 and 7.5-26.
     """
-    given = ENVIRONMENTS[environment]
-    count = clusters or given.clusters
-    delay = -given.stretch * large.delay_s * np.log1p(-rng.random(count))
+    table = ENVIRONMENTS[environment]
+    count = clusters or table.clusters
+    delay = -table.stretch * large.delay_s * np.log1p(-rng.random(count))
     delay = np.sort(delay - delay.min())
-    power = np.exp(-delay * (given.stretch - 1) / (given.stretch * large.delay_s))
+    power = np.exp(-delay * (table.stretch - 1) / (table.stretch * large.delay_s))
     power *= 10 ** (-0.3 * rng.standard_normal(count))
     power /= power.sum()
     depth = -np.log(power / power.max())
@@ -179,22 +152,22 @@ def rays(environment: str, link: Link, large: Large, rng: np.random.Generator, c
     sign = np.where(rng.random((2, count)) < 0.5, -1.0, 1.0)
     spread = np.array([large.azimuth_deg, large.zenith_deg])[:, None]
     jitter = spread / 7 * rng.standard_normal((2, count))
-    azimuth = sign[0] * 2 * (large.azimuth_deg / 1.4) * np.sqrt(depth) / given.scale_azimuth + jitter[0]
+    azimuth = sign[0] * 2 * (large.azimuth_deg / 1.4) * np.sqrt(depth) / table.scale_azimuth + jitter[0]
     straight = math.degrees(math.acos((link.height_m - link.station_m) / link.range_m))
-    zenith = sign[1] * large.zenith_deg * depth / given.scale_zenith + jitter[1] + straight + offset
+    zenith = sign[1] * large.zenith_deg * depth / table.scale_zenith + jitter[1] + straight + offset
     kept = power > power.max() * 10 ** (-FAINTEST_DB / 10)
     delay, azimuth, zenith, power = delay[kept], azimuth[kept], zenith[kept], power[kept]
     if clusters:
         return Rays(delay, azimuth, zenith, power)
-    return _split(given, link, mean_zenith, Rays(delay, azimuth, zenith, power), rng)
+    return _split(table, link, mean_zenith, Rays(delay, azimuth, zenith, power), rng)
 
 
-def _split(given: Fading, link: Link, mean_zenith: float, clusters: Rays, rng: np.random.Generator) -> Rays:
+def _split(table: Fading, link: Link, mean_zenith: float, clusters: Rays, rng: np.random.Generator) -> Rays:
     """The rays of clusters, coupled at random in azimuth and zenith; the two strongest clusters have three parts."""
     count = len(OFFSETS)
     delay = np.repeat(clusters.delay_s[:, None], count, axis=1)
-    azimuth = clusters.azimuth_deg[:, None] + given.cluster_azimuth_deg * OFFSETS
-    later = 1.28e-9 * given.cluster_delay_ns(max(link.ghz, given.lowest_ghz))
+    azimuth = clusters.azimuth_deg[:, None] + table.cluster_azimuth_deg * OFFSETS
+    later = 1.28e-9 * table.cluster_delay_ns(max(link.ghz, table.lowest_ghz))
     zenith = np.empty_like(azimuth)
     strongest = np.argsort(-clusters.power)[:2]
     for number in range(len(delay)):

@@ -65,7 +65,7 @@ def pattern_dbsm(
     face = (np.floor((azimuth_deg + 45.0) / 90.0) % 4).astype(int)
     face = np.where(zenith_deg < roof, 4, np.where(zenith_deg >= floor, 5, face))
     centre, width, high, tall, peak, depth = (
-        np.array([0.0 if one[k] is None else one[k] for one in faces])[np.minimum(face, len(faces) - 1)]
+        np.array([0.0 if lobe[k] is None else lobe[k] for lobe in faces])[np.minimum(face, len(faces) - 1)]
         for k in range(6)
     )
     off = (azimuth_deg - centre + 180.0) % 360.0 - 180.0

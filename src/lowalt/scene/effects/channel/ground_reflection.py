@@ -9,7 +9,6 @@ from scipy.special import i0e
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
-from lowalt.files.errors import InputError
 from lowalt.scene import series
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.fresnel import fresnel
@@ -17,24 +16,12 @@ from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
 SOURCE = (
-    "materials: ITU-R P.2040-3, Table 3, permittivity a f^b and conductivity c f^d S/m with f in GHz, each within its "
-    "range of frequencies; "
     "Fresnel coefficients of a lossy half space: ITU-R P.527, and Balanis, Advanced Engineering Electromagnetics, "
-    "section 5.3; rough surface: Miller, Brown & Vegh, New derivation for the rough-surface reflection coefficient "
-    "and for the distribution of sea-wave elevations, IEE Proc. F 131, 1984"
+    "section 5.3; medium dry ground at 4.9 GHz: ITU-R P.2040-3, Table 3; rough surface: Miller, Brown & Vegh, New "
+    "derivation for the rough-surface reflection coefficient and for the distribution of sea-wave elevations, IEE "
+    "Proc. F 131, 1984"
 )
-DEFAULTS = {
-    "material": "medium_dry_ground", "permittivity": None, "conductivity_s_m": None, "roughness_m": 0.0,
-    "polarisation": "vertical",
-}  # fmt: skip
-
-MATERIALS = {
-    "very_dry_ground": (3.0, 0.0, 0.00015, 2.52, 1.0, 10.0),
-    "medium_dry_ground": (15.0, -0.1, 0.035, 1.63, 1.0, 10.0),
-    "wet_ground": (30.0, -0.4, 0.15, 1.30, 1.0, 10.0),
-    "concrete": (5.24, 0.0, 0.0462, 0.7822, 1.0, 100.0),
-}
-"""Each material's a, b, c and d, and the lowest and highest frequency (GHz) for which they hold."""
+DEFAULTS = {"permittivity": 12.8, "conductivity_s_m": 0.467, "roughness_m": 0.0, "polarisation": "vertical"}
 
 
 def idle(settings: dict) -> bool:
@@ -43,34 +30,8 @@ def idle(settings: dict) -> bool:
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a station in or below the ground, or properties that no material has."""
+    """Raise InputError for a station in or below the ground."""
     above_ground("ground_reflection", scene.network)
-    _, _, _, _, lowest, highest = MATERIALS[settings["material"]]
-    given = {key: value for key, value in settings.items() if key in ("permittivity", "conductivity_s_m")}
-    for station in scene.network.stations:
-        frequency = radar(scene.network, station).centre_hz / 1e9
-        if None in given.values() and not lowest <= frequency <= highest:
-            raise InputError(
-                f"effects.ground_reflection: material {settings['material']} is known from {lowest:g} to {highest:g} "
-                f"GHz, station {station.name} sends at {frequency:.3g} GHz: expected permittivity and conductivity_s_m"
-            )
-    for key, low in (("permittivity", 1), ("conductivity_s_m", 0), ("roughness_m", 0)):
-        if settings[key] is None:
-            continue
-        if not low <= settings[key] < np.inf:
-            raise InputError(f"effects.ground_reflection: {key} is {settings[key]}, expected at least {low}")
-    if settings["polarisation"] not in ("vertical", "horizontal"):
-        raise InputError(
-            f"effects.ground_reflection: polarisation is {settings['polarisation']!r}, expected vertical or horizontal"
-        )
-
-
-def ground(settings: dict, frequency_hz: float) -> tuple[float, float]:
-    """Return permittivity and conductivity (S/m) of the ground: those given, or the material's at this frequency."""
-    a, b, c, d, _, _ = MATERIALS[settings["material"]]
-    given, frequency = (settings["permittivity"], settings["conductivity_s_m"]), frequency_hz / 1e9
-    found = (a * frequency**b, c * frequency**d)
-    return tuple(one if value is None else value for value, one in zip(given, found, strict=True))
 
 
 def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndarray:
@@ -95,8 +56,8 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
 
     def reflected(sine: np.ndarray) -> np.ndarray:
         """Coefficient of the rough ground at grazing angles of this sine."""
-        smooth = fresnel(sine, *ground(settings, frequency), frequency, settings["polarisation"])
-        return smooth * roughness(sine, settings["roughness_m"], frequency)
+        material = settings["permittivity"], settings["conductivity_s_m"], frequency, settings["polarisation"]
+        return fresnel(sine, *material) * roughness(sine, settings["roughness_m"], frequency)
 
     coefficient = series.at(reflected, sine) * view.relative_gain(images)
     return [ImagePath(images, coefficient, station_m * mirror)]

@@ -9,8 +9,6 @@ import math
 
 import numpy as np
 
-from lowalt.files.errors import InputError
-from lowalt.scene.checks import CheckedScene
 from lowalt.scene.view import View
 
 SOURCE = (
@@ -19,20 +17,10 @@ SOURCE = (
 )
 DEFAULTS = {"environment": "UMa", "blocked_db": 20.0}
 
-ENVIRONMENTS = ("UMa", "UMi", "RMa")
-
 
 def idle(settings: dict) -> bool:
     """Return whether a blocked echo is as strong as any."""
     return settings["blocked_db"] == 0
-
-
-def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for an environment that has no formula."""
-    if settings["environment"] not in ENVIRONMENTS:
-        raise InputError(
-            f"effects.line_of_sight.environment: {settings['environment']!r}, expected one of {list(ENVIRONMENTS)}"
-        )
 
 
 def probability(environment: str, flat_m: float, height_m: float) -> float:

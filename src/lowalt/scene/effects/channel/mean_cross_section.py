@@ -36,11 +36,6 @@ _KEPT: dict[bytes, np.ndarray] = {}
 """Cross sections of clouds by their content: the mean over thousands of looks takes longer than a sample."""
 
 
-def idle(settings: dict) -> bool:
-    """Return False: the paper's equal points are a scene without this effect."""
-    return False
-
-
 def mean_dbsm(category: str, size: float) -> float:
     """Return a target's mean cross section (dBsm) by its class and the largest dimension of its body (m)."""
     if category == "UAV":

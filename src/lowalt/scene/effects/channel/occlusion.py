@@ -21,12 +21,7 @@ SOURCE = (
     "integrals); the rest, geometrical optics: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd ed. 1993, chapter 5; "
     "rays and triangles: Moeller & Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, J. Graphics Tools 2, 1997"
 )
-DEFAULTS = {"strength": 1.0, "blades": "bent"}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether hidden points echo as if nothing were before them."""
-    return settings["strength"] == 0
+DEFAULTS = {"blades": "bent"}
 
 
 def blades_m(cloud: Cloud, surfaces: dict) -> list[tuple[float, float]]:
@@ -71,7 +66,7 @@ def hidden(view: View, parts: Collection[int], known: np.ndarray | None = None) 
     """
     surfaces, cloud, place_m = _surfaces(view), view.cloud, np.asarray(view.station.position_m, np.float64)
     result = np.zeros(view.places.shape[:2], np.bool_) if known is None else known.copy()
-    if view.nodes:
+    if "node" in cloud.kinds:
         hidden_by_bones(surfaces, place_m, view.places, result)
         return result
     # Rays start a little off the point's own surface: along its normal, or toward the station where it has none.
@@ -97,7 +92,7 @@ def _surfaces(view: View) -> dict:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
-    """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 1 - strength where not.
+    """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 0 where not.
 
     Behind bent blades it is the share that goes around them instead. On a link each way has the root of the factor that
     a station at its end has: a point hidden from either end by opaque surfaces does not echo.
@@ -108,8 +103,8 @@ def visible(settings: dict, view: View, rng: np.random.Generator | None = None) 
         return np.sqrt(visible(settings, ends[0]) * visible(settings, ends[1]))
     blades = [] if settings["blades"] == "opaque" else view.cloud.parts_of("rotor")
     dark = hidden(view, [part for part in range(len(view.cloud.kinds)) if part not in blades])
-    result = np.where(dark, 1.0 - settings["strength"], 1.0)
+    result = np.where(dark, 0.0, 1.0)
     if settings["blades"] == "bent" and blades:
         behind = hidden(view, blades, dark) & ~dark
-        result[behind] = 1.0 - settings["strength"] * (1.0 - through_blades(view))
+        result[behind] = through_blades(view)
     return result

@@ -16,12 +16,12 @@ SOURCE = (
     "R. J. Mailloux, Phased Array Antenna Handbook, 3rd ed. 2018, ch. 1 and 7 (pattern and pointing error of a steered "
     "array); standard deviation of a tenth of the default array's 6.4 degrees beam: estimate"
 )
-DEFAULTS = {"sigma_deg": 0.64, "fixed_deg": [0.0, 0.0], "update_s": None}
+DEFAULTS = {"sigma_deg": 0.64, "update_s": None}
 
 
 def idle(settings: dict) -> bool:
     """Return whether the beams point at the target's place at the first symbol, as without this effect."""
-    return settings["sigma_deg"] == 0 and not any(settings["fixed_deg"]) and settings["update_s"] is None
+    return settings["sigma_deg"] == 0 and settings["update_s"] is None
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
@@ -51,6 +51,6 @@ def beams(settings: dict, view: View, rng: np.random.Generator) -> Beams:
     update = settings["update_s"]
     starts = np.zeros(1) if update is None else np.arange(0.0, last + 1e-9, update)
     course = np.array([view.row[f"v{axis}_mps"] for axis in "xyz"])
-    errors = np.radians(settings["fixed_deg"] + settings["sigma_deg"] * rng.standard_normal((len(starts), 2)))
+    errors = np.radians(settings["sigma_deg"] * rng.standard_normal((len(starts), 2)))
     places = view.aim_m + starts[:, None] * course
     return Beams(starts, turned(places, np.asarray(view.station.position_m), errors))

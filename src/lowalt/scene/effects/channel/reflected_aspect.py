@@ -5,13 +5,13 @@ of a station at the mirror image's place. Out by one path and back by another, e
 two-way factor. Without this effect all paths have the direct one's aspect and shadows.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.scene.catalogue import PLACES
 from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects import PLACES
 from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
@@ -20,33 +20,25 @@ SOURCE = (
     "each way: reciprocity, exact for a Lambert surface (Lambert's cosine law, cos i cos s) and for opaque shadows, an "
     "estimate for facets"
 )
-DEFAULTS = {"follow": ["cross_sections", "fluctuation", "occlusion"]}
+DEFAULTS: dict[str, float] = {}
 
-FOLLOWED = tuple(DEFAULTS["follow"])
+FOLLOWED = ("cross_sections", "fluctuation", "occlusion")
 """Effects that depend on the side that a target shows."""
 
 
-def idle(settings: dict) -> bool:
-    """Return whether no effect is evaluated along the reflected routes."""
-    return not settings["follow"]
-
-
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError where the scene has no reflected route, or none of the effects in `follow`."""
+    """Raise InputError where the scene has no reflected route, or none of FOLLOWED."""
     if not {"ground_reflection", "walls"} & set(scene.effects):
         raise InputError(
             "effects.reflected_aspect: there is no reflected route, expected ground_reflection or walls in the same "
             "scene"
         )
-    if not set(settings["follow"]) & set(scene.effects):
-        raise InputError(
-            f"effects.reflected_aspect.follow: {settings['follow']}, expected one of the scene's effects among "
-            f"{list(FOLLOWED)}"
-        )
+    if not set(FOLLOWED) & set(scene.effects):
+        raise InputError(f"effects.reflected_aspect: no side to follow, expected one of {list(FOLLOWED)} in the scene")
 
 
 def routes(
-    settings: dict, view: View, paths: list[ImagePath], weight: Callable[[View, Iterable[str] | None], np.ndarray]
+    settings: dict, view: View, paths: list[ImagePath], weight: Callable[[View, Collection[str] | None], np.ndarray]
 ) -> np.ndarray:
     """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the direct one first.
 
@@ -54,14 +46,13 @@ def routes(
     both ways by the same kind of path are the link between both images. A path without an image of the station shows
     the direct one's side.
     """
-    follow = settings["follow"]
-    rest, ends = weight(view, PLACES.keys() - set(follow)), view.ends()
+    rest, ends = weight(view, PLACES.keys() - set(FOLLOWED)), view.ends()
     heard = [None, *(path.station_m for path in paths)]
-    sent = [None, *((path.sender or path).station_m for path in paths)]
+    sent = [None, *(path.outward.station_m for path in paths)]
 
     def two_way(end: View, image_m: np.ndarray | None, sender_m: np.ndarray | None = None) -> np.ndarray:
         """The followed effects' factor (N, L) for a station, or a link, that stands at its image."""
-        return weight(end if image_m is None else end.seen_from(image_m, sender_m), follow)
+        return weight(end if image_m is None else end.seen_from(image_m, sender_m), FOLLOWED)
 
     back = [two_way(ends[-1], image_m) for image_m in heard]
     out, same = back, back

@@ -6,8 +6,3 @@ sums the arrays at a few frequencies of the band where a scene names this effect
 
 SOURCE = "Mailloux, Phased Array Antenna Handbook, 3rd ed., 2018, section 1.3.4 (phase-steered arrays over a bandwidth)"
 DEFAULTS: dict[str, float] = {}
-
-
-def idle(settings: dict) -> bool:
-    """Return False: a scene that names this effect always gets it."""
-    return False

@@ -16,11 +16,6 @@ SOURCE = (
 DEFAULTS: dict[str, float] = {}
 
 
-def idle(settings: dict) -> bool:
-    """Return False: a scene that names this effect always gets it."""
-    return False
-
-
 def instants(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Return instants (Q,) s after a symbol's beginning, and their weights (Q, M) in each of its M samples.
 

@@ -6,13 +6,10 @@ facades, edges and shadows of the buildings are left out (`line_of_sight` blocks
 either side; a facade reflects only between points on the station's side.
 """
 
-import math
-
 import numpy as np
 
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
-from lowalt.machine.jit import VECTOR
 from lowalt.scene import series
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.fresnel import fresnel
@@ -35,12 +32,10 @@ def idle(settings: dict) -> bool:
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a facade without extent, or a material that does not exist."""
+    """Raise InputError for a facade without extent."""
     for facade in settings["facades"]:
         if min(facade[3:]) <= 0:
             raise InputError(f"effects.walls.facades: {facade} has width and height {facade[3:]}, expected positive")
-    if settings["permittivity"] < 1:
-        raise InputError(f"effects.walls.permittivity: {settings['permittivity']}, expected at least 1")
 
 
 def mirrored(
@@ -51,37 +46,22 @@ def mirrored(
     facade: x, y of its foot's middle (m), azimuth of its normal (degrees), width and height (m). A ray is reflected
     where station and point are on the same side and the line to the image meets the rectangle.
     """
-    x, y, azimuth, width, height = facade
+    foot_x, foot_y, azimuth, width, height = facade
     cosine, sine = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
-    foot, normal, along = np.array([x, y, 0.0]), np.array([cosine, sine, 0.0]), np.array([-sine, cosine, 0.0])
-    images, grazing = np.empty(places.shape), np.empty(places.shape[:2])
-    reflected, size = np.empty(places.shape[:2], np.bool_), np.array([0.5 * width, height])
-    _mirror(places, station_m, (foot, normal, along), size, images, grazing, reflected)
-    return images, grazing, reflected
-
-
-@VECTOR
-def _mirror(places, station, axes, size, images, grazing, reflected):
-    """Fill images (N, L, 3), grazing and reflected (N, L) of `mirrored`; size: half the width and the height (m).
-
-    axes: the middle of the facade's foot (m), its normal, and the direction along it.
-    """
-    foot, normal, along = axes
-    before = (station[0] - foot[0]) * normal[0] + (station[1] - foot[1]) * normal[1]
-    beside = (station[0] - foot[0]) * along[0] + (station[1] - foot[1]) * along[1]
-    for n in range(places.shape[0]):
-        for l in range(places.shape[1]):  # noqa: E741
-            x, y, z = places[n, l, 0], places[n, l, 1], places[n, l, 2]
-            off = (x - foot[0]) * normal[0] + (y - foot[1]) * normal[1]
-            x, y = x - 2.0 * off * normal[0], y - 2.0 * off * normal[1]
-            images[n, l, 0], images[n, l, 1], images[n, l, 2] = x, y, z
-            a, b, c = x - station[0], y - station[1], z - station[2]
-            grazing[n, l] = abs(a * normal[0] + b * normal[1]) / math.sqrt(a * a + b * b + c * c)
-            # The ray meets the facade's plane at this share of its way to the image.
-            share = before / (before + off)
-            across, up = beside + share * (a * along[0] + b * along[1]), station[2] + share * c
-            inside = (abs(across) <= size[0]) & (up >= 0.0) & (up <= size[1])
-            reflected[n, l] = inside & (before * off > 0.0)
+    x, y, z = np.moveaxis(places, -1, 0)
+    # Ways off the facade's plane, and along it from its foot's middle.
+    before = (station_m[0] - foot_x) * cosine + (station_m[1] - foot_y) * sine
+    beside = (station_m[1] - foot_y) * cosine - (station_m[0] - foot_x) * sine
+    off = (x - foot_x) * cosine + (y - foot_y) * sine
+    images = np.stack([x - 2.0 * off * cosine, y - 2.0 * off * sine, z], axis=1)
+    away_x, away_y, away_z = np.moveaxis(images - station_m[:, None], 1, 0)
+    grazing = abs(away_x * cosine + away_y * sine) / np.sqrt(away_x**2 + away_y**2 + away_z**2)
+    # The ray meets the facade's plane at this share of its way to the image.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = before / (before + off)
+    across, up = beside + share * (away_y * cosine - away_x * sine), station_m[2] + share * away_z
+    inside = (abs(across) <= 0.5 * width) & (up >= 0.0) & (up <= height)
+    return images.swapaxes(1, 2), grazing, inside & (before * off > 0.0)
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:

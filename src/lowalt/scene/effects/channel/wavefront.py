@@ -6,8 +6,3 @@ where a scene names this effect.
 
 SOURCE = "Balanis, Antenna Theory, 4th ed., 2016, section 4.4.1 (phase error of the far-field approximation)"
 DEFAULTS: dict[str, float] = {}
-
-
-def idle(settings: dict) -> bool:
-    """Return False: a scene that names this effect always gets it."""
-    return False

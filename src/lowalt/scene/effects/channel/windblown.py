@@ -3,6 +3,8 @@
 import numpy as np
 from scipy import fft
 
+from lowalt.scene.set_noise import white
+
 MPH = 0.44704
 """Metres per second in a statute mile per hour, the unit of Billingsley's formulas."""
 TAIL = 1e-3
@@ -34,11 +36,6 @@ def spectrum(count: int, step_s: float, slope_s: np.ndarray) -> np.ndarray:
     return np.sqrt(power / power.sum(axis=1, keepdims=True))
 
 
-def normal(rng: np.random.Generator, *shape: int) -> np.ndarray:
-    """Return circular complex normals of unit power."""
-    return rng.standard_normal((*shape, 2)).view(np.complex128)[..., 0] * np.sqrt(0.5)
-
-
 def speckle(
     rng: np.random.Generator, cells: int, count: int, step_s: float, wind: tuple[float, float], wavelength_m: float,
     slow: np.ndarray | float = 1.0,
@@ -49,7 +46,7 @@ def speckle(
     on Doppler frequencies, a number or (cells,).
     """
     still, beta = wind
-    constant = normal(rng, cells)[:, None]
+    constant = white(rng, 1.0, (cells,))[:, None]
     if not np.isfinite(still):
         return np.repeat(constant, count, axis=1)
     decay_s, slope_s = beta * wavelength_m / (4 * np.pi), 0.5 * beta * wavelength_m
@@ -59,6 +56,6 @@ def speckle(
     # A factor of 0 leaves all power at zero frequency.
     shape = spectrum(long, step_s, slope_s / np.maximum(np.atleast_1d(slow), 1e-6))[:, strong]
     lines = np.zeros((cells, long), np.complex128)
-    lines[:, strong] = normal(rng, cells, int(strong.sum())) * shape
+    lines[:, strong] = white(rng, 1.0, (cells, int(strong.sum()))) * shape
     moving = fft.ifft(lines, axis=1, norm="forward", overwrite_x=True)[:, :count]
     return np.sqrt(still / (1 + still)) * constant + np.sqrt(1 / (1 + still)) * moving

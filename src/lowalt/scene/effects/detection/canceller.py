@@ -1,20 +1,19 @@
 """Canceller of the land's echoes on range cells, over the symbols of a look.
 
-mean, pulse and exponential cancel what stands still. Wind moves land, and it passes them; `clutter` is made for the
+mean and pulse cancel what stands still. Wind moves land, and it passes them; `clutter` is made for the
 spectrum of windblown land: of the covariance that land has over the symbols, it removes every component that lies less
 than `depth_db` below the land's power, and leaves all else as it is. What it costs a target follows from the target's
-radial speed alone (`loss_db`). All filters are scaled to unit noise gain, so that a set SNR means the same before and
+radial speed alone. All filters are scaled to unit noise gain, so that a set SNR means the same before and
 behind them.
 """
 
 import math
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import eigh, toeplitz
 
-from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.channel.windblown import windblown
@@ -22,12 +21,12 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, their response and "
-    "noise gain); M. I. Skolnik, Radar Handbook, 3rd ed. 2008, ch. 2 (recursive MTI filters); A. M. Haimovich, Y. "
+    "noise gain); A. M. Haimovich, Y. "
     "Bar-Ness, An eigenanalysis interference canceler, IEEE Trans. Signal Process. 39(1), 1991 (clutter); its "
     "covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
 )
 DEFAULTS = {
-    "kind": "mean", "order": 1, "memory": 0.95,
+    "kind": "mean", "order": 1,
     "wind_mps": 4.5, "depth_db": 50.0, "carrier_hz": 4.9e9, "symbol_interval_s": 2.5e-3,
 }  # fmt: skip
 
@@ -44,8 +43,8 @@ def check(settings: dict, scene: CheckedScene) -> None:
     timing = scene.effects.get("slow_time", {"downlink": 1, "missing": 0})
     if timing["downlink"] < 1 or timing["missing"] > 0:
         raise InputError(
-            "effects.canceller.kind: 'clutter' needs all symbols, and effects.slow_time leaves gaps, expected mean, "
-            "pulse or exponential"
+            "effects.canceller.kind: 'clutter' needs all symbols, and effects.slow_time leaves gaps, expected mean "
+            "or pulse"
         )
     for key in ("carrier_hz", "symbol_interval_s"):
         if settings[key] != getattr(scene.network, key):
@@ -63,9 +62,8 @@ def process(settings: dict, cells: np.ndarray, look: Look, rng: np.random.Genera
 def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:
     """Return range cells (N, M) without the echoes of land.
 
-    mean: subtracts the look's mean. pulse: `order` first differences over symbols. exponential: subtracts a running
-    mean with weights memory^n. These two start as if the first symbol had lasted forever: their first output is zero,
-    and clutter leaves no transient, though a moving target does. clutter: projects on what `land` leaves.
+    mean: subtracts the look's mean. pulse: `order` first differences over symbols, which start as if the first symbol
+    had lasted forever, so that clutter leaves no transient. clutter: projects on what `land` leaves.
     Source: Richards 2014, 5.2; Haimovich and Bar-Ness 1991.
     """
     if settings["kind"] == "mean":
@@ -74,26 +72,14 @@ def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:
         return moved - moved.mean(axis=0)
     if settings["kind"] == "pulse":
         for _ in range(settings["order"]):
-            cells = _step(cells)
+            cells = np.diff(cells, axis=0, prepend=cells[:1])
         # The noise gain of k differences is the sum of squared binomials, C(2k, k).
         return cells / math.sqrt(math.comb(2 * settings["order"], settings["order"]))
-    if settings["kind"] == "clutter":
-        radar = settings["carrier_hz"], settings["symbol_interval_s"]
-        basis = land(len(cells), *radar, settings["wind_mps"], settings["depth_db"])
-        parts = np.ascontiguousarray(cells, np.complex128).view(np.float64)
-        left = (parts - basis @ (basis.T @ parts)).view(np.complex128)
-        return left * math.sqrt(len(cells) / max(len(cells) - basis.shape[1], 1))
-    memory = settings["memory"]
-    # The noise gain of a (1 - z^-1) / (1 - a z^-1) is 2 a^2 / (1 + a).
-    result = _step(cells) * math.sqrt((1 + memory) / 2)
-    for earlier, now in pairwise(result):
-        now += memory * earlier
-    return result
-
-
-def _step(cells: np.ndarray) -> np.ndarray:
-    """First difference over symbols (N, M), zero at the first."""
-    return np.diff(cells, axis=0, prepend=cells[:1])
+    radar = settings["carrier_hz"], settings["symbol_interval_s"]
+    basis = land(len(cells), *radar, settings["wind_mps"], settings["depth_db"])
+    parts = np.ascontiguousarray(cells, np.complex128).view(np.float64)
+    left = (parts - basis @ (basis.T @ parts)).view(np.complex128)
+    return left * math.sqrt(len(cells) / max(len(cells) - basis.shape[1], 1))
 
 
 @lru_cache(maxsize=8)
@@ -114,15 +100,3 @@ def land(symbols: int, carrier_hz: float, interval_s: float, wind_mps: float, de
     beside = moving - moving.mean(axis=0)
     power, basis = eigh(beside - beside.mean(axis=1, keepdims=True))
     return np.hstack([constant, basis[:, power > 10 ** (-depth_db / 10)]])
-
-
-def loss_db(settings: dict, network: Network, speed_mps: float) -> float:
-    """Return by how much a filter weakens a steady echo of this radial speed (m/s), over its gain on white noise (dB).
-
-    Of the median symbol of a look, so that what a filter does at its start counts little. Negative where the echo gains
-    on the noise, infinite where none is left. Speeds fold at c / (4 f T_r) to each side.
-    """
-    turns = 2 * speed_mps * network.carrier_hz / SPEED_OF_LIGHT * network.symbol_interval_s
-    echo = np.exp(2j * np.pi * turns * np.arange(network.symbols))[:, None]
-    left = np.median(abs(filtered(settings, echo)) ** 2)
-    return float(-10 * np.log10(left)) if left > 0 else math.inf

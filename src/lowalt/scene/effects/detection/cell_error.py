@@ -1,4 +1,4 @@
-"""Wrong range cell: the detector takes another cell than the strongest, now and then or all along."""
+"""Wrong range cell: the detector takes another cell than the strongest, now and then."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ SOURCE = (
     "this project's own error model, for the imperfect range-bin selection that the paper leaves out (Luo et al., "
     "footnote to Eq. 7's signal model); wrong cells that follow from noise are receiver_noise"
 )
-DEFAULTS = {"probability": 0.1, "spread_cells": 2, "mode": "jitter", "hold": "symbol"}
+DEFAULTS = {"probability": 0.1, "spread_cells": 2}
 
 
 def idle(settings: dict) -> bool:
@@ -20,27 +20,19 @@ def idle(settings: dict) -> bool:
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a spread that reaches around all range cells."""
-    cells = scene.network.subcarriers
-    if 2 * abs(settings["spread_cells"]) >= cells:
-        spread = settings["spread_cells"]
+    cells, spread = scene.network.subcarriers, settings["spread_cells"]
+    if 2 * spread >= cells:
         raise InputError(f"effects.cell_error.spread_cells: {spread}, expected less than half of {cells} range cells")
 
 
 def choose(settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return chosen cells (N,) int64, each wrong with `probability`; cells (N, M) wrap around as ranges do.
 
-    Mode jitter: off by a whole number, uniform on -spread .. spread without 0. Mode fixed: off by spread_cells, sign
-    included. Hold symbol: every symbol errs by itself; look: all or none, by the same number. 2 N draws.
+    A wrong one is off by a whole number, uniform on -spread .. spread without 0. 2 N draws.
     """
     wrong, place = rng.random((2, len(chosen)))
-    if settings["hold"] == "look":
-        wrong, place = wrong[:1], place[:1]
-    spread = settings["spread_cells"]
-    if settings["mode"] == "jitter":
-        reach = abs(spread)
-        step = np.minimum((place * (2 * reach)).astype(np.int64), 2 * reach - 1) - reach
-        step += step >= 0
-    else:
-        step = np.full(wrong.shape, spread)
+    reach = settings["spread_cells"]
+    step = np.minimum((place * (2 * reach)).astype(np.int64), 2 * reach - 1) - reach
+    step += step >= 0
     moved = np.where(wrong < settings["probability"], step, 0)
     return np.asarray(chosen + moved, np.int64) % cells.shape[1]

@@ -23,7 +23,7 @@ SOURCE = (
     "gains 0.95/s on place and 1.8/s on speed of PX4 (MPC_XY_P, MPC_XY_VEL_P_ACC) at a lag of 0.1 s, scaled with it; "
     + flight.SOURCE
 )
-DEFAULTS = {"wind_mps": 7.7, "response_s": None, "attitude_s": None}
+DEFAULTS = {"wind_mps": 7.7}
 
 SPEED_GAIN, PLACE_GAIN = 0.18, 0.0171
 """Thrust against speed times the attitude's lag, and against displacement times its square; stable at any drag."""
@@ -117,8 +117,7 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
     through = velocity - mean_wind_mps(row["z_m"], settings["wind_mps"]) * forward
     airspeed = max(float(portable.norm(through)), SLOWEST_MPS)
     step = step_s(times_s)
-    level, up = (settings["response_s"],) * 2 if settings["response_s"] else flight.response_s(cloud, airspeed)
-    lag = settings["attitude_s"] or flight.attitude_s(cloud)
+    (level, up), lag = flight.response_s(cloud, airspeed), flight.attitude_s(cloud)
     axes = [
         axis(scale / airspeed / step, number == 0, response / step, lag / step)
         for number, (scale, response) in enumerate(zip(scales, (level, level, up), strict=True))

@@ -8,7 +8,7 @@ SOURCE = (
     "W. R. Bennett, Spectra of quantized signals, Bell Syst. Tech. J. 27(3), 1948; "
     "A. Gersho, R. M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise quantiser, overload)"
 )
-DEFAULTS = {"bits": 12, "backoff_db": 12.0, "clip": True}
+DEFAULTS = {"bits": 12, "backoff_db": 12.0}
 
 
 def idle(settings: dict) -> bool:
@@ -16,18 +16,15 @@ def idle(settings: dict) -> bool:
     return not settings["bits"]
 
 
-def quantise(samples: np.ndarray, bits: int, full_scale: float, clip: bool = True) -> tuple[np.ndarray, int]:
-    """Return samples with I and Q at the middles of 2^bits steps of [-full_scale, full_scale], and the number clipped.
+def quantise(samples: np.ndarray, bits: int, full_scale: float) -> np.ndarray:
+    """Return samples with I and Q at the middles of 2^bits steps of [-full_scale, full_scale].
 
-    A component outside the range is put in the outermost step or, with clip False, in a step of its own. Source: Gersho
-    and Gray 1992, ch. 5.
+    A component outside the range is put in the outermost step. Source: Gersho and Gray 1992, ch. 5.
     """
     step = full_scale * 2.0 ** (1 - bits)
     parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)
-    code = np.floor(parts / step)
-    if clip:
-        code = np.clip(code, -(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1)
-    return ((code + 0.5) * step).view(np.complex128), int((abs(parts) > full_scale).sum())
+    code = np.clip(np.floor(parts / step), -(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1)
+    return ((code + 0.5) * step).view(np.complex128)
 
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:
@@ -41,4 +38,4 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
     A look of zeros stays zeros. Source: Bennett 1948; nothing is drawn.
     """
     scale = full_scale(samples, settings["backoff_db"])
-    return quantise(samples, settings["bits"], scale, settings["clip"])[0] if scale > 0 else samples
+    return quantise(samples, settings["bits"], scale) if scale > 0 else samples

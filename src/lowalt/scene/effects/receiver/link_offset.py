@@ -7,9 +7,8 @@ from B to A the opposite. A station that receives its own signal has no offset.
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.scene import clocks
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver.offsets import delayed, risen
+from lowalt.scene.effects.receiver.offsets import delayed, of_stations, risen
 from lowalt.scene.waveform import Look
 
 SOURCE = (
@@ -40,6 +39,6 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
     sends, hears = look.station.transmitter, look.station.receiver
     if sends is None:
         return samples
-    errors = clocks.errors(settings, look.network, rng)
+    errors = of_stations(settings, look.network, rng)
     ppm, late_s = (theirs - ours for theirs, ours in zip(errors[sends.name], errors[hears.name], strict=True))
     return risen(delayed(samples, late_s, look), 1e-6 * ppm * look.oscillator_hz, look)

@@ -1,7 +1,7 @@
-"""Offsets of a station's clocks, and what they do to time samples.
+"""Offsets of stations' clocks, and what they do to time samples.
 
-An offset has a fixed part, for all stations or each by its name, and a drawn part. That is normal, cut at three
-standard deviations, so that a scene's largest offset is known beforehand.
+An offset has a fixed part and a drawn part. That is normal, cut at three standard deviations, so that a scene's largest
+offset is known beforehand.
 """
 
 from statistics import NormalDist
@@ -20,34 +20,34 @@ CUT = 3.0
 """Standard deviations at which draws are cut."""
 
 
-def fixed(value: float | dict[str, float], station: str) -> float:
-    """Return the fixed part of a station's offset: a number for all, or the mapping's entry (0 where it has none)."""
-    return float(value.get(station, 0.0)) if isinstance(value, dict) else float(value)
-
-
 def drawn(rng: np.random.Generator) -> float:
     """Return a standard normal number cut at +-3, by one uniform draw through the inverse distribution."""
     tail = NormalDist().cdf(-CUT)
     return NormalDist().inv_cdf(tail + (1 - 2 * tail) * rng.random())
 
 
-def largest(value: float | dict[str, float], sigma: float) -> float:
+def largest(fixed: float, sigma: float) -> float:
     """Return the largest magnitude that fixed part and drawn part can reach together."""
-    parts = value.values() if isinstance(value, dict) else [value]
-    return max((abs(part) for part in parts), default=0.0) + CUT * sigma
+    return abs(fixed) + CUT * sigma
 
 
-def idle(value: float | dict[str, float], sigma: float) -> bool:
-    """Return True where no station has an offset."""
-    return largest(value, sigma) == 0
+def check_slip(effect: str, slip_s: float, slack_s: float) -> None:
+    """Raise InputError naming `effect` where a window can slip farther than the cyclic prefix allows (s)."""
+    if slip_s > slack_s:
+        raise InputError(
+            f"effects.{effect}: the window can be off by {slip_s:g} s, expected at most prefix_slack_s = {slack_s:g}: "
+            "beyond the cyclic prefix it would take in another symbol's data"
+        )
 
 
-def check_stations(key: str, value: float | dict[str, float], network: Network) -> None:
-    """Raise InputError naming `key` where a mapping names a station that the network does not have."""
-    names = [station.name for station in network.stations]
-    unknown = sorted(set(value) - set(names)) if isinstance(value, dict) else []
-    if unknown:
-        raise InputError(f"{key}: station(s) {unknown} are not in the network, expected some of {names}")
+def of_stations(settings: dict, network: Network, rng: np.random.Generator) -> dict[str, tuple[float, float]]:
+    """Return each station's frequency error (ppm) and clock error (s) in a look, by name; two draws a station.
+
+    rng: the look's stream of `link_offset`. Links and other stations' signals see these errors.
+    """
+    names = [station.name for station in network.stations if station.transmitter is None]
+    drawn = rng.standard_normal((len(names), 2)) * [settings["sigma_ppm"], settings["sigma_s"]]
+    return dict(zip(names, map(tuple, drawn.tolist()), strict=True))
 
 
 def check_oscillator(effect: str, scene: CheckedScene) -> None:
@@ -80,8 +80,7 @@ def _turned(samples, turns, out):
 
 def risen(samples: np.ndarray, rise_hz: float, look: Look) -> np.ndarray:
     """Return samples (N, M) all of whose frequencies are higher by `rise_hz`: turned at their absolute times."""
-    between = np.exp(2j * np.pi * np.mod(rise_hz * look.times_s, 1.0))
-    return samples * between[:, None] * np.exp(2j * np.pi * rise_hz * look.within_s)
+    return turned(samples, rise_hz * look.sample_times_s)
 
 
 def delayed(samples: np.ndarray, delay_s: float, look: Look) -> np.ndarray:

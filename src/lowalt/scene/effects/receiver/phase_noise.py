@@ -75,9 +75,9 @@ def density(settings: dict, frequency_hz: np.ndarray) -> np.ndarray:
         offset, decibels = np.array(points, float).T
         return 10 ** (np.interp(np.log(frequency_hz), np.log(offset), decibels) / 10)
 
-    own, loop_hz = level(settings["points"]) * 10 ** (settings["level_db"] / 10), settings["loop_hz"]
+    oscillator, loop_hz = level(settings["points"]) * 10 ** (settings["level_db"] / 10), settings["loop_hz"]
     follows = 1.0 / (1.0 + (frequency_hz / loop_hz) ** 4) if loop_hz else 0.0
-    return follows * level(settings["reference"]) + (1.0 - follows) * own
+    return follows * level(settings["reference"]) + (1.0 - follows) * oscillator
 
 
 def range_factor(frequency_hz: np.ndarray, width_hz: np.ndarray | float, delay_s: float) -> np.ndarray:

@@ -6,9 +6,6 @@ A subcarrier that carried a symbol s has noise of 1 / |s|^2 times the receiver's
 
 import numpy as np
 
-from lowalt.files.errors import InputError
-from lowalt.scene.checks import CheckedScene
-
 SOURCE = (
     "3GPP TS 38.211, 5.1.4 and 5.1.5 (square QAM of mean power one); noise after division by the symbol: C. Sturm, "
     "W. Wiesbeck, Waveform design and signal processing aspects for fusion of wireless communications and radar "
@@ -22,22 +19,11 @@ def idle(settings: dict) -> bool:
     return settings["order"] == 4
 
 
-def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for an order that is no square of a power of two."""
-    if settings["order"] not in (4, 16, 64, 256, 1024):
-        raise InputError(f"effects.data_symbols.order: {settings['order']}, expected 4, 16, 64, 256 or 1024")
-
-
 def constellation(order: int) -> np.ndarray:
     """Return all symbols (order,) complex128 of square QAM, of mean power one."""
     side = np.arange(1 - np.sqrt(order), np.sqrt(order), 2.0)
     points = (side[:, None] + 1j * side).ravel()
     return points / np.sqrt(np.mean(abs(points) ** 2))
-
-
-def noise_rise(order: int) -> float:
-    """Return by how much division by the symbol raises the noise power, the mean of 1 / |s|^2."""
-    return float(np.mean(abs(constellation(order)) ** -2.0))
 
 
 def data(settings: dict, symbols: int, subcarriers: int, rng: np.random.Generator) -> np.ndarray:

@@ -3,7 +3,7 @@
 The amplifier has no memory and no phase distortion. It acts on the OFDM symbol's time signal, sampled four times
 as often as the subcarriers need, so that distortion beyond the band leaves the band. Echoes are those of the distorted
 waveform; the receiver divides by the data it knows. A Gaussian signal comes out as a smaller copy of itself plus
-distortion (Bussgang): `soft_limit` states both for an ideal limiter.
+distortion (Bussgang).
 """
 
 import math
@@ -13,10 +13,9 @@ from scipy import fft
 
 SOURCE = (
     "C. Rapp, Effects of HPA-nonlinearity on a 4-DPSK/OFDM-signal for a digital sound broadcasting system, ESA SP-332, "
-    "1991; H. Ochiai, H. Imai, Performance analysis of deliberately clipped OFDM signals, IEEE Trans. Commun. 50(1), "
-    "2002 (equivalent gain and distortion); smoothness 2 of a solid-state amplifier, and back-off: estimate"
+    "1991; smoothness 2 of a solid-state amplifier, and back-off: estimate"
 )
-DEFAULTS = {"backoff_db": 8.0, "smoothness": 2.0}
+DEFAULTS = {"backoff_db": 8.0}
 
 OVERSAMPLING = 4
 
@@ -26,27 +25,13 @@ def idle(settings: dict) -> bool:
     return settings["backoff_db"] is None
 
 
-def rapp(samples: np.ndarray, saturation: float, smoothness: float) -> np.ndarray:
-    """Return amplified samples (any shape), of gain one at small amplitudes and at most `saturation`.
+def rapp(samples: np.ndarray, saturation: float) -> np.ndarray:
+    """Return amplified samples (any shape), of gain one at small amplitudes and at most `saturation` A.
 
-    Source: Rapp 1991: g(a) = a / (1 + (a / A)^(2p))^(1/(2p)).
+    Source: Rapp 1991: g(a) = a / (1 + (a / A)^(2p))^(1/(2p)) with p = 2.
     """
     power = (samples.real**2 + samples.imag**2) / saturation**2
-    if smoothness == 2:
-        # Roots cost a tenth of powers.
-        return samples / np.sqrt(np.sqrt(1.0 + power * power))
-    return samples * (1.0 + power**smoothness) ** (-0.5 / smoothness)
-
-
-def soft_limit(backoff_db: float) -> tuple[float, float]:
-    """Return the equivalent gain and the distortion's share of the sent power, of a limiter and a Gaussian signal.
-
-    The limit of `rapp` for large smoothness; the distortion is that of all frequencies, inside and outside the band.
-    Source: Ochiai and Imai 2002: gain 1 - exp(-g^2) + sqrt(pi) g erfc(g) / 2, power out 1 - exp(-g^2), g^2 = back-off.
-    """
-    g = 10 ** (backoff_db / 20)
-    gain = 1.0 - math.exp(-g * g) + 0.5 * math.sqrt(math.pi) * g * math.erfc(g)
-    return gain, 1.0 - math.exp(-g * g) - gain**2
+    return samples / np.sqrt(np.sqrt(1.0 + power * power))
 
 
 def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
@@ -61,6 +46,6 @@ def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
     wide[:, first : first + count] = sent
     # Without the inverse transform's 1 / length, the mean power of the samples is the number of subcarriers.
     samples = fft.ifft(fft.ifftshift(wide, axes=1), axis=1, norm="forward", overwrite_x=True)
-    amplified = rapp(samples, math.sqrt(count) * 10 ** (settings["backoff_db"] / 20), settings["smoothness"])
+    amplified = rapp(samples, math.sqrt(count) * 10 ** (settings["backoff_db"] / 20))
     spectrum = fft.fftshift(fft.fft(amplified, axis=1, norm="forward", overwrite_x=True), axes=1)
     return np.ascontiguousarray(spectrum[:, first : first + count])

@@ -11,7 +11,7 @@ import numpy as np
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.sampling import Sampling
+from lowalt.scene.view import Sampling
 
 SOURCE = (
     "3GPP TS 38.331, TDD-UL-DL-Pattern (periods of 0.5 to 10 ms); non-uniform transform: F. Marvasti (ed.), Nonuniform "
@@ -19,7 +19,6 @@ SOURCE = (
 )
 DEFAULTS = {"tdd_period_s": 0.01, "downlink": 0.75, "missing": 0.0, "jitter_s": 0.0, "regrid": "zero"}
 
-REGRIDS = ("zero", "hold", "linear", "nudft")
 FEWEST = 2
 """Least number of symbols in a look."""
 
@@ -30,7 +29,7 @@ def idle(settings: dict) -> bool:
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a jitter beyond the next symbol, a look without symbols, or set SNRs with gaps of zeros."""
+    """Raise InputError for a jitter beyond the next symbol, a look without symbols, or set SNRs with gaps."""
     step = scene.network.symbol_interval_s
     if settings["jitter_s"] >= step:
         raise InputError(
@@ -43,10 +42,10 @@ def check(settings: dict, scene: CheckedScene) -> None:
         )
     noisy = [snr for snr in scene.snr_db if snr != float("inf")]
     gaps = settings["downlink"] < 1 or settings["missing"] > 0
-    if noisy and gaps and settings["regrid"] in ("zero", "nudft"):
+    if noisy and gaps:
         raise InputError(
-            f"effects.slow_time.regrid: {settings['regrid']!r} leaves gaps without a signal, and noise.snr_db "
-            f"{list(scene.snr_db)} would fill them with noise; expected hold or linear, or [.inf] with receiver_noise"
+            f"effects.slow_time: gaps hold no signal, and noise.snr_db {list(scene.snr_db)} would fill them with "
+            "noise; expected [.inf] with receiver_noise"
         )
 
 
@@ -70,24 +69,16 @@ def sampling(settings: dict, network: Network, rng: np.random.Generator) -> Samp
     return Sampling(network.times_s + settings["jitter_s"] * late, present)
 
 
-def regridded(settings: dict, signal: np.ndarray, given: Sampling, network: Network) -> np.ndarray:
+def regridded(settings: dict, signal: np.ndarray, timing: Sampling, network: Network) -> np.ndarray:
     """Return the evenly spaced signal (N,) made of received symbols `signal` (K,), K of them present.
 
-    zero: each symbol at its nominal instant, zeros in the gaps. hold: the last symbol received, or the first one before
-    any was. linear: straight lines between the true instants, constant beyond them. nudft: the evenly spaced signal
-    whose N Fourier coefficients are the sums over symbols at their true instants.
+    zero: each symbol at its nominal instant, zeros in the gaps. nudft: the evenly spaced signal whose N Fourier
+    coefficients are the sums over symbols at their true instants.
     """
-    steps = np.arange(network.symbols)
-    at = np.flatnonzero(given.present)
-    if settings["regrid"] == "hold":
-        return signal[np.maximum(np.searchsorted(at, steps, side="right") - 1, 0)]
-    times = given.times_s[at]
-    if settings["regrid"] == "linear":
-        nominal = network.times_s
-        return np.interp(nominal, times, signal.real) + 1j * np.interp(nominal, times, signal.imag)
     if settings["regrid"] == "nudft":
         frequency = np.fft.fftfreq(network.symbols, network.symbol_interval_s)
-        return np.fft.ifft(np.exp(-2j * np.pi * np.outer(frequency, times)) @ signal)
+        times_s = timing.times_s[timing.present]
+        return np.fft.ifft(np.exp(-2j * np.pi * np.outer(frequency, times_s)) @ signal)
     result = np.zeros(network.symbols, np.complex128)
-    result[at] = signal
+    result[timing.present] = signal
     return result

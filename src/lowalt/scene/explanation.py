@@ -1,0 +1,316 @@
+"""What a scene does to the signals of a few samples: whether the target's cell is found, and what each effect changes.
+
+An effect is priced by leaving it out of the scene, or by adding it with its defaults where the scene does not name it.
+`commands.explain` prints it all; what changes mean for images and for a trained network is asked of a function, since
+those rooms come later.
+"""
+
+import importlib
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import yaml
+
+from lowalt.config.network import Network, Station, masts_m
+from lowalt.config.plan import motion_block
+from lowalt.files.errors import InputError
+from lowalt.motion.drawing import region_polygon
+from lowalt.motion.track_files import path_of
+from lowalt.motion.tracks import model_rows
+from lowalt.scene.chain import SceneSample, received_signal
+from lowalt.scene.checks import check
+from lowalt.scene.effects import PLACES, NamedEffect, called, dotted
+from lowalt.scene.levels import Level, levels, table
+from lowalt.scene.observe import Scene, observe
+from lowalt.targets import occluders
+from lowalt.targets.cloud import Cloud
+from lowalt.targets.make import make
+from lowalt.targets.records import records_of
+
+CANCELLERS = (
+    ("none", {"kind": "none"}), ("mean", {"kind": "mean"}), ("pulse, order 1", {"kind": "pulse", "order": 1}),
+    ("pulse, order 2", {"kind": "pulse", "order": 2}), ("clutter", {"kind": "clutter"}),
+)  # fmt: skip
+"""Cancellers that a verdict compares."""
+CLOSE_CELLS = 1
+"""Range cells by which a chosen cell may be beside the target's and still hold it."""
+VISIBLE = 8
+"""Difference of pixels, of 255, from which they count as changed."""
+FOUND = 0.9
+"""Share of symbols from which a target counts as found."""
+
+
+class ExplainedSample(NamedTuple):
+    """One motion model to explain the scene by."""
+
+    cloud: Cloud
+    row: dict
+    occluders: dict | None
+
+
+class Finding(NamedTuple):
+    """One sample at one station.
+
+    right: share of symbols whose chosen cell is within one of the target's; over_db: the target in its cell over the
+    mean power of the loudest cell of all else, behind the filters (dB, inf without anything else); otherwise: share
+    right with other detection: each of CANCELLERS where the scene has one, with and without a detector.
+    """
+
+    category: str
+    subtype: str
+    model: int
+    station: str
+    range_m: float
+    right: float
+    over_db: float
+    otherwise: dict[str, float]
+    levels: list[Level]
+
+
+class Change(NamedTuple):
+    """What leaving an effect out, or adding it, changes.
+
+    signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
+    more: shares of what becomes of the signals (pixels, answers) that differ; ms: processor time that the effect takes
+    a sample and station, a median; also: what else had to change for the scene to fit; refused: why it was not tried.
+    """
+
+    effect: str
+    place: str
+    named: bool
+    signal: float = math.nan
+    cells: float = math.nan
+    more: dict[str, float] = {}  # noqa: RUF012
+    ms: float = math.nan
+    also: str = ""
+    refused: str = ""
+
+
+def samples(config: dict, inputs: Path | None, asked: list[tuple[str, int]]) -> list[ExplainedSample]:
+    """Return the motion models `asked` for (subtype, number), or the first model of each category's first subtype.
+
+    Clouds and motion are made as the workflow makes them, so a sample is the one the data set holds.
+    Raises: InputError for a subtype the scene does not have.
+    """
+    records, select = records_of(config["targets"], inputs), config["targets"]["select"]
+    records = {name: record for name, record in records.items() if not select or name in select}
+    unknown = [name for name, _ in asked if name not in records]
+    if unknown:
+        raise InputError(f"--sample: {unknown}, expected subtypes of the scene such as {next(iter(records))!r}")
+    firsts: dict[str, tuple[str, int]] = {}
+    for name, record in records.items():
+        firsts.setdefault(record["published"]["category"], (name, 0))
+    masts = np.array(masts_m(config["network"]), dtype=float)
+    corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
+    motion, result = motion_block(config), []
+    path = path_of(motion, corners, masts)
+    for name, model in asked or firsts.values():
+        record = records[name]
+        cloud = make(record, inputs, config["seed"])
+        track, look = divmod(model, motion.get("looks", 1))
+        row = model_rows(config["seed"], cloud, record["published"], masts, corners, motion, track, path)[look]
+        try:
+            surfaces = occluders.make(record, inputs, config["seed"]) | {"subtype": name}
+        except InputError:
+            # A target without surfaces is refused where the scene, or a trial, hides points behind them.
+            surfaces = None
+        row = {**row, "group": record["published"]["unseen_protocol"], "model": model}
+        result.append(ExplainedSample(cloud, row, surfaces))
+    return result
+
+
+def scene_of(config: dict) -> Scene:
+    """Return the checked scene of a whole configuration, with noise at its middle SNR where the effects add that.
+
+    Raises: InputError where effects contradict each other.
+    """
+    check(config)
+    network, effects = Network.from_settings(config["network"]), tuple(called(config["effects"]))
+    snrs = sorted(float(snr) for snr in config["noise"]["snr_db"])
+    return Scene(network, config["seed"], config["echo"]["tolerance"], effects).at_snr(snrs[(len(snrs) - 1) // 2])
+
+
+def finding(
+    scene: Scene, station: Station, explained: ExplainedSample, clouds: dict[str, Cloud], listed: bool = False
+) -> Finding:
+    """Return whether a sample's target is found at a station, how loud it is against all else, and its levels if asked.
+
+    listed: whether levels are wanted, which take as long as a sample.
+    """
+    cloud, row, surfaces = explained
+    sample = SceneSample(scene, observe(scene, station, cloud, row, surfaces), clouds)
+    target_cell, empty = sample.own_cell(), sample.without_target()
+    behind, rest = sample.filtered(sample.detection), empty.filtered(sample.detection)
+    at_target = (behind - rest)[np.arange(len(target_cell)), target_cell]
+    loudest = float((abs(rest) ** 2).mean(axis=0).max())
+    with np.errstate(divide="ignore"):
+        over_db = 10 * np.log10(np.mean(abs(at_target) ** 2) / loudest) if loudest > 0 else np.inf
+    named, otherwise = {effect.name for effect in sample.detection}, {}
+    for kind, changed in CANCELLERS if "canceller" in named else (("", {}),):
+        detection = [
+            effect._replace(settings=effect.settings | changed) if effect.name == "canceller" else effect
+            for effect in sample.detection
+        ]
+        for added in ("",) if "detector" in named else ("", "detector"):
+            label = " and ".join(filter(None, (kind and f"canceller {kind}", added))) or "the same"
+            otherwise[label] = _right(sample, detection + called({added: {}} if added else {}), target_cell)
+    range_m = float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m)))
+    return Finding(
+        row["category"], row["subtype"], row["model"], station.name, range_m,
+        _right(sample, sample.detection, target_cell), float(over_db), otherwise,
+        levels(sample.view, scene.effects, sample.power) if listed else [],
+    )  # fmt: skip
+
+
+def _right(sample: SceneSample, detection: Sequence[NamedEffect], target_cell: np.ndarray) -> float:
+    """Share of symbols whose chosen cell is close to the target's, cells wrapping around as ranges do."""
+    acting = [effect for effect in detection if not effect.idle]
+    cells = sample.filtered(acting)
+    off = abs(sample.chosen(acting, cells) - target_cell)
+    return float(np.mean(np.minimum(off, cells.shape[1] - off) <= CLOSE_CELLS))
+
+
+def changes(
+    config: dict, chosen: list[ExplainedSample], station_names: Sequence[str],
+    shown: Callable[[np.ndarray], dict[str, np.ndarray]],
+) -> list[Change]:  # fmt: skip
+    """Return what each effect of the catalogue changes at some stations, those that the scene names first.
+
+    shown: returns what becomes of the signals (K, stations, N) of all samples by name: pixels of images, answers of a
+    network.
+    """
+    named = [effect.name for effect in scene_of(config).effects]
+    signals, cells, times_ms = _received(config, station_names, chosen)
+    before, result = shown(signals), []
+    for name in [*named, *(name for name in PLACES if name not in config["effects"])]:
+        place, inside = PLACES[name], name in named
+        try:
+            changed, also = _changed(config, name)
+            new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen)
+        except InputError as error:
+            result.append(Change(name, place, inside, refused=str(error)))
+            continue
+        moved = np.linalg.norm(new_signals - signals, axis=2) / np.linalg.norm(signals, axis=2)
+        # A kernel's first call compiles it: one sample's time is then far off, and the median is not.
+        ms = float(np.median(new_times_ms - times_ms)) * (-1.0 if inside else 1.0)
+        shares = float(np.mean(moved)), float(np.mean(cells != new_cells))
+        after = shown(new_signals)
+        more = {kind: _differing(before[kind], after[kind]) for kind in before}
+        result.append(Change(name, place, inside, *shares, more, ms, also))
+    return result
+
+
+def _differing(before: np.ndarray, after: np.ndarray) -> float:
+    """Share of entries that differ: numbers by more than VISIBLE, texts at all."""
+    differs = abs(before - after) > VISIBLE if before.dtype.kind == "i" else before != after
+    return float(np.mean(differs))
+
+
+def _changed(config: dict, name: str) -> tuple[dict, str]:
+    """The configuration without an effect that it names, or with one more, and what else had to change with it.
+
+    Raises: InputError where no single further change makes the scene fit.
+    """
+    effects = config["effects"]
+    if name in effects:
+        rest = {key: value for key, value in effects.items() if key != name}
+        choices = [(config | {"effects": rest}, "")]
+        for other in rest:
+            fewer = {key: value for key, value in rest.items() if key != other}
+            choices.append((config | {"effects": fewer}, f"and without {other}"))
+    else:
+        added = config | {"effects": effects | {name: {}}}
+        choices = [(added, ""), (added | {"noise": config["noise"] | {"snr_db": [np.inf]}}, "at no set SNR")]
+    faults = []
+    for changed, also in choices:
+        try:
+            check(changed)
+            return changed, also
+        except InputError as error:
+            faults.append(error)
+    raise faults[0]
+
+
+def _received(
+    config: dict, station_names: Sequence[str], chosen: list[ExplainedSample]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Signals and cells (K, stations, N) of the chosen samples, and the processor times (K, stations) ms they took."""
+    scene, clouds = scene_of(config), {explained.cloud.subtype: explained.cloud for explained in chosen}
+    received, times_s = [], [time.process_time()]
+    for explained in chosen:
+        for name in station_names:
+            received.append(received_signal(scene, scene.network.station(name), *explained, clouds))
+            times_s.append(time.process_time())
+    shape = len(chosen), len(station_names)
+    signals, cells = (np.array([each[k] for each in received]).reshape(*shape, -1) for k in range(2))
+    return signals, cells, 1e3 * np.diff(times_s).reshape(shape)
+
+
+def verdict(findings: Sequence[Finding]) -> list[str]:
+    """Return sentences that say whether the receiver finds its targets, and what would find more of them."""
+    share = _mean([finding.right for finding in findings])
+    classes = list(dict.fromkeys(finding.category for finding in findings))
+    of_class = {name: [finding for finding in findings if finding.category == name] for name in classes}
+    shares = ", ".join(f"{name} {_mean([each.right for each in mine]):.0%}" for name, mine in of_class.items())
+    lines = [f"The target's range cell, or one next to it, is chosen in {share:.0%} of the symbols: {shares}."]
+    over_db = {name: _mean([each.over_db for each in mine]) for name, mine in of_class.items()}
+    if any(math.isfinite(level) for level in over_db.values()):
+        texts = (f"{name} {abs(level):.1f} dB {'above' if level >= 0 else 'below'}" for name, level in over_db.items())
+        lines.append(f"Behind the filters the target is, against the loudest cell of all else: {', '.join(texts)} it.")
+    better = {name: _mean([each.otherwise[name] for each in findings]) for name in findings[0].otherwise}
+    best = max(better, key=better.__getitem__)
+    if share < FOUND and better[best] > share + 0.05:
+        lines.append(f"With {best} it would be {better[best]:.0%}.")
+    return lines
+
+
+def _mean(values: Sequence[float]) -> float:
+    """Mean of some numbers."""
+    return sum(values) / len(values)
+
+
+def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
+    """Return one line an effect: what the signal, the cells and the images lose or gain with it, and its time."""
+    more = list(dict.fromkeys(key for change in changes for key in change.more))
+    columns = "".join(f"{key:>9}" for key in more)
+    lines = [f"{'effect':<20} {'':<7} {'signal':>8} {'cells':>7} {columns}{'ms':>9}"]
+    for change in changes:
+        head = f"{change.effect:<20} {'named' if change.named else 'added':<7} "
+        if change.refused:
+            lines.append(f"{head}not tried: {change.refused}")
+            continue
+        shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
+        cells = f"{change.signal:>8.1%} {change.cells:>7.1%} {shares}{change.ms:>9.1f}"
+        lines.append(f"{head}{cells}  {change.also}".rstrip())
+    lines.append(
+        "named: without it; added: with it and its defaults. Shares of the signal's rms, of symbols, of pixels."
+    )
+    if sources:
+        lines += [f"{change.effect}: {importlib.import_module(dotted(change.effect)).SOURCE}" for change in changes]
+    return lines
+
+
+def suggested(overlay: dict, changes: Sequence[Change], least: float) -> str:
+    """Return a scene as YAML with those of its effects that change a signal by more than `least`, each with its share.
+
+    overlay: the scene's own blocks.
+    """
+    rest = {key: value for key, value in overlay.items() if key != "effects"}
+    lines = [yaml.safe_dump(rest, sort_keys=False).rstrip()] if rest else []
+    kept = [change for change in changes if change.named and not change.signal <= least]
+    lines.append(f"# Effects that change a signal by more than {least:g} of its root mean square, and by how much.")
+    lines.append("effects:" if kept else "effects: {}")
+    for change in kept:
+        block = yaml.safe_dump(overlay["effects"][change.effect] or {}, default_flow_style=True, width=1000)
+        lines.append(f"  {change.effect}: {block.strip()}  # {change.signal:.2g}")
+    return "\n".join(lines) + "\n"
+
+
+def level_lines(finding: Finding) -> list[str]:
+    """Return the levels of one sample at one station as a link budget lists them."""
+    head = f"{finding.subtype}, model {finding.model}, station {finding.station}, range {finding.range_m:.0f} m"
+    return [head, *(f"  {line}" for line in table(finding.levels))]
