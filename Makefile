@@ -87,15 +87,8 @@ data: $(BASE)  ## the default's data set only, no training
 real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 	LOWALT_INPUTS="$$INPUTS" $(SNAKEMAKE) --configfile config/real.yaml
 
-# Twice gives equal bytes. Of the recordings only those of vehicles have a licence, so only their picture is kept in git.
-measured: $(SETUP)  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
-	for step in pairs compare; do $(BIN)/python -m lowalt.recordings $$step --inputs "$$INPUTS" --out results/measured || exit 1; done
-	$(BIN)/python -m lowalt.recordings recognise --inputs "$$INPUTS" --out results/measured --models results/measured/models
-	$(BIN)/python -m lowalt.recordings ablate --inputs "$$INPUTS" --out results/measured --models results/measured/models/ablation
-	$(BIN)/python -m lowalt.report.measured --pairs results/measured --tables results/measured --page results/measured/report.html
-	cp results/measured/measured-*.csv results/reference/
-	for pair in measured-vehicle.png:results/reference/ measured-short.png:design/pictures/measured.png; do \
-	  if [ -f results/measured/$${pair%%:*} ]; then cp results/measured/$${pair%%:*} $${pair##*:}; fi; done
+measured:  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
+	$(MAKE) --no-print-directory study NAME=measured
 
 ready: $(BYTECODE) $(KERNELS)
 

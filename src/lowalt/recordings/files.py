@@ -83,7 +83,7 @@ def read(record: Record) -> Baseband:
     if record.trust == "record":
         rate = float(record.rate_hz)
     else:
-        rate = faults.agreed_rate(path, record.rates_hz or record.rate_hz, table.rate_hz, times)
+        rate = faults.agreed_rate(path, record.rate_hz, table.rate_hz, times)
     values = _channel(table, record)
     faults.check(path, values, record.moves)
     return Baseband(values, rate)

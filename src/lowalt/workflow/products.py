@@ -128,8 +128,6 @@ class Products(DataProducts):
             files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
         if block["accuracy"]:
             files["accuracy_cost"] = block["accuracy"]
-        if block["measured"]:
-            files["measured"] = block["measured"]
         if block["cost"]:
             files["echo_cost"] = block["cost"]
         return files

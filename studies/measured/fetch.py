@@ -1,8 +1,9 @@
 """The measured recordings from their public addresses, each with its pinned SHA-256.
 
+    python studies/measured/fetch.py --out FOLDER [--sources studies/measured/further.yaml]
+
 Only the vehicle recordings carry a licence (MIT, University of Cape Town 2025). The makers of the others state none:
-fetch those for your own comparison and do not pass them on.
-Run `python -m lowalt.recordings.download --out FOLDER`; FOLDER is then what `make measured INPUTS=FOLDER` takes.
+fetch those for your own comparison and do not pass them on. FOLDER is then what `make measured INPUTS=FOLDER` takes.
 """
 
 import argparse
@@ -13,10 +14,9 @@ from lowalt.config.command import run
 from lowalt.files.atomic import sha256
 from lowalt.files.download import download, fetch_each
 from lowalt.files.errors import InputError
-from lowalt.files.shipped import shipped
 from lowalt.files.yaml_files import load_yaml
 
-SOURCES = "config/measured/sources.yaml"
+SOURCES = Path(__file__).with_name("sources.yaml")
 
 
 def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
@@ -40,13 +40,13 @@ def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
 
 def addresses(sources: dict) -> dict[str, tuple[list[str], str]]:
     """Return SET/FILE -> (its addresses, SHA-256) of a sources file: sets, each a list of `addresses` and `files`."""
-    found = {}
+    places = {}
     for name, folders in sources.items():
         for entry in folders:
             for file, pinned in entry["files"].items():
-                places = [f"{base}/{urllib.parse.quote(file)}" for base in entry["addresses"]]
-                found[f"{name}/{file}"] = places, pinned
-    return found
+                quoted = [f"{base}/{urllib.parse.quote(file)}" for base in entry["addresses"]]
+                places[f"{name}/{file}"] = quoted, pinned
+    return places
 
 
 def main(arguments: list[str]) -> None:
@@ -54,9 +54,9 @@ def main(arguments: list[str]) -> None:
 
     Raises: as `fetch_each`.
     """
-    line = argparse.ArgumentParser(prog="python -m lowalt.recordings.download", description=__doc__)
+    line = argparse.ArgumentParser("fetch.py", description=__doc__.splitlines()[0])
     line.add_argument("--out", required=True, type=Path, help="folder of the measured sets")
-    line.add_argument("--sources", type=shipped, default=SOURCES, help="addresses and checksums (.yaml)")
+    line.add_argument("--sources", type=Path, default=SOURCES, help="addresses and checksums (.yaml)")
     given = line.parse_args(arguments)
     wanted = addresses(load_yaml(given.sources, "sources of recordings"))
     fetch_each(wanted, lambda name: fetch(name, *wanted[name], given.out))

@@ -1,4 +1,4 @@
-"""Recognition from simulation to reality: a network that saw only a twin's samples names the recordings' windows.
+"""The network of a radar's twin: it learns from simulated windows alone and names the windows of recordings.
 
 The images are those of the data set: spectra, tiles and shrinking by the same functions, one station. The network and
 its training are those of `lowalt.recognition`. Recordings are never trained or validated on.
@@ -7,12 +7,18 @@ its training are those of `lowalt.recognition`. Recordings are never trained or 
 from pathlib import Path
 
 import numpy as np
+from torch import nn
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.layers import load_yaml, merge
 from lowalt.files.errors import InputError
+from lowalt.recognition.checkpoint import identity
+from lowalt.recognition.inference import Machine
+from lowalt.recognition.methods import built
+from lowalt.recognition.recipe import seeded
 from lowalt.recognition.samples import Facts, Samples
-from lowalt.recognition.schemes import SPECTRA, named
+from lowalt.recognition.schemes import named
+from lowalt.recognition.training import Trainer
 from lowalt.recordings.library import Library
 from lowalt.recordings.twin import Twin
 from lowalt.tiles.render import Renderer, split
@@ -41,8 +47,8 @@ def settings(path: str | Path) -> dict:
     try:
         default = load_yaml(block["default"])
         result = merge(default["recognition"], {key: block[key] for key in ("size", "training", "augmentation")})
-        own = {key: block[key] for key in ("scheme", "echoes", "receivers", "seeds")}
-        return {**result, **own, "images": default["images"], "seed": default["seed"]}
+        simulation = {key: block[key] for key in ("scheme", "echoes", "receivers", "seeds")}
+        return {**result, **simulation, "images": default["images"], "seed": default["seed"]}
     except KeyError as error:
         raise InputError(f"{path}: key {error} is missing") from None
 
@@ -50,10 +56,10 @@ def settings(path: str | Path) -> dict:
 def rendered(intervals: np.ndarray, twin: Twin, images: Images, size: int) -> np.ndarray:
     """Return the images (n, 3, size, size) uint8 of coherent intervals (n, symbols), at a radar's own carrier."""
     renderer = Renderer(twin.network(intervals.shape[1]), twin.spectra(), images)
-    found = np.empty((len(intervals), len(renderer.spectra), size, size), np.uint8)
+    result = np.empty((len(intervals), len(renderer.spectra), size, size), np.uint8)
     for number, interval in enumerate(intervals):
-        found[number] = resize(split(renderer.tile(interval[None].astype(np.complex64)), len(renderer.spectra)), size)
-    return found
+        result[number] = resize(split(renderer.tile(interval[None].astype(np.complex64)), len(renderer.spectra)), size)
+    return result
 
 
 def facts(labels: np.ndarray, names: list[str], models: np.ndarray, snr: np.ndarray, fold: str) -> Facts:
@@ -76,71 +82,34 @@ def simulated(library: Library, name: str, block: dict, fold: str) -> Windows:
     labels, names, models, snrs = [], [], [], []
     count, receivers = block["echoes"][fold], block["receivers"]
     for label, category in enumerate(CATEGORIES):
-        found, subtypes = library.simulated(name, category, count, fold, receivers)
-        parts.append(rendered(found.reshape(-1, found.shape[-1]), library.twins[name], images, block["size"]))
+        intervals, subtypes = library.simulated(name, category, count, fold, receivers)
+        every_interval = intervals.reshape(-1, intervals.shape[-1])
+        parts.append(rendered(every_interval, library.twins[name], images, block["size"]))
         labels += [label] * count * receivers
         names += np.repeat(subtypes, receivers).tolist()
         models += np.repeat(np.arange(count), receivers).tolist()
         snrs += list(range(receivers)) * count
-    told = facts(np.array(labels), names, np.array(models), np.array(snrs, float), fold)
-    return Windows(np.concatenate(parts), told)
+    return Windows(np.concatenate(parts), facts(np.array(labels), names, np.array(models), np.array(snrs, float), fold))
 
 
-def recogniser(block: dict):
-    """Return a network of the settings' scheme with fresh weights, and the scheme."""
-    from lowalt.recognition.network import Recogniser
-
-    scheme = named(block["table"], block["scheme"], ["A"])
-    palette = Images.from_settings(block["images"]).palette
-    palettes = np.stack([palette] * len(SPECTRA))
-    return Recogniser(scheme, block["network"], block["size"], palettes, len(CATEGORIES)), scheme
-
-
-def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder: str | Path):
+def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder: str | Path) -> nn.Module:
     """Return the network trained on simulated windows {"train": ..., "validation": ...} of the twin `name`.
 
-    seed: of the weights and the order; folder: where `model.pt` and `history.csv` go.
+    block: as `settings` gives it; seed: of the weights and the order; folder: where `model.pt` and `history.csv` go.
     """
-    from lowalt.recognition.checkpoint import identity
-    from lowalt.recognition.inference import Machine
-    from lowalt.recognition.recipe import seeded
-    from lowalt.recognition.training import Trainer
-
-    keys = ("recordings", name, seed)
+    keys, colours = ("recordings", name, seed), block["images"]["colour_map"]
     seeded(block["seed"], keys, block["training"]["threads"])
-    model, scheme = recogniser(block)
+    scheme = named(block["table"], block["scheme"], ["A"])
+    model = built(scheme, block["network"], block["size"], colours, len(CATEGORIES))
     Path(folder).mkdir(parents=True, exist_ok=True)
-    own = {key: block[key] for key in ("seed", "training", "augmentation")} | {"classes": CATEGORIES}
+    training = {key: block[key] for key in ("seed", "training", "augmentation")} | {"classes": CATEGORIES}
     machine, run = Machine.here(block["training"]["precision"]), identity(twin=name, seed=seed, settings=block)
-    trainer = Trainer(model, windows, scheme.columns, own, keys, run, folder, machine)
+    trainer = Trainer(model, windows, scheme.columns, training, keys, run, folder, machine)
     trainer.fit()
     weights = trainer.best_weights
     trainer.finish({
         "scheme": scheme.record, "protocol": "seen", "network": block["network"], "size": block["size"], "seed": seed,
-        "colour_map": block["images"]["colour_map"], "classes": list(CATEGORIES), "twin": name,
+        "colour_map": colours, "classes": list(CATEGORIES), "twin": name,
     })  # fmt: skip
     model.load_state_dict(weights)
     return model.eval()
-
-
-def load_model(path: str | Path, name: str, block: dict):
-    """Return the network in a file that `train` wrote.
-
-    Raises: InputError where the file is missing, damaged, or was trained on another twin than `name`.
-    """
-    from lowalt.recognition.checkpoint import load
-
-    _, state = load(path)
-    if state.get("twin") != name:
-        raise InputError(f"{path}: trained on the twin {state.get('twin')!r}, expected {name!r}")
-    model, _ = recogniser(block)
-    model.load_state_dict(state["weights"])
-    return model.eval()
-
-
-def guesses(model, windows: Windows, block: dict) -> np.ndarray:
-    """Return class probabilities (n, 4) of windows."""
-    from lowalt.recognition.inference import Machine, probabilities
-
-    machine = Machine.here(block["evaluation"]["precision"])
-    return probabilities(model, windows, np.arange(len(windows.images)), machine, block["evaluation"]["batch"])

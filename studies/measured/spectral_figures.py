@@ -5,29 +5,16 @@ signals go through the same functions.
 """
 
 import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks, welch
 
+from lowalt.recordings.presence import speeds_shown
 from lowalt.spectra import magnitudes
 from lowalt.spectra.settings import Fourier
 
 INTERVAL = ("edge_mps", "line_mps", "width_mps", "kurtosis", "entropy")
 """Figures of one coherent interval, for every class."""
 EDGE_SHARE = 0.95
-
-
-def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of the speeds that are shown, in order of display, and the speeds (m/s) that they mean.
-
-    speeds: (n,) m/s, ascending; sides: "both"; "positive", only those above zero; "wrapped", a speed v < 0 means v + 2
-    edge_mps.
-    """
-    if sides == "positive":
-        shown = np.flatnonzero(speeds > 0)
-        return shown, speeds[shown]
-    if sides == "wrapped":
-        meant = np.mod(speeds, 2 * edge_mps)
-        shown = np.argsort(meant, kind="stable")
-        return shown, meant[shown]
-    return np.arange(len(speeds)), speeds
 
 
 def spectrum(interval: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
@@ -99,9 +86,6 @@ def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: 
     The spacing is a peak of the autocorrelation over frequency of the log spectrum less its running median. Multiples
     of the spacing give peaks too, so the smallest spacing whose peak reaches 70 % of the highest is taken.
     """
-    from scipy.ndimage import median_filter
-    from scipy.signal import find_peaks, welch
-
     length = min(len(signal), 1 << int(np.log2(rate_hz)))
     frequency, power = welch(signal, rate_hz, nperseg=length, return_onesided=False, detrend="constant")
     order = np.argsort(frequency)
@@ -115,10 +99,9 @@ def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: 
     peaks, _ = find_peaks(spread[first - 1 : last + 2])
     if not len(peaks):
         return float("nan")
-    found = peaks + first - 1
-    best = spread[found].max()
-    good = found[spread[found] >= best - 0.3 * abs(best)]
-    at = int(good.min())
+    places = peaks + first - 1
+    best = spread[places].max()
+    at = int(places[spread[places] >= best - 0.3 * abs(best)].min())
     # A parabola through three points places the peak between bins.
     before, top, after = spread[at - 1 : at + 2]
     return float((at + 0.5 * (before - after) / (before - 2 * top + after)) * step)
@@ -129,8 +112,6 @@ def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> flo
 
     The mean autocorrelation over time of the rows' magnitudes, each row weighted by its own variance.
     """
-    from scipy.signal import find_peaks
-
     rows = shown - shown.mean(axis=1, keepdims=True)
     count = rows.shape[1]
     alike = np.fft.ifft(np.abs(np.fft.fft(rows, 2 * count, axis=1)) ** 2, axis=1).real.sum(axis=0)[:count]
@@ -139,10 +120,9 @@ def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> flo
     peaks, _ = find_peaks(alike[first : last + 1])
     if not len(peaks):
         return float("nan")
-    found = peaks + first
-    best = alike[found].max()
-    good = found[alike[found] >= best - 0.2 * abs(best)]
-    return float(good.min() * hop_s)
+    places = peaks + first
+    best = alike[places].max()
+    return float(places[alike[places] >= best - 0.2 * abs(best)].min() * hop_s)
 
 
 def tracks(shown: np.ndarray, speeds: np.ndarray, slowest_mps: float) -> dict[str, np.ndarray]:

@@ -5,8 +5,7 @@ and hop in symbols. The name of a figure ends in its unit.
 """
 
 import numpy as np
-
-from lowalt.recordings.figures import EDGE_SHARE, above_floor, cycle_s, line_spacing_hz, quantile, spectrogram, tracks
+from spectral_figures import EDGE_SHARE, above_floor, cycle_s, line_spacing_hz, quantile, spectrogram, tracks
 
 
 def rotor_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:

@@ -6,15 +6,16 @@ their class. difference_percent is this accuracy less that of the unchanged twin
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+from accuracy import heard, recognition_rows
+from recorded_sets import Measured
 
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recordings.library import Library
-from lowalt.recordings.reality import tested, windows_of
-from lowalt.recordings.recognise import simulated, train
-from lowalt.recordings.sets import Measured
+from lowalt.recordings.twin_network import simulated, train
 
 ABLATION = (
     "radar", "change", "class", "seeds", "files", "windows", "accuracy_percent", "low", "high", "difference_percent",
@@ -42,21 +43,20 @@ def changed(library: Library, name: str, change: dict) -> Library:
             raise InputError(
                 f"ablation: receiver has no {sorted(unknown)}, expected some of {sorted(scene['receiver'])}"
             )
-        return {key: item for key, item in scene.items() if key not in drop} | {
-            "receiver": scene["receiver"] | receiver
-        }
+        kept = {key: item for key, item in scene.items() if key not in drop}
+        return kept | {"receiver": scene["receiver"] | receiver}
 
-    scenes = {category: [plainer(scene) for scene in many] for category, many in library.scenes[name].items()}
+    scenes = {category: [plainer(scene) for scene in scenes] for category, scenes in library.scenes[name].items()}
     return replace(library, scenes=library.scenes | {name: scenes})
 
 
 def shares(rows: list[list]) -> dict[str, np.ndarray]:
-    """Return class -> share of right windows (files, seeds) in percent from rows of `reality.RECOGNITION`."""
-    found: dict[str, dict[str, list[float]]] = {}
-    for row in rows:
-        if row[1] != "mean":
-            found.setdefault(row[5], {}).setdefault(f"{row[2]}/{row[4]}", []).append(row[-1])
-    return {label: np.array(list(files.values())) for label, files in found.items()}
+    """Return class -> share of right windows (files, seeds) in percent from rows of `accuracy.RECOGNITION`."""
+    files: dict[str, dict[str, list[float]]] = {}
+    for _, seed, folder, _, file, label, *_, right in rows:
+        if seed != "mean":
+            files.setdefault(label, {}).setdefault(f"{folder}/{file}", []).append(right)
+    return {label: np.array(list(of_label.values())) for label, of_label in files.items()}
 
 
 def _draws(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -66,17 +66,17 @@ def _draws(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return values[files[:, :, None], seeds[:, None, :]].mean(axis=(1, 2))
 
 
-def summarised(name: str, change: str, own: dict, full: dict, windows: dict[str, int], seed: int) -> list[list]:
+def summarised(name: str, change: str, changed: dict, full: dict, windows: dict[str, int], seed: int) -> list[list]:
     """Return the rows of `ABLATION` of one change from its `shares` and those of the unchanged twin."""
     rows, means, levels = [], [], []
-    for label in own:
+    for label in changed:
         keys = (seed, "measured-ablation", name, label)
         # Both streams have the same keys, so both twins get the same draws and the difference is paired.
-        pair = [_draws(values[label], stream(*keys)) for values in (own, full)]
-        means.append((own[label].mean(), own[label].mean() - full[label].mean()))
+        pair = [_draws(values[label], stream(*keys)) for values in (changed, full)]
+        means.append((changed[label].mean(), changed[label].mean() - full[label].mean()))
         levels.append((pair[0], pair[0] - pair[1]))
-    labels, counts = list(own), [own[label].shape for label in own]
-    if len(own) > 1:
+    labels, counts = list(changed), [changed[label].shape for label in changed]
+    if len(labels) > 1:
         labels.append("balanced")
         counts.append((sum(files for files, _ in counts), counts[0][1]))
         means.append(tuple(np.mean(means, axis=0)))
@@ -88,29 +88,30 @@ def summarised(name: str, change: str, own: dict, full: dict, windows: dict[str,
     return rows
 
 
-def ablation(name: str, found: list[Measured], library: Library, block: dict, changes: dict, folder) -> list[list]:
+def ablation_rows(
+    name: str, recordings: list[Measured], library: Library, block: dict, changes: dict, folder: Path
+) -> list[list]:
     """Return the rows of `ABLATION` of the twin `name`: trained as it is, and with each of the changes.
 
     changes: name -> change as `changed` takes it; folder: where the networks go. Test recordings are not looked at;
     without any tuning recording there are no rows.
     """
-    mine = [one for one in found if one.like in library.sets[name] and one.half == "tuning"]
-    measured = [(one, windows_of(one, library, block)) for one in mine]
-    measured = [(one, windows) for one, windows in measured if len(windows.images)]
+    of_radar = [recording for recording in recordings if recording.like in library.sets[name]]
+    measured = heard([recording for recording in of_radar if recording.half == "tuning"], library, block)
     if not measured:
         return []
-    windows: dict[str, int] = {}
-    for one, held in measured:
-        windows[one.record.label] = windows.get(one.record.label, 0) + len(held.images)
-    rows, full, library = [], None, replace(library, memo={})
+    counts: dict[str, int] = {}
+    for recording, windows in measured:
+        counts[recording.record.label] = counts.get(recording.record.label, 0) + len(windows.images)
+    rows, full = [], None
     for title, change in {FULL: {}, **changes}.items():
         plainer = changed(library, name, change)
         samples = {fold: simulated(plainer, name, block, fold) for fold in ("train", "validation")}
-        models = {
+        networks = {
             seed: train(block, samples, name, seed, folder / f"{name}-{title}-{seed}".replace(" ", "_"))
             for seed in block["seeds"]
         }
-        own = shares(tested(name, measured, models, block))
-        full = full or own
-        rows += summarised(name, title, own, full, windows, block["seed"])
+        of_change = shares(recognition_rows(name, measured, networks, block))
+        full = full or of_change
+        rows += summarised(name, title, of_change, full, counts, block["seed"])
     return rows
