@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rooms_picture
 from PIL import Image
 from scipy import ndimage
 
 from forks import printed
 from lowalt.files.street import PACKAGE, STREET, modules, rooms_imported
-from lowalt.report.figures import house
 from lowalt.scene.catalogue import PLACES
 
 ROOT = Path(__file__).parent.parent
@@ -76,10 +76,10 @@ def test_the_street_holds_every_room():
 
 
 def test_the_picture_of_the_house_has_a_mark_for_every_import_between_rooms():
-    pairs = set(zip(*house.imports(), strict=True))
+    pairs = set(zip(*rooms_picture.imports(), strict=True))
     assert ("measure", "recognition") in pairs
     assert not {(room, other) for room, other in pairs if room == "files"}
-    picture = np.asarray(Image.open(io.BytesIO(house.draw())).convert("RGB")).astype(int)
+    picture = np.asarray(Image.open(io.BytesIO(rooms_picture.draw())).convert("RGB")).astype(int)
     # Dots are the only thing in colour. The first column of dots is that of the room `files`.
     dots, count = ndimage.label(picture[..., 2] - picture[..., 0] > 40)
     centres = np.array(ndimage.center_of_mass(dots > 0, dots, range(1, count + 1)))

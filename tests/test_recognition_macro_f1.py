@@ -7,7 +7,7 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition import schemes, tables
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
-from lowalt.report.tables import macro_f1 as in_words
+from lowalt.report.pivots import macro_f1 as in_words
 from made_predictions import read_rows, run_files
 
 

@@ -71,14 +71,14 @@ def gallery(given: argparse.Namespace) -> str:
 
     Raises: InputError where the folder holds no run, or a run's tables or configuration cannot be read.
     """
-    from lowalt.report.gallery import gallery
+    from lowalt.report.all_runs import all_runs
 
     results = given.results
     folders = sorted(path.parent for path in results.glob("*/config.yaml"))
     if not folders:
         raise InputError(f"{results}: no run, expected folders with a config.yaml such as results/default")
     pages = {path.name: f"{path.name}/report.html" for path in folders if (path / "report.html").is_file()}
-    text = gallery({path.name: facts(path) for path in folders}, pages)
+    text = all_runs({path.name: facts(path) for path in folders}, pages)
     with replacing(results / "index.html") as temporary:
         temporary.write_text(text)
     if given.json:

@@ -35,7 +35,7 @@ def run(given: argparse.Namespace) -> str:
 
     Raises: InputError for a wrong configuration, subtype or model.
     """
-    from lowalt.report.figures.sample import figure
+    from lowalt.report.figures.tile_axes import figure
 
     config = overlaid(given.overlay)
     everything = config["targets"]["select"]

@@ -103,7 +103,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
 
 def _inspect(given: argparse.Namespace) -> str:
     """Inspect a mesh and draw it."""
-    from lowalt.report.figures.inspection import inspection_picture
+    from lowalt.report.figures.mesh_picture import inspection_picture
 
     found = inspect_mesh(given.file, given.category, given.unit, size_m=given.size_m)
     out = given.out or Path(f"{given.file.stem}-inspect.png")
@@ -187,7 +187,7 @@ def _draft(
     try:
         refuse_miscount(found, groups, count, str(picture))
     except InputError:
-        from lowalt.report.figures.inspection import inspection_picture
+        from lowalt.report.figures.mesh_picture import inspection_picture
 
         with replacing(picture) as temporary:
             temporary.write_bytes(inspection_picture(found, numbered=True))
@@ -273,7 +273,7 @@ def _make(given: argparse.Namespace) -> str:
 
 def _picture(cloud: Path, out: Path) -> str:
     """Draw a cloud's file and return the picture's path."""
-    from lowalt.report.figures.target import target_animation, target_picture
+    from lowalt.report.figures.target_picture import target_animation, target_picture
 
     draw = target_animation if out.suffix == ".gif" else target_picture
     with replacing(out) as temporary:

@@ -13,8 +13,8 @@ from lowalt.report.figures.stills import write_stills
 from lowalt.report.inputs import Inputs
 from lowalt.report.page import SECTIONS, page, section
 from lowalt.report.plots import scripts, write_plots
-from lowalt.report.run import ReportedRun
-from lowalt.report.stages import write_stages
+from lowalt.report.reported_run import ReportedRun
+from lowalt.report.stage_times import write_stages
 from lowalt.targets.cloud import read
 
 
@@ -40,9 +40,9 @@ def main(arguments: list[str]) -> None:
     reported = ReportedRun(Inputs.read(given.manifest), *pick(given.settings, "config", "published"))
     write_stages(given.stages, reported)
     calls = [scripts, partial(_stills, given.figures, reported)]
-    script, _, *made = together(calls + [partial(section, reported, name) for name in SECTIONS], given.jobs)
-    write_plots(given.figures, [plot for one in made for plot in one.plots])
-    text = page(reported, dict(zip(SECTIONS, made, strict=True)), script)
+    script, _, *sections = together(calls + [partial(section, reported, name) for name in SECTIONS], given.jobs)
+    write_plots(given.figures, [plot for made in sections for plot in made.plots])
+    text = page(reported, dict(zip(SECTIONS, sections, strict=True)), script)
     with replacing(given.out) as temporary:
         temporary.write_text(text)
     print(json.dumps({"report": given.out, "samples": len(reported.shards)}), file=sys.stderr)

@@ -16,8 +16,8 @@ from lowalt.files.atomic import slug, text_file
 from lowalt.motion import positions
 from lowalt.recognition import predictions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report.figures.sample import axes_of
 from lowalt.report.figures.style import embedded
+from lowalt.report.figures.tile_axes import axes_of
 from lowalt.report.viewer_echoes import echoes, largest_speed
 from lowalt.shards import ShardSet
 from lowalt.shards.record import row_of

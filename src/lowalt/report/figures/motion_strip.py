@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report.figures.style import png
 from lowalt.targets.cloud import Cloud
 
 DIRECTIONS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),
@@ -67,8 +66,3 @@ def strip_figure(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> Fi
         line[0].set_ylabel(f"{row['subtype']}\n{view}", fontsize=8)
     figure.tight_layout()
     return figure
-
-
-def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:
-    """Return `strip_figure` as PNG bytes."""
-    return png(strip_figure(clouds, rows, instants))

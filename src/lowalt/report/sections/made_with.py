@@ -9,7 +9,7 @@ from lowalt.files.shipped import as_named, shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.hardware import describe
 from lowalt.report.provenance import changes, checksums, code_sum, commands, revision
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 NAMES = (
     "lowalt", "snakemake", "numpy", "scipy", "numba", "llvmlite", "pillow", "deflate", "trimesh", "pymeshlab", "torch",

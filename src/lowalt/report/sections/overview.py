@@ -4,9 +4,9 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
 from lowalt.report.figures.style import embedded
 from lowalt.report.figures.tiles import example_tiles
-from lowalt.report.run import ReportedRun
+from lowalt.report.pivots import by_scheme, macro_f1
+from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections.accuracy import COLUMNS
-from lowalt.report.tables import by_scheme, macro_f1
 
 TILES = 3
 """Tiles at the top of the page."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from lowalt.recognition.predictions import Predictions, read, record
 from lowalt.recognition.protocols import folds
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 ACCURACY = ("protocol", "scheme", "subtype", "category", "accuracy_percent")
 DISTANCES = ("category", "subtype", "nearest_trained", "trained_distance", "trained_size_ratio")
@@ -52,7 +52,7 @@ def values(run: ReportedRun) -> dict | None:
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}
     rows.sort(key=lambda row: float([*row[2].values()][-1]))
-    files = run.inputs.paths("predictions") if "predictions" in run.inputs else []
+    files = run.inputs.paths("predictions")
     # The last training is of the protocol and the scheme that the configuration names last.
     told = {}
     if files:

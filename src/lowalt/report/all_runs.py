@@ -1,4 +1,4 @@
-"""The gallery of runs: one self-contained page that links them all and shows any two of them side by side."""
+"""The page of all runs: it links them and shows any two of them side by side."""
 
 import json
 
@@ -13,16 +13,20 @@ def _text(value: object) -> str:
 
 
 def overview(name: str, facts: dict[str, dict], page: str | None) -> dict:
-    """Return a run's row of the gallery's table.
+    """Return a run's row of the table of runs.
 
     name: of its folder; facts: {"configuration", "accuracy_percent", "processor_s", "data"} as `lowalt compare` reads
     them; page: address of its report, None where it has none.
     """
     accuracy, sizes = facts["accuracy_percent"], facts["data"]
     best = {
-        protocol: max((value, scheme) for scheme, value in mine.items())
+        protocol: max((value, scheme) for scheme, value in schemes.items())
         for protocol in ("seen", "unseen")
-        if (mine := {key.partition(" ")[2]: value for key, value in accuracy.items() if key.startswith(f"{protocol} ")})
+        if (
+            schemes := {
+                key.partition(" ")[2]: value for key, value in accuracy.items() if key.startswith(f"{protocol} ")
+            }
+        )
     }
     return {
         "name": name, "page": page, "samples": sizes.get("samples", ""),
@@ -32,7 +36,7 @@ def overview(name: str, facts: dict[str, dict], page: str | None) -> dict:
     }  # fmt: skip
 
 
-def gallery(runs: dict[str, dict[str, dict]], pages: dict[str, str]) -> str:
+def all_runs(runs: dict[str, dict[str, dict]], pages: dict[str, str]) -> str:
     """Return the page of runs: a table, and a comparison of two that the reader picks.
 
     runs: facts of each run by the name of its folder, as in `overview`; pages: addresses of their reports.
@@ -42,7 +46,7 @@ def gallery(runs: dict[str, dict[str, dict]], pages: dict[str, str]) -> str:
         name: {**facts, "configuration": {key: _text(value) for key, value in facts["configuration"].items()}}
         for name, facts in runs.items()
     }
-    html = templates().get_template("gallery.html").render(rows=rows, data=data)
+    html = templates().get_template("all_runs.html").render(rows=rows, data=data)
     runs_html, _, compare_html = html.partition("<!-- compare -->")
     parts = [
         {"id": "runs", "title": "Runs", "html": runs_html},

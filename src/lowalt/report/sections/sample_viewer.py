@@ -1,7 +1,7 @@
 """Section: a viewer of some samples: echoes, tile with axes, probabilities of the networks, motion in 3-D."""
 
 from lowalt.report import viewer, viewer_echoes
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 from lowalt.shards.remake import opened
 from lowalt.targets.cloud import read
 
@@ -9,7 +9,7 @@ from lowalt.targets.cloud import read
 def values(run: ReportedRun) -> dict:
     """Return the viewer's samples, the panels of a tile, and the sizes of images."""
     clouds = {cloud.subtype: cloud for cloud in map(read, run.inputs.paths("clouds"))}
-    files = run.inputs.paths("predictions") if "predictions" in run.inputs else []
+    files = run.inputs.paths("predictions")
     groups = {name: row["unseen_protocol"] for name, row in run.targets.items()}
     network, pixels = run.shards.renderer.network, run.config["recognition"]["size"]
     panels = viewer.panels(run.shards.renderer)

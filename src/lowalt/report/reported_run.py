@@ -1,11 +1,8 @@
-"""A run as the sections of the page see it: its files, its configuration, its shards and its jobs' times."""
-
-import functools
+"""A run as the sections of the page see it: its files, its configuration and its shards."""
 
 from lowalt.config.network import station_names
 from lowalt.config.plan import snrs_of
 from lowalt.report.inputs import Inputs
-from lowalt.report.tables import stage_times
 from lowalt.shards import ShardSet
 
 
@@ -16,11 +13,6 @@ class ReportedRun:
         """inputs: the run's files; config: its configuration; targets: row of the table of targets by subtype."""
         self.inputs, self.config, self.targets = inputs, config, targets
         self.shards = ShardSet(inputs.path("index"))
-
-    @functools.cached_property
-    def stage_times(self) -> list[dict]:
-        """Time and memory of each rule, as `tables.stage_times` gives them."""
-        return stage_times(self.inputs.paths("benchmarks"))
 
     @property
     def sample_bytes(self) -> float:

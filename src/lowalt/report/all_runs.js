@@ -1,7 +1,7 @@
 "use strict";
 // Two runs side by side: the keys of their configurations that differ, then accuracy, processor seconds and bytes.
 (() => {
-  const data = JSON.parse(document.getElementById("gallery-data").textContent);
+  const data = JSON.parse(document.getElementById("runs-data").textContent);
   const names = Object.keys(data), selects = ["first", "second"].map((name) => document.getElementById(name));
   const titles = { configuration: "Configuration, where it differs", accuracy_percent: "Accuracy, percent", processor_s: "Processor seconds", data: "Data" };
   const cell = (value) => (value === undefined ? "-" : typeof value === "number" && !Number.isInteger(value) ? value.toFixed(2) : String(value));

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from lowalt.files.errors import InputError
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 
 def values(run: ReportedRun) -> dict:

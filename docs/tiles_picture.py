@@ -1,4 +1,7 @@
-"""The README's picture: one clean tile of each category out of a finished run, two by two at half size."""
+"""The README's picture: one clean tile of each category out of a finished run, two by two at half size.
+
+python docs/tiles_picture.py INDEX OUT
+"""
 
 import io
 import sys
@@ -32,7 +35,7 @@ def cover(tiles: list[bytes]) -> Image.Image:
 
 
 def main(arguments: list[str]) -> None:
-    """Write the picture: cover.py INDEX OUT."""
+    """Write the picture."""
     index, out = arguments
     with replacing(out) as temporary:
         cover([data for _, data in example_tiles(ShardSet(index, folds=["test"]))]).save(temporary, optimize=True)

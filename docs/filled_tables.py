@@ -1,6 +1,6 @@
 """Tables of measured results in Markdown documents, written from the reference CSVs and never by hand.
 
-    python -m lowalt.report.documents DOCUMENT NAME=FOLDER/PREFIX ...
+    python docs/filled_tables.py DOCUMENT NAME=FOLDER/PREFIX ...
 
 replaces the text between `<!-- NAME -->` and `<!-- end of NAME -->`. NAME is `schemes`: accuracy of every scheme
 next to the paper's, and which orderings hold; or `presets`: those of `make accuracy-cost`, their time and accuracy.
@@ -13,8 +13,8 @@ from lowalt.files.atomic import existing, replacing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.report.figures import cost_plots
-from lowalt.report.sections.orderings import ordering_words
-from lowalt.report.tables import by_scheme
+from lowalt.report.pivots import by_scheme
+from lowalt.report.sections.comparisons import ordering_words
 
 PUBLISHED = "config/published_accuracy.csv"
 

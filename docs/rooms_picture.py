@@ -1,6 +1,6 @@
 """The picture of the package: its rooms in the order of the data, what each holds, and which rooms it imports.
 
-    python -m lowalt.report.figures.house --figure design/pictures/house.png
+    python docs/rooms_picture.py --figure design/pictures/house.png
 
 Everything in it is read from the source files: purposes (first line of each room's docstring), inner rooms, imports.
 """
@@ -69,7 +69,7 @@ def draw() -> bytes:
 
 def main(arguments: list[str]) -> None:
     """Write the picture."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.report.figures.house", description=__doc__)
+    options = argparse.ArgumentParser("rooms_picture.py", description=__doc__)
     options.add_argument("--figure", required=True, help="picture to write (.png)")
     given = options.parse_args(arguments)
     with replacing(given.figure) as temporary:

@@ -1,6 +1,6 @@
 """Section: which scheme is better than which, paired on the same samples, and whether the paper's orderings hold."""
 
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 COMPARISONS = ("protocol", "scheme", "over", "difference_points", "low", "high", "resampled", "seeds")
 ORDERINGS = ("protocol", "scheme", "over", "claim", "paper_points", "difference_points", "ordering")

@@ -1,7 +1,7 @@
 """Section: recognition accuracy over its time, from this run's table or the kept reference."""
 
 from lowalt.report.figures import cost_plots
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 SHOWN = (*cost_plots.PRESET, "pixels", "train_samples", "steps", "seen_percent", "inference_ms_1", "inference_ms_64",
          "hardware")  # fmt: skip

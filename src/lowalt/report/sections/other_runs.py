@@ -1,6 +1,6 @@
 """Section: models of other runs on this run's test samples."""
 
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 COLUMNS = (
     "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low", "high",

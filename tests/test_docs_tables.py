@@ -1,9 +1,9 @@
 """Documents: tables are written between their marks from the CSVs, and a document without marks is refused."""
 
 import pytest
+from filled_tables import fill, main
 
 from lowalt.files.errors import InputError
-from lowalt.report.documents import fill, main
 
 ACCURACY = """protocol,scheme,snr_db,accuracy_percent,samples,hardware
 seen,A:VT,3,90,10,here

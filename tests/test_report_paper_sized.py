@@ -12,14 +12,14 @@ from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import assembled, rendered
-from lowalt.report.sections import accuracy, confusion, orderings, subtypes
+from lowalt.report.sections import accuracy, comparisons, confusion, subtypes
 from lowalt.targets.records import load_table
 from pages import browsed, sound
 
 pytestmark = pytest.mark.slow
 PUBLISHED = "config/published_accuracy.csv"
 CLASSES = ("UAV", "Bird", "Vehicle", "Pedestrian")
-SECTIONS = {"accuracy": accuracy, "orderings": orderings, "confusion": confusion, "subtypes": subtypes}
+SECTIONS = {"accuracy": accuracy, "comparisons": comparisons, "confusion": confusion, "subtypes": subtypes}
 
 
 def tables():

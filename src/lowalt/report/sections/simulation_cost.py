@@ -1,7 +1,7 @@
 """Section: the echo's error over its time, from the table of `make cost`."""
 
 from lowalt.report.figures import cost_plots
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 USUAL = 300
 """Points of a usual target: most built-in ones have 100 to 400."""

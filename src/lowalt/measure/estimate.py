@@ -98,7 +98,7 @@ def estimate(
 
 def main(arguments: list[str]) -> None:
     """Write a row of every overlay."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.measure.scale", description=__doc__)
+    options = argparse.ArgumentParser(prog="python -m lowalt.measure.estimate", description=__doc__)
     options.add_argument("--stages", required=True, help="stages.csv of a finished run")
     options.add_argument("--costs", required=True, help="table of lowalt.measure.accuracy_cost (.csv)")
     options.add_argument("--schema", required=True, help="schema of the configuration (.yaml)")
