@@ -69,10 +69,10 @@ def draw() -> bytes:
 
 def main(arguments: list[str]) -> None:
     """Write the picture."""
-    options = argparse.ArgumentParser("rooms_picture.py", description=__doc__)
-    options.add_argument("--figure", required=True, help="picture to write (.png)")
-    given = options.parse_args(arguments)
-    with replacing(given.figure) as temporary:
+    line = argparse.ArgumentParser("rooms_picture.py", description=__doc__)
+    line.add_argument("--figure", required=True, help="picture to write (.png)")
+    options = line.parse_args(arguments)
+    with replacing(options.figure) as temporary:
         temporary.write_bytes(draw())
 
 

@@ -44,9 +44,9 @@ def heard(recordings: list[Measured], library: Library, block: dict) -> Heard:
         twin = recording.twin(library)
         images = rendered(recording.windows(twin), twin, Images.from_settings(block["images"]), block["size"])
         count, label = len(images), CATEGORIES.index(recording.record.label)
-        told = facts(np.full(count, label), [recording.name] * count, np.arange(count), np.zeros(count), "test")
+        about = facts(np.full(count, label), [recording.name] * count, np.arange(count), np.zeros(count), "test")
         if count:
-            pairs.append((recording, Windows(images, told)))
+            pairs.append((recording, Windows(images, about)))
     return pairs
 
 

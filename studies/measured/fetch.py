@@ -57,9 +57,9 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser("fetch.py", description=__doc__.splitlines()[0])
     line.add_argument("--out", required=True, type=Path, help="folder of the measured sets")
     line.add_argument("--sources", type=Path, default=SOURCES, help="addresses and checksums (.yaml)")
-    given = line.parse_args(arguments)
-    wanted = addresses(load_yaml(given.sources, "sources of recordings"))
-    fetch_each(wanted, lambda name: fetch(name, *wanted[name], given.out))
+    options = line.parse_args(arguments)
+    wanted = addresses(load_yaml(options.sources, "sources of recordings"))
+    fetch_each(wanted, lambda name: fetch(name, *wanted[name], options.out))
 
 
 if __name__ == "__main__":

@@ -98,21 +98,21 @@ def estimate(
 
 def main(arguments: list[str]) -> None:
     """Write a row of every overlay."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.measure.estimate", description=__doc__)
-    options.add_argument("--stages", required=True, help="stages.csv of a finished run")
-    options.add_argument("--costs", required=True, help="table of lowalt.measure.accuracy_cost (.csv)")
-    options.add_argument("--schema", required=True, help="schema of the configuration (.yaml)")
-    options.add_argument("--base", required=True, help="configuration on which the overlays lie (.yaml)")
-    options.add_argument("--overlays", nargs="+", required=True, help="configurations to estimate (.yaml)")
-    options.add_argument("--out", required=True, help="table to write (.csv)")
-    given = options.parse_args(arguments)
-    stages = read_csv(given.stages, "rule", "wall_s", "samples", "sample_bytes", "hardware")
-    costs = read_csv(given.costs, *COST_COLUMNS)
-    found = [
-        estimate(stages, costs, load([given.base, overlay], given.schema), Path(overlay).stem)
-        for overlay in given.overlays
+    line = argparse.ArgumentParser(prog="python -m lowalt.measure.estimate", description=__doc__)
+    line.add_argument("--stages", required=True, help="stages.csv of a finished run")
+    line.add_argument("--costs", required=True, help="table of lowalt.measure.accuracy_cost (.csv)")
+    line.add_argument("--schema", required=True, help="schema of the configuration (.yaml)")
+    line.add_argument("--base", required=True, help="configuration on which the overlays lie (.yaml)")
+    line.add_argument("--overlays", nargs="+", required=True, help="configurations to estimate (.yaml)")
+    line.add_argument("--out", required=True, help="table to write (.csv)")
+    options = line.parse_args(arguments)
+    stages = read_csv(options.stages, "rule", "wall_s", "samples", "sample_bytes", "hardware")
+    costs = read_csv(options.costs, *COST_COLUMNS)
+    rows = [
+        estimate(stages, costs, load([options.base, overlay], options.schema), Path(overlay).stem)
+        for overlay in options.overlays
     ]
-    write_csv(given.out, COLUMNS, found)
+    write_csv(options.out, COLUMNS, rows)
 
 
 if __name__ == "__main__":

@@ -149,12 +149,12 @@ def textured(cloud: Cloud, texture_db: float, tip: float, rng: np.random.Generat
         10 ** (texture_db / 10 * rng.standard_normal(len(cloud.points))) if texture_db else np.ones(len(cloud.points))
     )
     for rotor in cloud.parts_of("rotor") if tip else ():
-        mine = cloud.part == rotor
-        reach = radii(cloud, np.flatnonzero(mine))
-        gain[mine] *= (reach / reach.max()) ** tip
+        of_part = cloud.part == rotor
+        reach = radii(cloud, np.flatnonzero(of_part))
+        gain[of_part] *= (reach / reach.max()) ** tip
     for part in range(len(cloud.kinds)) if "node" not in cloud.kinds else ():
-        mine = cloud.part == part
-        gain[mine] /= gain[mine].mean()
+        of_part = cloud.part == part
+        gain[of_part] /= gain[of_part].mean()
     return replace(cloud, rcs_m2=cloud.rcs_m2 * gain)
 
 

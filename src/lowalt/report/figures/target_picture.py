@@ -105,16 +105,16 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
     motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
     aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
     signal = echo_signal(network, station, motion, cloud.rcs_m2, aim).signal
-    given = (station.frequency_hz, network.symbol_interval_s)
+    of_station = (station.frequency_hz, network.symbol_interval_s)
     for panel, (name, windows) in zip(panels, settings.items(), strict=False):
         kind = spectrum(name)
         if isinstance(kind, OfCells):
             continue
-        values = kind.definition(signal, windows, name, *given)
+        values = kind.definition(signal, windows, name, *of_station)
         values = values if kind.SIGNED else _decibel(values)
         half = windows.window / 2
         times = network.symbol_interval_s * np.array([half, half + windows.hop * values.shape[1]])
-        speeds = kind.speeds(windows, *given)
+        speeds = kind.speeds(windows, *of_station)
         scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
         if kind.SIGNED:
             top = float(abs(values).max()) or 1.0

@@ -21,13 +21,13 @@ BASE = "config/default.yaml"
 
 def versions() -> list[tuple[str, str]]:
     """Return (name, version) of Python and of every package of NAMES."""
-    found = [("Python", platform.python_version())]
+    rows = [("Python", platform.python_version())]
     for name in NAMES:
         try:
-            found.append((name, version(name)))
+            rows.append((name, version(name)))
         except PackageNotFoundError:
-            found.append((name, "not installed"))
-    return found
+            rows.append((name, "not installed"))
+    return rows
 
 
 def machines(run: ReportedRun) -> list[tuple[str, str]]:

@@ -23,8 +23,8 @@ def sentence(rows: list[dict[str, str]]) -> str:
     usual, most = min(pairs, key=lambda points: abs(points - USUAL)), max(pairs)
     exact, saved = pairs[usual]
     words = f"Exact costs {exact:.2f} ms a signal of {usual} points, and tolerances save at most {saved:.2f} ms of it"
-    more = "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
-    return f"{words}{more}" + (", so use exact." if saved < exact / 2 else ".")
+    of_the_largest = "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
+    return f"{words}{of_the_largest}" + (", so use exact." if saved < exact / 2 else ".")
 
 
 def values(run: ReportedRun) -> dict | None:
