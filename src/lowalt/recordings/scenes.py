@@ -11,7 +11,7 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
     texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
     beam           width_deg and floor_db of the antenna, which looks along +y (optional: all directions)
-    foils          patterns of foil, one drawn a sample; foil_reach: its end, as a share of the blade (both optional)
+    foils          patterns of foil, one drawn a sample (optional)
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
     second         share of samples with a second target of the same scene, and its level_db (optional)
@@ -119,8 +119,7 @@ def _of_one_target(
             cloud = sized(cloud, [value(scene["size"][axis], rng) for axis in ("width", "length", "height")])
         strength = {kind: value(setting, rng) for kind, setting in scene.get("strength_db", {}).items()}
         foils = scene.get("foils")
-        reach = value(scene.get("foil_reach", 1.0), rng)
-        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "", reach)
+        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "")
         cloud = textured(cloud, *(value(scene.get(key, 0.0), rng) for key in ("texture_db", "tip")), rng)
         margin = 2 * MARGIN * twin.symbol_interval_s
         times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz

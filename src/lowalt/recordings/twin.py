@@ -102,12 +102,11 @@ TORSO = ("root", "hipjoint", "back", "thorax", "neck", "head", "clavicle")
 LEGS = ("femur", "tibia", "foot", "toes")
 
 
-def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "", foil_reach: float = 1.0) -> Cloud:
+def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "") -> Cloud:
     """Return the cloud with the cross sections of some of its parts raised by decibels.
 
     strength_db: kind of part ("body", "rotor", "wing", "wheel"; of nodes "torso", "arms", "legs") -> dB; foil: a digit
-    for each blade, rotor by rotor, "1" for a blade with foil, raised by strength_db["foil"] from the hub to
-    `foil_reach` of its length.
+    for each blade, rotor by rotor, "1" for a blade with foil, raised by strength_db["foil"].
     Raises: InputError for an unknown kind, or a foil that does not fit the blades.
     """
     gain = np.zeros(len(cloud.points))
@@ -127,8 +126,7 @@ def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "", fo
         if len(foil) != len(blades) or set(foil) - set("01"):
             raise InputError(f"foil {foil!r}, expected one digit 0 or 1 for each of {len(blades)} blades")
         for digit, points in zip(foil, blades, strict=True):
-            covered = radii(cloud, points) <= foil_reach * radii(cloud, points).max()
-            gain[points] += strength_db["foil"] * (covered & (digit == "1"))
+            gain[points] += strength_db["foil"] * (digit == "1")
     return replace(cloud, rcs_m2=cloud.rcs_m2 * 10 ** (gain / 10))
 
 

@@ -46,7 +46,8 @@ def inspection_picture(inspection: Inspection, numbered: bool = False) -> bytes:
         panel.set(xlim=middle[across] + limits, ylim=middle[high] + limits, aspect="equal")
         panel.set(xlabel=f"the file's {'xyz'[across]} (m)", ylabel=f"the file's {'xyz'[high]} (m)")
         panel.grid(alpha=0.25)
-    words = f"{inspection.path.name}: unit {inspection.unit} ({inspection.unit_from}); guessed: up {inspection.up}, front {inspection.front}"
+    unit = f"unit {inspection.unit} ({inspection.unit_from})"
+    words = f"{inspection.path.name}: {unit}; guessed: up {inspection.up}, front {inspection.front}"
     figure.suptitle(
         words.replace("$", r"\$") + (", wings beyond the dashed lines" if inspection.category == "Bird" else "")
     )
