@@ -6,7 +6,7 @@ The order is that of the parts: antenna and mixer (wander, leak), noise of the m
 the amplifier's coupling capacitors (high pass), its supply rails (clipping).
 """
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 
 import numpy as np
 from scipy.signal import butter, sosfilt
@@ -43,11 +43,10 @@ class Receiver:
 
         Raises: InputError naming a missing or unknown key.
         """
-        full = {key: field.default for key, field in cls.__dataclass_fields__.items() if key in OPTIONAL} | block
-        return cls(*(float(value) for value in pick(full, *cls.__dataclass_fields__)))
+        defaults = {field.name: field.default for field in fields(cls) if field.default is not MISSING}
+        return cls(*map(float, pick(defaults | block, *(field.name for field in fields(cls)))))
 
 
-OPTIONAL = ("hum_lines", "highpass_hz", "clip_rms")
 ORDER = 2
 """Order of the high pass: two coupling capacitors."""
 
