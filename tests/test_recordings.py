@@ -9,11 +9,12 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.config.schema import BROUGHT
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings import coherent_intervals, read, read_record, symbol_rate
 from lowalt.recordings.channel import analytic
-from lowalt.recordings.record import SCHEMA, Record, record
+from lowalt.recordings.record import Record, record
 from lowalt.recordings.twin import CHANNELS
 
 RATE = 8000.0
@@ -131,7 +132,7 @@ def test_a_wrong_record_is_refused_by_key(tmp_path, change, words):
 
 
 def test_the_schema_of_records_has_the_words_of_the_code():
-    schema = load_yaml(SCHEMA)
+    schema = load_yaml(BROUGHT)["$defs"]["recording"]
     assert set(schema["properties"]) == {field.name for field in fields(Record)}
     assert schema["properties"]["label"]["enum"] == list(CATEGORIES)
     assert schema["properties"]["channel"]["enum"] == list(CHANNELS)

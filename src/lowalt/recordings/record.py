@@ -1,22 +1,19 @@
 """The record of a recording: a short YAML file with the facts that the samples do not hold.
 
-Its keys stand in `record.schema.yaml`, each with its unit and meaning.
+Its keys stand in the definition `recording` of `config/brought.schema.yaml`, each with its unit and meaning.
 """
 
-import functools
 from dataclasses import dataclass
 from pathlib import Path
 
-from lowalt.config.schema import faults
+from lowalt.config.schema import check_brought
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-
-SCHEMA = Path(__file__).with_name("record.schema.yaml")
 
 
 @dataclass(frozen=True)
 class Record:
-    """One recording: the keys of `record.schema.yaml`, `file` with its folder, None where left out."""
+    """One recording: the keys of a record, `file` with its folder, None where left out."""
 
     file: Path
     carrier_hz: float
@@ -39,21 +36,13 @@ class Record:
         return self.file.stem
 
 
-@functools.cache
-def _schema() -> dict:
-    """The schema of records."""
-    return load_yaml(SCHEMA, "schema of records")
-
-
 def record(block: dict, folder: Path, where: str) -> Record:
     """Return the record in a mapping; its file is relative to `folder`.
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
     block = {key: value for key, value in block.items() if value is not None}
-    wrong = faults(block, _schema(), "record")
-    if wrong:
-        raise InputError(f"{where}: {wrong[0]}")
+    check_brought("recording", block, where)
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":
         for key in ("moves", "layout"):
