@@ -19,15 +19,10 @@ def overview(name: str, facts: dict[str, dict], page: str | None) -> dict:
     them; page: address of its report, None where it has none.
     """
     accuracy, sizes = facts["accuracy_percent"], facts["data"]
-    best = {
-        protocol: max((value, scheme) for scheme, value in schemes.items())
-        for protocol in ("seen", "unseen")
-        if (
-            schemes := {
-                key.partition(" ")[2]: value for key, value in accuracy.items() if key.startswith(f"{protocol} ")
-            }
-        )
-    }
+    best: dict[str, tuple[float, str]] = {}
+    for key, value in accuracy.items():
+        protocol, _, scheme = key.partition(" ")
+        best[protocol] = max(best.get(protocol, (value, scheme)), (value, scheme))
     return {
         "name": name, "page": page, "samples": sizes.get("samples", ""),
         "gigabytes": f"{sizes['bytes'] / 1e9:.3f}" if "bytes" in sizes else "",
