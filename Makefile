@@ -87,15 +87,8 @@ data: $(BASE)  ## the default's data set only, no training
 real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 	LOWALT_INPUTS="$$INPUTS" $(SNAKEMAKE) --configfile config/real.yaml
 
-# Twice gives equal bytes. Of the recordings only those of vehicles have a licence, so only their picture is kept in git.
-measured: $(SETUP)  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
-	for step in pairs compare; do $(BIN)/python -m lowalt.recordings $$step --inputs "$$INPUTS" --out results/measured || exit 1; done
-	$(BIN)/python -m lowalt.recordings recognise --inputs "$$INPUTS" --out results/measured --models results/measured/models
-	$(BIN)/python -m lowalt.recordings ablate --inputs "$$INPUTS" --out results/measured --models results/measured/models/ablation
-	$(BIN)/python -m lowalt.report.measured --pairs results/measured --tables results/measured --page results/measured/report.html
-	cp results/measured/measured-*.csv results/reference/
-	for pair in measured-vehicle.png:results/reference/ measured-short.png:design/pictures/measured.png; do \
-	  if [ -f results/measured/$${pair%%:*} ]; then cp results/measured/$${pair%%:*} $${pair##*:}; fi; done
+measured:  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
+	$(MAKE) --no-print-directory study NAME=measured
 
 ready: $(BYTECODE) $(KERNELS)
 
@@ -144,12 +137,12 @@ reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	for table in cost accuracy_cost; do cp results/default/$$table.csv results/reference/default-$$table.csv 2>/dev/null || true; done
 	$(BIN)/python -m lowalt.report.figures.cost_plots echo --table results/reference/default-cost.csv --figure design/pictures/cost.svg
 	$(BIN)/python -m lowalt.report.figures.cost_plots recognition --table results/reference/default-accuracy_cost.csv --figure design/pictures/accuracy_cost.svg
-	$(BIN)/python -m lowalt.report.documents docs/results.md presets=results/reference/default-
+	$(BIN)/python docs/filled_tables.py docs/results.md presets=results/reference/default-
 	for run in default tiny; do test ! -e results/$$run/shards || \
 		$(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
-	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
+	$(BIN)/python -m lowalt.measure.estimate --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
-	$(BIN)/python -m lowalt.report.figures.cover results/default/shards/index.json design/pictures/tiles.png
+	$(BIN)/python docs/tiles_picture.py results/default/shards/index.json design/pictures/tiles.png
 
 # The picture of a sample is made by the command that its page shows.
 docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error

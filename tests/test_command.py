@@ -18,20 +18,13 @@ echo.__main__: --settings, --motion, --clouds, --station, --out
 scene.__main__: --settings, --motion, --clouds, --station, --out, --power
 measure.accuracy_cost: --settings, --predictions, --speeds, --data-jobs, --index, --presets, --out
 measure.echo_cost: --settings, --clouds, --out
-measure.scale: --stages, --costs, --schema, --base, --overlays, --out
+measure.estimate: --stages, --costs, --schema, --base, --overlays, --out
 motion.__main__: --settings, --clouds, --group, --first, --count, --out
 noise.__main__: --settings, --motion, --echoes, --out
-recordings.__main__ ablate: --out, --inputs, --models
-recordings.__main__ compare: --out, --inputs
 recordings.__main__ import: --out, --record, --radar
 recordings.__main__ keep: --out, --models
-recordings.__main__ pairs: --out, --inputs
-recordings.__main__ recognise: --out, --inputs, --models
-recordings.download: --out
 report.__main__: --settings, --manifest, --stages, --figures, --out
 report.figures.cost_plots: plot, --table, --figure
-report.figures.house: --figure
-report.measured: --pairs, --tables, --page
 shards.__main__ index: --settings, --shards, --out
 shards.__main__ write: --settings, --motion, --fold, --out
 shards.build: --config, --out

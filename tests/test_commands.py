@@ -19,7 +19,7 @@ from lowalt.config.layers import load, load_yaml, plain
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.shipped import located
 from lowalt.recognition import one_sample, runs
-from lowalt.report.figures.sample import axes_of
+from lowalt.report.figures.tile_axes import axes_of
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from trainings import train, with_training, write_views

@@ -14,7 +14,7 @@ from lowalt.commands import spectra, workflow
 from lowalt.commands.command_line import as_json
 from lowalt.config.layers import load, plain
 from lowalt.files.atomic import replacing
-from lowalt.report.figures import inspection, target
+from lowalt.report.figures import mesh_picture, target_picture
 from lowalt.scene.effects import PLACES
 from lowalt.tiles.render import Renderer
 from lowalt.workflow.board import Board, Job
@@ -132,8 +132,8 @@ def test_targets_answer_from_mesh_to_picture(answer, tmp_path, monkeypatch):
     craft(False, 1000).export(tmp_path / "craft.stl")
     monkeypatch.chdir(tmp_path)
     # The pictures have tests of their own.
-    monkeypatch.setattr(inspection, "inspection_picture", lambda found: b"picture")
-    monkeypatch.setattr(target, "target_picture", lambda cloud: b"picture")
+    monkeypatch.setattr(mesh_picture, "inspection_picture", lambda found: b"picture")
+    monkeypatch.setattr(target_picture, "target_picture", lambda cloud: b"picture")
     found, status = answer("target", "inspect", "craft.stl")
     assert status == 0 and len(found["components"]) == 5 and found["triangles"] == 60
     assert Path(found["picture"]).is_file()

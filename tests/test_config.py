@@ -12,7 +12,7 @@ from lowalt.files import yaml_files
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.motion import COLUMNS
-from lowalt.report.stages import COLUMNS as STAGE_COLUMNS
+from lowalt.report.stage_times import COLUMNS as STAGE_COLUMNS
 from lowalt.workflow.sources import PACKAGE, sources
 
 ROOT = Path(__file__).parent.parent

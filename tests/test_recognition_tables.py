@@ -12,7 +12,7 @@ from lowalt.recognition import orderings, predictions, samples, schemes, tables,
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
-from lowalt.report.tables import macro_f1 as in_words
+from lowalt.report.pivots import macro_f1 as in_words
 from made_predictions import read_rows, run_files
 
 SNRS = (3.0, np.inf)

@@ -1,16 +1,21 @@
 """Recordings in: every format gives the same samples, bad files are refused by name, rates and tones come out right."""
 
 import struct
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.schema import BROUGHT
 from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings import coherent_intervals, read, read_record, symbol_rate
 from lowalt.recordings.channel import analytic
-from lowalt.recordings.record import record
+from lowalt.recordings.record import Record, record
+from lowalt.recordings.twin import CHANNELS
 
 RATE = 8000.0
 BASE = {"carrier_hz": 24.0e9, "source": "made here", "licence": "MIT"}
@@ -112,17 +117,25 @@ def test_damaged_and_unknown_files_are_refused_by_name(tmp_path):
 @pytest.mark.parametrize(
     "change, words",
     [
-        ({"channel": "stereo"}, r"channel is 'stereo', expected one of"),
-        ({"carrier_hz": -1}, r"carrier_hz is -1, expected a positive number"),
-        ({"colour": 1}, r"unknown keys \['colour'\]"),
-        ({"label": "Fish"}, r"label is 'Fish', expected one of"),
-        ({"columns": [0, 0]}, r"columns is \[0, 0\]"),
-        ({"moves": "away"}, r"real channel has no sign of Doppler"),
+        ({"channel": "stereo"}, r"here: channel: value 'stereo', expected one of"),
+        ({"carrier_hz": -1}, r"carrier_hz: value -1, expected more than 0"),
+        ({"colour": 1}, r"unknown key\(s\) \['colour'\]"),
+        ({"label": "Fish"}, r"label: value 'Fish', expected one of"),
+        ({"columns": [0, 0]}, r"columns: value \[0, 0\], expected every item once"),
+        ({"columns": [0, 1]}, r"columns is \[0, 1\], expected one for channel 'real'"),
+        ({"moves": "away"}, r"moves is 'away', expected channel 'complex' with it"),
     ],
 )
 def test_a_wrong_record_is_refused_by_key(tmp_path, change, words):
     with pytest.raises(InputError, match=words):
         entry(tmp_path, "x.wav", **{"channel": "real", **change})
+
+
+def test_the_schema_of_records_has_the_words_of_the_code():
+    schema = load_yaml(BROUGHT)["$defs"]["recording"]
+    assert set(schema["properties"]) == {field.name for field in fields(Record)}
+    assert schema["properties"]["label"]["enum"] == list(CATEGORIES)
+    assert schema["properties"]["channel"]["enum"] == list(CHANNELS)
 
 
 def test_a_record_file_says_where_its_samples_are(tmp_path):

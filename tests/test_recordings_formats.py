@@ -63,14 +63,14 @@ def test_cut_and_unknown_raw_files_are_refused(tmp_path):
 
 @pytest.mark.parametrize("key, value", [("layout", "qiqi"), ("dtype", "object"), ("trust", "file")])
 def test_unknown_layouts_types_and_trust_are_refused(tmp_path, key, value):
-    with pytest.raises(InputError, match=f"here: {key} is '{value}', expected one of"):
+    with pytest.raises(InputError, match=f"here: {key}: value '{value}', expected one of"):
         entry(tmp_path, "a.iq", **{key: value})
 
 
 def test_contradictions_of_a_record_are_refused(tmp_path):
     with pytest.raises(InputError, match="layout is 'iqiq', expected channel 'complex'"):
         entry(tmp_path, "a.iq", "real", layout="iqiq")
-    with pytest.raises(InputError, match="trust is 'record', but rate_hz is missing"):
+    with pytest.raises(InputError, match="expected trust together with rate_hz"):
         entry(tmp_path, "a.wav", trust="record", rate_hz=None)
 
 

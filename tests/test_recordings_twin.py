@@ -7,14 +7,10 @@ import pytest
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
-from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings import figures, kinds
 from lowalt.recordings.courses import hover, straight, to_and_fro
-from lowalt.recordings.library import Library
 from lowalt.recordings.presence import present
 from lowalt.recordings.receiver import Receiver, received
-from lowalt.recordings.scenes import clouds_of, heard, samples, stretch
-from lowalt.recordings.sets import halves, recordings
+from lowalt.recordings.scenes import MARGIN, clouds_of, heard, samples, stretch
 from lowalt.recordings.twin import Twin, beam_gain, blade_points, echo, still_row, strengthened, textured
 from lowalt.targets.records import load_records
 
@@ -50,17 +46,28 @@ HOVER = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("foil, times", [("10000000", 1), ("11000000", 2), ("11111111", 2)])
-def test_foil_on_one_blade_of_two_halves_the_spacing_of_the_lines(records, foil, times):
+def powers(signal, rate_hz):
+    """Frequencies (Hz) and powers of a signal without its mean, Hann window."""
+    power = np.abs(np.fft.fft((signal - signal.mean()) * np.hanning(len(signal)))) ** 2
+    return np.fft.fftfreq(len(signal), 1 / rate_hz), power
+
+
+@pytest.mark.parametrize("foil, all_lines", [("10000000", True), ("11000000", False), ("11111111", False)])
+def test_foil_on_one_blade_of_two_halves_the_spacing_of_the_lines(records, foil, all_lines):
     scene = {**HOVER, "strength_db": {"rotor": -20.0, "foil": 40.0}, "foils": [foil]}
-    found = signal(records, TWIN, scene, 1.2)
-    assert figures.line_spacing_hz(found - found.mean(), 5000.0, 60.0, 500.0) == pytest.approx(times * 161.0, abs=3)
+    frequency, power = powers(signal(records, TWIN, scene, 1.2), 5000.0)
+    turns = frequency / 161.0
+    line = np.abs(turns - np.rint(turns)) < 0.02
+    odd, even = (power[line & (np.rint(turns) % 2 == rest) & (turns > 0.5)].sum() for rest in (1, 0))
+    assert (odd > 0.1 * even) == all_lines and (odd < 1e-3 * even) != all_lines
 
 
 def test_the_doppler_edge_is_the_blade_tip_speed(records, quadrotor):
     scene = {**HOVER, "strength_db": {"body": -40.0}, "tip": 6.0}
-    spec = {"window": 256, "hop": 16, "slowest_mps": 2.0, "spacing_hz": [60.0, 500.0]}
-    edge = kinds.rotor_figures(signal(records, TWIN, scene, 0.5), 5000.0, SPEED_OF_LIGHT / 3.3e9, spec)["edge_mps"]
+    frequency, power = powers(signal(records, TWIN, scene, 0.5), 5000.0)
+    order = np.argsort(abs(frequency))
+    share = np.cumsum(power[order]) / power.sum()
+    edge = abs(frequency[order])[np.searchsorted(share, 0.95)] * SPEED_OF_LIGHT / 3.3e9 / 2
     blade = blade_points(quadrotor)[0]
     reach = np.hypot(*(quadrotor.points[blade] - quadrotor.hinges[quadrotor.part[blade[0]]])[:, :2].T).max()
     assert edge == pytest.approx(2 * np.pi * 161.0 * reach, rel=0.12)
@@ -72,18 +79,15 @@ def test_a_car_that_drives_past_shows_the_cosine_of_its_aspect(records):
         "subtypes": ["Audi A6L 2019"], "course": "pass", "lateral_m": 4.0, "ahead_m": 10.0, "height_m": 0.0,
         "speed_mps": 8.0, "receiver": QUIET, "strength_db": {"wheel": -40.0},
     }  # fmt: skip
-    found = signal(records, twin, scene, 1.5)
-    times, frequency, shown = figures.spectrogram(found, 4000.0, 512, 128)
-    keep = frequency > 0
-    speeds = frequency[keep] * SPEED_OF_LIGHT / 24.0e9 / 2
-    line = figures.tracks(shown[keep], speeds, 0.5)["line"]
-    along = 10.0 + 8.0 * (times + 40 * 2.5e-4)
+    received_signal = signal(records, twin, scene, 1.5)
+    starts = np.arange(0, len(received_signal) - 512, 128)
+    spectra = [powers(received_signal[start : start + 512], 4000.0) for start in starts]
+    line = np.array([frequency[power.argmax()] for frequency, power in spectra]) * SPEED_OF_LIGHT / 24.0e9 / 2
+    along = 10.0 + 8.0 * (starts + 256 + MARGIN) * 2.5e-4
     wanted = 8.0 * along / np.hypot(along, 4.0)
     # The car is 5 m long, and its near end is the strong one: half its length shifts the aspect.
     nearer = 8.0 * (along - 2.5) / np.hypot(along - 2.5, 3.0)
     assert (np.abs(line - (wanted + nearer) / 2) < 0.6).all()
-    spec = {"window": 512, "hop": 128, "slowest_mps": 2.0}
-    assert kinds.drive_figures(found, 4000.0, SPEED_OF_LIGHT / 24.0e9, spec)["speed_mps"] == pytest.approx(7.9, abs=0.3)
 
 
 def test_a_walker_turns_back_and_the_steps_keep_to_the_ground_covered():
@@ -169,22 +173,6 @@ def test_the_receiver_adds_as_much_as_set():
     assert np.isrealobj(received(echoes, 5000.0, Receiver.from_settings(settings), True, rng))
 
 
-def test_figures_of_known_signals():
-    time = np.arange(400)
-    tone = np.exp(2j * np.pi * 0.125 * time)
-    found = figures.interval_figures(tone, 10.0, "both")
-    assert found["line_mps"] == pytest.approx(2.5)
-    assert found["edge_mps"] == pytest.approx(2.5, abs=0.15)
-    noise = np.random.default_rng(0).standard_normal((2, 400))
-    white = figures.interval_figures(noise[0] + 1j * noise[1], 10.0, "both")
-    assert found["entropy"] < 0.3 < 0.85 < white["entropy"]
-    assert found["kurtosis"] > 30 > 5 > white["kurtosis"]
-    # Above half the symbol rate a one-sided real channel means speeds beyond the edge.
-    assert figures.interval_figures(tone.conj(), 10.0, "wrapped")["line_mps"] == pytest.approx(17.5)
-    beats = (1 + np.cos(2 * np.pi * np.arange(2000) / 50)) * np.ones((3, 1))
-    assert figures.cycle_s(beats, 0.01, 0.2, 1.8) == pytest.approx(0.5, abs=0.011)
-
-
 def test_intervals_without_a_target_are_left_out():
     rng = np.random.default_rng(0)
     intervals = 0.01 * (rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400)))
@@ -197,26 +185,3 @@ def test_intervals_without_a_target_are_left_out():
     slow = replace(looking, slowest_mps=10.0)
     intervals[25:35] += np.exp(2j * np.pi * 0.001 * np.arange(400))
     assert present(intervals, slow).nonzero()[0].tolist() == list(range(10, 20))
-
-
-def test_the_committed_configuration_is_whole_and_its_halves_share_no_file():
-    library = Library.read("config/measured/twins.yaml")
-    sets = load_yaml("config/measured/sets.yaml")
-    assert sorted(name for names in library.sets.values() for name in names) == sorted(sets)
-    split = halves("config/measured/split.yaml")
-    assert set(split) == set(sets)
-    for block in split.values():
-        assert block["tuning"] and block["test"] and not set(block["tuning"]) & set(block["test"])
-    for pair in load_yaml("config/measured/pictures.yaml")["pairs"].values():
-        assert pair["file"] in split[pair["set"]]["tuning"]
-        Twin.from_settings(pair["radar"])
-
-
-def test_files_of_a_set_that_came_later_are_test_files(tmp_path):
-    (tmp_path / "walker_24ghz").mkdir()
-    for name in ("PCM2900_Best_Walking_Data.wav", "tomorrow.wav"):
-        (tmp_path / "walker_24ghz" / name).write_bytes(b"")
-    found = recordings(tmp_path, "config/measured/sets.yaml", "config/measured/split.yaml")
-    assert {one.name: one.half for one in found} == {"PCM2900_Best_Walking_Data.wav": "tuning", "tomorrow.wav": "test"}
-    with pytest.raises(InputError, match="no recordings of"):
-        recordings(tmp_path / "walker_24ghz", "config/measured/sets.yaml", "config/measured/split.yaml")

@@ -1,23 +1,23 @@
-"""A recording nobody has seen: a WAV and five lines become spectra, tiles and a prediction, in mono or stereo.
-
-Files of the public sets that came later, and folders that are no set yet, go through without a change of the code.
-"""
+"""A recording nobody has seen: a WAV and five lines become spectra, tiles, a shard and a prediction."""
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 from scipy.io import wavfile
 
 from lowalt.__main__ import main as lowalt
-from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
+from lowalt.recordings import read_record
 from lowalt.recordings.__main__ import main
 from lowalt.recordings.library import Library
-from lowalt.recordings.sets import measured_intervals, recordings, usable
+from lowalt.recordings.windows import spectra, write
+from lowalt.shards import ShardSet, faults
 
 SECONDS = 1.3
 CARRIER = 24.0e9
@@ -56,34 +56,20 @@ def test_a_wav_and_five_lines_become_spectra_and_tiles(tmp_path, rate, stereo):
 def network(tmp_path_factory):
     """A network of the 24 GHz radar, trained for two steps on its twin and kept as the zoo keeps its own."""
     folder = tmp_path_factory.mktemp("network")
-    (folder / "inputs/vehicle_24ghz").mkdir(parents=True)
-    drive(folder / "inputs/vehicle_24ghz", 22050, True, label="Vehicle")
     block = load_yaml("config/measured/recognition.yaml")
     block |= {"size": 24, "echoes": {"train": 2, "validation": 1}, "receivers": 1, "seeds": [0]}
     block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
     (folder / "recognition.yaml").write_text(yaml.safe_dump(block))
     twins = load_yaml("config/measured/twins.yaml")
-    del twins["twins"]["uav_3ghz"]
+    twins["twins"] = {"cw_24ghz": twins["twins"]["cw_24ghz"]}
     for block in (twins, *twins["twins"].values()):
         for scene in (scene for scenes in block["scenes"].values() for scene in scenes):
             scene["subtypes"] = scene["subtypes"][:1]
     (folder / "twins.yaml").write_text(yaml.safe_dump(twins))
-    shared = [
-        "--twins",
-        str(folder / "twins.yaml"),
-        "--recognition",
-        str(folder / "recognition.yaml"),
-        "--models",
-        str(folder / "models"),
-        "--out",
-    ]
-    main(["recognise", "--inputs", str(folder / "inputs"), *shared, str(folder), "--jobs", "1"])
-    assert [row["file"] for row in read_csv(folder / "measured-recognition.csv")] == ["drive.wav"] * 2
-    main(["keep", *shared, str(folder / "zoo")])
-    # The radar without a recording gets a network of its own.
-    assert {path.name for path in (folder / "zoo").iterdir()} == {
-        f"{name}.{kind}" for name in ("bird_drone_10ghz", "cw_24ghz") for kind in ("md", "safetensors")
-    }
+    options = {"twins": folder / "twins.yaml", "recognition": folder / "recognition.yaml", "models": folder / "models",
+               "out": folder / "zoo"}  # fmt: skip
+    main(["keep", *(word for name, value in options.items() for word in (f"--{name}", str(value)))])
+    assert {path.name for path in (folder / "zoo").iterdir()} == {"cw_24ghz.md", "cw_24ghz.safetensors"}
     return folder / "zoo/cw_24ghz.safetensors"
 
 
@@ -123,77 +109,37 @@ def test_swapped_channels_are_refused_where_the_direction_is_known(tmp_path):
     main([*call, str(drive(tmp_path, 22050, True, swapped=True))])
 
 
-def test_a_record_next_to_a_new_file_goes_before_the_sets_pattern(tmp_path):
-    folder = tmp_path / "vehicle_24ghz"
-    folder.mkdir()
-    drive(folder, 22050, True, label="Pedestrian")
-    (one,) = recordings(tmp_path, "config/measured/sets.yaml", "config/measured/split.yaml")
-    assert (one.name, one.half, one.record.label, one.record.channel) == ("drive.wav", "test", "Pedestrian", "complex")
-    drive(folder, 22050, True)
-    with pytest.raises(InputError, match=r"drive.yaml: no label, expected one of"):
-        recordings(tmp_path, "config/measured/sets.yaml", "config/measured/split.yaml")
-
-
-SETS, SPLIT = "config/measured/sets.yaml", "config/measured/split.yaml"
-
-
-def volts(folder, name, rate, seconds=1.0):
-    """Write a CSV of the set at 10 GHz: volts and sample times."""
-    folder.mkdir(exist_ok=True)
-    time = np.arange(round(rate * seconds)) / rate
-    wave = np.sin(2 * np.pi * 60.0 * time) + 0.01 * np.random.default_rng(1).standard_normal(len(time))
-    rows = np.stack([wave, time], axis=1)
-    np.savetxt(folder / name, rows, delimiter=",", header="V,timestamps", comments="", fmt="%.9g")
-
-
-def test_later_files_of_a_set_may_have_another_rate_and_bad_ones_are_left_out_by_name(tmp_path, capsys):
-    folder = tmp_path / "bird_drone_10ghz"
-    volts(folder, "bird99.csv", 10000)
-    volts(folder, "bird98.csv", 20000)
-    volts(folder, "DRONE97.CSV", 10000)
-    volts(folder, "bird96.csv", 8000)
-    volts(folder, "bird95.csv", 10000, seconds=0.2)
-    volts(folder, "quadcopter.csv", 10000)
-    twin = Library.read("config/measured/twins.yaml").twins["bird_drone_10ghz"]
-    found = usable(recordings(tmp_path, SETS, SPLIT), {"bird_drone_10ghz": twin})
-    assert {one.name: one.record.label for one in found} == {
-        "bird99.csv": "Bird", "bird98.csv": "Bird", "DRONE97.CSV": "UAV",
-    }  # fmt: skip
-    assert {one.half for one in found} == {"test"}
-    for one in found:
-        # 60 Hz stand at 60 Hz, whichever of the set's rates the file has.
-        power = np.abs(np.fft.fft(measured_intervals(one, twin)[0])) ** 2
-        assert power.argmax() / len(power) * 1000.0 == pytest.approx(60.0, abs=2.5)
-    told = capsys.readouterr().err
-    assert "quadcopter.csv: left out" in told
-    assert "bird96.csv: wrong rate" in told and "bird95.csv: 200 symbols, shorter than one window" in told
-    with pytest.raises(InputError, match="none of 1 recordings can be used"):
-        usable(
-            [one for one in recordings(tmp_path, SETS, SPLIT) if one.name == "bird95.csv"], {"bird_drone_10ghz": twin}
-        )
-
-
-def test_the_carrier_stands_in_the_name_of_later_files(tmp_path):
-    folder = tmp_path / "uav_3ghz"
-    folder.mkdir()
-    for name in ("DJI_Hovering_on_Rotors_Foil_10000000__Freq_3.400__Sample_2.mat", "renamed.mat"):
-        (folder / name).write_bytes(b"")
-    found = {one.name: one.record.carrier_hz for one in recordings(tmp_path, SETS, SPLIT)}
-    assert sorted(found.values()) == [3.3e9, 3.4e9] and found["renamed.mat"] == 3.3e9
-
-
-def test_a_folder_that_is_no_set_becomes_one_by_a_file(tmp_path, capsys):
-    (tmp_path / "buses").mkdir()
-    drive(tmp_path / "buses", 22050, False)
-    (tmp_path / "buses/drive.yaml").unlink()
-    with pytest.raises(InputError, match="no recordings of"):
-        recordings(tmp_path, SETS, SPLIT)
-    assert "buses: left out, no set of that name and no set.yaml in it" in capsys.readouterr().err
-    own = tmp_path / "buses/set.yaml"
-    line = '{file: "*.wav", carrier_hz: 24.0e+9, channel: real, label: Vehicle, source: made here, licence: MIT}'
-    own.write_text(f"like: vehicle_24ghz\nfiles:\n  - {line}\n")
-    (one,) = recordings(tmp_path, SETS, SPLIT)
-    assert (one.set, one.like, one.half, one.name) == ("buses", "vehicle_24ghz", "test", "drive.wav")
-    own.write_text(f"like: aircraft_77ghz\nfiles:\n  - {line}\n")
-    with pytest.raises(InputError, match=r"set\.yaml: expected files, a list of records, and like, one of"):
-        recordings(tmp_path, SETS, SPLIT)
+def test_a_recording_becomes_signals_spectra_tiles_and_a_shard_of_its_own(tmp_path):
+    rate = 48000
+    time = np.arange(rate) / rate
+    # 10 m/s away from a radar at 24 GHz, and a little noise.
+    sound = 0.5 * np.cos(2 * np.pi * 1601.0 * time) + 1e-3 * np.random.default_rng(0).standard_normal(rate)
+    wavfile.write(tmp_path / "drive.wav", rate, sound.astype(np.float32))
+    (tmp_path / "drive.yaml").write_text(
+        "file: drive.wav\ncarrier_hz: 24.0e+9\nchannel: real\nlabel: Vehicle\nsource: made here\nlicence: MIT\n"
+    )
+    record, twin = read_record(tmp_path / "drive.yaml"), Library.read("config/measured/twins.yaml").twins["cw_24ghz"]
+    images = load_yaml("config/default.yaml")["images"]
+    count = write(record, twin, images, tmp_path / "out")
+    signals = np.load(tmp_path / "out/signals.npy")
+    assert signals.shape == (count, 1200) == (2, 1200) and signals.dtype == np.complex64
+    shown = np.load(tmp_path / "out/spectra.npz")
+    np.testing.assert_array_equal(shown["vrp"], spectra(signals[:1], twin)["vrp"][0])
+    # Above half the symbol rate: 1601 Hz at 3000 symbols/s stands at -1399 Hz.
+    row = int(shown["vrp"].mean(axis=1).argmax())
+    assert (row - 128) * 3000 / 256 == pytest.approx(-1399, abs=6)
+    shards = ShardSet(tmp_path / "out/shards/index.json")
+    assert len(shards) == count and set(shards.labels.tolist()) == {2}
+    # A data card is for data sets: everything else of the shard is whole.
+    assert all("SHA256SUMS" in line for line in faults(shards.index_path))
+    tile = np.asarray(Image.open(tmp_path / "out/tiles/000000.png"))
+    found = next(number for number in range(count) if shards.record(number)["model"] == 0)
+    np.testing.assert_array_equal(shards.tile(found), tile)
+    assert tile.shape == (256, 768)
+    entry = shards.record(found)
+    assert entry["fold"] == "test" and entry["geometry"]["A"]["range_m"] is None and entry["motion"]["x_m"] is None
+    quiet = tmp_path / "noise.yaml"
+    quiet.write_text((tmp_path / "drive.yaml").read_text().replace("channel: real", "channel: complex"))
+    with pytest.raises(InputError, match="expected one complex or two"):
+        write(read_record(quiet), replace(twin, channel="complex", sampling="bare"), images, tmp_path / "none")
+    assert not (tmp_path / "none").exists()

@@ -1,14 +1,14 @@
 """What accuracy costs in time, as the page says it: the sentence of the echo, the figures and the presets."""
 
 import pytest
+from filled_tables import presets
 
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.measure import accuracy_cost, echo_cost
-from lowalt.report.documents import presets
 from lowalt.report.figures import cost_plots
 from lowalt.report.page import rendered
-from lowalt.report.sections import accuracy_cost as recognition
-from lowalt.report.sections.echo_cost import sentence
+from lowalt.report.sections import recognition_cost
+from lowalt.report.sections.simulation_cost import sentence
 
 
 def echo_rows(**tolerances):
@@ -62,7 +62,7 @@ def test_the_band_spans_what_cannot_be_told_apart_and_names_rise_along_the_front
 
 def test_presets_stand_by_their_time_with_interval_and_command():
     inputs = type("Held", (), {"own_or_kept": lambda *_: "accuracy_cost", "table": lambda *_: PRESETS})()
-    text = rendered("accuracy_cost", recognition.values(type("Run", (), {"inputs": inputs})()))
+    text = rendered("recognition_cost", recognition_cost.values(type("Run", (), {"inputs": inputs})()))
     places = [text.index(f"{name}: <code>") for name in ("quick", "default", "best")]
     assert places == sorted(places) and "<td>100 + 100</td><td>90.0 (80.0 to 97.0)</td>" in text
     assert "large (timed only)" in text

@@ -7,7 +7,7 @@ import pytest
 
 from lowalt.report.inputs import FILES, KEPT, Inputs
 from lowalt.report.page import PARTS, assembled, rendered
-from lowalt.report.sections import accuracy_cost, echo_cost
+from lowalt.report.sections import recognition_cost, simulation_cost
 from pages import browsed, sound
 
 TABLE = """<table><caption>Sizes</caption><thead><tr><th scope="col">name</th><th scope="col">size</th></tr></thead>
@@ -25,7 +25,7 @@ def kept():
 
 def test_a_run_without_own_costs_shows_the_kept_ones_and_says_so(kept):
     parts = []
-    for name, section in {"echo_cost": echo_cost, "accuracy_cost": accuracy_cost}.items():
+    for name, section in {"simulation_cost": simulation_cost, "recognition_cost": recognition_cost}.items():
         text = rendered(name, section.values(kept))
         assert "This run did not measure it" in " ".join(text.split()) and "make " in text
         parts.append({"id": name, "title": name, "html": text})
@@ -37,7 +37,7 @@ def test_a_run_s_own_table_goes_before_the_kept_one(kept):
     own = Inputs(kept.inputs.files | {"accuracy_cost": kept.inputs.files["kept_accuracy_cost"]})
     assert kept.inputs.own_or_kept("accuracy_cost") == "kept_accuracy_cost"
     assert own.own_or_kept("accuracy_cost") == "accuracy_cost" and own.own_or_kept("transfer") is None
-    text = " ".join(rendered("accuracy_cost", accuracy_cost.values(SimpleNamespace(inputs=own))).split())
+    text = " ".join(rendered("recognition_cost", recognition_cost.values(SimpleNamespace(inputs=own))).split())
     assert "This run measured it on " in text and "did not" not in text
 
 

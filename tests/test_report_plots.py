@@ -9,8 +9,8 @@ import pytest
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures import accuracy_plots, cost_plots
 from lowalt.report.page import assembled
+from lowalt.report.pivots import by_scheme, confusion
 from lowalt.report.plots import Plot, plotted, svg, whole, write_plots
-from lowalt.report.tables import by_scheme, confusion
 from pages import browsed, sound
 
 REFERENCE = "results/reference/default"

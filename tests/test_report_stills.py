@@ -7,8 +7,9 @@ import numpy as np
 from craft import craft, row
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report.figures.motion_strip import motion_strip, strip_rows
+from lowalt.report.figures.motion_strip import strip_figure, strip_rows
 from lowalt.report.figures.stills import cloud_points, write_stills
+from lowalt.report.figures.style import png
 
 
 def test_tables_hold_every_point_that_is_drawn():
@@ -25,7 +26,7 @@ def test_tables_hold_every_point_that_is_drawn():
 
 def test_files_repeat_and_the_svg_of_clouds_holds_their_picture(tmp_path):
     cloud, moving = craft(), {**row(0), "category": "UAV"}
-    picture = motion_strip([cloud], [moving])
+    picture = png(strip_figure([cloud], [moving]))
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         write_stills(tmp_path / name, [cloud], picture, [moving])

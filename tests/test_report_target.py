@@ -8,7 +8,7 @@ from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgba
 
 from craft import craft
-from lowalt.report.figures import inspection, target
+from lowalt.report.figures import mesh_picture, target_picture
 from lowalt.targets.guesses import Component
 from lowalt.targets.inspection import Inspection
 
@@ -41,7 +41,7 @@ def test_an_inspection_shows_each_plane_at_one_scale_and_what_may_move_in_colour
     found = Inspection(
         Path("a$b.obj"), "in", "given", low, high, 4, "z", "y", [], parts, "Vehicle", points, np.array([7, 2, 5, 7])
     )
-    figure = drawn(inspection, "inspection_picture", found)
+    figure = drawn(mesh_picture, "inspection_picture", found)
     assert tuple(figure.get_size_inches()) == (14, 5)
     assert figure.get_suptitle() == r"a\$b.obj: unit in (given); guessed: up z, front y"
     for panel, (across, high_axis) in zip(figure.axes, [(0, 1), (1, 2), (0, 2)], strict=True):
@@ -71,7 +71,7 @@ def test_an_inspected_bird_has_its_shoulders_marked_on_both_sides(drawn):
     found = Inspection(
         Path("crow.stl"), "m", "given", low, high, 1, "z", "y", [], [], "Bird", points, np.zeros(len(points), int)
     )
-    figure = drawn(inspection, "inspection_picture", found)
+    figure = drawn(mesh_picture, "inspection_picture", found)
     assert 0.1 < found.shoulder_m < 0.15
     sides = [3.0 - found.shoulder_m, 3.0 + found.shoulder_m]
     top, side, front = figure.axes
@@ -82,17 +82,17 @@ def test_an_inspected_bird_has_its_shoulders_marked_on_both_sides(drawn):
 
 
 def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monkeypatch):
-    monkeypatch.setattr(target, "_motion_row", lambda *given: {})
-    monkeypatch.setattr(target, "_spectra", lambda *given: None)
+    monkeypatch.setattr(target_picture, "_motion_row", lambda *given: {})
+    monkeypatch.setattr(target_picture, "_spectra", lambda *given: None)
     cloud = craft()
     cloud.normals[3] = [0.0, 0.0, 1.0]
-    figure = drawn(target, "target_picture", cloud)
+    figure = drawn(target_picture, "target_picture", cloud)
     assert tuple(figure.get_size_inches()) == (14, 8.6)
     middle, half = (cloud.points.min(0) + cloud.points.max(0)) / 2, 0.58 * np.ptp(cloud.points, axis=0).max()
     titles = {"from above": (0, 1), "from the right": (1, 2), "from behind": (0, 2)}
     for panel, (title, (across, up)) in zip(figure.axes[:3], titles.items(), strict=True):
         assert panel.get_title() == title and panel.get_aspect() == 1
-        assert (panel.get_xlabel(), panel.get_ylabel()) == (target.AXES[across], target.AXES[up])
+        assert (panel.get_xlabel(), panel.get_ylabel()) == (target_picture.AXES[across], target_picture.AXES[up])
         np.testing.assert_array_equal(offsets(panel), cloud.points[:, [across, up]])
         np.testing.assert_allclose(panel.get_xlim(), middle[across] + np.array([-half, half]))
         np.testing.assert_allclose(panel.get_ylim(), middle[up] + np.array([-half, half]))
@@ -115,5 +115,5 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
 
 
 def test_decibels_end_at_the_floor_and_silence_is_the_floor():
-    np.testing.assert_allclose(target._decibel(np.array([1.0, 10.0, 0.001])), [-20, 0, -40])
-    np.testing.assert_array_equal(target._decibel(np.zeros(2)), [-40, -40])
+    np.testing.assert_allclose(target_picture._decibel(np.array([1.0, 10.0, 0.001])), [-20, 0, -40])
+    np.testing.assert_array_equal(target_picture._decibel(np.zeros(2)), [-40, -40])

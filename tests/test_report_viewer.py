@@ -101,7 +101,7 @@ def page():
             "stations": ["A", "B"]}  # fmt: skip
     values = {"data": data, "panels": panels, "size": 16, "shown": 16, "rows": 2, "columns": 3, "pixels": 8,
               "stations": ["A", "B"], "floor_db": 40.0, "look_s": 0.06}  # fmt: skip
-    text = assembled("viewer", [{"id": "samples", "title": "Samples", "html": rendered("samples", values)}])
+    text = assembled("viewer", [{"id": "samples", "title": "Samples", "html": rendered("sample_viewer", values)}])
     sound(text)
     return text, tile
 

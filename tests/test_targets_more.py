@@ -16,7 +16,7 @@ from lowalt.motion.drawing import draw
 from lowalt.numerics import portable
 from lowalt.numerics.streams import stream
 from lowalt.report.figures.motion_strip import motion_strip, view_of
-from lowalt.report.figures.target import target_animation
+from lowalt.report.figures.target_picture import target_animation
 from lowalt.targets import cyclist, quadruped
 from lowalt.targets.cloud import write
 from lowalt.targets.gallery import bones

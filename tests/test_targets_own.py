@@ -11,7 +11,7 @@ from PIL import Image
 
 from lowalt.__main__ import main
 from lowalt.files.errors import InputWarning
-from lowalt.report.figures.target import target_animation
+from lowalt.report.figures.target_picture import target_animation
 from lowalt.targets.cloud import read
 from lowalt.targets.guesses import clusters, guessed_axes, guessed_unit
 from lowalt.targets.inspection import described, inspect_mesh

@@ -133,7 +133,7 @@ CHANGES = {
     "code of training": code("recognition/training.py", TRAIN | EVALUATE),
     "code of tables": code("recognition/tables.py", TABLES),
     "code of distances": code("recognition/distances.py", DISTANCES),
-    "code of the report": code("report/tables.py", REPORT),
+    "code of the report": code("report/pivots.py", REPORT),
     "nothing": Change(set(), ()),
 }
 

@@ -132,6 +132,6 @@ def test_the_report_s_files_are_a_manifest_that_the_report_takes():
         files = ReportInputs(products.report(CHUNK)).files
         kept = {name for name in files if name.startswith("kept_")}
         assert kept == {f"kept_{name}" for name in KEPT}
-        assert names == (set(files) & set(OPTIONAL)) - {"published"} - kept
+        assert names == (set(files) & set(OPTIONAL)) - {"published", "predictions"} - kept
         assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
     assert "src/lowalt/report/sections/accuracy.html" in products.page_templates(CHUNK)

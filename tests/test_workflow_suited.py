@@ -56,7 +56,7 @@ def test_what_suits_is_taken(overlay):
         (recognition(network={"weights": "a.pth"}), "recognition.network.weights: 'a.pth' is not there"),
         (recognition(network={"backbone": "a.py:f"}), "recognition.network.backbone: 'a.py' is not there"),
         (recognition(table="a.csv"), "recognition.table: 'a.csv' is not there"),
-        ({"report": {"measured": "a.csv"}}, "report.measured: 'a.csv' is not there"),
+        ({"report": {"accuracy": "a.csv"}}, "report.accuracy: 'a.csv' is not there"),
         ({"targets": {"select": ["crow"]}}, r"targets.select: \['crow'\], expected perhaps \['Crow'\]$"),
     ],
 )

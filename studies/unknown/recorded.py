@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import recorded_sets
 import rejection
 from study import logits
 
@@ -29,7 +30,7 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition import runs, zoo
 from lowalt.recognition.samples import fingerprint, joined
 from lowalt.recognition.schemes import TABLE, named
-from lowalt.recordings import recognise, sets
+from lowalt.recordings import twin_network
 from lowalt.recordings.channel import coherent_intervals
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.library import Library
@@ -37,6 +38,7 @@ from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
 from lowalt.recordings.scenes import MARGIN, samples, stretch
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.windows import at_symbol_rate
 from lowalt.tiles.settings import Images
 
 FOLDER = Path("config/measured")
@@ -62,14 +64,14 @@ class Radar:
 
     def rendered(self, intervals: np.ndarray, twin: Twin) -> np.ndarray:
         """Return the images (n, 3, size, size) uint8 of intervals (n, symbols)."""
-        return recognise.rendered(intervals, twin, self.images, self.size)
+        return twin_network.rendered(intervals, twin, self.images, self.size)
 
     def logits(self, intervals: np.ndarray, twin: Twin) -> np.ndarray:
         """Return the logits (n, classes) of intervals (n, symbols) at a recording's own carrier."""
         shown = self.rendered(intervals, twin)
         count = len(shown)
-        told = recognise.facts(np.zeros(count, int), ["window"] * count, np.arange(count), np.zeros(count), "")
-        return logits(self.model, recognise.Windows(shown, told))
+        facts = twin_network.facts(np.zeros(count, int), ["window"] * count, np.arange(count), np.zeros(count), "")
+        return logits(self.model, twin_network.Windows(shown, facts))
 
 
 class Part(NamedTuple):
@@ -102,7 +104,7 @@ def foreign(entry: dict, folder: Path, twin: Twin) -> np.ndarray:
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the recording that foreign.yaml names")
     record = Record(path, entry["carrier_hz"], "real", "foreign.yaml", "none stated")
-    signal = sets.sampled(record, twin, of_text(path) if path.suffix == ".txt" else read(record))
+    signal = at_symbol_rate(record, twin, of_text(path) if path.suffix == ".txt" else read(record))
     return coherent_intervals(signal, twin.symbols, name=str(path))
 
 
@@ -132,7 +134,7 @@ def empty(radar: Radar, library: Library, kind: str, count: int, fold: str) -> n
     return np.array(found)
 
 
-class Kept(recognise.Windows):
+class Kept(twin_network.Windows):
     """Windows in memory whose images and facts name a training."""
 
     def sha256(self) -> str:
@@ -142,13 +144,13 @@ class Kept(recognise.Windows):
 
 def with_empty(radar: Radar, library: Library, block: dict, fold: str) -> Kept:
     """Return the twin's windows of a fold, "train" or "validation", and as many of an extra class as of another."""
-    known = recognise.simulated(library, radar.name, block, fold)
+    known = twin_network.simulated(library, radar.name, block, fold)
     count = len(known.facts) // (2 * len(CATEGORIES))
     parts, told = [known.images], [known.facts]
     for kind in EMPTY:
         parts.append(radar.rendered(empty(radar, library, kind, count, fold), radar.twin))
         numbers = np.arange(count)
-        told.append(recognise.facts(np.full(count, len(CATEGORIES)), [kind] * count, numbers, np.zeros(count), fold))
+        told.append(twin_network.facts(np.full(count, len(CATEGORIES)), [kind] * count, numbers, np.zeros(count), fold))
     return Kept(np.concatenate(parts), joined(told))
 
 
@@ -165,16 +167,16 @@ def with_extra(radar: Radar, library: Library, block: dict, folder: Path) -> Rad
 
 def known_parts(radar: Radar, library: Library, inputs: Path) -> list[Part]:
     """Return the parts of the recordings that a network knows, one a category: windows that hold a target."""
-    every = sets.recordings(inputs, FOLDER / "sets.yaml", FOLDER / "split.yaml")
-    mine, parts = [one for one in every if library.twin_of(one.like) == radar.name], []
+    every, parts = recorded_sets.recordings(inputs), []
+    of_radar = [recording for recording in every if recording.like in library.sets[radar.name]]
     for label, category in enumerate(CATEGORIES):
-        found = []
-        for one in mine:
-            if one.record.label == category:
-                twin = sets.at_carrier(radar.twin, one.record.carrier_hz)
-                found.append(radar.logits(sets.measured_intervals(one, twin), twin))
-        if found:
-            parts.append(Part(f"recorded, {category}", np.concatenate(found), label))
+        of_category = []
+        for recording in of_radar:
+            if recording.record.label == category:
+                twin = radar.twin.at_carrier(recording.record.carrier_hz)
+                of_category.append(radar.logits(recording.windows(twin), twin))
+        if of_category:
+            parts.append(Part(f"recorded, {category}", np.concatenate(of_category), label))
     return parts
 
 
@@ -184,7 +186,7 @@ def foreign_parts(radar: Radar, folder: Path) -> list[Part]:
     for entry in load_yaml(Path(__file__).with_name("foreign.yaml"), "recordings")["files"]:
         if entry["network"] != radar.name:
             continue
-        twin = sets.at_carrier(radar.twin, entry["carrier_hz"])
+        twin = radar.twin.at_carrier(entry["carrier_hz"])
         windows = foreign(entry, folder, twin)
         moving = present(windows, twin)
         parts.append(Part(f"recorded, {entry['what']}, all windows", radar.logits(windows, twin), None))
@@ -196,8 +198,8 @@ def foreign_parts(radar: Radar, folder: Path) -> list[Part]:
 
 def rows_of(radar: Radar, library: Library, inputs: Path, folder: Path, models: Path) -> list[list]:
     """Return the table's rows of one network of the zoo, and of one with an extra class."""
-    block = recognise.settings(FOLDER / "recognition.yaml")
-    own = recognise.simulated(library, radar.name, block, "validation")
+    block = twin_network.settings(FOLDER / "recognition.yaml")
+    own = twin_network.simulated(library, radar.name, block, "validation")
     hollow = {kind: empty(radar, library, kind, ASKED, "test") for kind in EMPTY}
     rows = []
     for asked, scores in ((radar, SCORES), (with_extra(radar, library, block, models), EXTRA)):

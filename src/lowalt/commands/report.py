@@ -66,13 +66,13 @@ def gallery(results: Path) -> Answer:
 
     Raises: InputError where the folder holds no run, or a run's tables or configuration cannot be read.
     """
-    from lowalt.report.gallery import gallery
+    from lowalt.report.all_runs import all_runs
 
     folders = sorted(path.parent for path in results.glob("*/config.yaml"))
     if not folders:
         raise InputError(f"{results}: no run, expected folders with a config.yaml such as results/default")
     pages = {path.name: f"{path.name}/report.html" for path in folders if (path / "report.html").is_file()}
     with replacing(results / "index.html") as temporary:
-        temporary.write_text(gallery({path.name: facts(path) for path in folders}, pages))
+        temporary.write_text(all_runs({path.name: facts(path) for path in folders}, pages))
     text = f"{results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"
     return Answer({"files": [results / "index.html"], "runs": [path.name for path in folders]}, text)

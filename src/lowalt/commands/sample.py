@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> Answer:
 
     Raises: InputError for a wrong configuration, subtype or model.
     """
-    from lowalt.report.figures.sample import figure
+    from lowalt.report.figures.tile_axes import figure
 
     config = overlaid(options.overlay)
     everything = config["targets"]["select"]

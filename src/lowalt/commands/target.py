@@ -100,7 +100,7 @@ def _write(path: Path, data: bytes) -> Path:
 
 def _inspect(options: argparse.Namespace) -> Answer:
     """Inspect a mesh and draw it."""
-    from lowalt.report.figures.inspection import inspection_picture
+    from lowalt.report.figures.mesh_picture import inspection_picture
 
     seen = inspect_mesh(options.file, options.category, options.unit, size_m=options.size_m)
     out = _write(options.out or Path(f"{options.file.stem}-inspect.png"), inspection_picture(seen))
@@ -177,7 +177,7 @@ def _draft(
     try:
         refuse_miscount(seen, groups, count, str(picture))
     except InputError:
-        from lowalt.report.figures.inspection import inspection_picture
+        from lowalt.report.figures.mesh_picture import inspection_picture
 
         _write(picture, inspection_picture(seen, numbered=True))
         raise
@@ -256,7 +256,7 @@ def _make(options: argparse.Namespace) -> Answer:
 
 def _picture(cloud: Path, out: Path) -> str:
     """Draw a cloud's file and return the picture's path."""
-    from lowalt.report.figures.target import target_animation, target_picture
+    from lowalt.report.figures.target_picture import target_animation, target_picture
 
     draw = target_animation if out.suffix == ".gif" else target_picture
     return str(_write(out, draw(read(cloud))))

@@ -1,7 +1,6 @@
 """The plan of the package: its rooms in the order in which data passes them, and which room imports which.
 
-A room imports only rooms that stand before it: `tests/test_house.py` checks this, and `lowalt.report.figures.house`
-draws it.
+A room imports only rooms that stand before it: `tests/test_house.py` checks this, and `docs/rooms_picture.py` draws it.
 """
 
 import ast

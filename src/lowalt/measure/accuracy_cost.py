@@ -55,7 +55,7 @@ def read_speeds(paths: list[str | Path], table: str | Path, stations: Sequence[s
     paths: files of `network_speed`; table: table of schemes; stations: names of the network's stations, in its order.
     Raises: InputError for a file that is no such record, or a scheme that the table lacks.
     """
-    found = {}
+    rows = {}
     for path in paths:
         try:
             entry = json.loads(text_of(path, "speed"))
@@ -64,13 +64,13 @@ def read_speeds(paths: list[str | Path], table: str | Path, stations: Sequence[s
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"{path}: not a record of speed ({error!r})") from error
         scheme = named(table, name, stations)
-        found[name] = row | {
+        rows[name] = row | {
             "scheme": name, "kind": "timed", "pixels": pixels, "network_bytes": len(scheme.columns) * pixels**2,
             "spectra": "+".join(SPECTRA[number] for number in scheme.spectra),
             "stations": joined([stations[number] for number in scheme.stations]),
             "core_s_training": extrapolated * entry["steps"], "share": len(scheme.stations) / len(stations),
         }  # fmt: skip
-    return found
+    return rows
 
 
 def sample_seconds(paths: list[str | Path], samples: int) -> float:
@@ -138,33 +138,33 @@ def table_rows(
 
 def main(arguments: list[str]) -> None:
     """Write the table from predictions, measured speeds and the times of the data's jobs."""
-    options = parser("lowalt.measure.accuracy_cost", __doc__.splitlines()[0])
-    options.add_argument(
+    line = parser("lowalt.measure.accuracy_cost", __doc__.splitlines()[0])
+    line.add_argument(
         "--predictions", nargs="+", required=True, help="predictions of the unseen protocol, all seeds (.csv)"
     )
-    options.add_argument("--speeds", nargs="+", required=True, help="files of lowalt.measure.network_speed (.json)")
-    options.add_argument("--data-jobs", nargs="+", required=True, help="benchmarks of the data set's jobs (.jsonl)")
-    options.add_argument("--index", required=True, help="index of the shards: number of samples, stations")
-    options.add_argument("--presets", required=True, help="table of presets (.csv)")
-    options.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
-    options.add_argument("--out", required=True, help="table to write (.csv)")
-    given = options.parse_args(arguments)
-    (seed,) = pick(given.settings, "seed")
-    index, presets = json.loads(text_of(given.index, "index")), read_csv(given.presets, *PRESETS)
+    line.add_argument("--speeds", nargs="+", required=True, help="files of lowalt.measure.network_speed (.json)")
+    line.add_argument("--data-jobs", nargs="+", required=True, help="benchmarks of the data set's jobs (.jsonl)")
+    line.add_argument("--index", required=True, help="index of the shards: number of samples, stations")
+    line.add_argument("--presets", required=True, help="table of presets (.csv)")
+    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
+    line.add_argument("--out", required=True, help="table to write (.csv)")
+    options = line.parse_args(arguments)
+    (seed,) = pick(options.settings, "seed")
+    index, presets = json.loads(text_of(options.index, "index")), read_csv(options.presets, *PRESETS)
     studies = {row["predictions"]: row["scheme"] for row in presets if row["predictions"]}
     by_name: dict[str, list[Evaluated]] = {}
-    for path in given.predictions:
+    for path in options.predictions:
         training, folder = Evaluated(path), str(Path(path).parent)
         name = next((studies[end] for end in studies if folder.endswith(end)), training.scheme)
         by_name.setdefault(name, []).append(training)
-    order = [*names(given.schemes), *studies.values()]
+    order = [*names(options.schemes), *studies.values()]
     if unknown := sorted(set(by_name) - set(order)):
-        raise InputError(f"{given.schemes}: no row for {unknown}, expected one for each prediction file")
+        raise InputError(f"{options.schemes}: no row for {unknown}, expected one for each prediction file")
     runs = {name: by_name[name] for name in order if name in by_name}
-    speeds = read_speeds(given.speeds, given.schemes, station_names(index["render"]["network"]))
-    data_s = sample_seconds(given.data_jobs, sum(shard["samples"] for shard in index["shards"]))
+    speeds = read_speeds(options.speeds, options.schemes, station_names(index["render"]["network"]))
+    data_s = sample_seconds(options.data_jobs, sum(shard["samples"] for shard in index["shards"]))
     rows = table_rows(runs, speeds, presets, data_s, seed)
-    write_csv(given.out, COLUMNS, [[short(row.get(name)) for name in COLUMNS] for row in rows])
+    write_csv(options.out, COLUMNS, [[short(row.get(name)) for name in COLUMNS] for row in rows])
 
 
 if __name__ == "__main__":

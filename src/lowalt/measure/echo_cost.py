@@ -63,15 +63,15 @@ def sample(
     return moved, cloud.rcs_m2[order], np.array([row["x_m"], row["y_m"], row["z_m"]])
 
 
-def truths(network: Network, given: tuple, signal: np.ndarray, cell: np.ndarray, seed: int) -> dict[int, mpmath.mpc]:
+def truths(network: Network, sample: tuple, signal: np.ndarray, cell: np.ndarray, seed: int) -> dict[int, mpmath.mpc]:
     """The true values of the strongest cells (N,) at two random symbols and the deepest fade of a signal (N,)."""
-    rng, (motion, rcs_m2, aim_m) = stream(seed, "judged symbols"), given
+    rng, (motion, rcs_m2, aim_m) = stream(seed, "judged symbols"), sample
     chosen = {*rng.choice(len(signal), min(2, len(signal)), replace=False).tolist(), int(np.argmin(abs(signal)))}
-    found = {}
+    values = {}
     for n in chosen:
         places, strongest = places_mp(motion, n), [int(cell[n])]
-        found[n] = cells_mp(network, network.stations[0], places, rcs_m2.tolist(), aim_m.tolist(), strongest)[0]
-    return found
+        values[n] = cells_mp(network, network.stations[0], places, rcs_m2.tolist(), aim_m.tolist(), strongest)[0]
+    return values
 
 
 def error(signal: np.ndarray, truth: dict[int, mpmath.mpc]) -> float:
@@ -80,11 +80,11 @@ def error(signal: np.ndarray, truth: dict[int, mpmath.mpc]) -> float:
         return float(max(abs(mpmath.mpc(complex(signal[n])) - value) for n, value in truth.items()) / abs(signal).max())
 
 
-def measured(network: Network, given: tuple, seed: int, block: dict) -> dict[tuple, tuple[float, float]]:
+def measured(network: Network, sample: tuple, seed: int, block: dict) -> dict[tuple, tuple[float, float]]:
     """Return the median seconds and the error of one sample by (method, tolerance), tolerances that float64 keeps."""
-    arguments, repeats = (network, network.stations[0], *given), block["repeats"]
+    arguments, repeats = (network, network.stations[0], *sample), block["repeats"]
     exact = echo_signal(*arguments)
-    truth = truths(network, given, exact.signal, exact.cell, seed)
+    truth = truths(network, sample, exact.signal, exact.cell, seed)
     calls = {
         (NAIVE32, ""): (functools.partial(echo_baselines.closed, *arguments, np.float32), repeats, 1),
         (NAIVE64, ""): (functools.partial(echo_baselines.closed, *arguments), repeats, 1),
@@ -98,10 +98,10 @@ def measured(network: Network, given: tuple, seed: int, block: dict) -> dict[tup
             continue
         # A call takes about a millisecond: with only five calls, one interrupt would be a quarter of the time.
         calls[ENGINE, tolerance or "exact"] = call, repeats, 8
-    found = in_turn(list(calls.values()))
+    timed = in_turn(list(calls.values()))
     return {
         key: (seconds, error(result.signal if key[0] == ENGINE else result, truth))
-        for key, (seconds, result) in zip(calls, found, strict=True)
+        for key, (seconds, result) in zip(calls, timed, strict=True)
     }
 
 
@@ -109,13 +109,13 @@ def measure(network: Network, clouds: list[Cloud], published: dict, block: dict)
     """Return the table's rows (keys COLUMNS): over all clouds the mean of the seconds and the largest error."""
     rows = []
     for points in block["points"]:
-        found: dict[tuple, list[tuple[float, float]]] = {}
+        by_method: dict[tuple, list[tuple[float, float]]] = {}
         for cloud in clouds:
-            seen = published[cloud.subtype], network, block["motion"], block["seed"], block["distance_m"], points
-            for key, pair in measured(network, sample(cloud, *seen), block["seed"], block).items():
-                found.setdefault(key, []).append(pair)
+            drawn_with = published[cloud.subtype], network, block["motion"], block["seed"], block["distance_m"], points
+            for key, pair in measured(network, sample(cloud, *drawn_with), block["seed"], block).items():
+                by_method.setdefault(key, []).append(pair)
             print(f"{cloud.subtype}, {points} points", file=sys.stderr)
-        for (method, tolerance), pairs in found.items():
+        for (method, tolerance), pairs in by_method.items():
             seconds, errors = zip(*pairs, strict=True)
             row = method, tolerance, points, float(np.mean(seconds)), max(errors), hardware()
             rows.append(dict(zip(COLUMNS, row, strict=True)))
@@ -124,15 +124,15 @@ def measure(network: Network, clouds: list[Cloud], published: dict, block: dict)
 
 def main(arguments: list[str]) -> None:
     """Measure and write the table."""
-    options = parser("lowalt.measure.echo_cost", __doc__.splitlines()[0])
-    options.add_argument("--clouds", nargs="+", required=True, help="cloud files, best one of each category")
-    options.add_argument("--out", required=True, help="table to write (.csv)")
-    given = options.parse_args(arguments)
+    line = parser("lowalt.measure.echo_cost", __doc__.splitlines()[0])
+    line.add_argument("--clouds", nargs="+", required=True, help="cloud files, best one of each category")
+    line.add_argument("--out", required=True, help="table to write (.csv)")
+    options = line.parse_args(arguments)
     keys = ("network", "motion", "seed", "cost", "published")
-    network, motion, seed, block, published = pick(given.settings, *keys)
+    network, motion, seed, block, published = pick(options.settings, *keys)
     block |= {"motion": motion, "seed": seed}
     write_csv(
-        given.out, COLUMNS, measure(Network.from_settings(network), list(map(read, given.clouds)), published, block)
+        options.out, COLUMNS, measure(Network.from_settings(network), list(map(read, options.clouds)), published, block)
     )
 
 

@@ -67,17 +67,17 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
     layout = torch.channels_last if block["channels_last"] else torch.contiguous_format
     model, clock = model.to(machine.device, memory_format=layout), _clock(machine, block["threads"])
     times: dict[str, float | None] = {}
-    one = 0.0
+    single_s = 0.0
     with torch.inference_mode(), machine.autocast():
         model.eval()
         for batch in BATCHES:
             images = _inputs(batch, scheme, settings["size"]).to(machine.device)
-            fits = one * batch < limit_s
+            fits = single_s * batch < limit_s
             least = least_s(lambda x=images: model(x), limit_s, clock) / batch if fits else None
             times[f"inference_ms_{batch}"] = 1e3 * least if fits else None
-            one = one or least
+            single_s = single_s or least
     # Forward and backward cost about three times a forward.
-    most = max(1.0, min(block["batch"], limit_s / 4 / (3 * one)))
+    most = max(1.0, min(block["batch"], limit_s / 4 / (3 * single_s)))
     batch = 1 << int(np.log2(most))
     images, labels = (
         _inputs(batch, scheme, settings["size"]).to(machine.device),
@@ -106,17 +106,17 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
 
 def main(arguments: list[str]) -> None:
     """Time one scheme's network and write the record."""
-    options = parser("lowalt.measure.network_speed", __doc__.splitlines()[0])
-    options.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
-    options.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
-    options.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
-    options.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
-    options.add_argument("--out", required=True, help="record to write (.json)")
-    given = options.parse_args(arguments)
-    scheme = named(given.schemes, given.scheme, given.stations)
-    found = measure(scheme, scheme.settled(given.settings), given.limit_s)
-    with replacing(given.out) as temporary:
-        temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
+    line = parser("lowalt.measure.network_speed", __doc__.splitlines()[0])
+    line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
+    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
+    line.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
+    line.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
+    line.add_argument("--out", required=True, help="record to write (.json)")
+    options = line.parse_args(arguments)
+    scheme = named(options.schemes, options.scheme, options.stations)
+    record = measure(scheme, scheme.settled(options.settings), options.limit_s)
+    with replacing(options.out) as temporary:
+        temporary.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
 
 
 if __name__ == "__main__":

@@ -8,13 +8,12 @@ from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.runs import Trained
-from lowalt.recordings import samples
 from lowalt.recordings.library import Library
 from lowalt.recordings.presence import present
-from lowalt.recordings.recognise import Windows, facts, rendered
 from lowalt.recordings.record import Record
-from lowalt.recordings.sets import at_carrier
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_network import Windows, facts, rendered
+from lowalt.recordings.windows import windows
 from lowalt.tiles.settings import Images
 
 TWINS = "config/measured/twins.yaml"
@@ -45,18 +44,18 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     radars = Library.read(shipped(TWINS)).twins
     if "radar" not in settings:
         raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(radars)}")
-    known = Twin.from_settings(settings["radar"])
-    if not _near(record, known):
-        near = [name for name, twin in radars.items() if _near(record, twin)]
+    radar = Twin.from_settings(settings["radar"])
+    if not _near(record, radar):
+        near = [name for name, other in radars.items() if _near(record, other)]
         raise InputError(
-            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {known.carrier_hz:.3g}, "
+            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
             + (f"expected a network of {near}" if near else "expected a network of a twin at this carrier, which "
                "`python -m lowalt.recordings keep --twins FILE` trains; the zoo has none")
         )  # fmt: skip
-    twin = at_carrier(known, record.carrier_hz)
-    intervals = samples.signals(record, twin)
+    twin = radar.at_carrier(record.carrier_hz)
+    intervals = windows(record, twin).astype(np.complex64)
     images = rendered(intervals, twin, Images.from_settings(settings["images"]), trained.size)
-    count = len(intervals)
-    windows = Windows(images, facts(np.zeros(count, int), [record.name] * count, np.arange(count), np.zeros(count), ""))
-    found = probabilities(trained.model, windows, np.arange(count), Machine.here("fp32"), 64)
-    return Answers(np.arange(count) * twin.symbols * twin.symbol_interval_s, present(intervals, twin), found)
+    count, numbers = len(intervals), np.arange(len(intervals))
+    samples = Windows(images, facts(np.zeros(count, int), [record.name] * count, numbers, np.zeros(count), ""))
+    shares = probabilities(trained.model, samples, numbers, Machine.here("fp32"), 64)
+    return Answers(numbers * twin.symbols * twin.symbol_interval_s, present(intervals, twin), shares)

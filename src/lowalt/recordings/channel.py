@@ -113,18 +113,16 @@ def _resampled(signal: np.ndarray, step: float, band: float) -> np.ndarray:
     return result
 
 
-def coherent_intervals(signal: np.ndarray, symbols: int, hop: int | None = None, name: str = "recording") -> np.ndarray:
+def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording") -> np.ndarray:
     """Return the coherent processing intervals (intervals, symbols) of a signal, each without its mean.
 
-    hop: symbols from one interval to the next, by default as many as it has, so that none share a symbol. The mean is
-    the echo of everything that does not move, which is orders of magnitude above the target's.
+    No two share a symbol. The mean is the echo of everything that does not move, which is orders of magnitude above the
+    target's.
     Raises: InputError naming the recording where it is shorter than one interval.
     """
-    hop = symbols if hop is None else hop
     if len(signal) < symbols:
         raise InputError(f"{name}: {len(signal)} symbols, shorter than one window of {symbols}")
-    starts = np.arange(0, len(signal) - symbols + 1, hop)
-    windows = signal[starts[:, None] + np.arange(symbols)]
+    windows = signal[: len(signal) // symbols * symbols].reshape(-1, symbols)
     # Subtract the first symbol before the mean: a constant signal then becomes exactly zero.
     moved = windows - windows[:, :1]
     return moved - moved.mean(axis=1, keepdims=True)

@@ -20,12 +20,10 @@ class Course(NamedTuple):
     clock_s: np.ndarray
 
 
-def straight(
-    times_s: np.ndarray, start_m: np.ndarray, speed_mps: float, yaw_rad: float, climb_mps: float = 0.0
-) -> Course:
+def straight(times_s: np.ndarray, start_m: np.ndarray, speed_mps: float, yaw_rad: float) -> Course:
     """Return a course from `start_m` (3,) along the target's front at `speed_mps`; a car that drives past is one."""
     front = np.array([-np.sin(yaw_rad), np.cos(yaw_rad), 0.0])
-    velocity = speed_mps * front + [0.0, 0.0, climb_mps]
+    velocity = speed_mps * front
     tilt = np.zeros((len(times_s), 3))
     tilt[:, 0] = yaw_rad
     return Course(np.asarray(start_m) + times_s[:, None] * velocity, tilt, times_s)

@@ -31,14 +31,13 @@ SIDE_RATIO = 4.0
 
 
 def agreed_rate(
-    path: Path, stated_hz: float | tuple[float, ...] | None, header_hz: float | None, times_s: np.ndarray | None
-) -> float:
+    path: Path, stated_hz: float | None, header_hz: float | None, times_s: np.ndarray | None
+) -> float:  # fmt: skip
     """Return the sampling rate (Hz) on which record, file header and sample times (s) agree.
 
-    stated_hz: the record's rate, or several rates of which the file has one; the nearest to header or times is taken.
     Raises: InputError where nothing says the rate, two sources differ, or the times are not evenly spaced.
     """
-    found: dict[str, float | None] = {"record": None, "file": header_hz}
+    rates: dict[str, float | None] = {"record": stated_hz, "file": header_hz}
     if times_s is not None:
         steps = np.diff(times_s)
         if len(steps) < 1 or not np.isfinite(steps).all() or steps.min() <= 0:
@@ -48,12 +47,8 @@ def agreed_rate(
             place = int(abs(steps - middle).argmax())
             raise InputError(f"{path}: the sample times jump by {steps[place]:.4g} s at sample {place + 1}, expected "
                              f"{middle:.4g} s everywhere")  # fmt: skip
-        found["times"] = float(1 / middle)
-    if isinstance(stated_hz, tuple):
-        own = next((rate for rate in (header_hz, found.get("times")) if rate is not None), stated_hz[0])
-        stated_hz = min(stated_hz, key=lambda rate: abs(rate - own))
-    found["record"] = stated_hz
-    known = {name: rate for name, rate in found.items() if rate is not None}
+        rates["times"] = float(1 / middle)
+    known = {name: rate for name, rate in rates.items() if rate is not None}
     if not known:
         raise InputError(f"{path}: nothing says the sampling rate, expected rate_hz in the record")
     low, high = min(known.values()), max(known.values())

@@ -39,11 +39,11 @@ def _parted(values: np.ndarray, layout: str, path: Path) -> list[np.ndarray]:
 
 def _channel(table: Table, record: Record) -> np.ndarray:
     """The record's channel out of a table's columns."""
-    path, wanted = record.file, record.columns
-    if wanted is None:
+    path, columns = record.file, record.columns
+    if columns is None:
         free = [n for n in range(len(table.columns)) if not table.names or table.names[n] != record.times]
-        wanted = tuple(free)
-    parts = [_column(table, name, path) for name in wanted]
+        columns = tuple(free)
+    parts = [_column(table, name, path) for name in columns]
     if record.layout is not None:
         if len(parts) != 1:
             raise InputError(f"{path}: {len(parts)} columns, expected one for layout {record.layout!r}")
@@ -83,7 +83,7 @@ def read(record: Record) -> Baseband:
     if record.trust == "record":
         rate = float(record.rate_hz)
     else:
-        rate = faults.agreed_rate(path, record.rates_hz or record.rate_hz, table.rate_hz, times)
+        rate = faults.agreed_rate(path, record.rate_hz, table.rate_hz, times)
     values = _channel(table, record)
     faults.check(path, values, record.moves)
     return Baseband(values, rate)

@@ -53,16 +53,16 @@ def _wav(path: Path, record: Record) -> Table:
 
 def _mat(path: Path, record: Record) -> Table:
     """Read the record's variable of a MATLAB file, or its only one; `rec.iq` is a field of a struct."""
-    held = read_mat(path)
+    variables = read_mat(path)
     name = record.variable
     if name is None:
-        arrays = [key for key, value in held.items() if value.size > 1]
+        arrays = [key for key, value in variables.items() if value.size > 1]
         if len(arrays) != 1:
-            raise InputError(f"{path}: variables {sorted(held)}, expected the record to name one as `variable`")
+            raise InputError(f"{path}: variables {sorted(variables)}, expected the record to name one as `variable`")
         name = arrays[0]
-    if name not in held:
-        raise InputError(f"{path}: no variable {name!r}, expected one of {sorted(held)}")
-    return Table(_columns(held[name], path), (), None)
+    if name not in variables:
+        raise InputError(f"{path}: no variable {name!r}, expected one of {sorted(variables)}")
+    return Table(_columns(variables[name], path), (), None)
 
 
 def _is_number(cell: str) -> bool:
@@ -129,9 +129,9 @@ def _sigmf(path: Path, record: Record) -> Table:
     fields = about.get("global") if isinstance(about, dict) else None
     if not isinstance(fields, dict):
         raise InputError(f"{path}: its metadata has no block global, expected a SigMF recording")
-    other = fields.get("core:dataset")
-    if other is not None and Path(str(other)).name != other:
-        raise InputError(f"{path}: core:dataset is {other!r}, expected the name of a file beside it")
+    dataset = fields.get("core:dataset")
+    if dataset is not None and Path(str(dataset)).name != dataset:
+        raise InputError(f"{path}: core:dataset is {dataset!r}, expected the name of a file beside it")
     try:
         signal = sigmf.sigmffile.fromfile(str(path))
         values, rate = signal.read_samples(), signal.get_global_field("core:sample_rate")

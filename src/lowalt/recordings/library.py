@@ -10,7 +10,6 @@ from lowalt.config.layers import load_yaml, merge
 from lowalt.files.errors import InputError
 from lowalt.recordings.scenes import clouds_of, intervals
 from lowalt.recordings.twin import Twin
-from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import load_records
 
 
@@ -23,8 +22,6 @@ class Library:
     sets: dict[str, list[str]]
     scenes: dict[str, dict[str, list[dict]]]
     records: dict[str, dict]
-    memo: dict | None = None
-    """Cache of simulated echoes, or None to keep none. Libraries that differ only in their receivers may share one."""
 
     @classmethod
     def read(cls, path: str | Path) -> "Library":
@@ -55,35 +52,20 @@ class Library:
         except KeyError as error:
             raise InputError(f"{path}: key {error} is missing") from None
 
-    def clouds(self, twin: str, category: str) -> dict[str, Cloud]:
-        """Return the clouds of all subtypes of a twin's scenes of one category."""
-        names = dict.fromkeys(name for scene in self.scenes[twin][category] for name in scene["subtypes"])
-        return clouds_of(self.records, list(names), self.seed)
-
     def simulated(self, twin: str, category: str, count: int, purpose: str, receivers: int = 1):
         """Return simulated intervals (count, receivers, symbols) of a category, and the names of their subtypes.
 
         The category's scenes share the `count` intervals evenly. `purpose` keys the random streams: equal purposes give
         equal scenes.
         """
-        clouds, scenes = self.clouds(twin, category), self.scenes[twin][category]
-        found, names = [], []
+        scenes = self.scenes[twin][category]
+        subtypes_of_all = dict.fromkeys(name for scene in scenes for name in scene["subtypes"])
+        clouds = clouds_of(self.records, list(subtypes_of_all), self.seed)
+        parts, names = [], []
         for number, scene in enumerate(scenes):
             share = len(range(number, count, len(scenes)))
             keys = (purpose, twin, category, number)
-            signals, subtypes = intervals(self.twins[twin], scene, clouds, self.seed, keys, share, receivers, self.memo)
-            found.append(signals)
+            signals, subtypes = intervals(self.twins[twin], scene, clouds, self.seed, keys, share, receivers)
+            parts.append(signals)
             names += subtypes
-        return np.concatenate(found), names
-
-    def twin_of(self, name: str) -> str:
-        """Return the twin of a measured set.
-
-        Raises: InputError naming the sets there are.
-        """
-        for twin, sets in self.sets.items():
-            if name in sets:
-                return twin
-        raise InputError(
-            f"set {name!r}: no twin, expected one of {[one for sets in self.sets.values() for one in sets]}"
-        )
+        return np.concatenate(parts), names

@@ -34,9 +34,9 @@ def read_mat(path: Path) -> dict[str, np.ndarray]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "variables.npz"
         line = [sys.executable, "-m", "lowalt.recordings.mat_files", str(path), str(out)]
-        found = subprocess.run(line, capture_output=True, text=True, errors="replace")
-        if found.returncode:
-            reason = found.stderr.strip().splitlines()[-1:] or [f"the reader ended with {found.returncode}"]
+        ended = subprocess.run(line, capture_output=True, text=True, errors="replace")
+        if ended.returncode:
+            reason = ended.stderr.strip().splitlines()[-1:] or [f"the reader ended with {ended.returncode}"]
             raise InputError(f"{path}: not a readable .mat file ({reason[0][:200]})")
         with np.load(out, allow_pickle=False) as data:
             names = json.loads(str(data["names"]))
@@ -97,9 +97,9 @@ def main(arguments: list[str]) -> None:
     source, out = arguments
     with Path(source).open("rb") as file:
         start = file.read(520)
-    held = _new(source) if HDF5 in (start[:8], start[512:]) else _old(source)
-    arrays = {str(number): value for number, value in enumerate(held.values())}
-    np.savez(out, names=np.array(json.dumps(list(held))), **arrays)
+    variables = _new(source) if HDF5 in (start[:8], start[512:]) else _old(source)
+    arrays = {str(number): value for number, value in enumerate(variables.values())}
+    np.savez(out, names=np.array(json.dumps(list(variables))), **arrays)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.ndimage import maximum_filter, median_filter
 
 from lowalt.recordings.channel import EDGE
-from lowalt.recordings.figures import speeds_shown
 from lowalt.recordings.twin import Twin
 
 QUIET_SHARE = 0.1
@@ -19,6 +18,22 @@ FLOOR_MPS = 0.5
 """Speeds to either side over which the noise floor is smooth."""
 ENOUGH = 20
 """Least number of windows with which a constant line can be told from a target."""
+
+
+def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of the speeds that are shown, in order of display, and the speeds (m/s) that they mean.
+
+    speeds: (n,) m/s, ascending; sides: "both"; "positive", only those above zero; "wrapped", a speed v < 0 means v + 2
+    edge_mps.
+    """
+    if sides == "positive":
+        shown = np.flatnonzero(speeds > 0)
+        return shown, speeds[shown]
+    if sides == "wrapped":
+        meant = np.mod(speeds, 2 * edge_mps)
+        shown = np.argsort(meant, kind="stable")
+        return shown, meant[shown]
+    return np.arange(len(speeds)), speeds
 
 
 def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:

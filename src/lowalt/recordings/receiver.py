@@ -6,7 +6,7 @@ The order is that of the parts: antenna and mixer (wander, leak), noise of the m
 the amplifier's coupling capacitors (high pass), its supply rails (clipping).
 """
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 
 import numpy as np
 from scipy.signal import butter, sosfilt
@@ -22,9 +22,9 @@ class Receiver:
     spectrum above its corner, over the white noise's density at the corner; wander_db: rms of a slow change of the
     amplitude; leak_db: a constant, over the echo; hum_db and hum_hz: a line, over the echo.
 
-    May be left out: hum_lines, how many harmonics the line has, each 1 / number as strong; highpass_hz and
-    highpass_order, a Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude over the rms of all samples,
-    0 for no limit."""
+    May be left out: hum_lines, how many harmonics the line has, each 1 / number as strong; highpass_hz, corner of a
+    Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude over the rms of all samples, 0 for no limit.
+    """
 
     snr_db: float
     flicker_db: float
@@ -35,7 +35,6 @@ class Receiver:
     hum_hz: float
     hum_lines: float = 1.0
     highpass_hz: float = 0.0
-    highpass_order: float = 2.0
     clip_rms: float = 0.0
 
     @classmethod
@@ -44,11 +43,12 @@ class Receiver:
 
         Raises: InputError naming a missing or unknown key.
         """
-        full = {key: field.default for key, field in cls.__dataclass_fields__.items() if key in OPTIONAL} | block
-        return cls(*(float(value) for value in pick(full, *cls.__dataclass_fields__)))
+        defaults = {field.name: field.default for field in fields(cls) if field.default is not MISSING}
+        return cls(*map(float, pick(defaults | block, *(field.name for field in fields(cls)))))
 
 
-OPTIONAL = ("hum_lines", "highpass_hz", "highpass_order", "clip_rms")
+ORDER = 2
+"""Order of the high pass: two coupling capacitors."""
 
 
 def shaped(count: int, rate_hz: float, corner_hz: float, rng: np.random.Generator) -> np.ndarray:
@@ -71,7 +71,7 @@ def received(
     """
     count = len(echo)
     # The coupling capacitors suppress the echo of a slow target, so its power is measured behind them.
-    power = rms(highpassed(echo, rate_hz, settings.highpass_hz, settings.highpass_order)) ** 2
+    power = rms(highpassed(echo, rate_hz, settings.highpass_hz)) ** 2
     slow = shaped(count, rate_hz, 0.5, rng).real
     spread = slow.std() or 1.0
     result = (echo if target else 0 * echo) * 10 ** (settings.wander_db / 20 * slow / spread)
@@ -87,11 +87,11 @@ def received(
     hum = np.sqrt(power) * 10 ** (settings.hum_db / 20) * hum
     result = add_noise(result, settings.snr_db, rng, power) + flicker + static + hum
     result = result.real if real else result
-    return clipped(highpassed(result, rate_hz, settings.highpass_hz, settings.highpass_order), settings.clip_rms)
+    return clipped(highpassed(result, rate_hz, settings.highpass_hz), settings.clip_rms)
 
 
-def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float, order: float) -> np.ndarray:
-    """Return samples (N,) behind a Butterworth high pass, 0 Hz for none. Two coupling capacitors make order 2.
+def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float) -> np.ndarray:
+    """Return samples (N,) behind a Butterworth high pass of order 2, 0 Hz for none.
 
     The noise floors of all tuning recordings at 24 GHz fall off below 100 to 150 Hz (0.6 to 0.9 m/s), as audio
     amplifiers and sound cards with coupling capacitors do (Horowitz and Hill 2015, section 1.7).
@@ -99,7 +99,7 @@ def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float, order: floa
     if not corner_hz:
         return values
     # Subtract the first value, so that a constant part causes no transient at the start.
-    return sosfilt(butter(round(order), corner_hz, "highpass", fs=rate_hz, output="sos"), values - values[0])
+    return sosfilt(butter(ORDER, corner_hz, "highpass", fs=rate_hz, output="sos"), values - values[0])
 
 
 def clipped(values: np.ndarray, limit_rms: float) -> np.ndarray:

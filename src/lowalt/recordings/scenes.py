@@ -2,9 +2,8 @@
 
 A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene:
     subtypes       names of targets, one drawn a sample
-    course         hover | straight | pass | to_and_fro, and the course's own keys:
+    course         hover | pass | to_and_fro, and the course's own keys:
                    hover: distance_m, height_m, sway_m, sway_hz, rock_deg
-                   straight: distance_m, height_m, speed_mps, climb_mps (any heading)
                    pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol)
                    to_and_fro: near_m, far_m, height_m, speed_mps, turn_s
     rate_hz        of rotors or wings; wheels roll with the speed
@@ -12,14 +11,13 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
     texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
     beam           width_deg and floor_db of the antenna, which looks along +y (optional: all directions)
-    foils          patterns of foil, one drawn a sample; foil_reach: its end, as a share of the blade (both optional)
+    foils          patterns of foil, one drawn a sample (optional)
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
     second         share of samples with a second target of the same scene, and its level_db (optional)
     receiver       settings of `lowalt.recordings.receiver` (in a twin: only those that differ from its receiver)
 """
 
-import json
 import math
 from dataclasses import replace
 
@@ -33,9 +31,8 @@ from lowalt.recordings.courses import Course, hover, straight, to_and_fro
 from lowalt.recordings.presence import present
 from lowalt.recordings.receiver import Receiver, received
 from lowalt.recordings.twin import Twin, beam_gain, echo, sized, still_row, strengthened, textured
-from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.gait import gait_cloud
+from lowalt.targets.make import make
 
 MARGIN = 40
 """Symbols simulated before and after a stretch; they take the transients of the filters and of the analytic signal."""
@@ -58,34 +55,31 @@ def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str
 
     Raises: InputError naming a subtype without a built-in record.
     """
-    found = {}
     for name in names:
         if name not in records or records[name]["source"] not in ("builtin", "gait"):
             raise InputError(f"scene: subtype {name!r}, expected one with a built-in record of {sorted(records)}")
-        make = builtin_cloud if records[name]["source"] == "builtin" else gait_cloud
-        found[name] = make(records[name], seed)
-    return found
+    return {name: make(records[name], None, seed) for name in names}
 
 
 def _course(scene: dict, cloud: Cloud, times_s: np.ndarray, rng: np.random.Generator) -> tuple[Course, float]:
     """The course at the times, and the target's speed (m/s)."""
-    take = lambda name: value(scene[name], rng)  # noqa: E731
+
+    def drawn(key: str) -> float:
+        """The value of one of the course's keys."""
+        return value(scene[key], rng)
+
     kind, heading = scene["course"], rng.uniform(0, 2 * np.pi)
     if kind == "hover":
-        place = np.array([0.0, take("distance_m"), take("height_m")])
-        rock = math.radians(take("rock_deg"))
-        return hover(times_s, place, heading, take("sway_m"), take("sway_hz"), rock, rng), 0.0
-    if kind == "straight":
-        place, speed = np.array([0.0, take("distance_m"), take("height_m")]), take("speed_mps")
-        return straight(times_s, place, speed, heading, take("climb_mps")), speed
+        place = np.array([0.0, drawn("distance_m"), drawn("height_m")])
+        rock = math.radians(drawn("rock_deg"))
+        return hover(times_s, place, heading, drawn("sway_m"), drawn("sway_hz"), rock, rng), 0.0
     if kind == "pass":
-        place, speed = np.array([take("lateral_m"), take("ahead_m"), take("height_m")]), take("speed_mps")
+        place, speed = np.array([drawn("lateral_m"), drawn("ahead_m"), drawn("height_m")]), drawn("speed_mps")
         return straight(times_s, place, abs(speed), 0.0 if speed > 0 else math.pi), abs(speed)
     if kind == "to_and_fro":
-        own = cloud.record["track_speed_mps"]
-        walk = [take(name) for name in ("near_m", "far_m", "speed_mps", "turn_s")]
-        return to_and_fro(times_s, *walk, own, 0.0, take("height_m")), walk[2]
-    raise InputError(f"scene: course is {kind!r}, expected hover, straight, pass or to_and_fro")
+        walk = [drawn(name) for name in ("near_m", "far_m", "speed_mps", "turn_s")]
+        return to_and_fro(times_s, *walk, cloud.record["track_speed_mps"], 0.0, drawn("height_m")), walk[2]
+    raise InputError(f"scene: course is {kind!r}, expected hover, pass or to_and_fro")
 
 
 def _rate(scene: dict, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
@@ -103,15 +97,15 @@ def heard(
     seconds: length without the margins. A second target, where the scene has one, drives at its own place and speed.
     Raises: InputError for a scene with a wrong key or value.
     """
-    signal, name = _one(twin, scene, clouds, rng, seconds)
+    signal, name = _of_one_target(twin, scene, clouds, rng, seconds)
     if "second" in scene and rng.uniform() < scene["second"]["share"]:
-        more, _ = _one(twin, scene, clouds, rng, seconds)
+        second, _ = _of_one_target(twin, scene, clouds, rng, seconds)
         level = 10 ** (value(scene["second"]["level_db"], rng) / 20)
-        signal = signal + level * rms(signal) / max(rms(more), 1e-300) * more
+        signal = signal + level * rms(signal) / max(rms(second), 1e-300) * second
     return signal, name
 
 
-def _one(
+def _of_one_target(
     twin: Twin, scene: dict, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
 ) -> tuple[np.ndarray, str]:
     """The echo of one drawn target, and its subtype's name."""
@@ -125,8 +119,7 @@ def _one(
             cloud = sized(cloud, [value(scene["size"][axis], rng) for axis in ("width", "length", "height")])
         strength = {kind: value(setting, rng) for kind, setting in scene.get("strength_db", {}).items()}
         foils = scene.get("foils")
-        reach = value(scene.get("foil_reach", 1.0), rng)
-        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "", reach)
+        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "")
         cloud = textured(cloud, *(value(scene.get(key, 0.0), rng) for key in ("texture_db", "tip")), rng)
         margin = 2 * MARGIN * twin.symbol_interval_s
         times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz
@@ -166,7 +159,7 @@ REDRAWS = 8
 
 
 def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np.ndarray:
-    """Return the coherent interval (1, symbols) of an echo at a receiver, which is drawn again while no target is
+    """Return the coherent interval (symbols,) of an echo at a receiver, which is drawn again while no target is
     present."""
     seconds = twin.symbols * twin.symbol_interval_s
     for redraw in range(REDRAWS):
@@ -176,34 +169,23 @@ def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np
             both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols))
         if present(both[0], twin, both[-1]).all():
             break
-    return both[0]
+    return both[0][0]
 
 
 def intervals(
-    twin: Twin,
-    scene: dict,
-    clouds: dict[str, Cloud],
-    seed: int,
-    keys: tuple,
-    count: int,
-    receivers: int = 1,
-    memo: dict | None = None,
+    twin: Twin, scene: dict, clouds: dict[str, Cloud], seed: int, keys: tuple, count: int, receivers: int = 1
 ) -> tuple[np.ndarray, list[str]]:
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
 
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from the scene's ranges.
     As with recordings, a window counts where its target stands above the noise (`presence.present`).
-    memo: echoes of earlier calls, which do not depend on the receiver; new ones are put into it.
     """
-    seconds, memo = twin.symbols * twin.symbol_interval_s, {} if memo is None else memo
-    found, names = np.empty((count, receivers, twin.symbols), np.complex128), []
+    seconds = twin.symbols * twin.symbol_interval_s
+    result, names = np.empty((count, receivers, twin.symbols), np.complex128), []
     for number in range(count):
-        known = (*keys, number, json.dumps({key: item for key, item in scene.items() if key != "receiver"}))
-        if known not in memo:
-            memo[known] = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
-        signal, name = memo[known]
+        signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
         for again in range(receivers):
-            own = (seed, "twin-receiver", *keys, number, again)
-            found[number, again] = _interval(twin, scene["receiver"], signal, own)[0]
+            receiver_keys = (seed, "twin-receiver", *keys, number, again)
+            result[number, again] = _interval(twin, scene["receiver"], signal, receiver_keys)
         names.append(name)
-    return found, names
+    return result, names

@@ -5,23 +5,24 @@ complex channel, or one real channel of which only the real part is kept. A twin
 as a recording: `lowalt.recordings.channel` turns both into intervals at the symbol rate.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from lowalt.config.command import pick
-from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo import Rigid, echo_signals
 from lowalt.files.errors import InputError
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.table import NUMBERS, PHASES
 from lowalt.recordings.channel import SAMPLINGS
 from lowalt.recordings.courses import Course
-from lowalt.recordings.record import CHANNELS
 from lowalt.scene.effects.motion import rotor_spread
 from lowalt.spectra import Fourier, Spectra, Transfer
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import NODES
+
+CHANNELS = ("complex", "real")
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,10 @@ class Twin:
         twin.network(2)
         return twin
 
+    def at_carrier(self, carrier_hz: float) -> "Twin":
+        """Return the twin at a recording's own carrier; the symbol interval stays, so the speeds scale a little."""
+        return replace(self, carrier_hz=carrier_hz)
+
     @property
     def edge_mps(self) -> float:
         """Largest unambiguous radial speed of the symbol rate, lambda / (4 T_r) (m/s)."""
@@ -66,17 +71,29 @@ class Twin:
             return "positive" if self.sampling == "anti_aliased" else "wrapped"
         return "both"
 
-    def network(self, symbols: int, interval_s: float | None = None) -> Network:
-        """Return the one-station network at `interval_s` a symbol (by default that of the images)."""
-        station = Station("A", (0.0, 0.0, 0.0), np.pi / 2, self.carrier_hz)
-        interval = self.symbol_interval_s if interval_s is None else interval_s
+    def network_settings(self) -> dict:
+        """Return the one-station network of the images as a configuration's block `network`."""
         # With one subcarrier the spacing only sets the length of the one range cell, which nothing depends on.
-        return Network(self.carrier_hz, 1.0, 1, 0, interval, symbols, (1, 1), (1, 1), 1.0, (station,))
+        return {
+            "carrier_hz": self.carrier_hz, "subcarrier_spacing_hz": 1.0, "subcarriers": 1, "guard_subcarriers": 0,
+            "symbol_interval_s": self.symbol_interval_s, "symbols": self.symbols, "transmit_array": [1, 1],
+            "receive_array": [1, 1], "power_w": 1.0,
+            "stations": {"A": {"position_m": [0.0, 0.0, 0.0], "normal_deg": 90.0}},
+        }  # fmt: skip
+
+    def network(self, symbols: int, interval_s: float | None = None) -> Network:
+        """Return the one-station network of `symbols` at `interval_s` a symbol (by default that of the images)."""
+        network = Network.from_settings(self.network_settings() | {"symbols": symbols})
+        return network if interval_s is None else replace(network, symbol_interval_s=interval_s)
 
     def spectra(self) -> Spectra:
         """Return the project's three spectra; the matched speeds cover this radar's unambiguous ones in 123 steps."""
         edge = float(f"{self.edge_mps:.3g}")
         return Spectra(vrp=Fourier(256, 1, 256), trp=Fourier(8, 1, 1024), vt=Transfer(8, 1, -edge, edge, edge / 61))
+
+    def spectra_settings(self) -> dict:
+        """Return the spectra as a configuration's block `spectra`."""
+        return {name: asdict(settings) for name, settings in self.spectra().items()}
 
 
 TOLERANCE = 1e-4
@@ -85,12 +102,11 @@ TORSO = ("root", "hipjoint", "back", "thorax", "neck", "head", "clavicle")
 LEGS = ("femur", "tibia", "foot", "toes")
 
 
-def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "", foil_reach: float = 1.0) -> Cloud:
+def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "") -> Cloud:
     """Return the cloud with the cross sections of some of its parts raised by decibels.
 
     strength_db: kind of part ("body", "rotor", "wing", "wheel"; of nodes "torso", "arms", "legs") -> dB; foil: a digit
-    for each blade, rotor by rotor, "1" for a blade with foil, raised by strength_db["foil"] from the hub to
-    `foil_reach` of its length.
+    for each blade, rotor by rotor, "1" for a blade with foil, raised by strength_db["foil"].
     Raises: InputError for an unknown kind, or a foil that does not fit the blades.
     """
     gain = np.zeros(len(cloud.points))
@@ -110,8 +126,7 @@ def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "", fo
         if len(foil) != len(blades) or set(foil) - set("01"):
             raise InputError(f"foil {foil!r}, expected one digit 0 or 1 for each of {len(blades)} blades")
         for digit, points in zip(foil, blades, strict=True):
-            covered = radii(cloud, points) <= foil_reach * radii(cloud, points).max()
-            gain[points] += strength_db["foil"] * (covered & (digit == "1"))
+            gain[points] += strength_db["foil"] * (digit == "1")
     return replace(cloud, rcs_m2=cloud.rcs_m2 * 10 ** (gain / 10))
 
 
@@ -132,12 +147,12 @@ def textured(cloud: Cloud, texture_db: float, tip: float, rng: np.random.Generat
         10 ** (texture_db / 10 * rng.standard_normal(len(cloud.points))) if texture_db else np.ones(len(cloud.points))
     )
     for rotor in cloud.parts_of("rotor") if tip else ():
-        mine = cloud.part == rotor
-        reach = radii(cloud, np.flatnonzero(mine))
-        gain[mine] *= (reach / reach.max()) ** tip
+        of_part = cloud.part == rotor
+        reach = radii(cloud, np.flatnonzero(of_part))
+        gain[of_part] *= (reach / reach.max()) ** tip
     for part in range(len(cloud.kinds)) if "node" not in cloud.kinds else ():
-        mine = cloud.part == part
-        gain[mine] /= gain[mine].mean()
+        of_part = cloud.part == part
+        gain[of_part] /= gain[of_part].mean()
     return replace(cloud, rcs_m2=cloud.rcs_m2 * gain)
 
 
@@ -189,11 +204,11 @@ def echo(
     `rotor_spread` has them. Every pose is taken at the course's clock, so limbs slow down where the walker does.
     Source: paper Eqs. 7 and 22 to 25 with one subcarrier; the poses as in `lowalt.motion`.
     """
-    more = rotor_spread.perturb(
+    rotor_angles = rotor_spread.perturb(
         {"spread": spread, "wander": wander, "correlation_s": 1.5}, cloud, row, course.clock_s, rng
     ).angle_rad
     start = course.clock_s + row["start_s"]
-    placed = poses(cloud, row | {"start_s": 0.0}, start, Perturbation(more, course.place_m, course.tilt_rad))
+    placed = poses(cloud, row | {"start_s": 0.0}, start, Perturbation(rotor_angles, course.place_m, course.tilt_rad))
     network = twin.network(len(times_s), 1 / twin.rate_hz)
     motion = Rigid(placed.rotation, placed.translation, cloud.points, cloud.part)
     return echo_signals(network, motion, cloud.rcs_m2, course.place_m[0], TOLERANCE, cloud.subtype)[0]

@@ -13,8 +13,8 @@ from lowalt.report.figures.stills import write_stills
 from lowalt.report.inputs import Inputs
 from lowalt.report.page import SECTIONS, page, section
 from lowalt.report.plots import scripts, write_plots
-from lowalt.report.run import ReportedRun
-from lowalt.report.stages import write_stages
+from lowalt.report.reported_run import ReportedRun
+from lowalt.report.stage_times import write_stages
 from lowalt.targets.cloud import read
 
 
@@ -30,22 +30,22 @@ def main(arguments: list[str]) -> None:
 
     Settings: config, published (rows of the table of targets).
     """
-    options = parser("lowalt.report", __doc__)
-    options.add_argument("--manifest", required=True, help="files of the run by name (.json)")
-    options.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
-    options.add_argument("--figures", required=True, type=Path, help="folder of the figures to write (.svg, .csv)")
-    options.add_argument("--out", required=True, help="page to write (.html)")
-    options.add_argument("--jobs", type=int, default=1, help="sections made at a time, each in a process of its own")
-    given = options.parse_args(arguments)
-    reported = ReportedRun(Inputs.read(given.manifest), *pick(given.settings, "config", "published"))
-    write_stages(given.stages, reported)
-    calls = [scripts, partial(_stills, given.figures, reported)]
-    script, _, *made = together(calls + [partial(section, reported, name) for name in SECTIONS], given.jobs)
-    write_plots(given.figures, [plot for one in made for plot in one.plots])
-    text = page(reported, dict(zip(SECTIONS, made, strict=True)), script)
-    with replacing(given.out) as temporary:
+    line = parser("lowalt.report", __doc__)
+    line.add_argument("--manifest", required=True, help="files of the run by name (.json)")
+    line.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
+    line.add_argument("--figures", required=True, type=Path, help="folder of the figures to write (.svg, .csv)")
+    line.add_argument("--out", required=True, help="page to write (.html)")
+    line.add_argument("--jobs", type=int, default=1, help="sections made at a time, each in a process of its own")
+    options = line.parse_args(arguments)
+    reported = ReportedRun(Inputs.read(options.manifest), *pick(options.settings, "config", "published"))
+    write_stages(options.stages, reported)
+    calls = [scripts, partial(_stills, options.figures, reported)]
+    script, _, *sections = together(calls + [partial(section, reported, name) for name in SECTIONS], options.jobs)
+    write_plots(options.figures, [plot for made in sections for plot in made.plots])
+    text = page(reported, dict(zip(SECTIONS, sections, strict=True)), script)
+    with replacing(options.out) as temporary:
         temporary.write_text(text)
-    print(json.dumps({"report": given.out, "samples": len(reported.shards)}), file=sys.stderr)
+    print(json.dumps({"report": options.out, "samples": len(reported.shards)}), file=sys.stderr)
 
 
 if __name__ == "__main__":

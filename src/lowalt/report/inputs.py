@@ -22,10 +22,8 @@ LISTS = ("clouds", "benchmarks")
 """Names of which every manifest has a list of files."""
 KEPT = {"accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv"}
 """Tables in results/reference that the page shows where the run has none of its own: file by the own table's name."""
-OPTIONAL = ("published", "transfer", "measured", *KEPT, *(f"kept_{name}" for name in KEPT))
-"""Names that a manifest leaves out where the run has no such file; the page then has no such section."""
-OPTIONAL_LISTS = ("predictions",)
-"""Names of lists that a manifest may leave out."""
+OPTIONAL = ("published", "predictions", "transfer", *KEPT, *(f"kept_{name}" for name in KEPT))
+"""Names that a manifest leaves out where the run has no such file or files; the page then has no such section."""
 
 
 class Inputs:
@@ -34,30 +32,23 @@ class Inputs:
     def __init__(self, files: dict[str, str | list[str]], source: str = "manifest") -> None:
         """files: path or list of paths by name; source: the manifest's own path, for messages.
 
-        Raises: InputError for names that are missing or unknown, and for a path in place of a list or the reverse.
+        Raises: InputError for names that are missing or unknown.
         """
-        missing = [name for name in (*FILES, *LISTS) if name not in files]
-        unknown = [name for name in files if name not in (*FILES, *LISTS, *OPTIONAL, *OPTIONAL_LISTS)]
+        missing = sorted({*FILES, *LISTS} - set(files))
+        unknown = sorted(set(files) - {*FILES, *LISTS, *OPTIONAL})
         if missing or unknown:
-            raise InputError(
-                f"{source}: missing {missing}, unknown {unknown}, optional are {[*OPTIONAL, *OPTIONAL_LISTS]}"
-            )
-        for name, value in files.items():
-            many = name in (*LISTS, *OPTIONAL_LISTS)
-            if isinstance(value, str) == many:
-                raise InputError(f"{source}: {name} is {value!r}, expected {'a list' if many else 'a path'}")
+            raise InputError(f"{source}: missing {missing}, unknown {unknown}, optional are {OPTIONAL}")
         self.files = files
 
     @classmethod
     def read(cls, path: str | Path) -> "Inputs":
-        """Read a manifest. Raises: InputError where it is missing, no JSON object, or as the constructor says."""
+        """Read a manifest. Raises: InputError where it is missing, no JSON, or as the constructor says."""
+        text = text_of(path, "manifest")
         try:
-            found = json.loads(text_of(path, "manifest"))
+            files = json.loads(text)
         except ValueError as error:
             raise InputError(f"{path}: not JSON ({error})") from error
-        if not isinstance(found, dict):
-            raise InputError(f"{path}: {type(found).__name__}, expected a JSON object")
-        return cls(found, str(path))
+        return cls(files, str(path))
 
     def __contains__(self, name: str) -> bool:
         """Whether the run or the kept references have this file."""
@@ -65,15 +56,15 @@ class Inputs:
 
     def own_or_kept(self, name: str) -> str | None:
         """Return the manifest's name of this run's file, or else of the kept one; None where there is neither."""
-        return next((found for found in (name, f"kept_{name}") if found in self), None)
+        return next((known for known in (name, f"kept_{name}") if known in self), None)
 
     def path(self, name: str) -> Path:
         """Return the file called `name`. Raises: InputError where it does not exist."""
         return existing(self.files[name], name)
 
     def paths(self, name: str) -> list[str]:
-        """Return the list of files called `name`."""
-        return self.files[name]
+        """Return the list of files called `name`, none where the manifest leaves it out."""
+        return self.files.get(name, [])
 
     def table(self, name: str, *columns: str) -> list[dict[str, str]]:
         """Return the rows of the table called `name`. Raises: InputError where it lacks one of `columns`."""

@@ -7,20 +7,19 @@ from typing import NamedTuple
 import jinja2
 
 from lowalt.report.plots import Plot, plotted, scripts, svg
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections import (
     accuracy,
-    accuracy_cost,
+    comparisons,
     confusion,
-    echo_cost,
     made_with,
-    measured,
-    orderings,
+    other_runs,
     overview,
-    samples,
-    scene,
+    recognition_cost,
+    sample_viewer,
+    scene_verdict,
+    simulation_cost,
     subtypes,
-    transfer,
 )
 
 
@@ -41,11 +40,10 @@ class Section(NamedTuple):
 
 PARTS = (
     PagePart("run", "This run", (overview,)),
-    PagePart("samples", "Samples", (samples,)),
-    PagePart("results", "Results", (subtypes, confusion, accuracy, orderings, transfer)),
-    PagePart("cost", "What accuracy costs in time", (accuracy_cost, echo_cost)),
-    PagePart("effects", "The scene", (scene,)),
-    PagePart("measured", "Held against measurement", (measured,)),
+    PagePart("samples", "Samples", (sample_viewer,)),
+    PagePart("results", "Results", (subtypes, confusion, accuracy, comparisons, other_runs)),
+    PagePart("cost", "What accuracy costs in time", (recognition_cost, simulation_cost)),
+    PagePart("effects", "The scene", (scene_verdict,)),
     PagePart("provenance", "Provenance", (made_with,)),
 )
 """The parts in the order of the page; one that the run has nothing for is left out."""
@@ -91,18 +89,13 @@ def assembled(title: str, parts: list[dict[str, str]], script: str = "") -> str:
     return templates().get_template("page.html").render(title=title, parts=parts, plots=plots)
 
 
-def section_page(title: str, name: str, values: dict) -> str:
-    """Return a page of the one section `name` with these values."""
-    return assembled(title, [{"id": name, "title": title, "html": rendered(name, values)}])
-
-
 def section(run: ReportedRun, name: str) -> Section:
     """Return the section `name` of a run.
 
     Raises: InputError for a table that is missing or lacks a column.
     """
     values = _MODULES[name].values(run)
-    plots = [held for held in (values or {}).values() if isinstance(held, Plot)]
+    plots = [value for value in (values or {}).values() if isinstance(value, Plot)]
     return Section(rendered(name, values), [(plot, svg(plot)) for plot in plots])
 
 

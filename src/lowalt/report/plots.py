@@ -58,7 +58,7 @@ def _drawn(specification: str, name: str) -> str:
     # The library counts clip paths through a process, so their numbers tell what else it has drawn.
     numbers: dict[str, int] = {}
     return re.sub(r'(id="|url\(#)clip(\d+)',
-                  lambda found: f"{found[1]}{name}-clip{numbers.setdefault(found[2], len(numbers) + 1)}",
+                  lambda match: f"{match[1]}{name}-clip{numbers.setdefault(match[2], len(numbers) + 1)}",
                   text)  # fmt: skip
 
 

@@ -67,16 +67,16 @@ def _numbers(value: Any) -> Any:
 
 def _differing(base: dict, config: dict) -> dict:
     """The keys of `changes` with their values, infinities as words."""
-    found = {}
+    differing = {}
     for key in [*config, *(key for key in base if key not in config)]:
-        mine, other = config.get(key), base.get(key)
-        if isinstance(mine, dict) and isinstance(other, dict):
-            inner = _differing(other, mine)
+        value, base_value = config.get(key), base.get(key)
+        if isinstance(value, dict) and isinstance(base_value, dict):
+            inner = _differing(base_value, value)
             if inner:
-                found[key] = inner
-        elif key not in config or key not in base or mine != other:
-            found[key] = mine
-    return found
+                differing[key] = inner
+        elif key not in config or key not in base or value != base_value:
+            differing[key] = value
+    return differing
 
 
 def checksums(files: dict[str, str | list[str]]) -> list[dict]:

@@ -16,8 +16,8 @@ from lowalt.files.atomic import slug, text_file
 from lowalt.motion import positions
 from lowalt.recognition import predictions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report.figures.sample import axes_of
 from lowalt.report.figures.style import embedded
+from lowalt.report.figures.tile_axes import axes_of
 from lowalt.report.viewer_echoes import echoes, largest_speed
 from lowalt.shards import ShardSet
 from lowalt.shards.record import row_of
@@ -55,30 +55,30 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
     rounds: list[list[int]] = [[] for _ in range(MODELS * SNRS)]
     for _, subtypes in sorted(models.items()):
         known = [name for name in sorted(subtypes) if any(keys[n] in predicted for n in subtypes[name])]
-        mine: dict[tuple, list[int]] = {}
+        of_model: dict[tuple, list[int]] = {}
         for number in subtypes[(known or sorted(subtypes))[0]]:
             model = int(KEY.fullmatch(keys[number])[2])
-            mine.setdefault((keys[number] not in predicted, model), []).append(number)
-        for place, (_, numbers) in enumerate(sorted(mine.items())[:MODELS]):
+            of_model.setdefault((keys[number] not in predicted, model), []).append(number)
+        for place, (_, numbers) in enumerate(sorted(of_model.items())[:MODELS]):
             levels = sorted(numbers, key=lambda number: shards.snrs_db[number])
-            wanted = dict.fromkeys([len(levels) - 1, 0, len(levels) // 2][:SNRS])
-            for step, level in enumerate(wanted):
+            steps_shown = dict.fromkeys([len(levels) - 1, 0, len(levels) // 2][:SNRS])
+            for step, level in enumerate(steps_shown):
                 rounds[step * MODELS + place].append(levels[level])
     return [number for some in rounds for number in some]
 
 
 def predicted_keys(paths: Iterable[str | Path]) -> set[str]:
     """Return the keys of all samples in prediction files."""
-    found = set()
+    keys = set()
     for path in paths:
         with text_file(path, "predictions") as file:
-            found.update(row[0] for row in csv.reader(file))
-    return found
+            keys.update(row[0] for row in csv.reader(file))
+    return keys
 
 
 def probabilities(paths: Iterable[str | Path], keys: set[str], classes: tuple[str, ...]) -> dict[str, dict]:
     """Return class probabilities as key -> "protocol scheme" -> list; one file a protocol and scheme, the first."""
-    columns, first, found = predictions.probability_columns(classes), {}, {}
+    columns, first, of_samples = predictions.probability_columns(classes), {}, {}
     for path in paths:
         first.setdefault(Path(path).parent, Path(path))
     for path in first.values():
@@ -88,8 +88,8 @@ def probabilities(paths: Iterable[str | Path], keys: set[str], classes: tuple[st
             for row in csv.DictReader(file):
                 if row["key"] in keys:
                     shares = [round(float(row[column]), 4) for column in columns]
-                    found.setdefault(row["key"], {})[name] = shares
-    return found
+                    of_samples.setdefault(row["key"], {})[name] = shares
+    return of_samples
 
 
 def motion(cloud: Cloud, row: dict) -> dict:
@@ -108,7 +108,7 @@ def motion(cloud: Cloud, row: dict) -> dict:
 
 def panels(renderer: Renderer) -> list[dict]:
     """Return what the images of a tile show, station by station: names, axes, ticks."""
-    found = []
+    entries = []
     for row, station in enumerate(renderer.network.stations):
         for column, name in enumerate(renderer.spectra):
             axes = axes_of(name, station, renderer)
@@ -119,13 +119,13 @@ def panels(renderer: Renderer) -> list[dict]:
                 key: [float(f"{t:g}") for t in MaxNLocator(4).tick_values(*ends) if ends[0] <= t <= ends[1]]
                 for key, ends in (("x", (left, right)), ("y", (low, high)))
             }
-            found.append(
+            entries.append(
                 {"row": row, "column": column, "station": station.name, "title": spectrum(name).TITLE, "low": low,
                  "high": high, "left": left, "right": right, "across": across, "upwards": upwards.partition("\n")[0],
                  "turned": first > last,
                  "folds": folds, **ticks}
             )  # fmt: skip
-    return found
+    return entries
 
 
 def reduced(tile: np.ndarray, spectra: int, pixels: int, palette: np.ndarray) -> str:
@@ -149,24 +149,24 @@ def samples(
     shares = probabilities(files, {shards.keys[number].decode() for number in numbers}, shards.classes)
     names = [station.name for station in shards.renderer.network.stations]
     spectra, motions, total = len(shards.spectra), {}, 0
-    held: list[tuple[float, dict]] = []
+    kept: list[tuple[float, dict]] = []
     for number in numbers:
         whole, record = shards.tile(number), shards.record(number)
         tile = reduced(whole, spectra, PIXELS, shards.palette)
         total += len(tile)
-        if held and total > BUDGET:
+        if kept and total > BUDGET:
             break
         name = f"{record['subtype']} {record['model']}"
         if name not in motions and record["subtype"] in clouds and record["motion"].get("x_m") is not None:
             motions[name] = motion(clouds[record["subtype"]], row_of(record)[0])
         heard = echoes(remaker.signal(record), record["geometry"], remaker.network) if remaker else []
         snr = f"{record['snr_db']:g} dB" if record["noise"] else "no noise"
-        held.append((record["snr_db"], {
+        kept.append((record["snr_db"], {
             "subtype": record["subtype"], "category": record["category"], "model": record["model"],
             "group": groups.get(record["subtype"], ""), "snr": snr, "tile": tile,
             "network": reduced(whole, spectra, pixels, shards.palette), "echoes": heard,
             "probabilities": shares.get(record["key"], {}),
         }))  # fmt: skip
     # The clearest sample of a motion model first, as the page lists them.
-    clearest = [sample for _, sample in sorted(held, key=lambda pair: -pair[0])]
+    clearest = [sample for _, sample in sorted(kept, key=lambda pair: -pair[0])]
     return {"samples": clearest, "motions": motions, "classes": list(shards.classes), "stations": names}

@@ -57,12 +57,12 @@ def echoes(signals: np.ndarray, geometry: dict[str, dict[str, float]], network: 
 
     geometry: of the sample's record, with `radial_mps` of each station, receding positive; None where it has no place.
     """
-    found = []
+    entries = []
     for station, signal in zip(network.stations, signals, strict=True):
         speed = geometry[station.name]["radial_mps"]
-        held: dict = {"power": power(signal), "phase": phase(signal)}
+        entry: dict = {"power": power(signal), "phase": phase(signal)}
         if speed is not None and math.isfinite(speed):
             shown, folds = folded(speed, station.frequency_hz, network.symbol_interval_s)
-            held |= {"speed": round(speed, 2), "shown": round(shown, 2), "folds": folds}
-        found.append(held)
-    return found
+            entry |= {"speed": round(speed, 2), "shown": round(shown, 2), "folds": folds}
+        entries.append(entry)
+    return entries

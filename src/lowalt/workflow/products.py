@@ -118,7 +118,7 @@ class Products(DataProducts):
         }
         if self._run.trainings:
             files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
-        asked = {"accuracy_cost": block["accuracy"], "measured": block["measured"], "echo_cost": block["cost"]}
+        asked = {"accuracy_cost": block["accuracy"], "echo_cost": block["cost"]}
         return files | {name: path for name, path in asked.items() if path}
 
     def manifest(self, wildcards: Any) -> str:

@@ -28,8 +28,7 @@ TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
 
 def refuse_braces(config: dict, inputs: str | None) -> None:
     """Refuse paths with braces, which Snakemake takes for a wildcard or a format."""
-    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"),
-            ("motion", "track"))  # fmt: skip
+    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("motion", "track"))
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
     paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
     for name, path in paths.items():
@@ -152,7 +151,7 @@ def refuse_missing(config: dict) -> None:
         "recognition.table": [config["recognition"]["table"]],
         "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
         "recognition.network.weights": [] if network["weights"] in ("none", "hub") else [network["weights"]],
-        **{f"report.{key}": [report[key]] for key in ("published", "accuracy", "measured")},
+        **{f"report.{key}": [report[key]] for key in ("published", "accuracy")},
     }
     for key, paths in files.items():
         missing = [path for path in paths if path is not None and not Path(path).exists()]

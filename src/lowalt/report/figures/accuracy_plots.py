@@ -12,9 +12,9 @@ _BELOW = {"orient": "bottom", "title": None, "columns": 4}
 _SCHEME = {"field": "scheme", "type": "nominal", "legend": _BELOW}
 
 
-def _lines(across: dict, more: dict | None = None) -> dict:
+def _lines(across: dict, further: dict | None = None) -> dict:
     """A line and its points over `across`, a colour a scheme; the legend picks schemes."""
-    encoding = {"x": across, "y": _ACCURACY, "color": _SCHEME, "opacity": _FADE, **(more or {})}
+    encoding = {"x": across, "y": _ACCURACY, "color": _SCHEME, "opacity": _FADE, **(further or {})}
     return {"encoding": encoding, "layer": [
         {"mark": {"type": "line", "tooltip": {"content": "data"}}, "params": [_PICKED]},
         {"mark": {"type": "point", "filled": True, "size": 45, "tooltip": {"content": "data"}}},
@@ -29,8 +29,8 @@ def over_snr(ours: dict, published: dict) -> Plot:
     rows = [
         {"protocol": f"{protocol} subtypes", "scheme": scheme, "snr_db": SNR_LABELS.get(label, label),
          "accuracy_percent": round(value, 3), "source": source}
-        for source, found in (("this run", ours), ("paper", published))
-        for protocol, schemes in found.items() if protocol in ours
+        for source, table in (("this run", ours), ("paper", published))
+        for protocol, schemes in table.items() if protocol in ours
         for scheme, values in schemes.items() if scheme in ours[protocol]
         for label, value in values.items() if label != "avg"
     ]  # fmt: skip

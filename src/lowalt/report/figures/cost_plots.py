@@ -21,10 +21,10 @@ _PER_NAME = {"content": "data"}
 _TEXT = {"type": "text", "align": "right", "baseline": "middle"}
 
 
-def _log(field: str, title: str, values: list[float], room: float, **more) -> dict:
+def _log(field: str, title: str, values: list[float], room: float, **further) -> dict:
     """A logarithmic axis of a field from half the least of its values to `room` times the largest."""
     scale = {"type": "log", "domain": [min(values) / 2, room * max(values)], "nice": False}
-    return {"field": field, "type": "quantitative", "title": title, "scale": scale, **more}
+    return {"field": field, "type": "quantitative", "title": title, "scale": scale, **further}
 
 
 def recognition(rows: list[dict[str, str]]) -> Plot:
@@ -116,15 +116,15 @@ def echo(measured: list[dict[str, str]]) -> Plot:
 
 def main(arguments: list[str]) -> None:
     """Write one of the plots as SVG."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.report.figures.cost_plots", description=__doc__)
-    options.add_argument("plot", choices=("echo", "recognition"), help="the echo, or the networks")
-    options.add_argument("--table", required=True, help="cost.csv or accuracy_cost.csv")
-    options.add_argument("--figure", required=True, help="picture to write (.svg)")
-    given = options.parse_args(arguments)
-    draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[given.plot]
-    plot = draw(read_csv(given.table, *columns))
+    line = argparse.ArgumentParser(prog="python -m lowalt.report.figures.cost_plots", description=__doc__)
+    line.add_argument("plot", choices=("echo", "recognition"), help="the echo, or the networks")
+    line.add_argument("--table", required=True, help="cost.csv or accuracy_cost.csv")
+    line.add_argument("--figure", required=True, help="picture to write (.svg)")
+    options = line.parse_args(arguments)
+    draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[options.plot]
+    plot = draw(read_csv(options.table, *columns))
     drawn = svg(plot._replace(spec={**plot.spec, "background": "white"}))
-    with replacing(given.figure) as temporary:
+    with replacing(options.figure) as temporary:
         temporary.write_text(drawn)
 
 

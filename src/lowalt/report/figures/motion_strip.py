@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report.figures.style import png
 from lowalt.targets.cloud import Cloud
 
 DIRECTIONS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),
@@ -36,14 +35,14 @@ def _frames(cloud: Cloud, row: dict, instants: int) -> tuple[np.ndarray, np.ndar
 
 def strip_rows(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> list[dict]:
     """Return the points that `strip_figure` draws: subtype, time (ms), part, x, y, z (m, to 0.1 mm)."""
-    named, found = {cloud.subtype: cloud for cloud in clouds}, []
+    named, points = {cloud.subtype: cloud for cloud in clouds}, []
     for row in _chosen(rows):
         cloud = named[row["subtype"]]
         for time, frame in zip(*_frames(cloud, row, instants), strict=True):
             for part, point in zip(cloud.part.tolist(), np.round(frame, 4).tolist(), strict=True):
                 facts = {"subtype": cloud.subtype, "time_ms": float(f"{1000 * time:.6g}"), "part": part}
-                found.append(facts | dict(zip(("x_m", "y_m", "z_m"), point, strict=True)))
-    return found
+                points.append(facts | dict(zip(("x_m", "y_m", "z_m"), point, strict=True)))
+    return points
 
 
 def strip_figure(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> Figure:
@@ -67,8 +66,3 @@ def strip_figure(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> Fi
         line[0].set_ylabel(f"{row['subtype']}\n{view}", fontsize=8)
     figure.tight_layout()
     return figure
-
-
-def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:
-    """Return `strip_figure` as PNG bytes."""
-    return png(strip_figure(clouds, rows, instants))

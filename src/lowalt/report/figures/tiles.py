@@ -1,11 +1,9 @@
 """One clean sample of each category out of the shards, as pictures for the page."""
 
-import io
-
 import numpy as np
-from PIL import Image
 
 from lowalt.shards import ShardSet
+from lowalt.tiles.png import encode
 
 
 def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
@@ -18,16 +16,7 @@ def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
             record = shards.record(int(best))
             noise = "no noise" if np.isinf(shards.snrs_db[best]) else f"SNR {shards.snrs_db[best]:g} dB"
             caption = f"{category}: {record['subtype']}, motion model {record['model']}, {noise}"
-            chosen.append((caption, _picture(shards, int(best))))
+            stored = shards.kind == "image"
+            picture = shards.png(int(best)) if stored else encode(shards.tile(int(best)), shards.palette)
+            chosen.append((caption, picture))
     return chosen
-
-
-def _picture(shards: ShardSet, number: int) -> bytes:
-    """PNG of a sample: the stored one, or one drawn from its signals."""
-    if shards.kind == "image":
-        return shards.png(number)
-    buffer = io.BytesIO()
-    picture = Image.fromarray(shards.tile(number), "P")
-    picture.putpalette(np.ascontiguousarray(shards.palette).tobytes())
-    picture.save(buffer, "PNG")
-    return buffer.getvalue()

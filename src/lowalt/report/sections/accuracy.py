@@ -4,8 +4,8 @@ from pathlib import Path
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.accuracy_plots import over_snr
-from lowalt.report.run import ReportedRun
-from lowalt.report.tables import by_scheme, macro_f1, spreads
+from lowalt.report.pivots import by_scheme, macro_f1, spreads
+from lowalt.report.reported_run import ReportedRun
 
 COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
 

@@ -1,8 +1,8 @@
 """Section: confusion matrices."""
 
 from lowalt.report.figures import accuracy_plots
-from lowalt.report.run import ReportedRun
-from lowalt.report.tables import confusion
+from lowalt.report.pivots import confusion
+from lowalt.report.reported_run import ReportedRun
 
 COLUMNS = ("protocol", "scheme", "category", "predicted", "samples")
 

@@ -9,7 +9,7 @@ from lowalt.files.shipped import as_named, shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.hardware import describe
 from lowalt.report.provenance import changes, checksums, code_sum, commands, revision
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 NAMES = (
     "lowalt", "snakemake", "numpy", "scipy", "numba", "llvmlite", "pillow", "deflate", "trimesh", "pymeshlab", "torch",
@@ -21,13 +21,13 @@ BASE = "config/default.yaml"
 
 def versions() -> list[tuple[str, str]]:
     """Return (name, version) of Python and of every package of NAMES."""
-    found = [("Python", platform.python_version())]
+    rows = [("Python", platform.python_version())]
     for name in NAMES:
         try:
-            found.append((name, version(name)))
+            rows.append((name, version(name)))
         except PackageNotFoundError:
-            found.append((name, "not installed"))
-    return found
+            rows.append((name, "not installed"))
+    return rows
 
 
 def machines(run: ReportedRun) -> list[tuple[str, str]]:

@@ -4,9 +4,9 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
 from lowalt.report.figures.style import embedded
 from lowalt.report.figures.tiles import example_tiles
-from lowalt.report.run import ReportedRun
+from lowalt.report.pivots import by_scheme, macro_f1
+from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections.accuracy import COLUMNS
-from lowalt.report.tables import by_scheme, macro_f1
 
 TILES = 3
 """Tiles at the top of the page."""
@@ -24,16 +24,16 @@ def verdict(here: float, paper: float | None, classes: int, seeds: int) -> str:
 def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]], classes: int) -> list[dict]:
     """Return one entry a protocol: the scheme of highest average, its accuracy, interval of macro F1 and a verdict."""
     ours, paper, intervals = by_scheme(rows), by_scheme(published), macro_f1(rows)
-    found = []
+    entries = []
     for protocol, schemes in ours.items():
         scheme = max(schemes, key=lambda name: schemes[name]["avg"])
         here, there = schemes[scheme]["avg"], paper.get(protocol, {}).get(scheme, {}).get("avg")
         seeds = max(int(row["seeds"]) for row in rows)
-        found.append({
+        entries.append({
             "protocol": protocol, "scheme": scheme, "percent": here, "paper": there,
             "interval": intervals.get(protocol, {}).get(scheme, ""), "words": verdict(here, there, classes, seeds),
         })  # fmt: skip
-    return found
+    return entries
 
 
 def values(run: ReportedRun) -> dict:

@@ -4,7 +4,7 @@ import numpy as np
 
 from lowalt.recognition.predictions import Predictions, read, record
 from lowalt.recognition.protocols import folds
-from lowalt.report.run import ReportedRun
+from lowalt.report.reported_run import ReportedRun
 
 ACCURACY = ("protocol", "scheme", "subtype", "category", "accuracy_percent")
 DISTANCES = ("category", "subtype", "nearest_trained", "trained_distance", "trained_size_ratio")
@@ -25,26 +25,26 @@ def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str
     return list(columns), [(name, category, values) for (name, category), values in table.items()]
 
 
-def reasons(found: Predictions, classes: tuple[str, ...]) -> dict[str, str]:
+def reasons(predictions: Predictions, classes: tuple[str, ...]) -> dict[str, str]:
     """Return by subtype what its wrong samples have in common, in a sentence; "" where none is wrong."""
-    said = {}
-    for subtype in np.unique(found.subtype):
-        mine = found.take(found.subtype == subtype)
-        wrong = mine.take(~mine.correct)
+    sentences = {}
+    for subtype in np.unique(predictions.subtype):
+        of_subtype = predictions.take(predictions.subtype == subtype)
+        wrong = of_subtype.take(~of_subtype.correct)
         if not len(wrong):
             continue
         called = classes[np.bincount(wrong.guesses).argmax()]
-        models = np.unique(mine.motion)
-        always = sum(not mine.correct[mine.motion == model].any() for model in models)
-        along = np.abs(np.cos(np.radians(mine.aspect_deg)))
+        models = np.unique(of_subtype.motion)
+        always = sum(not of_subtype.correct[of_subtype.motion == model].any() for model in models)
+        along = np.abs(np.cos(np.radians(of_subtype.aspect_deg)))
         words = f"called {called} in {np.mean(wrong.guesses == classes.index(called)):.0%} of its errors; "
         words += f"{always} of {len(models)} motion models are wrong at every SNR"
         if np.isfinite(along).all():
-            apart = along[~mine.correct].mean() - along.mean()
+            apart = along[~of_subtype.correct].mean() - along.mean()
             if abs(apart) > 0.1:
                 words += f"; wrong more often seen {'from the front or rear' if apart > 0 else 'from the side'}"
-        said[str(subtype)] = words
-    return said
+        sentences[str(subtype)] = words
+    return sentences
 
 
 def values(run: ReportedRun) -> dict | None:
@@ -52,10 +52,14 @@ def values(run: ReportedRun) -> dict | None:
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}
     rows.sort(key=lambda row: float([*row[2].values()][-1]))
-    files = run.inputs.paths("predictions") if "predictions" in run.inputs else []
+    files = run.inputs.paths("predictions")
     # The last training is of the protocol and the scheme that the configuration names last.
-    told = {}
+    in_common = {}
     if files:
         tested = folds(record(files[-1])["protocol"], "test")
-        told = reasons(read(files[-1], run.shards.classes).of(tested), run.shards.classes)
-    return {"columns": columns, "rows": rows, "distances": distances, "reasons": told, "worst": WORST} if rows else None
+        in_common = reasons(read(files[-1], run.shards.classes).of(tested), run.shards.classes)
+    return (
+        {"columns": columns, "rows": rows, "distances": distances, "reasons": in_common, "worst": WORST}
+        if rows
+        else None
+    )

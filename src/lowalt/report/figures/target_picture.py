@@ -1,0 +1,180 @@
+"""Pictures of one target: points by part with hinges, axes and normals, motion over a cycle, the three spectra."""
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+from matplotlib import pyplot as plt
+from PIL import Image
+
+from lowalt.config.layers import load_yaml
+from lowalt.config.network import Network, masts_m
+from lowalt.echo import Rigid, echo_signal
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED
+from lowalt.motion import poses, positions
+from lowalt.motion.drawing import draw, region_polygon
+from lowalt.numerics.streams import stream
+from lowalt.recognition.distances import cycle_s, still_row
+from lowalt.report.figures.style import png
+from lowalt.spectra import Spectra, spectrum
+from lowalt.spectra.interface import OfCells
+from lowalt.targets.cloud import Cloud
+from lowalt.targets.gallery import bones
+
+DIRECTIONS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0, 2))
+AXES = ("right x (m)", "front y (m)", "up z (m)")
+NORMALS = 150
+"""Normals drawn at most: more would hide the points."""
+FRAMES, MOST_FRAMES = 24, 96
+FLOOR_DB = -40.0
+CONFIG = SHIPPED / "config/default.yaml"
+
+
+def _colours(cloud: Cloud) -> np.ndarray:
+    """RGBA colour of each point (L, 4), by its part."""
+    table = plt.get_cmap("tab20")
+    parts = np.array(
+        [(0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20) for i, kind in enumerate(cloud.kinds)]
+    )
+    return parts[cloud.part]
+
+
+def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Middle (3,) and half width of a cube with a margin around all points (..., 3)."""
+    flat = points.reshape(-1, 3)
+    return (flat.min(axis=0) + flat.max(axis=0)) / 2, 0.58 * float(np.ptp(flat, axis=0).max())
+
+
+def _view(panel, cloud: Cloud, points: np.ndarray, view: tuple[str, int, int], middle: np.ndarray, half: float) -> None:
+    """Draw points (L, 3) m and the bones between them as seen along one axis, in a square of half width `half`."""
+    title, across, up = view
+    panel.scatter(points[:, across], points[:, up], s=6, c=_colours(cloud), linewidths=0)
+    for bone in bones(cloud.names):
+        x, y = points[list(bone)][:, [across, up]].T
+        panel.plot(x, y, color="0.6", linewidth=0.8, zorder=0)
+    panel.set(xlim=middle[across] + np.array([-half, half]), ylim=middle[up] + np.array([-half, half]), aspect="equal")
+    panel.set(title=title, xlabel=AXES[across], ylabel=AXES[up])
+    panel.grid(alpha=0.25)
+
+
+def _marks(panel, cloud: Cloud, view: tuple[str, int, int], middle: np.ndarray, half: float) -> None:
+    """Hinges with their axes, some normals, and an arrow to the front where the view shows it."""
+    _, across, up = view
+    known = np.flatnonzero(np.isfinite(cloud.normals).all(axis=1))
+    some = known[np.linspace(0, len(known) - 1, min(NORMALS, len(known))).round().astype(int)] if len(known) else known
+    tips = cloud.points[some] + 0.05 * half * cloud.normals[some]
+    ends = np.stack([cloud.points[some], tips])
+    panel.plot(ends[..., across], ends[..., up], color="0.75", linewidth=0.5, zorder=0)
+    for hinge, axis in zip(cloud.hinges, cloud.axes, strict=True):
+        if np.isfinite(hinge).all():
+            ends = np.stack([hinge - 0.12 * half * axis, hinge + 0.12 * half * axis])
+            panel.plot(ends[:, across], ends[:, up], color="black", linewidth=0.9)
+            panel.plot(hinge[across], hinge[up], "k.", markersize=4)
+    if 1 in (across, up):
+        start = np.array([middle[across], middle[up]]) - (0.9 * half if across != 1 else 0) * np.array([1, 0])
+        step = 0.8 * half * (np.array([0, 1]) if up == 1 else np.array([1, 0]))
+        start = start - (step / 2 if up == 1 else np.array([0.4 * half, 0.92 * half]))
+        panel.annotate("front", xy=start + step, xytext=start, color="tab:red", fontsize=8, ha="center", va="center",
+                       arrowprops={"arrowstyle": "->", "color": "tab:red"})  # fmt: skip
+
+
+def _motion_row(cloud: Cloud, config: dict, seed: int) -> dict:
+    """One motion model of the target, drawn as the motion stage draws them."""
+    masts = np.array(masts_m(config["network"]))
+    corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
+    row = draw(stream(seed, "show", cloud.subtype), cloud, cloud.record["published"], masts, corners, config["motion"])
+    return {**row, "group": cloud.record.get("group", "seen"), "model": 0}
+
+
+def _decibel(values: np.ndarray) -> np.ndarray:
+    """Magnitudes relative to their largest, in dB, at least FLOOR_DB."""
+    top = float(values.max())
+    return (
+        20 * np.log10(np.maximum(values, top * 10 ** (FLOOR_DB / 20)) / top)
+        if top > 0
+        else np.full(values.shape, FLOOR_DB)
+    )
+
+
+def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
+    """Up to three spectra of the first station, axes in seconds and metres a second."""
+    network = Network.from_settings(config["network"])
+    station, settings = network.stations[0], Spectra.from_settings(config["spectra"])
+    motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
+    aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
+    signal = echo_signal(network, station, motion, cloud.rcs_m2, aim).signal
+    of_station = (station.frequency_hz, network.symbol_interval_s)
+    for panel, (name, windows) in zip(panels, settings.items(), strict=False):
+        kind = spectrum(name)
+        if isinstance(kind, OfCells):
+            continue
+        values = kind.definition(signal, windows, name, *of_station)
+        values = values if kind.SIGNED else _decibel(values)
+        half = windows.window / 2
+        times = network.symbol_interval_s * np.array([half, half + windows.hop * values.shape[1]])
+        speeds = kind.speeds(windows, *of_station)
+        scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
+        if kind.SIGNED:
+            top = float(abs(values).max()) or 1.0
+            scale = {"vmin": -top, "vmax": top, "cmap": "RdBu_r"}
+        picture = panel.imshow(
+            values, origin="lower", aspect="auto", extent=(*times, *speeds), interpolation="nearest", **scale
+        )
+        panel.set(title=kind.TITLE, xlabel="time (s)", ylabel="speed away from the station (m/s, folded)")
+        panel.figure.colorbar(picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05)
+
+
+def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:
+    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, and one motion model's spectra.
+
+    The motion model is drawn as the workflow draws them, for the network of the configuration.
+    Raises: InputError where there is no such configuration, or the target's motion cannot be drawn.
+    """
+    config = load_yaml(config_path)
+    row = _motion_row(cloud, config, seed)
+    figure, panels = plt.subplots(2, 3, figsize=(14, 8.6))
+    points = cloud.track[0] if len(cloud.track) else cloud.points
+    middle, half = _limits(points)
+    for panel, view in zip(panels[0], DIRECTIONS, strict=True):
+        _view(panel, cloud, points, view, middle, half)
+        _marks(panel, cloud, view, middle, half)
+    _spectra(panels[1], cloud, row, config)
+    size = " x ".join(f"{value:.3g}" for value in np.ptp(points, axis=0))
+    doubts = "".join(f"\nwarning: {text}" for text in cloud.record.get("warnings", []))
+    about = f"{cloud.subtype} ({cloud.category}, {cloud.record['source']})"
+    figure.suptitle(f"{about}: {len(points)} points, {len(cloud.kinds)} parts, {size} m{doubts}", fontsize=11)
+    figure.tight_layout()
+    return png(figure)
+
+
+def target_animation(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1, count: int = FRAMES) -> bytes:
+    """Return a GIF of `count` frames of one cycle of a target's own motion, from above, from the right and from behind.
+
+    Where a rotor turns at several times the target's rate there are as many times the frames, at most MOST_FRAMES.
+    Raises: as `target_picture`; also where nothing of the target moves.
+    """
+    row = _motion_row(cloud, load_yaml(config_path), seed)
+    if not len(cloud.track) and all(kind == "body" for kind in cloud.kinds):
+        raise InputError(f"{cloud.subtype}: no part moves, expected rotors, wings, wheels or a recording to animate")
+    length = cycle_s(cloud, row)
+    count = min(MOST_FRAMES, count * max(1, math.ceil(cloud.rate_factors.max())))
+    frames = positions(cloud, still_row(row), np.arange(count) / count * length)
+    middle, half = _limits(frames)
+    pictures = []
+    for number, points in enumerate(frames):
+        figure, panels = plt.subplots(1, 3, figsize=(10, 3.9))
+        for panel, view in zip(panels, DIRECTIONS, strict=True):
+            _view(panel, cloud, points, view, middle, half)
+        figure.suptitle(
+            f"{cloud.subtype}: {1000 * number / count * length:.4g} ms of a cycle of {1000 * length:.4g} ms"
+        )
+        figure.tight_layout()
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", dpi=70)
+        plt.close(figure)
+        pictures.append(Image.open(buffer).convert("RGB"))
+    result = io.BytesIO()
+    pictures[0].save(result, format="GIF", save_all=True, append_images=pictures[1:], duration=80, loop=0)
+    return result.getvalue()

@@ -1,0 +1,30 @@
+"""A run as the sections of the page see it: its files, its configuration and its shards."""
+
+from lowalt.config.network import station_names
+from lowalt.config.plan import snrs_of
+from lowalt.report.inputs import Inputs
+from lowalt.shards import ShardSet
+
+
+class ReportedRun:
+    """The run that a page shows."""
+
+    def __init__(self, inputs: Inputs, config: dict, targets: dict[str, dict]) -> None:
+        """inputs: the run's files; config: its configuration; targets: row of the table of targets by subtype."""
+        self.inputs, self.config, self.targets = inputs, config, targets
+        self.shards = ShardSet(inputs.path("index"))
+
+    @property
+    def sample_bytes(self) -> float:
+        """Bytes a sample in the shards."""
+        return sum(shard["bytes"] for shard in self.shards.shards) / len(self.shards)
+
+    @property
+    def snr_labels(self) -> list[str]:
+        """The run's SNRs (dB) as the tables write them."""
+        return [f"{snr:g}" for snr in snrs_of(self.config)]
+
+    @property
+    def stations(self) -> list[str]:
+        """Names of the base stations, in the network's order."""
+        return station_names(self.config["network"])

@@ -1,0 +1,37 @@
+"""Section: the echo's error over its time, from the table of `make cost`."""
+
+from lowalt.report.figures import cost_plots
+from lowalt.report.reported_run import ReportedRun
+
+USUAL = 300
+"""Points of a usual target: most built-in ones have 100 to 400."""
+
+
+def sentence(rows: list[dict[str, str]]) -> str:
+    """Return what a tolerance saves; "" where the exact mode or tolerances were not timed. rows: of cost.csv."""
+    times: dict[int, dict[str, float]] = {}
+    for row in rows:
+        if row["tolerance"]:
+            times.setdefault(int(row["points"]), {})[row["tolerance"]] = 1e3 * float(row["seconds"])
+    pairs = {
+        points: (of["exact"], max(0.0, of["exact"] - min(of.values())))
+        for points, of in times.items()
+        if "exact" in of and len(of) > 1
+    }
+    if not pairs:
+        return ""
+    usual, most = min(pairs, key=lambda points: abs(points - USUAL)), max(pairs)
+    exact, saved = pairs[usual]
+    words = f"Exact costs {exact:.2f} ms a signal of {usual} points, and tolerances save at most {saved:.2f} ms of it"
+    of_the_largest = "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
+    return f"{words}{of_the_largest}" + (", so use exact." if saved < exact / 2 else ".")
+
+
+def values(run: ReportedRun) -> dict | None:
+    """Return the plot and what it says; None where neither run nor reference has the table."""
+    name = run.inputs.own_or_kept("echo_cost")
+    if name is None:
+        return None
+    rows = run.inputs.table(name, *cost_plots.ECHO, "hardware")
+    return {"own": name == "echo_cost", "hardware": rows[0]["hardware"], "plot": cost_plots.echo(rows),
+            "sentence": sentence(rows)}  # fmt: skip

@@ -1,0 +1,149 @@
+"""The test of networks on recordings: confusion by file, and balanced accuracy with an interval over files.
+
+measured-recognition.csv: one row a radar, training seed and recording, with the number of windows of each name. The
+    seed "mean" stands for all networks together, by the mean of their probabilities.
+measured-accuracy.csv: share of right windows of each class in each half, mean over its files, and balanced accuracy
+    over the radar's classes; intervals resample files within their class. One row is for all radars together.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from recorded_sets import HALVES, Measured
+from torch import nn
+
+from lowalt.config.classes import CATEGORIES
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
+from lowalt.recognition import checkpoint, runs
+from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recordings.library import Library
+from lowalt.recordings.twin_network import Windows, facts, rendered, simulated, train
+from lowalt.tiles import join
+from lowalt.tiles.png import encode
+from lowalt.tiles.settings import Images
+
+RECOGNITION = ("radar", "seed", "set", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
+ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")
+REPEATS = 4000
+PIXELS = 3
+"""Side of a network's pixel in a picture."""
+
+Heard = list[tuple[Measured, Windows]]
+"""Recordings with their windows."""
+
+
+def heard(recordings: list[Measured], library: Library, block: dict) -> Heard:
+    """Return the windows of recordings that hold a target, rendered as their radar's twin renders its own.
+
+    Recordings without any such window are left out.
+    """
+    pairs = []
+    for recording in recordings:
+        twin = recording.twin(library)
+        images = rendered(recording.windows(twin), twin, Images.from_settings(block["images"]), block["size"])
+        count, label = len(images), CATEGORIES.index(recording.record.label)
+        about = facts(np.full(count, label), [recording.name] * count, np.arange(count), np.zeros(count), "test")
+        if count:
+            pairs.append((recording, Windows(images, about)))
+    return pairs
+
+
+def write_picture(recording: Measured, windows: Windows, block: dict, folder: Path) -> None:
+    """Write the three spectra of a recording's middle window, as the network sees them, into `folder` as PNG."""
+    views = windows.images[len(windows.images) // 2]
+    tile = encode(np.kron(join(views, len(views)), np.ones((PIXELS, PIXELS), np.uint8)),
+                  Images.from_settings(block["images"]).palette)  # fmt: skip
+    with replacing(folder / f"spectra-{recording.set}-{recording.name}.png") as temporary:
+        temporary.write_bytes(tile)
+
+
+def loaded(path: Path, name: str) -> nn.Module:
+    """Return the network in a file that `train` wrote.
+
+    Raises: InputError where the file is missing, damaged, or was trained on another twin than `name`.
+    """
+    twin = checkpoint.model(path)[1].get("twin")
+    if twin != name:
+        raise InputError(f"{path}: trained on the twin {twin!r}, expected {name!r}")
+    return runs.load(path).model
+
+
+def recognition_rows(name: str, measured: Heard, networks: dict[int, nn.Module], block: dict) -> list[list]:
+    """Return the rows of `RECOGNITION` of recordings with their windows, named by networks {training seed: network}.
+
+    One row a network and recording, and one of all networks together (seed "mean"), whose probabilities are averaged.
+    """
+    rows, machine = [], Machine.here(block["evaluation"]["precision"])
+    for recording, windows in measured:
+        every = np.arange(len(windows.images))
+        answers = {seed: probabilities(network, windows, every, machine, block["evaluation"]["batch"])
+                   for seed, network in networks.items()}  # fmt: skip
+        answers["mean"] = np.mean(list(answers.values()), axis=0)
+        about = recording.set, recording.half, recording.name, recording.record.label
+        for seed, shares in answers.items():
+            guesses = shares.argmax(1)
+            counts = np.bincount(guesses, minlength=len(CATEGORIES)).tolist()
+            right = 100 * float(np.mean(guesses == windows.facts.label))
+            rows.append([name, seed, *about, len(guesses), *counts, right])
+    return rows
+
+
+def radar_rows(
+    name: str, recordings: list[Measured], library: Library, block: dict, models: Path, out: Path, reuse: bool = False
+) -> list[list]:
+    """Train one network a seed on the twin `name` and return the rows of `RECOGNITION` of its recordings.
+
+    models: where the networks go, one folder a seed; out: where a picture of every recording's spectra goes; reuse:
+    take the networks that are there and train none.
+    """
+    measured = heard([recording for recording in recordings if recording.like in library.sets[name]], library, block)
+    if not measured:
+        return []
+    for recording, windows in measured:
+        write_picture(recording, windows, block, out)
+    if reuse:
+        networks = {seed: loaded(models / f"{name}-{seed}/model.pt", name) for seed in block["seeds"]}
+    else:
+        samples = {fold: simulated(library, name, block, fold) for fold in ("train", "validation")}
+        networks = {seed: train(block, samples, name, seed, models / f"{name}-{seed}") for seed in block["seeds"]}
+    return recognition_rows(name, measured, networks, block)
+
+
+def _interval(by_class: list[np.ndarray], rng: np.random.Generator) -> tuple[float, float, float]:
+    """Mean over classes of the mean over files, with the 95 % interval from resampling files within each class."""
+    draws = [values[rng.integers(0, len(values), (REPEATS, len(values)))].mean(axis=1) for values in by_class]
+    low, high = np.quantile(np.mean(draws, axis=0), [0.025, 0.975])
+    return float(np.mean([values.mean() for values in by_class])), float(low), float(high)
+
+
+def accuracy_rows(rows: list[list], seed: int) -> list[list]:
+    """Return the rows of `ACCURACY` from those of `RECOGNITION` whose seed is "mean"; a file counts once.
+
+    Classes are counted for each radar: drones at 10 GHz and drones at 3.3 GHz are two classes.
+    """
+    files: dict[tuple[str, str, str], list[tuple[int, float]]] = {}
+    for name, kind, _, half, _, label, windows, *_, right in rows:
+        if kind == "mean":
+            files.setdefault((name, half, label), []).append((windows, right))
+    result = []
+
+    def add(name: str, half: str, title: str, classes: list[tuple[str, str, str]]) -> None:
+        """Append the row of `classes`, (radar, half, class), under the name `title`."""
+        rng = stream(seed, "measured-accuracy", name, half, title)
+        interval = _interval([np.array([right for _, right in files[key]]) for key in classes], rng)
+        counts = [windows for key in classes for windows, _ in files[key]]
+        result.append([name, half, title, len(counts), sum(counts), *interval, 100 / len(CATEGORIES)])
+
+    for half in HALVES:
+        for name in dict.fromkeys(name for name, _, _ in files):
+            classes = [key for key in files if key[:2] == (name, half)]
+            for key in classes:
+                add(name, half, key[2], [key])
+            if len(classes) > 1:
+                add(name, half, "balanced", classes)
+        every_class = [key for key in files if key[1] == half]
+        if every_class:
+            add("all", half, "balanced", every_class)
+    return result

@@ -1,0 +1,173 @@
+"""Recordings of real radars held against the twins of these radars.
+
+    python studies/measured/study.py pairs | compare | recognise | ablate --inputs FOLDER --out FOLDER
+    python studies/measured/study.py page --out FOLDER
+
+FOLDER of the inputs: one folder a measured set (`sets.yaml`). `--out` gets the tables measured-*.csv, the pictures and
+report.html. `recognise` and `ablate` train networks into the folder `--models`.
+"""
+
+import argparse
+import math
+import os
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from recorded_sets import Measured, recordings, usable
+
+from lowalt.config.command import dispatch, run
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.yaml_files import load_yaml
+from lowalt.machine.side_by_side import together
+from lowalt.recordings.library import Library
+from lowalt.targets.records import load_records
+
+HERE = Path(__file__).parent
+TWINS = Path("config/measured/twins.yaml")
+PAIRS = HERE / "pictures.yaml"
+
+
+class Inputs(NamedTuple):
+    """A command's options, the twins that networks learn from, and the recordings that can be used."""
+
+    options: argparse.Namespace
+    library: Library
+    recordings: list[Measured]
+
+
+def _inputs(name: str, description: str, arguments: list[str], *, trains: bool = False) -> Inputs:
+    """Read a command's arguments and what they name; trains: whether it has the arguments of a training."""
+    line = argparse.ArgumentParser(f"study.py {name}", description=description)
+    line.add_argument("--inputs", required=True, type=Path, help="folder of the measured sets")
+    line.add_argument("--out", required=True, type=Path, help="folder to write")
+    line.add_argument("--twins", type=Path, default=TWINS, help="radars and scenes")
+    if name == "compare":
+        line.add_argument("--count", type=int, default=60, help="simulated windows a class")
+    if trains:
+        line.add_argument("--models", required=True, type=Path, help="folder of the networks")
+        line.add_argument("--recognition", type=Path, default=TWINS.with_name("recognition.yaml"))
+    if name == "recognise":
+        line.add_argument("--reuse", action="store_true", help="take the networks that --models holds, train none")
+        line.add_argument("--jobs", type=int, default=os.cpu_count(), help="radars at a time")
+    options = line.parse_args(arguments)
+    library = Library.read(options.twins)
+    return Inputs(options, library, usable(recordings(options.inputs), library))
+
+
+def _cell(value: object) -> object:
+    """A cell of a table: a float with five significant digits, NaN as an empty cell."""
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.5g}"
+    return value
+
+
+def _write(folder: Path, name: str, columns: tuple[str, ...], rows: list[list]) -> None:
+    """Write rows as measured-NAME.csv into a folder."""
+    write_csv(folder / f"measured-{name}.csv", columns, ([_cell(value) for value in row] for row in rows))
+
+
+def pairs(arguments: list[str]) -> None:
+    """Compute the pairs of pictures, measured and simulated, into one pair-NAME.npz each."""
+    from comparison import unmended
+    from pairs import measured_stretch, picture, simulated_stretch
+
+    from lowalt.recordings.twin import Twin
+
+    inputs, block = _inputs("pairs", pairs.__doc__, arguments), load_yaml(PAIRS)
+    records = load_records(block["targets"]["table"], block["targets"]["records"])
+    files = {(recording.set, recording.name): recording for recording in inputs.recordings}
+    for name, pair in block["pairs"].items():
+        recording, twin = files.get((pair["set"], pair["file"])), Twin.from_settings(pair["radar"])
+        if recording is None:
+            print(f"{name}: {pair['file']} is not there, left out")
+            continue
+        before = {**pair, "scene": unmended(pair["scene"], block["mended"])}
+        measured = picture(measured_stretch(recording, twin, pair["start_s"], pair["seconds"]), twin, pair)
+        sides = {
+            side: picture(simulated_stretch(name, drawn, records, block["seed"]), twin, pair)
+            for side, drawn in (("simulated", pair), ("before", before))
+        }
+        with replacing(inputs.options.out / f"pair-{name}.npz") as temporary:
+            np.savez(
+                temporary, caption=np.array(pair["caption"]), times_s=measured.times_s, speeds_mps=measured.speeds_mps,
+                **{side: shown.level_db.astype(np.float32) for side, shown in {"measured": measured, **sides}.items()},
+            )  # fmt: skip
+
+
+def compare(arguments: list[str]) -> None:
+    """Compute measured-figures.csv, measured-files.csv and measured-distances.csv."""
+    from comparison import DISTANCES, FIGURES, FILES, distance_rows, figure_rows
+
+    inputs, block = _inputs("compare", compare.__doc__, arguments), load_yaml(PAIRS)
+    options, library, recorded = inputs.options, inputs.library, Library.read(HERE / "recorded.yaml")
+    parts = [
+        figure_rows(name, pair, inputs.recordings, library.records, block) for name, pair in block["pairs"].items()
+    ]
+    apart = [distance_rows(name, inputs.recordings, library, recorded, block["mended"], options.count)
+             for name in library.twins]  # fmt: skip
+    _write(options.out, "figures", FIGURES, [row for rows, _ in parts for row in rows])
+    _write(options.out, "files", FILES, [row for _, rows in parts for row in rows])
+    _write(options.out, "distances", DISTANCES, [row for rows in apart for row in rows])
+
+
+def recognise(arguments: list[str]) -> None:
+    """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
+    inputs = _inputs("recognise", recognise.__doc__, arguments, trains=True)
+    from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
+
+    from lowalt.recordings.twin_network import settings
+
+    options, block = inputs.options, settings(inputs.options.recognition)
+    shared = inputs.recordings, inputs.library, block, options.models, options.out, options.reuse
+    # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
+    # last radar takes longest, so it starts first.
+    calls = [partial(radar_rows, name, *shared) for name in reversed(inputs.library.twins)]
+    rows = [row for rows in reversed(together(calls, options.jobs, "spawn")) for row in rows]
+    _write(options.out, "recognition", RECOGNITION, rows)
+    _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, block["seed"]))
+
+
+def ablate(arguments: list[str]) -> None:
+    """Train networks without one randomisation each and test them on the tuning half: measured-ablation.csv."""
+    inputs, block = _inputs("ablate", ablate.__doc__, arguments, trains=True), load_yaml(HERE / "ablation.yaml")
+    from ablation import ABLATION, ablation_rows
+
+    from lowalt.recordings.twin_network import settings
+
+    network = settings(inputs.options.recognition) | {key: block[key] for key in ("echoes", "receivers", "seeds")}
+    network["training"] = network["training"] | {"steps": block["steps"], "validate_every": block["steps"]}
+    shared = inputs.recordings, inputs.library, network, block["changes"], inputs.options.models
+    _write(inputs.options.out, "ablation", ABLATION, ablation_rows(block["radar"], *shared))
+
+
+def write_page(arguments: list[str]) -> None:
+    """Draw the pairs of pictures that there are, then write the page of all tables, report.html."""
+    options = argparse.ArgumentParser("study.py page", description=write_page.__doc__)
+    options.add_argument("--out", required=True, type=Path, help="folder of measured-*.csv and pair-NAME.npz")
+    folder = options.parse_args(arguments).out
+    from page import page, pair_picture, read_pair
+
+    pairs = {path.stem.removeprefix("pair-"): read_pair(path) for path in sorted(folder.glob("pair-*.npz"))}
+    pictures = {name: pair_picture(pair) for name, pair in pairs.items()}
+    if "vehicle" in pairs:
+        pictures["short"] = pair_picture(pairs["vehicle"], ("measured", "simulated"))
+    for name, picture in pictures.items():
+        with replacing(folder / f"measured-{name}.png") as temporary:
+            temporary.write_bytes(picture)
+    with replacing(folder / "report.html") as temporary:
+        temporary.write_text(page(folder))
+
+
+COMMANDS = {"pairs": pairs, "compare": compare, "recognise": recognise, "ablate": ablate, "page": write_page}
+
+
+def main(arguments: list[str]) -> None:
+    """Run one command."""
+    dispatch("study.py", COMMANDS, arguments)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,187 @@
+"""Sets of measured recordings: which files belong to them, which half each is in, and their windows with a target.
+
+A file of sets holds records whose `file` is a pattern inside the set's folder. A file of the split lists the files of
+both halves by name; a file that is in neither list is a test file. A record next to a file (any .yaml in the set's
+folder) takes precedence over the set's pattern, so a file of any name, rate and channel can be added.
+
+Two keys stand only in records of sets: `rates_hz`, the possible rates of the set's files, of which each file's sample
+times select one; and `carrier_ghz_in_name`, a regular expression whose group is the carrier (GHz) in the file's name.
+`carrier_hz` then serves files without a carrier in their names.
+Another folder becomes a set by its file `set.yaml`: `like`, a set of the same radar, and `files`, its records.
+"""
+
+import re
+import sys
+from dataclasses import replace
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.config.classes import CATEGORIES
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
+from lowalt.recordings.faults import RATE_SHARE
+from lowalt.recordings.files import Baseband, read
+from lowalt.recordings.formats import READERS
+from lowalt.recordings.library import Library
+from lowalt.recordings.presence import present
+from lowalt.recordings.record import Record, read_record, record
+from lowalt.recordings.twin import Twin
+from lowalt.recordings.windows import windows
+
+HALVES = ("tuning", "test")
+SET_FILE = "set.yaml"
+"""Name of the file that makes a folder a set."""
+SETS, SPLIT = (Path(__file__).parent / f"measured/{name}.yaml" for name in ("sets", "split"))
+
+
+class Measured(NamedTuple):
+    """One recording of a set: `half` is "tuning" or "test", `like` the known set of the same radar.
+
+    rates_hz: possible rates (Hz), of which the file has one; none where its record alone says it.
+    """
+
+    set: str
+    half: str
+    record: Record
+    like: str
+    rates_hz: tuple[float, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """File name, which is unique in a set."""
+        return self.record.file.name
+
+    def twin(self, library: Library) -> Twin:
+        """Return the twin of this recording's radar, at the recording's carrier.
+
+        Raises: InputError where no radar of the library has this set.
+        """
+        for name, sets in library.sets.items():
+            if self.like in sets:
+                return library.twins[name].at_carrier(self.record.carrier_hz)
+        raise InputError(f"set {self.like!r}: no twin, expected one of {[*library.sets.values()]}")
+
+    def read(self) -> Baseband:
+        """Return the recording's samples, at the one of its possible rates that the file has.
+
+        Raises: InputError as `lowalt.recordings.read`, and where the file has none of the rates.
+        """
+        baseband = read(self.record)
+        if not self.rates_hz:
+            return baseband
+        nearest = min(self.rates_hz, key=lambda rate_hz: abs(rate_hz - baseband.rate_hz))
+        if abs(nearest - baseband.rate_hz) > RATE_SHARE * nearest:
+            raise InputError(
+                f"{self.record.file}: wrong rate, {baseband.rate_hz:.6g} Hz, expected one of {self.rates_hz}"
+            )
+        return baseband._replace(rate_hz=nearest)
+
+    def windows(self, twin: Twin) -> np.ndarray:
+        """Return the recording's windows that hold a target, (n, symbols) complex128 at the twin's symbol rate.
+
+        Raises: InputError as `read`, and where the recording is shorter than one window.
+        """
+        every = windows(self.record, twin, self.read())
+        return every[present(every, twin)]
+
+
+def halves(path: str | Path = SPLIT) -> dict[str, dict[str, list[str]]]:
+    """Return set -> half -> file names.
+
+    Raises: InputError where a set lacks a half, or names a file twice.
+    """
+    split = load_yaml(path, "split of the recordings", "sets to their halves")
+    for name, block in split.items():
+        if not isinstance(block, dict) or set(block) != set(HALVES):
+            raise InputError(f"{path}: {name} is {block!r:.80}, expected exactly {HALVES}")
+        both = [file for half in HALVES for file in block[half]]
+        twice = sorted({file for file in both if both.count(file) > 1})
+        if twice:
+            raise InputError(f"{path}: {name} names {twice} twice, expected every file in one half")
+    return split
+
+
+def _of_pattern(block: dict, path: Path, where: str) -> tuple[Record, tuple[float, ...]]:
+    """The record of one file of a set, its carrier read from its name where the set says so, and its possible rates."""
+    keys = {key: item for key, item in block.items() if key not in ("carrier_ghz_in_name", "rates_hz")}
+    carrier = re.search(block.get("carrier_ghz_in_name", "(?!)"), path.name)
+    if carrier:
+        keys["carrier_hz"] = float(carrier[1]) * 1e9
+    return replace(record(keys, path.parent, where), file=path), tuple(map(float, block.get("rates_hz", ())))
+
+
+def _files(folder: Path, patterns: list[dict], where: str) -> dict[str, tuple[Record, tuple[float, ...]]]:
+    """Records and rates by file name of a set's folder; files that no record describes are named on standard error."""
+    files: dict[str, tuple[Record, tuple[float, ...]]] = {}
+    for number, block in enumerate(patterns):
+        for path in sorted(folder.glob("*")):
+            if not fnmatch(path.name.lower(), block["file"].lower()):
+                continue
+            if path.name in files:
+                raise InputError(f"{where}: {path.name} fits two patterns, expected one")
+            files[path.name] = _of_pattern(block, path, f"{where}[{number}]")
+    for path in sorted(folder.glob("*.yaml")):
+        if path.name != SET_FILE:
+            beside = read_record(path)
+            if beside.label is None:
+                raise InputError(f"{path}: no label, expected one of {CATEGORIES}")
+            files[beside.file.name] = beside, ()
+    for path in sorted(folder.glob("*")):
+        if path.suffix.lower() in READERS and path.name not in files:
+            print(f"{path}: left out, no pattern of its set and no record fits", file=sys.stderr)
+    return files
+
+
+def _blocks(inputs: Path, sets: str | Path) -> dict[str, tuple[str, list[dict]]]:
+    """Set -> (known set of the same radar, records): the known sets and the folders that have a file of their own."""
+    known = load_yaml(sets, "measured sets", "sets to their records")
+    blocks = {name: (name, patterns) for name, patterns in known.items()}
+    for folder in sorted(path for path in inputs.glob("*") if path.is_dir() and path.name not in known):
+        if not (folder / SET_FILE).is_file():
+            print(f"{folder}: left out, no set of that name and no {SET_FILE} in it", file=sys.stderr)
+            continue
+        block = load_yaml(folder / SET_FILE, "set of recordings", "like and files")
+        if set(block) != {"like", "files"} or block["like"] not in known or not isinstance(block["files"], list):
+            raise InputError(
+                f"{folder / SET_FILE}: expected files, a list of records, and like, one of {sorted(known)}"
+            )
+        blocks[folder.name] = block["like"], block["files"]
+    return blocks
+
+
+def recordings(inputs: str | Path, sets: str | Path = SETS, split: str | Path = SPLIT) -> list[Measured]:
+    """Return the recordings there are below the folder `inputs`, one folder a set, in the order of sets and names.
+
+    A set whose folder is missing is left out. Raises: InputError where no recording is there, a record is wrong, or a
+    file fits two patterns of its set.
+    """
+    blocks, half_of, result = _blocks(Path(inputs), sets), halves(split), []
+    for name, (like, patterns) in blocks.items():
+        where = f"{sets}: {name}" if like == name else str(Path(inputs) / name / SET_FILE)
+        tuning = half_of.get(name, {}).get("tuning", ())
+        for file, (described, rates_hz) in sorted(_files(Path(inputs) / name, patterns, where).items()):
+            half = "tuning" if file in tuning else "test"
+            result.append(Measured(name, half, described, like, rates_hz))
+    if not result:
+        raise InputError(f"{inputs}: no recordings of {sorted(blocks)}, expected a folder a set")
+    return result
+
+
+def usable(measured: list[Measured], library: Library) -> list[Measured]:
+    """Return the recordings that can be read and cut into windows; the others are named on standard error.
+
+    Raises: InputError where none can be used.
+    """
+    good = []
+    for recording in measured:
+        try:
+            recording.windows(recording.twin(library))
+            good.append(recording)
+        except InputError as error:
+            print(f"left out: {error}", file=sys.stderr)
+    if not good:
+        raise InputError(f"none of {len(measured)} recordings can be used, expected at least one")
+    return good
