@@ -153,10 +153,10 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (11, 1130), "config": (9, 1040), "echo": (30, 3080), "files": (12, 720), "machine": (10, 640),
+    "commands": (11, 1040), "config": (9, 1040), "echo": (30, 3080), "files": (12, 700), "machine": (9, 590),
     "measure": (7, 730), "motion": (10, 1030), "noise": (5, 210), "numerics": (14, 1100), "recognition": (51, 5140),
-    "recordings": (25, 3110), "report": (42, 2660), "scene": (83, 6920), "shards": (25, 3000), "spectra": (16, 920),
-    "targets": (54, 7000), "tiles": (17, 1550), "workflow": (16, 1930),
+    "recordings": (25, 3110), "report": (42, 2660), "scene": (83, 6920), "shards": (22, 2640), "spectra": (16, 920),
+    "targets": (54, 7000), "tiles": (17, 1540), "workflow": (16, 1850),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 
