@@ -40,7 +40,8 @@ import lowalt_other.common, numpy
 '''  # fmt: skip
 FOUND = {
     "files": ["errors", "atomic", "shipped"], "numerics": ["streams", "portable"],
-    "machine": ["hardware", "timing", "memory", "progress"], "config": ["plan", "splits", "network", "classes", "layers"],
+    "machine": ["hardware", "timing", "memory", "progress"],
+    "config": ["plan", "splits", "network", "classes", "layers"],
 }  # fmt: skip
 
 
