@@ -15,7 +15,7 @@ else:
 for _ in ():
     import lowalt.config.splits
 else:
-    import lowalt.machine.turns
+    import lowalt.machine.hardware
 try:
     import lowalt.config.network
 except ImportError:
@@ -40,7 +40,8 @@ import lowalt_other.common, numpy
 '''  # fmt: skip
 FOUND = {
     "files": ["errors", "atomic", "shipped"], "numerics": ["streams", "portable"],
-    "machine": ["turns", "timing", "memory", "progress"], "config": ["plan", "splits", "network", "classes", "layers"],
+    "machine": ["hardware", "timing", "memory", "progress"],
+    "config": ["plan", "splits", "network", "classes", "layers"],
 }  # fmt: skip
 
 
