@@ -156,7 +156,7 @@ CEILINGS = {
     "commands": (11, 1130), "config": (9, 1040), "echo": (30, 3080), "files": (12, 720), "machine": (10, 640),
     "measure": (7, 730), "motion": (10, 1030), "noise": (5, 210), "numerics": (14, 1100), "recognition": (51, 5140),
     "recordings": (25, 3110), "report": (42, 2660), "scene": (83, 6920), "shards": (25, 3000), "spectra": (16, 920),
-    "targets": (51, 6490), "tiles": (17, 1550), "workflow": (16, 1930),
+    "targets": (50, 6490), "tiles": (17, 1550), "workflow": (16, 1930),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 
