@@ -171,10 +171,13 @@ def moments(out, back, same, strength, reach, result):
 
 @LOOPS
 def add_turned(values, start, step, result):
-    """Add values (N, M) exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result (N, M)."""
-    middle = 0.5 * (values.shape[1] - 1)
-    for n in range(len(values)):
-        row, out, first = values[n], result[n], start[n] - np.rint(start[n])
-        for m in range(np.uint64(values.shape[1])):
+    """Add values (N, M) exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result (N, M).
+
+    values: real and imaginary parts.
+    """
+    middle = 0.5 * (result.shape[1] - 1)
+    for n in range(len(result)):
+        real, imag, out, first = values[0][n], values[1][n], result[n], start[n] - np.rint(start[n])
+        for m in range(np.uint64(result.shape[1])):
             c, s = phasor(first + (np.float64(m) - middle) * step[n])
-            out[m] += complex(row[m].real * c - row[m].imag * s, row[m].real * s + row[m].imag * c)
+            out[m] += complex(real[m] * c - imag[m] * s, real[m] * s + imag[m] * c)

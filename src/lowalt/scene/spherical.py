@@ -149,7 +149,9 @@ def _polynomials(at, box, counts, powers, terms, result):
 
     terms: (2 Q, T), the factors' real parts at every frequency, then their imaginary parts.
     """
-    size, (middle, half) = min(at.shape[2], CHUNK), box
+    # Chunks of about one size, since the last one is computed whole.
+    chunks = (at.shape[2] + CHUNK - 1) // CHUNK
+    size, (middle, half) = (at.shape[2] + chunks - 1) // chunks, box
     across, up, near = np.zeros((counts[0], size)), np.zeros((counts[1], size)), np.zeros((counts[2], size))
     table, sums = np.empty((len(powers), size)), np.empty((len(terms), size))
     for n in range(len(at)):
