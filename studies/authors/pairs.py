@@ -2,13 +2,14 @@
 
 FOLDER holds `pictures/`. Fixed parts and nodes are blue, moving ones red. A target is drawn by the axes of its picture,
 a pedestrian at the moment of the cycle that is most like the picture. The factors by which our cars' bodies would have
-to be scaled to have the authors' outline are printed.
+to be scaled to have the authors' outline are printed, and what `pedestrians` measures of our pedestrians.
 """
 
 import sys
 from pathlib import Path
 
 import numpy as np
+from pedestrians import measured
 from PIL import Image, ImageDraw
 from read import LABELS, axes, dots
 from scipy.optimize import least_squares
@@ -76,6 +77,9 @@ def main(folder: Path, out: Path) -> None:
                 body = points[[cloud.kinds[part] == "body" for part in cloud.part]]
                 factors = scaled(body, base, outline)
                 print(name, "width, length, height times", *factors[:3].round(2), "moved", *factors[3:].round(2))
+            if category == "Pedestrian":
+                figures = measured(cloud.track - cloud.track[:, :1])
+                print(name, *(f"{what} {value:.3g} {unit};" for what, (value, unit) in figures.items()))
             ours = drawn(cloud, points, base, theirs.size)
             for side, picture in enumerate((theirs, ours)):
                 shown = picture.crop(CROPS.get(category, (0, 0, *picture.size)))

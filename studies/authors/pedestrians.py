@@ -4,7 +4,7 @@ All dots have one colour. `starts.csv` tells by eye which dot of the first frame
 followed from there. One view gives two coordinates of a node. The third follows from the gait: the left half of the
 body does what the right half does, mirrored and half a cycle later, so both halves together are one half seen from two
 directions, 60 degrees apart. The paths are Fourier series in the time, so that all this is one linear fit; the cycle's
-duration and the heading, which are not linear, are searched for. What then is left is added to each side in the plane
+duration is searched for, and the front is +y, as the paper says. What then is left is added to each side in the plane
 of the picture, so a person need not be as even as that; only depth is.
 
 `python pedestrians.py FOLDER` says how far off all this is: it draws four of CMU's recordings in FOLDER
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
-from scipy.optimize import minimize
+from scipy.optimize import minimize_scalar
 from scipy.spatial import cKDTree
 
 from lowalt.targets.mocap_files import read_motion, read_skeleton
@@ -46,10 +46,16 @@ SLOWER = 4
 LONGEST_SHANK_PIXELS = 72
 STRAY_PIXELS = 5.0
 """Pixels from which on a dot counts less, since it may be another node's."""
-PASSES = 3
+PASSES = 2
 VIEW = np.array([[138.0, -106, 0], [-37, -49, -106]])
 """About how the authors' pictures show a metre of x, y and z, in pixels."""
-ERRORS: dict = {}
+ERRORS = {
+    "highest to lowest node": 0.02, "thigh": 0.015, "shank": 0.01, "upper arm": 0.01, "forearm": 0.03, "stride": 0.25,
+    "step": 0.03, "trunk": 3, "hip": 2, "knee": 8, "ankle": 8, "shoulder": 10, "elbow": 15, "hand's path": 0.08,
+    "ankle's path": 0.025,
+}  # fmt: skip
+"""Errors (m or degrees) of what is measured: about twice what `main` finds, since here dots are also followed, and more
+where the dots are more than 3 pixels away from their paths."""
 
 
 def dot_pixels(frame: np.ndarray) -> np.ndarray:
@@ -78,7 +84,7 @@ def followed(
         else:
             expected = model[number]
         seen, alone = in_blobs(shown, expected)
-        seen = in_order(two_feet(seen, expected))
+        seen = in_order(two_feet(seen, expected) if model is None else seen)
         seen[0] = start[0]
         if now > before:
             surprise = (seen - expected) / (now - before)
@@ -144,7 +150,10 @@ def in_blobs(shown: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.nd
     places = expected.copy()
     for number, inside in enumerate(blobs):
         nodes = np.flatnonzero(owner == number)
-        for _ in range(3 if len(nodes) > 1 else len(nodes)):
+        if len(nodes) == 1:
+            places[nodes] = inside.mean(0)
+            continue
+        for _ in range(3 * (len(nodes) > 1)):
             away = ((inside[:, None] - places[None, nodes]) ** 2).sum(2)
             nearest = away.argmin(1)
             for place, node in enumerate(nodes):
@@ -157,12 +166,6 @@ def series(turns: np.ndarray) -> np.ndarray:
     """Return the terms (K, 2 H + 1) of a Fourier series at times (K,) in cycles."""
     angles = 2 * np.pi * turns[:, None] * np.arange(HARMONICS + 1)
     return np.hstack([np.cos(angles), np.sin(angles[:, 1:])])
-
-
-def turned(view: np.ndarray, heading: float) -> np.ndarray:
-    """Return the view (2, 3) of a person whose front points `heading` (rad) from +y towards -x."""
-    cosine, sine = np.cos(heading), np.sin(heading)
-    return view @ np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
 
 
 def even(seen: np.ndarray, view: np.ndarray, turns: np.ndarray, nodes: np.ndarray, rounds: int) -> np.ndarray:
@@ -191,31 +194,18 @@ def drawn(coefficients: np.ndarray, view: np.ndarray, turns: np.ndarray) -> np.n
     return np.einsum("ft,tjn,ij->fni", series(turns), coefficients, view)
 
 
-def cycle_of(
-    seen: np.ndarray, view: np.ndarray, times: np.ndarray, near: tuple[float, float] | None
-) -> tuple[float, float]:
-    """Return duration (s) and heading (rad) of the cycle, those that leave least of knees and arms; near: a guess."""
+def cycle_of(seen: np.ndarray, view: np.ndarray, times: np.ndarray) -> float:
+    """Return the duration (s) of the cycle: the one that leaves least of knees, shoulders and elbows."""
     nodes = np.array([NODES.index(side + name) for side in "lr" for name in ("femur", "clavicle", "humerus")])
 
-    def left(guess: np.ndarray) -> float:
-        """Mean distance of the dots from paths of this cycle and heading, each counted up to some pixels."""
-        ahead = turned(view, guess[1])
-        found = even(seen, ahead, times / guess[0], nodes, 1)
-        off = np.linalg.norm(drawn(found, ahead, times / guess[0]) - seen[:, nodes], axis=2)
+    def left(cycle: float) -> float:
+        """Mean distance of the dots from paths of this cycle, each counted up to some pixels."""
+        found = even(seen, view, times / cycle, nodes, 1)
+        off = np.linalg.norm(drawn(found, view, times / cycle) - seen[:, nodes], axis=2)
         return float(np.minimum(off, 2 * STRAY_PIXELS).mean())
 
-    if near is None:
-        near = min((left((cycle, 0.0)), cycle, 0.0) for cycle in np.geomspace(*CYCLES_S, 40) if cycle < np.ptp(times))[
-            1:
-        ]
-    shape = np.array([near, (near[0] * 1.02, near[1]), (near[0], near[1] + 0.1)])
-    best = minimize(
-        left,
-        near,
-        method="Nelder-Mead",
-        options={"xatol": 2e-3, "fatol": 2e-3, "maxiter": 40, "initial_simplex": shape},
-    )
-    return float(best.x[0]), float(best.x[1])
+    near = min((cycle for cycle in np.geomspace(*CYCLES_S, 40) if cycle < np.ptp(times)), key=left)
+    return float(minimize_scalar(left, bounds=(0.96 * near, 1.04 * near), options={"xatol": 1e-3 * near}).x)
 
 
 def lifted(seen: np.ndarray, view: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -255,12 +245,12 @@ def bend(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
 def stride(paths: np.ndarray) -> float:
     """Return the distance (m) of one cycle on the ground, from the speed at which feet move back against the root.
 
-    No part of a foot moves back on the ground, and while the foot carries the body some part of it stands still; at a
-    quarter of the moments the fastest part is faster than this, by what the root sways.
+    No part of a foot slides back on the ground, and while a foot carries the body some part of it stands still, so the
+    fastest part has the body's speed; half of all moments are faster than what is returned.
     """
     feet = paths[:, [NODES.index(side + name) for side in "lr" for name in ("tibia", "foot", "toes")], 1]
     back = (np.roll(feet, 1, 0) - np.roll(feet, -1, 0)) * len(paths) / 2
-    return float(np.quantile(back.max(1), 0.75))
+    return float(np.median(back.max(1)))
 
 
 def measured(paths: np.ndarray) -> dict[str, tuple[float, str]]:
@@ -294,16 +284,17 @@ def read(start: np.ndarray, view: np.ndarray, times: np.ndarray, pixels: list[np
     start: (31, 2) places of the nodes in the first frame; view: (2, 3) pixels a metre; times: (F,) s; pixels: those of
     each frame's dots.
     """
-    places, found = followed(pixels, times, start), None
+    places = followed(pixels, times, start)
+    cycle = cycle_of(places - start[0], view, times)
     for number in range(PASSES):
-        seen = places - start[0]
-        cycle, heading = found = cycle_of(seen, view, times, found)
-        ahead, turns = turned(view, heading), times / cycle
-        own, shared = lifted(seen, ahead, turns)
+        own, shared = lifted(places - start[0], view, times / cycle)
         # At first one half of the body corrects the other.
-        places = followed(pixels, times, start, drawn(shared if number < 2 else own, ahead, turns) + start[0])
-    off, uneven = (drawn(paths, ahead, turns) + start[0] - places for paths in (own, shared))
-    found = {"cycle": cycle, "heading": np.degrees(heading), "cycles": np.ptp(turns)}
+        model = drawn(shared if number == 0 else own, view, times / cycle) + start[0]
+        places = followed(pixels, times, start, model)
+    cycle = cycle_of(places - start[0], view, times)
+    own, shared = lifted(places - start[0], view, times / cycle)
+    off, uneven = (drawn(paths, view, times / cycle) + start[0] - places for paths in (own, shared))
+    found = {"cycle": cycle, "cycles": np.ptp(times) / cycle}
     found |= {name: float(np.sqrt((array**2).sum(2).mean())) for name, array in (("off", off), ("uneven", uneven))}
     return np.einsum("ft,tjn->fnj", series(np.arange(PHASES) / PHASES), own), found
 
@@ -318,9 +309,12 @@ def readings(paths: np.ndarray, found: dict) -> list[tuple]:
         ("dots away from paths that both sides share", found["uneven"], 0.1, "pixels"),
     ]
     for what, (value, unit) in measured(paths).items():
-        rows.append((what, value, ERRORS[what.split(",")[0].removeprefix("left ").removeprefix("right ")], unit))
+        error = ERRORS[what.split(",")[0].removeprefix("left ").removeprefix("right ")] * max(1, found["off"] / 3)
+        rows.append((what, value, error, unit))
         if what == "stride":
-            rows.append(("forward speed, likewise", value / found["cycle"] * SLOWER, 0.1, "m/s"))
+            rows.append(
+                ("forward speed, likewise", *(part / found["cycle"] * SLOWER for part in (value, error)), "m/s")
+            )
     return rows
 
 
@@ -340,12 +334,12 @@ def main(folder: Path) -> None:
     for name, nodes in recordings(folder):
         times = np.arange(len(nodes)) / 120 * SLOWER
         seen = np.einsum("ij,fnj->fni", VIEW, nodes) + rng.normal(0, 1, (*nodes.shape[:2], 2))
-        cycle, heading = cycle_of(seen, VIEW, times, None)
+        cycle = cycle_of(seen, VIEW, times)
         moments = series(np.arange(PHASES) / PHASES)
-        paths = np.einsum("ft,tjn->fnj", moments, lifted(seen, turned(VIEW, heading), times / cycle)[0])
+        paths = np.einsum("ft,tjn->fnj", moments, lifted(seen, VIEW, times / cycle)[0])
         known = np.linalg.lstsq(series(times / cycle), nodes.reshape(len(nodes), -1), rcond=None)[0]
         known = (moments @ known).reshape(PHASES, -1, 3)
-        print(name, f"cycle {cycle / SLOWER:.3f} s, heading {np.degrees(heading):.1f} degrees, nodes off by",
+        print(name, f"cycle {cycle / SLOWER:.3f} s, nodes off by",
               f"{np.linalg.norm(paths - known, axis=2).mean():.3f} m")  # fmt: skip
         for what, (value, _) in measured(paths).items():
             off.setdefault(what, []).append(value - measured(known)[what][0])

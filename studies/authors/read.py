@@ -329,14 +329,14 @@ def main(folder: Path, out: Path) -> None:
     """Read all targets and write the tables."""
     readers = {"UAV": craft, "Bird": bird, "Vehicle": car}
     with out.open("w", newline="") as file, out.with_name("paths.csv").open("w", newline="") as file_of_paths:
-        writer, paths_writer = csv.writer(file), csv.writer(file_of_paths)
+        writer, paths_writer = (csv.writer(opened, lineterminator="\n") for opened in (file, file_of_paths))
         writer.writerow(("target", "quantity", "value", "error", "unit"))
         paths_writer.writerow(("target", "phase", *(f"{node}_{axis}" for node in pedestrians.NODES for axis in "xyz")))
         for name in LABELS:
             category, video = name.split("_")[0], folder / "videos" / f"Target40_{name}.mp4"
             if category == "Pedestrian":
                 rows, paths = walker(name, video)
-                for number, places in enumerate(1000 * paths):
+                for number, places in enumerate(1000 * paths[::2]):
                     paths_writer.writerow((name, number, *places.ravel().round().astype(int)))
             else:
                 rows = readers[category](name, frames(video, FRAMES))
