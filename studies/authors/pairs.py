@@ -1,13 +1,15 @@
 """Our clouds beside the authors' pictures, in the same view: `python pairs.py FOLDER OUT` writes one PNG a category.
 
-FOLDER holds `pictures/`. Fixed parts are blue, moving ones red. A target is drawn by the axes of its picture. The
-factors by which our cars' bodies would have to be scaled to have the authors' outline are printed.
+FOLDER holds `pictures/`. Fixed parts and nodes are blue, moving ones red. A target is drawn by the axes of its picture,
+a pedestrian at the moment of the cycle that is most like the picture. The factors by which our cars' bodies would have
+to be scaled to have the authors' outline are printed, and what `pedestrians` measures of our pedestrians.
 """
 
 import sys
 from pathlib import Path
 
 import numpy as np
+from pedestrians import measured
 from PIL import Image, ImageDraw
 from read import LABELS, axes, dots
 from scipy.optimize import least_squares
@@ -21,10 +23,15 @@ CROPS = {"Vehicle": (395, 240, 920, 639), "Pedestrian": (450, 320, 820, 601)}
 """Part of the picture that is shown, in pixels: columns and rows of the first and of the last corner."""
 
 
-def placed(cloud, category: str) -> np.ndarray:
-    """Return the cloud's points as the authors place them: birds with the nose on -y, cars on the ground z = 0."""
+def placed(cloud, category: str, base: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+    """Return the cloud's points as the authors place them: birds with the nose on -y, cars on the ground z = 0,
+    pedestrians by their root, at the moment when their dots lie nearest to the authors' dots (K, 2)."""
     if category == "Bird":
         return cloud.points * [-1, -1, 1]
+    if category == "Pedestrian":
+        track = cloud.track - cloud.track[:, :1]
+        away = np.linalg.norm((base[0] + track @ base[1:])[:, :, None] - theirs, axis=3)
+        return track[(away.min(1).mean(1) + away.min(2).mean(1)).argmin()]
     return cloud.points + np.array([0, 0, cloud.record["origin_height_m"] if category == "Vehicle" else 0])
 
 
@@ -46,7 +53,7 @@ def drawn(cloud, points: np.ndarray, base: np.ndarray, size: tuple[int, int]) ->
     picture = Image.new("RGB", size, "white")
     pen = ImageDraw.Draw(picture)
     for place, part in zip(base[0] + points @ base[1:], cloud.part, strict=True):
-        colour = (0, 114, 189) if cloud.kinds[part] == "body" else (220, 0, 0)
+        colour = (0, 114, 189) if cloud.kinds[part] in ("body", "node") else (220, 0, 0)
         pen.ellipse((*(place - 3), *(place + 3)), fill=colour)
     return picture
 
@@ -64,11 +71,15 @@ def main(folder: Path, out: Path) -> None:
             subtype = names[10 * number + int(name.split("_")[1]) - 1]
             base = axes(np.asarray(theirs), name)
             cloud = make(records[subtype], None, 1)
-            points = placed(cloud, category)
+            outline = dots(np.asarray(theirs), category)["body"][0]
+            points = placed(cloud, category, base, outline)
             if category == "Vehicle":
                 body = points[[cloud.kinds[part] == "body" for part in cloud.part]]
-                factors = scaled(body, base, dots(np.asarray(theirs), category)["body"][0])
+                factors = scaled(body, base, outline)
                 print(name, "width, length, height times", *factors[:3].round(2), "moved", *factors[3:].round(2))
+            if category == "Pedestrian":
+                figures = measured(cloud.track - cloud.track[:, :1])
+                print(name, *(f"{what} {value:.3g} {unit};" for what, (value, unit) in figures.items()))
             ours = drawn(cloud, points, base, theirs.size)
             for side, picture in enumerate((theirs, ours)):
                 shown = picture.crop(CROPS.get(category, (0, 0, *picture.size)))

@@ -1,10 +1,11 @@
-"""Lengths of the authors' targets, read from their videos: rotors, layers, hubs, wings, wheels, shares of points.
+"""Lengths of the authors' targets, read from their videos: rotors, layers, hubs, wings, wheels, gait, shares of points.
 
 A view is orthographic, so a place (x, y, z) lies at pixel O + x e_x + y e_y + z e_z, and the ticks of the axes give the
 three vectors. Rotors turn about z: the union of a rotor's dots over the frames is an ellipse whose width tells the
 radius and whose height, beyond that, the distance between two layers. Wings are mirror images of each other in x: two
-tips give all three coordinates. Wheels turn about x: see `wheel`. Run as `python read.py FOLDER readings.csv`; FOLDER
-holds `videos/`.
+tips give all three coordinates. Wheels turn about x: see `wheel`. Pedestrians: see `pedestrians`. Run as
+`python read.py FOLDER readings.csv`; FOLDER holds `videos/`. The pedestrians' nodes over a cycle go to `paths.csv`
+beside the readings, in millimetres.
 """
 
 import csv
@@ -16,6 +17,7 @@ try:
 except ModuleNotFoundError:  # pairs.py reads pictures alone
     av = None
 import numpy as np
+import pedestrians
 from scipy import ndimage
 
 # Corner, end of the x edge, of the y edge, and top of the z edge, in pixels of the first frame.
@@ -308,15 +310,37 @@ def car(name: str, shown: list[np.ndarray]) -> list[tuple]:
     ]
 
 
+def walker(name: str, path: Path) -> tuple[list[tuple], np.ndarray]:
+    """Return the readings of a pedestrian, and the paths (K, 31, 3) m of its nodes over a cycle."""
+    with (Path(__file__).parent / "starts.csv").open() as file:
+        start = next(np.array(row[1:], float).reshape(-1, 2) for row in csv.reader(file) if row[0] == name)
+    base, times, pixels = None, [], []
+    with av.open(str(path)) as video:
+        for frame in video.decode(video=0):
+            shown = frame.to_ndarray(format="rgb24")
+            base = axes(shown, name) if base is None else base
+            times.append(frame.time)
+            pixels.append(pedestrians.dot_pixels(shown))
+    paths, found = pedestrians.read(start, base[1:].T, np.array(times), pixels)
+    return [(name, *row) for row in pedestrians.readings(paths, found)], paths
+
+
 def main(folder: Path, out: Path) -> None:
-    """Read all targets and write the table."""
+    """Read all targets and write the tables."""
     readers = {"UAV": craft, "Bird": bird, "Vehicle": car}
-    with out.open("w", newline="") as file:
-        writer = csv.writer(file)
+    with out.open("w", newline="") as file, out.with_name("paths.csv").open("w", newline="") as file_of_paths:
+        writer, paths_writer = (csv.writer(opened, lineterminator="\n") for opened in (file, file_of_paths))
         writer.writerow(("target", "quantity", "value", "error", "unit"))
+        paths_writer.writerow(("target", "phase", *(f"{node}_{axis}" for node in pedestrians.NODES for axis in "xyz")))
         for name in LABELS:
-            shown = frames(folder / "videos" / f"Target40_{name}.mp4", FRAMES)
-            for target, what, value, error, unit in readers[name.split("_")[0]](name, shown):
+            category, video = name.split("_")[0], folder / "videos" / f"Target40_{name}.mp4"
+            if category == "Pedestrian":
+                rows, paths = walker(name, video)
+                for number, places in enumerate(1000 * paths[::2]):
+                    paths_writer.writerow((name, number, *places.ravel().round().astype(int)))
+            else:
+                rows = readers[category](name, frames(video, FRAMES))
+            for target, what, value, error, unit in rows:
                 writer.writerow((target, what, f"{value:.4g}", f"{error:.2g}", unit))
             print(name, file=sys.stderr)
 
