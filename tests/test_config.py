@@ -13,7 +13,7 @@ from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.motion import COLUMNS
 from lowalt.report.stage_times import COLUMNS as STAGE_COLUMNS
-from lowalt.workflow.sources import PACKAGE, sources
+from lowalt.workflow.sources import PACKAGE, SOURCE_MODULES, sources
 
 ROOT = Path(__file__).parent.parent
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
@@ -151,7 +151,7 @@ def test_slugs_are_plain_and_distinct():
 
 
 def test_sources_follow_imports_and_leave_a_commands_own_choices_to_the_caller():
-    clouds = set(sources("lowalt.targets"))
+    clouds = set(sources("lowalt.targets", *SOURCE_MODULES))
     assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/gait.py", PACKAGE / "files/errors.py"} <= clouds
     plain = set(sources("lowalt.recognition"))
     assert PACKAGE / "recognition/views.py" not in plain

@@ -21,7 +21,7 @@ DEPENDS = {
     "norm", "inv", "solve", "svd", "eigh", "lstsq",
 }  # fmt: skip
 """Functions of NumPy that are other code on other processors, or that sum in an order of their own."""
-ALLOWED = {("surfaces.py", "arctan2"), ("sample.py", "hypot"), ("poses.py", "@")}
+ALLOWED = {("surfaces.py", "arctan2"), ("drawing.py", "hypot"), ("poses.py", "@")}
 """Turns around a point and a mast's clearance are only held against a limit; places of all points are for scenes with
 effects, whose bytes are not promised."""
 
