@@ -36,10 +36,14 @@ def copy_of_tree(root: Path, folder: Path) -> Path:
     return folder
 
 
-def test_file(name: str) -> Path:
-    """Return the test file of a name in the table, such as echo or scene/receiver."""
-    room, _, last = name.rpartition("/")
-    return Path("tests", room, f"test_{last}.py")
+def test_file(root: Path, name: str) -> Path:
+    """Return the test file of a name in the table, such as echo or scene/receiver, in whichever folder of tests it is.
+
+    Raises: ValueError where there is none.
+    """
+    for path in root.glob(f"tests/**/{Path(name).parent}/test_{Path(name).name}.py"):
+        return path.relative_to(root)
+    raise ValueError(f"no test file {name!r} in {root / 'tests'}")
 
 
 def planted(tree: Path, fault: dict[str, str]) -> str:
@@ -54,7 +58,7 @@ def planted(tree: Path, fault: dict[str, str]) -> str:
     with tempfile.TemporaryDirectory() as compiled:
         # Numba's kept machine code does not notice a change of a function that was compiled into another file's.
         own = {"NUMBA_CACHE_DIR": compiled} if any(word in good for word in COMPILED) else {}
-        tests = [str(test_file(name)) for name in fault["tests"].split()]
+        tests = [str(test_file(tree, name)) for name in fault["tests"].split()]
         command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--tb=no", "-k", NO_PINS]
         try:
             path.write_text(good.replace(fault["old"], fault["new"]))

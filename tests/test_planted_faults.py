@@ -16,7 +16,8 @@ def test_every_fault_of_the_table_can_be_planted_and_its_tests_are_there():
         faults = list(csv.DictReader(file))
     for fault in faults:
         assert (ROOT / fault["file"]).read_text().count(fault["old"]) == 1, fault
-        assert all((ROOT / planted_faults.test_file(name)).exists() for name in fault["tests"].split()), fault
+        for name in fault["tests"].split():
+            planted_faults.test_file(ROOT, name)
     with (ROOT / "results/benchmarks/planted_faults.csv").open(newline="") as file:
         assert [row["fault"] for row in csv.DictReader(file)] == [fault["fault"] for fault in faults]
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import trimesh
 
 from lowalt.targets import cloud as clouds
@@ -73,3 +74,18 @@ def car_record(**wheel) -> dict:
         if wheel:
             parts[name] = {"kind": "wheel", "wheel": wheel, "hinge": [x, y, 0.33]}
     return {"unit": "m", "up": "z", "front": "y", "parts": parts, "points": 400}
+
+
+HUBS = [(0.12, 0.1), (0.12, -0.1), (-0.12, 0.1), (-0.12, -0.1)]
+
+
+def quadrotor(blades: bool, scale: float = 1.0) -> trimesh.Trimesh:
+    """A quadrotor as one mesh, front along x, its propellers whole or of two blades each that touch nothing."""
+    shapes = [box((0.22, 0.12, 0.06))]
+    for x, y in HUBS:
+        halves = [(0.03, 0, 0.05), (-0.03, 0, 0.05)] if blades else [(0, 0, 0.05)]
+        for offset in halves:
+            shapes.append(box((0.058 if blades else 0.12, 0.012, 0.004), np.add((x, y, 0), offset)))
+    whole = trimesh.util.concatenate(shapes)
+    whole.apply_scale(scale)
+    return whole

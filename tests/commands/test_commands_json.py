@@ -1,0 +1,204 @@
+"""Answers of `lowalt --json`: valid JSON with the keys that the reference names, and the plain command's status."""
+
+import json
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from lowalt.__main__ import main
+from lowalt.commands import spectra, workflow
+from lowalt.commands.command_line import as_json
+from lowalt.config.layers import load, plain
+from lowalt.files.atomic import replacing
+from lowalt.report.figures import mesh_picture, target_picture
+from lowalt.scene.effects import PLACES
+from lowalt.tiles.render import Renderer
+from lowalt.workflow.board import Board, Job
+from lowalt.workflow.status import FOLDER, PLANNED_JOBS
+from meshes import quadrotor
+
+ROOT = Path(__file__).parents[2]
+CONFIG, SCHEMA = ROOT / "config/default.yaml", ROOT / "workflow/schemas/config.schema.yaml"
+PAGE = (ROOT / "docs/reference/json.md").read_text()
+STATION = {"method", "decisions", "rms_change", "other_cells"}
+STATIC = ("settings", "stages", "method", "otherwise")
+"""Keys whose own keys are names of settings, stages, fields or filters that the reference does not list."""
+
+
+def refused(text):
+    raise AssertionError(f"{text} is not JSON")
+
+
+@pytest.fixture
+def answer(capsys):
+    """What a command line prints with --json, and its exit status; every key stands on the page of the reference."""
+
+    def asked(*words):
+        status = main([*map(str, words), "--json"])
+        found = json.loads(capsys.readouterr().out, parse_constant=refused)
+        missing = {key for key in keys(found) if f"`{key}`" not in PAGE}
+        assert not missing
+        return found, status
+
+    return asked
+
+
+def keys(value):
+    """All keys of nested values, without those below STATIC."""
+    if isinstance(value, list):
+        return set().union(*map(keys, value)) if value else set()
+    if not isinstance(value, dict):
+        return set()
+    return set(value).union(*(keys(item) for name, item in value.items() if name not in STATIC))
+
+
+def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_surfaces(answer, tmp_path):
+    overlay = tmp_path / "scene.yaml"
+    effects = "effects: {clutter: {}, canceller: {kind: pulse}}, targets: {own: {more: config/targets/more.yaml}}"
+    overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
+    found, status = answer("explain", str(overlay), "--sample", "Road cyclist:0")
+    changes = {change["effect"]: change for change in found["changes"]}
+    assert status == 0 and not changes["clutter"]["refused"] and changes["clutter"]["signal"] > 0.01
+    assert changes["clutter"]["also"] == "and without canceller" and changes["canceller"]["also"] == ""
+    assert changes["receiver_noise"]["also"] == "at no set SNR" and changes["receiver_noise"]["signal"] > 0
+    assert "surfaces" in changes["occlusion"]["refused"]
+
+
+def test_explain_answers_with_findings_and_changes(answer, capsys, tmp_path):
+    overlay, mine = tmp_path / "scene.yaml", tmp_path / "mine.yaml"
+    effects = "effects: {iq_imbalance: {}, adc: {bits: 24, backoff_db: 40.0}}"
+    overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
+    scene = ["explain", str(overlay), "--sample", "Crow:3"]
+    model = str(ROOT / "results/zoo/default-unseen.safetensors")
+    found, status = answer(*scene, "--suggest", "1e-3", "--out", str(mine), "--model", model)
+    assert status == 0 and [one["station"] for one in found["findings"]] == ["A", "B", "C"]
+    assert all(one["right"] > 0.99 and one["subtype"] == "Crow" for one in found["findings"])
+    changes = {one["effect"]: one for one in found["changes"]}
+    assert set(changes) == set(PLACES) and [one["effect"] for one in found["changes"]][:2] == ["iq_imbalance", "adc"]
+    assert changes["iq_imbalance"]["signal"] > 1e-3 > changes["adc"]["signal"]
+    # 24 bits change no image, so no answer; leakage buries the target.
+    assert changes["adc"]["more"] == {"pixels": 0, "answers": 0} and changes["transmit_leakage"]["more"]["pixels"] > 0.5
+    assert "there is no clutter to cancel" in changes["canceller"]["refused"]
+    # The suggested scene has the effects that matter, and is a scene.
+    assert load([CONFIG, mine], SCHEMA)["effects"] == {"iq_imbalance": {}}
+    assert main([*scene, "--no-table", "--levels"]) == 0
+    text = capsys.readouterr().out
+    assert "is chosen in 100% of the symbols: Bird 100%" in text and "expected echo" in text
+
+
+def test_a_wrong_cell_changes_the_symbols_that_hold_another_cell(answer, tmp_path):
+    overlay = tmp_path / "scene.yaml"
+    overlay.write_text(
+        "network: {symbols: 32}\nspectra: {vrp: {window: 16}}\n"
+        "effects: {cell_error: {probability: 0.4, spread_cells: 60}}\n"
+    )
+    found, _ = answer("explain", str(overlay), "--sample", "Crow:3", "--station", "A")
+    right = found["findings"][0]["right"]
+    # An error of one cell still holds the target.
+    assert 0.3 < right < 0.9 and found["changes"][0]["cells"] == pytest.approx(1 - right, abs=0.1)
+
+
+def test_spectra_answers_with_the_size_of_each(answer, capsys):
+    found, status = answer("spectra")
+    assert main(["spectra"]) == 0
+    text = capsys.readouterr().out.splitlines()
+    assert len(text) == 2 * len(found["spectra"]) + 1 and text[-1] == f"medians of 5; {found['hardware']}"
+    for one, first, second in zip(found["spectra"], text[::2], text[1::2], strict=False):
+        said = f"{one['name']} ({one['title']}): {one['rows']} rows, {one['windows']} windows, zero at index "
+        assert first.startswith(f"{said}{one['zero_index']}, ") and second == f"  {one['source']}"
+        assert first.endswith(", ".join(f"{key} {value}" for key, value in one["settings"].items()))
+    assert status == 0
+    assert [(one["name"], one["rows"], one["windows"]) for one in found["spectra"]] == [
+        ("vrp", 256, 144), ("trp", 1024, 392), ("vt", 123, 392),
+    ]  # fmt: skip
+    assert all(one["image_ms"] > 0 for one in found["spectra"])
+
+
+def test_a_spectrum_that_knows_its_gaps_is_timed_with_some(monkeypatch):
+    given = []
+    monkeypatch.setattr(Renderer, "image", lambda self, signal, *rest: given.append(signal))
+    config = load([ROOT / "config/default.yaml"], SCHEMA)
+    for times in ("even", "known"):
+        spectra.facts({**config, "spectra": {**config["spectra"], "times": times}})
+        assert len(given[-1]) == 400 and (given[-1][3::4] == 0).all() == (times == "known")
+        assert (abs(np.delete(given[-1], np.s_[3::4])) > 0).all()
+
+
+def test_targets_answer_from_mesh_to_picture(answer, tmp_path, monkeypatch):
+    quadrotor(False, 1000).export(tmp_path / "craft.stl")
+    monkeypatch.chdir(tmp_path)
+    # The pictures have tests of their own.
+    monkeypatch.setattr(mesh_picture, "inspection_picture", lambda found: b"picture")
+    monkeypatch.setattr(target_picture, "target_picture", lambda cloud: b"picture")
+    found, status = answer("target", "inspect", "craft.stl")
+    assert status == 0 and len(found["components"]) == 5 and found["triangles"] == 60
+    assert Path(found["picture"]).is_file()
+    draft = ["target", "new", "craft.stl", "--subtype", "DJI Inspire 2"]
+    found, _ = answer(*draft)
+    assert found["file"] is None and yaml.safe_load(found["text"]) and found["moving_parts"] == 4
+    assert found["marked_lines"] == found["text"].count("GUESSED")
+    assert answer(*draft, "--out", "craft.yaml")[0]["file"] == "craft.yaml"
+    found, _ = answer("target", "make", "craft.yaml", "--out", "craft.npz")
+    assert found["points"] > 0 and len(found["parts"]) == 5 and Path(found["picture"]).is_file()
+    assert answer("target", "show", "craft.npz") == ({"picture": "craft.png"}, 0)
+
+
+def snakemake(code, jobs=()):
+    """In the place of Snakemake: note planned jobs, leave a run's state behind, end with a status."""
+
+    def run(line, stdout=None, env=None):
+        assert stdout == 2
+        Path(env[PLANNED_JOBS]).write_text("".join(json.dumps(job) + "\n" for job in jobs))
+        board = Board({"clouds": 2}, 1.0)
+        board.start(1, Job("clouds", "", "", 1.0))
+        board.finish(1, 2.0, good=not code)
+        with replacing(FOLDER / "1.json") as temporary:
+            kept = {"pid": 1, "process": None, "state": "ended", "written": 1e12, "board": board.kept()}
+            temporary.write_text(json.dumps(kept))
+        return SimpleNamespace(returncode=code)
+
+    return run
+
+
+def test_run_and_report_answer_with_what_ran_and_end_with_the_workflow_s_status(answer, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(workflow.subprocess, "run", snakemake(7))
+    found, status = answer("run")
+    assert status == found["status"] == 7 and found["command"][2] == "snakemake" and found["seconds"] >= 0
+    assert (found["stages"]["clouds"]["total"], found["stages"]["clouds"]["failed"]) == (2, 1)
+    job = {"rule": "clouds", "files": ["a.npz"], "reason": "Missing output files: a.npz"}
+    monkeypatch.setattr(workflow.subprocess, "run", snakemake(0, [job]))
+    found, status = answer("run", "-n")
+    assert status == 0 and found["jobs"] == [job] and "stages" not in found
+    settings = load([ROOT / "config/default.yaml", ROOT / "config/tiny.yaml"], SCHEMA)
+    Path("results/tiny").mkdir(parents=True)
+    Path("results/tiny/config.yaml").write_text(yaml.safe_dump(plain(settings)))
+    found, status = answer("report", "results/tiny")
+    assert status == 0 and found["files"] == ["results/tiny/report.html"] and found["stages"]
+    assert answer("report", "--gallery") == ({"files": ["results/index.html"], "runs": ["tiny"]}, 0)
+    monkeypatch.setattr(workflow.subprocess, "run", snakemake(1))
+    found, status = answer("report", "results/tiny")
+    assert status == found["status"] == 1 and found["files"] == []
+
+
+def test_an_answer_has_no_number_that_json_lacks():
+    odd = {"a": np.array([1.5, np.inf]), "b": (float("-inf"), np.float32("nan")), Path("c"): Path("d")}
+    assert json.loads(as_json(odd)) == {"a": [1.5, "inf"], "b": ["-inf", None], "c": "d"}
+    with pytest.raises(TypeError, match="set"):
+        as_json({"a": {1}})
+
+
+def test_every_command_with_an_answer_takes_json(capsys):
+    """All commands but `completion`, whose answer is a script."""
+    for words in re.findall(r"\.venv/bin/lowalt (\w+(?: (?:inspect|new|make|show)\b)?)", PAGE):
+        with pytest.raises(SystemExit):
+            main([*words.split(), "--help"])
+        assert "--json" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    names = set(capsys.readouterr().out.split("{")[1].split("}")[0].split(",")) - {"completion"}
+    assert names == set(re.findall(r"\.venv/bin/lowalt (\w+)", PAGE))

@@ -1,0 +1,175 @@
+"""Configuration, plan and source lists: faults named by key and value, counts known before any job."""
+
+import copy
+import math
+from pathlib import Path
+
+import pytest
+
+from lowalt.config.layers import canonical, check, load, load_yaml, merge
+from lowalt.config.plan import Plan
+from lowalt.files import yaml_files
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.motion import COLUMNS
+from lowalt.report.stage_times import COLUMNS as STAGE_COLUMNS
+from lowalt.workflow.sources import PACKAGE, SOURCE_MODULES, sources
+
+ROOT = Path(__file__).parents[2]
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+DEFAULT = load([ROOT / "config/default.yaml"], SCHEMA)
+
+
+@pytest.mark.parametrize("overlay", sorted(path.name for path in (ROOT / "config").glob("*.yaml")))
+def test_every_shipped_configuration_is_valid(overlay):
+    assert load([ROOT / "config/default.yaml", ROOT / "config" / overlay], SCHEMA)["seed"] >= 0
+
+
+@pytest.mark.parametrize(
+    ("overlay", "words"),
+    [
+        ({"moton": {}}, r"unknown key\(s\) \['moton'\]"),
+        ({"network": {"carrier_hz": 4.9}}, r"network.carrier_hz: value 4.9, expected at least 100000000"),
+        ({"network": {"carrier_hz": "4.9 GHz"}}, r"network.carrier_hz: value '4.9 GHz', expected type number"),
+        ({"network": {"symbols": 0}}, r"network.symbols: value 0, expected at least 1"),
+        ({"network": {"stations": {"A": {"position_m": [0, 0]}}}}, r"stations.A.position_m: .* at least 3 item"),
+        ({"noise": {"snr_db": []}}, r"noise.snr_db: value \[\], expected at least 1 item"),
+        ({"noise": {"snr_db": [3, 3]}}, r"noise.snr_db: .* every item once"),
+        ({"targets": {"select": ["Crow", "Crow"]}}, r"targets.select: .* every item once"),
+        ({"motion": {"region": {"polygn": 1}}}, r"motion.region: unknown key\(s\) \['polygn'\]"),
+        ({"split": {"by": "model"}}, r"split.by: value 'model', expected one of"),
+        ({"echo": {"tolerance": 0}}, r"echo.tolerance: value 0, expected more than 0"),
+        ({"echo": {"job": "all"}}, r"echo.job: value 'all', expected"),
+        ({"run": "../x"}, r"run: value '../x', expected text like"),
+        ({"run": "reference"}, r"run: value 'reference', expected none of"),
+        ({"moton": {}}, r"^configuration refused: configuration: .*, expected perhaps \['motion'\]$"),
+        ({"effects": {"adcs": {}}}, r"expected perhaps \['adc'\]$"),
+        ({"effects": None}, r"effects: value None, expected type object"),
+        ({"motion": {"tilt_deg": math.nan}}, r"motion.tilt_deg: value 'nan', expected type number"),
+        ({"noise": {"snr_db": ["a", "b"]}}, r"refused: noise.snr_db.0: value 'a', expected number or inf$"),
+        ({"noise": {"snr_db": [500]}}, r"noise.snr_db.0: value 500, expected at most 300$"),
+        ({"network": {"stations": {1: {}}}}, r"key 1 among .*, expected text"),
+        (
+            {"network": {"stations": {"D": {"position_m": [1, 2, 3]}}}},
+            "[^\n]*expected position_m together with normal_deg$",
+        ),
+    ],
+)
+def test_a_wrong_value_is_refused_by_key_value_and_expectation(overlay, words):
+    with pytest.raises(InputError, match=words):
+        check(merge(DEFAULT, overlay), SCHEMA)
+
+
+def test_a_null_takes_out_what_a_lower_layer_has_wherever_the_key_may_be_left_out():
+    layers = {"effects": {"adc": {"bits": 8}}, "recognition": {"processes": 3}, "targets": {"own": {"x": "x.yaml"}}}
+    nulls = {"effects": {"adc": None}, "recognition": {"processes": None}, "targets": {"own": {"x": None}},
+             "network": {"stations": {"C": None}}, "spectra": {"vt": None}, "echo": {"tolerance": None}}  # fmt: skip
+    found = check(merge(merge(copy.deepcopy(DEFAULT), layers), nulls), SCHEMA)
+    assert found["effects"] == found["targets"].pop("own") == {} and "processes" not in found["recognition"]
+    assert list(found["network"]["stations"]) == ["A", "B"] and list(found["spectra"]) == ["vrp", "trp"]
+    assert found["echo"] == DEFAULT["echo"]
+
+
+def test_a_number_is_a_number_however_it_is_written(tmp_path):
+    path = tmp_path / "overlay.yaml"
+    path.write_text(
+        "run: 1e5\nnetwork: {carrier_hz: 28e9, symbols: 4.0e+2, subcarriers: 256.0}\n"
+        "noise: {snr_db: [1e1, .inf]}\nmotion: {height_m: {UAV: [3e1, 150]}}\neffects: {cell_noise: {snr_db: 2e1}}\n"
+    )
+    found = load([ROOT / "config/default.yaml", path], SCHEMA)
+    network = found["network"]
+    assert [repr(network[key]) for key in ("carrier_hz", "symbols", "subcarriers")] == ["28000000000.0", "400", "256"]
+    assert found["noise"]["snr_db"] == [10.0, math.inf] and found["motion"]["height_m"]["UAV"] == [30.0, 150]
+    assert found["effects"] == {"cell_noise": {"snr_db": 20.0}} and found["run"] == "1e5"
+
+
+def test_a_missing_key_is_refused():
+    config = copy.deepcopy(DEFAULT)
+    del config["network"]["symbols"]
+    with pytest.raises(InputError, match=r"network: missing key\(s\) \['symbols'\]"):
+        check(config, SCHEMA)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a: 1\na: 2\n", "stands twice"),
+        ("- 1\n", "expected a mapping"),
+        ("a: [\n", "not YAML"),
+        ("a: \0", r"not YAML [^\n]*$"),
+        ("__use_yte__: true\n?print(1): 2\n", "run code in it, expected a plain"),
+    ],
+)
+def test_a_broken_file_is_refused(tmp_path, text, words):
+    path = tmp_path / "config.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_yaml(path)
+
+
+def test_both_parsers_read_the_same(monkeypatch):
+    monkeypatch.setattr(yaml_files, "DEEPEST", -1)
+    assert repr(load_yaml(ROOT / "config/default.yaml")) == repr(DEFAULT)
+
+
+def test_canonical_text_is_one_per_meaning():
+    assert canonical({"b": math.inf, "a": [1, 2.5]}) == canonical({"a": (1, 2.5), "b": math.inf})
+    assert canonical({"snr": math.inf}) == '{"snr": "inf"}'
+
+
+PUBLISHED = {f"t{index}": {"unseen_protocol": "seen" if index % 2 else "unseen"} for index in range(4)}
+
+
+def plan(**motion) -> Plan:
+    """A plan of four subtypes with the given motion keys."""
+    return Plan.of(merge(DEFAULT, {"motion": motion}), PUBLISHED)
+
+
+def test_the_plan_covers_every_model_once():
+    found = plan(models=55, models_per_chunk=20)
+    assert found.chunks == [f"{group}-{part:05d}" for group in ("seen", "unseen") for part in range(3)]
+    assert [found.span(chunk) for chunk in found.chunks[:3]] == [(0, 20), (20, 20), (40, 15)]
+    assert len(found.shards) == len(set(found.shards)) == sum(len(found.folds(chunk)) for chunk in found.chunks)
+
+
+def test_a_short_chunk_has_only_shards_with_samples():
+    found = plan(models=1, models_per_chunk=10)
+    assert 1 <= len(found.folds("seen-00000")) <= 2
+    assert set(plan(models=10, models_per_chunk=10).folds("seen-00000")) == {"train", "val", "test"}
+
+
+def test_a_chunk_that_breaks_blocks_and_an_unknown_subtype_are_refused():
+    with pytest.raises(InputError, match="models_per_chunk: value 15, expected a multiple of 10"):
+        plan(models_per_chunk=15)
+    with pytest.raises(InputError, match=r"targets.select: \['Dodo'\]"):
+        Plan.of(merge(DEFAULT, {"targets": {"select": ["Dodo"]}}), PUBLISHED)
+
+
+def test_slugs_are_plain_and_distinct():
+    assert slug("Ramphastidae (toucan)") == "ramphastidae-toucan"
+    assert slug("EH 216 S") == "eh-216-s"
+
+
+def test_sources_follow_imports_and_leave_a_commands_own_choices_to_the_caller():
+    clouds = set(sources("lowalt.targets", *SOURCE_MODULES))
+    assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/gait.py", PACKAGE / "files/errors.py"} <= clouds
+    plain = set(sources("lowalt.recognition"))
+    assert PACKAGE / "recognition/views.py" not in plain
+    views = set(sources("lowalt.recognition", "lowalt.recognition.views"))
+    assert views > plain | {PACKAGE / "recognition/views.py"}
+
+
+def test_sources_of_nothing_are_refused():
+    with pytest.raises(ModuleNotFoundError):
+        sources("lowalt.nowhere")
+
+
+def test_documented_columns_are_the_columns():
+    tables = load_yaml(ROOT / "workflow/schemas/tables.yaml")
+    header = (ROOT / "config/targets.csv").read_text().split("\n")[0].split(",")
+    assert list(tables["targets"]) == header
+    motion = [name for name in COLUMNS if not name.startswith("phase_")]
+    assert [name for name in tables["motion"] if name != "phase_N_rad"] == motion
+    assert list(tables["stages"]) == list(STAGE_COLUMNS)
+    published = (ROOT / "config/published_accuracy.csv").read_text().split("\n")[0].split(",")
+    assert list(tables["accuracy"])[:4] == published

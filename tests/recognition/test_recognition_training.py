@@ -1,0 +1,276 @@
+"""Training: it learns, repeats bit for bit, stops on NaN by name, refuses wrong settings; its recipe by formulas."""
+
+import csv
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from timm.utils import ModelEmaV3
+from torch import nn
+
+from lowalt.files.errors import InputError
+from lowalt.recognition import checkpoint, inference, recipe, runs, samples
+from lowalt.recognition import training as loop
+from lowalt.recognition.matrix_products import MatrixProduct
+from lowalt.recognition.order import batches, epoch_order
+from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
+
+PATHS = os.pathsep.join(str(Path(__file__).parents[2] / folder) for folder in ("src", "tests/support"))
+"""Where another process finds the package and what tests share."""
+
+
+def test_training_learns_an_easy_task_and_says_how(views, trained):
+    with (trained / "history.csv").open(newline="") as file:
+        history = list(csv.DictReader(file))
+    assert [int(row["step"]) for row in history] == [40, 80]
+    assert float(history[-1]["validation_accuracy"]) > 0.9
+    assert float(history[-1]["train_loss"]) < float(history[0]["train_loss"])
+    about = json.loads((trained / "run.json").read_text())
+    assert about["samples_seen"] == 640 and about["weights"] == "none" and about["train_samples"] == 96
+    assert not (trained / "checkpoint.pt").exists()
+
+
+@pytest.mark.parametrize("precision", ["fp32", "bf16"])
+def test_equal_seeds_repeat_bit_for_bit_and_others_do_not(views, tmp_path, precision):
+    settings = with_training(precision=precision, steps=10, validate_every=5)
+    one = train(views, tmp_path / "one", settings)
+    two = train(views, tmp_path / "two", settings)
+    assert equal(one[0], two[0]) and one[1] == two[1]
+    assert not equal(one[0], train(views, tmp_path / "three", {**settings, "seed": 4})[0])
+
+
+def test_workers_that_read_ahead_change_no_bit(views, tmp_path):
+    one = train(views, tmp_path / "here", with_training(steps=9, validate_every=3))
+    two = train(views, tmp_path / "ahead", with_training(steps=9, validate_every=3, workers=2))
+    assert equal(one[0], two[0]) and one[1] == two[1]
+
+
+@pytest.mark.parametrize("precision", ["fp32", "bf16"])
+def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(views, tmp_path, precision):
+    beyond = {"rate": 1, "backbone_rate": 1e30, "clip": 1e30}
+    overflow = with_training(**beyond, warmup=0.0, checkpoint_s=0, ema=0.0, precision=precision)
+    with pytest.raises(InputError, match=r"loss is .* at step"):
+        train(views, tmp_path, overflow)
+    kept = tmp_path / "checkpoint.pt"
+    if kept.exists():
+        _, state = checkpoint.load(kept)
+        assert np.isfinite(state["at"]["loss_sum"])
+    assert not (tmp_path / "model.pt").exists()
+
+
+def test_weights_that_a_finite_loss_steps_beyond_the_largest_number_are_never_written(views, tmp_path):
+    beyond = with_training(rate=1, backbone_rate=1e39, warmup=0.0, steps=2, validate_every=1, checkpoint_s=0, ema=0.0)
+    with pytest.raises(InputError, match=r"weights .* are not finite after step 1;"):
+        train(views, tmp_path / "validated", beyond)
+    with pytest.raises(InputError, match=r"weights .* are not finite after step 1;"):
+        train(views, tmp_path / "saved", {**beyond, "training": {**beyond["training"], "validate_every": 2}})
+    assert not list(tmp_path.rglob("*.pt"))
+
+
+def test_a_gradient_that_overflows_is_left_out_and_ten_in_a_row_stop_the_run(views, tmp_path, monkeypatch, capsys):
+    clip, calls = torch.nn.utils.clip_grad_norm_, []
+
+    def overflow(parameters, *given, **named):
+        calls.append(0)
+        norm = clip(parameters, *given, **named)
+        return norm * float("inf") if len(calls) % limit[0] == 0 else norm
+
+    limit = [5]
+    monkeypatch.setattr(torch.nn.utils, "clip_grad_norm_", overflow)
+    weights, _ = train(views, tmp_path / "survives", with_training(steps=12))
+    assert all(value.isfinite().all() for value in weights.values() if value.is_floating_point())
+    assert "step left out" in capsys.readouterr().err
+    limit[0] = 1
+    with pytest.raises(InputError, match="ten gradients in a row were not finite, last at step 9"):
+        train(views, tmp_path / "stops", with_training(steps=12))
+
+
+def test_a_batch_of_one_class_is_survived_and_a_set_without_one_refused(views, tmp_path):
+    found = sources(views)
+    facts = found["train"].facts
+    found["train"].facts = facts.take(np.arange(len(facts)))
+    runs.train(found, SCHEME, "seen", with_training(batch=1, steps=8, validate_every=8), tmp_path / "one")
+    assert (tmp_path / "one" / "model.pt").exists()
+    few = np.flatnonzero(facts.label != 2)
+    found["train"].facts, found["train"].images = facts.take(few), found["train"].images[few]
+    with pytest.raises(InputError, match=r"no training sample of \['Vehicle'\]"):
+        runs.train(found, SCHEME, "seen", SETTINGS, tmp_path / "none")
+
+
+def test_arithmetic_is_bf16_only_where_the_processor_has_it(monkeypatch):
+    for units, expected in (({"avx2": True}, "fp32"), ({"avx2": True, "amx_bf16": False}, "fp32"),
+                            ({"avx512_bf16": True}, "bf16"), ({"amx_bf16": True}, "bf16")):  # fmt: skip
+        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda units=units: units)
+        assert inference.arithmetic("auto", "cpu") == expected
+    assert (inference.arithmetic("fp32", "cpu"), inference.arithmetic("bf16", "cpu")) == ("fp32", "bf16")
+
+
+def test_early_stopping_counts_validations_without_gain(views, tmp_path):
+    settings = with_training(rate=0.0, steps=400, validate_every=2, patience=3)
+    _, history = train(views, tmp_path, settings)
+    assert len(history.splitlines()) == 1 + 4
+
+
+@pytest.mark.parametrize("change", [{"steps": 0}, {"rate": -1.0}, {"precision": "fp16"}, {"warmup": 2}, {"epochs": 3},
+                                    {"batch": True}, {"ema": math.nan}, {"threads": 1.0}])  # fmt: skip
+def test_wrong_training_settings_are_refused_by_name(change):
+    with pytest.raises(InputError, match=rf"recognition\.training: .*{next(iter(change))}.*, expected"):
+        recipe.check({**TRAINING, **change})
+
+
+@pytest.mark.parametrize("change", [{"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1}])
+def test_wrong_augmentation_is_refused_by_name(views, tmp_path, change):
+    settings = {**SETTINGS, "augmentation": {**SETTINGS["augmentation"], **change}}
+    with pytest.raises(InputError, match=rf"recognition\.augmentation: .*{next(iter(change))}.*, expected"):
+        train(views, tmp_path, settings)
+
+
+def test_settings_that_may_be_left_out_change_nothing_then():
+    checked = recipe.check(TRAINING)
+    assert checked == {**TRAINING, "accumulate": 1, "activation_checkpointing": False}
+    assert recipe.check({**TRAINING, "batch": 3, "accumulate": 3})["accumulate"] == 3
+    with pytest.raises(InputError, match="accumulate is 4, expected at most batch, 3"):
+        recipe.check({**TRAINING, "batch": 3, "accumulate": 4})
+
+
+def test_batches_follow_each_epoch_s_order_and_validations_the_steps_and_the_end(views, tmp_path):
+    read = []
+
+    class Noted(samples.ViewSamples):
+        def changed(self, numbers, *given):
+            read.append(numbers.tolist())
+            return super().changed(numbers, *given)
+
+    parts = sources(views) | {"train": Noted([views], SCHEME.columns, {("seen", "train")})}
+    settings = with_training(steps=8, batch=13, validate_every=3)
+    runs.train(parts, SCHEME, "seen", settings, tmp_path)
+    keys = (settings["seed"], ("seen", SCHEME.name))
+    orders = [batches(epoch_order(parts["train"].facts, *keys, epoch, 1), 13) for epoch in range(3)]
+    assert len(orders[0]) == 3
+    assert read == [part.tolist() for order in orders for part in order][:8]
+    rows = (tmp_path / "history.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[:3] for row in rows] == [["3", "0", "39"], ["6", "1", "78"], ["8", "2", "104"]]
+
+
+@pytest.mark.parametrize("last", [True, False])
+def test_weights_lie_in_memory_as_the_settings_say_and_products_stand_for_convolutions_in_float32(
+    views, tmp_path, last
+):
+    for precision, kind in (("fp32", MatrixProduct), ("bf16", nn.Conv2d)):
+        settings = with_training(channels_last=last)
+        settings["training"] = recipe.check(settings["training"])
+        machine = inference.Machine(torch.device("cpu"), precision)
+        run = loop.TrainingRun(("a",), "x", tmp_path)
+        model = loop.Trainer(nn.Conv2d(4, 8, 3), sources(views), SCHEME.columns, settings, run, machine).model
+        assert model.weight.is_contiguous(memory_format=torch.channels_last) == last
+        assert type(model) is kind and model.training
+
+
+def test_the_rate_rises_linearly_and_falls_as_a_cosine():
+    assert recipe.schedule(0.05, 0.1) == pytest.approx(0.5)
+    assert recipe.schedule(0.1, 0.1) == pytest.approx(1.0)
+    assert recipe.schedule(0.55, 0.1) == pytest.approx(0.5)
+    assert recipe.schedule(1.0, 0.1) == pytest.approx(0.0, abs=1e-12)
+    assert recipe.schedule(1.0, 1.0) == 1.0
+
+
+def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
+    model = runs.load(trained / "model.pt").model
+    groups = recipe.optimiser(model, {**TRAINING, "backbone_rate": 0.1}).param_groups
+    members = [id(value) for group in groups for value in group["params"]]
+    assert sorted(members) == sorted(id(value) for value in model.parameters())
+    matrices = {id(value) for name, value in model.named_parameters() if value.ndim > 1 and "modality" not in name}
+    decays = {id(value): group["weight_decay"] for group in groups for value in group["params"]}
+    assert 0 < len(matrices) < len(decays)
+    assert decays == {member: TRAINING["weight_decay"] if member in matrices else 0.0 for member in members}
+    slow = {id(value) for group in groups if group["factor"] == 0.1 for value in group["params"]}
+    assert slow == {id(value) for value in model.backbone.parameters()}
+
+
+def test_metrics_for_tensorboard_are_those_of_the_history(views, tmp_path, monkeypatch):
+    pytest.importorskip("tensorboard")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    settings = with_training(steps=8, validate_every=4)
+    runs.train(sources(views), SCHEME, "seen", settings, tmp_path, events=True)
+    found = EventAccumulator(str(tmp_path / "events")).Reload()
+    with (tmp_path / "history.csv").open(newline="") as file:
+        history = list(csv.DictReader(file))
+    for name in ("train_loss", "validation_accuracy", "rate"):
+        assert [entry.step for entry in found.Scalars(name)] == [4, 8]
+        assert [entry.value for entry in found.Scalars(name)] == pytest.approx([float(row[name]) for row in history])
+    assert 0 <= found.Scalars("waiting_share")[-1].value <= 1
+
+
+def test_tensorboard_asked_for_and_absent_is_named(views, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    with pytest.raises(InputError, match=r"tensorboard is not installed.*lowalt\[tensorboard\]"):
+        runs.train(sources(views), SCHEME, "seen", with_training(steps=4), tmp_path, events=True)
+
+
+@pytest.mark.slow
+def test_a_compiled_network_trains_to_the_same_history(views, tmp_path):
+    settings = with_training(steps=6, validate_every=3)
+    settings["network"] = {**SETTINGS["network"], "dropout": 0.0}
+    plain = train(views, tmp_path / "plain", settings)
+    settings = {**settings, "training": {**settings["training"], "compile": True}}
+    # The compiler refuses a process in which another test has imported the distutils that comes with Python.
+    program = (
+        "import json, sys; from pathlib import Path; from trainings import train; given = map(Path, sys.argv[1:3])"
+    )
+    program += "; train(*given, json.loads(sys.argv[3]))"
+    command = [sys.executable, "-c", program, views, tmp_path / "compiled", json.dumps(settings)]
+    ended = subprocess.run(command, env={**os.environ, "PYTHONPATH": PATHS}, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    weights, history = checkpoint.load(tmp_path / "compiled/model.pt")[1]["weights"], tmp_path / "compiled/history.csv"
+    assert weights.keys() == plain[0].keys()
+    one, other = (np.loadtxt(text.splitlines()[1:], delimiter=",") for text in (plain[1], history.read_text()))
+    np.testing.assert_allclose(other, one, rtol=1e-3)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.6, 0.99, 1.0])
+def test_the_moving_average_weighs_the_weights_of_k_steps_ago_by_the_decay_to_the_k(decay):
+    weights = [3.0, -1.0, 4.0, 1.5, 9.0]
+    average = 77.0
+    for step, weight in enumerate(weights, start=1):
+        kept = recipe.averaging(decay, step)
+        average = kept * average + (1 - kept) * weight
+        ages = [decay**age for age in range(step)][::-1]
+        assert average == pytest.approx(np.average(weights[:step], weights=ages))
+
+
+def test_averages_of_a_network_are_those_of_timm_bit_for_bit():
+    torch.manual_seed(3)
+    model = nn.Sequential(nn.Linear(3, 4), nn.BatchNorm1d(4))
+    average, reference = recipe.MovingAverage(model), ModelEmaV3(model)
+    for step in range(1, 8):
+        model(torch.randn(5, 3)).sum().backward()
+        with torch.no_grad():
+            for value in model.parameters():
+                value -= 0.1 * torch.randn_like(value)
+        reference.decay = recipe.averaging(0.9, step)
+        average.update(reference.decay)
+        reference.update(model)
+        assert average.module[1].num_batches_tracked == step
+        assert equal(average.module.state_dict(), reference.module.state_dict())
+    # It goes on with the weights that a checkpoint brings.
+    average.module.load_state_dict({name: torch.full_like(value, 1) for name, value in model.state_dict().items()})
+    model.load_state_dict({name: torch.full_like(value, 3) for name, value in model.state_dict().items()})
+    average.update(0.5)
+    assert torch.equal(average.module[0].weight, torch.full((4, 3), 2.0))
+
+
+def test_seed_names_and_threads_fix_what_torch_draws():
+    drawn = []
+    for seed, keys in ((1, ("a",)), (1, ("a",)), (2, ("a",)), (1, ("b",))):
+        recipe.seeded(seed, keys, 1)
+        drawn.append(torch.rand(3).tolist())
+    assert drawn[0] == drawn[1] and drawn[2] != drawn[0] != drawn[3]
+    assert torch.get_num_threads() == 1 and torch.are_deterministic_algorithms_enabled()
+    assert not torch.utils.deterministic.fill_uninitialized_memory

@@ -1,0 +1,233 @@
+"""Samples made on the spot are those that the stages write: bytes, numbering, workers, samples without end."""
+
+import itertools
+import json
+import math
+import pickle
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lowalt
+from lowalt.__main__ import main as lowalt_command
+from lowalt.config.command import settings
+from lowalt.config.layers import canonical
+from lowalt.echo.__main__ import main as echo
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.motion.__main__ import main as motion
+from lowalt.noise.__main__ import main as noise
+from lowalt.shards import ShardSet, card
+from lowalt.shards.__main__ import main as shards
+from lowalt.shards.build import write_run
+from lowalt.shards.dataset import Dataset, Endless
+from lowalt.targets import occluders
+from lowalt.targets.cloud import read
+from lowalt.targets.cloud import write as write_cloud
+from lowalt.targets.records import records_of
+from lowalt.tiles.__main__ import main as tiles
+from lowalt.tiles.png import decode
+from small_configuration import configuration
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return Dataset(configuration())
+
+
+def run_stages(dataset: Dataset, folder: Path, kind: str) -> Path:
+    """Run the stages' own commands over a whole small data set; return the index."""
+    config, plan = dataset.config, dataset.plan
+    stations = list(config["network"]["stations"])
+    for name, cloud in dataset.clouds.items():
+        write_cloud(folder / "clouds" / f"{slug(name)}.npz", cloud)
+    written = []
+    for chunk in plan.chunks:
+        group = chunk.partition("-")[0]
+        clouds = [str(folder / "clouds" / f"{slug(name)}.npz") for name in plan.groups[group]]
+        places = [place["position_m"][:2] for place in config["network"]["stations"].values()]
+        kept = {key: config["motion"][key] for key in ("region", "height_m", "tilt_deg", "cadence")}
+        published = {name: dataset.published[name] for name in plan.groups[group]}
+        block = canonical({"seed": config["seed"], "masts_m": places, "motion": kept, "published": published})
+        table, noisy, drawn = (str(folder / f"{chunk}{end}") for end in (".csv", ".npy", ".npz"))
+        first, count = plan.span(chunk)
+        motion(["--settings", block, "--clouds", *clouds, "--group", group, "--first", str(first), "--count",
+                str(count), "--out", table])  # fmt: skip
+        heard = [str(folder / f"{chunk}-{station}.npy") for station in stations]
+        block = canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]})
+        echo(["--settings", block, "--motion", table, "--clouds", *clouds, "--station", *stations, "--out", *heard])
+        block = canonical({"seed": config["seed"], "stations": stations, "snr_db": config["noise"]["snr_db"]})
+        noise(["--settings", block, "--motion", table, "--echoes", *heard, "--out", noisy])
+        render = {key: config[key] for key in ("network", "spectra", "images")}
+        tiles(["--settings", canonical(render), "--signals", noisy, "--out", drawn])
+        block = {key: config[key] for key in ("seed", "network", "split")}
+        block |= {"snr_db": config["noise"]["snr_db"], "shards": {**config["shards"], "kind": kind}}
+        for name in plan.folds(chunk):
+            written.append(str(folder / "shards" / f"{group}-{name}-{chunk.rpartition('-')[2]}.tar"))
+            given = ["--echoes", *heard] if kind == "recipe" else ["--signals", noisy, "--tiles", drawn]
+            if kind == "cube":
+                given += ["--clouds", *clouds]
+                block |= {"echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}}
+            shards(["write", "--settings", canonical(block), "--motion", table, *given, "--fold", name,
+                    "--out", written[-1]])  # fmt: skip
+    render |= {"echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}}
+    index = folder / "shards" / "index.json"
+    shards(["index", "--settings", canonical(render), "--shards", *written, "--out", str(index)])
+    return index
+
+
+@pytest.fixture(scope="module", params=["image", "signal", "recipe", "cube"])
+def index(request, dataset, tmp_path_factory):
+    return run_stages(dataset, tmp_path_factory.mktemp(request.param), request.param)
+
+
+def test_every_sample_has_the_bytes_of_its_shard(dataset, index):
+    stored = ShardSet(index)
+    numbers = {key.decode(): number for number, key in enumerate(stored.keys.tolist())}
+    assert len(dataset) == len(stored) == 3 * 4 * 2
+    for number in range(len(dataset)):
+        place = numbers[dataset.key(number)]
+        assert dataset.members(number, stored.kind) == stored.members(place)
+        assert dataset.record(number) == {key: value for key, value in stored.record(place).items() if key != "cube"}
+        assert dataset.labels[number] == stored.labels[place]
+
+
+def test_a_whole_data_set_is_written_without_the_workflow(dataset, index, tmp_path):
+    found = write_run(dataset, tmp_path, ShardSet(index).kind)
+    assert found == json.loads(index.read_text())
+    for path in sorted(tmp_path.rglob("*.tar")) + sorted(tmp_path.rglob("clouds/*.npz")):
+        assert path.read_bytes() == (index.parent.parent / path.relative_to(tmp_path)).read_bytes(), path.name
+
+
+def test_a_stored_sample_is_made_again_and_another_is_told(index, tmp_path, capsys):
+    key = ShardSet(index).keys[0].decode()
+    assert lowalt_command(["remake", str(index), key]) == 0
+    assert "1 samples made again" in capsys.readouterr().out
+    assert lowalt_command(["remake", str(index), "crow-000000-snrinf"]) == 2
+    assert "not in" in capsys.readouterr().err
+    clouds = shutil.copytree(index.parent.parent / "clouds", tmp_path / "clouds")
+    for path in clouds.iterdir():
+        cloud = read(path)
+        cloud.points[:] *= 1.01
+        cloud.track[:] *= 1.01
+        write_cloud(path, cloud)
+    assert lowalt_command(["remake", str(index), key, "--clouds", str(clouds)]) == 1
+    assert f"sample {key}: its" in capsys.readouterr().out
+    assert lowalt_command(["remake", str(index), key, "--clouds", str(tmp_path / "none")]) == 2
+    assert "cloud of" in capsys.readouterr().err
+
+
+def test_samples_to_make_again_are_drawn_and_an_index_must_say_how(index):
+    from lowalt.shards.remake import Remaker, some
+
+    stored = ShardSet(index)
+    assert len(set(some(stored, 5))) == 5 and some(stored, 100) == list(range(len(stored)))
+    damaged = index.parent / "old.json"
+    damaged.write_text(index.read_text().replace("lowalt-shards-2", "lowalt-shards-9"))
+    with pytest.raises(InputError, match="lowalt-shards-9"):
+        ShardSet(damaged)
+    damaged.unlink()
+    stored.index["echo"] = None
+    with pytest.raises(InputError, match=r"lowalt 0\.2 or later"):
+        Remaker(stored, {})
+
+
+def test_folds_and_groups_choose_samples(dataset, index):
+    chosen = Dataset(configuration(), dataset.clouds, groups=["seen"], folds=["train", "test"])
+    stored = ShardSet(index, groups=["seen"], folds=["train", "test"])
+    assert sorted(chosen.key(number) for number in range(len(chosen))) == sorted(k.decode() for k in stored.keys)
+    with pytest.raises(IndexError, match=rf"sample {len(chosen)}: expected 0 to {len(chosen) - 1}$"):
+        chosen[len(chosen)]
+    with pytest.raises(InputError, match="folds"):
+        Dataset(configuration(), dataset.clouds, folds=["training"])
+
+
+def test_image_signal_and_record_belong_together(dataset):
+    sample = dataset[5]
+    record, data = dataset.members(5, "image")
+    assert (decode(data)[0] == sample.image).all()
+    assert (dataset.maker.renderer.tile(sample.signal) == sample.image).all()
+    assert sample.record == json.loads(record) == json.loads(json.dumps(sample.record))
+    assert lowalt.Dataset is Dataset and lowalt.Endless is Endless
+
+
+def test_torch_loads_samples_in_workers(dataset):
+    torch = pytest.importorskip("torch")
+    loader = torch.utils.data.DataLoader(
+        torch.utils.data.Subset(dataset, range(4)), num_workers=2, batch_size=None, multiprocessing_context="fork"
+    )
+    for number, sample in enumerate(loader):
+        assert (np.asarray(sample.signal) == dataset.signal(number)).all()
+    copy = pickle.loads(pickle.dumps(dataset))
+    assert copy.members(3, "signal") == dataset.members(3, "signal")
+
+
+def test_samples_without_end_are_new_and_parts_share_them(dataset):
+    parts = [list(itertools.islice(Endless(dataset, part=part, parts=2).places(), 12)) for part in range(2)]
+    assert {place.model for place in parts[0]} == {4, 6} and {place.model for place in parts[1]} == {5, 7}
+    known = {dataset.key(number) for number in range(len(dataset))}
+    sample = next(iter(Endless(dataset)))
+    assert sample.record["key"] not in known and sample.record["model"] == 4
+    # A model beyond the count is the one that a larger configuration has.
+    wider = configuration()
+    wider["motion"] |= {"models": 8, "models_per_chunk": 4}
+    larger = Dataset(wider, dataset.clouds)
+    number = next(n for n in range(len(larger)) if larger.key(n) == sample.record["key"])
+    assert (larger.signal(number) == sample.signal).all()
+    with pytest.raises(InputError, match="part 2 of 2"):
+        Endless(dataset, part=2, parts=2)
+
+
+def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
+    from lowalt.scene.__main__ import main as effects
+
+    config = configuration(effects={"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}})
+    config["echo"] = {**config["echo"], "tolerance": 1e-3}
+    scene = Dataset(config, dataset.clouds, groups=["unseen"])
+    place = scene.place(0)
+    cloud = tmp_path / "cloud.npz"
+    write_cloud(cloud, dataset.clouds[place.subtype])
+    from lowalt.motion import write_table
+
+    write_table(tmp_path / "motion.csv", [scene.row(place)])
+    block = {"seed": config["seed"], "network": config["network"], "tolerance": 1e-3, "effects": config["effects"]}
+    stations = list(config["network"]["stations"])
+    out, power = ([str(tmp_path / f"{name}{end}.npy") for name in stations] for end in ("", "-power"))
+    effects(["--settings", canonical(block), "--motion", str(tmp_path / "motion.csv"), "--clouds", str(cloud),
+             "--station", *stations, "--out", *out, "--power", *power])  # fmt: skip
+    snrs = canonical({"seed": config["seed"], "stations": stations, "snr_db": [3, math.inf]})
+    assert settings(snrs)
+    noise(["--settings", snrs, "--motion", str(tmp_path / "motion.csv"), "--echoes", *out, "--powers", *power,
+           "--out", str(tmp_path / "noisy.npy")])  # fmt: skip
+    expected = np.load(tmp_path / "noisy.npy")[0]
+    assert (scene.signal(0) == expected[0]).all() and (scene.signal(1) == expected[1]).all()
+
+
+def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(dataset, tmp_path, capsys):
+    config = configuration(effects={"occlusion": {}})
+    config["targets"]["select"] = ["DJI Mini 2"]
+    config["motion"] |= {"models": 4, "models_per_chunk": 4}
+    config["noise"] = {"snr_db": [13]}
+    record = records_of(config["targets"], None)["DJI Mini 2"]
+    surfaces = occluders.make(record, None, config["seed"])
+    scene = Dataset(config, dataset.clouds, occluders={"DJI Mini 2": surfaces | {"subtype": "DJI Mini 2"}})
+    write_run(scene, tmp_path, "signal")
+    index, key = str(tmp_path / "shards/index.json"), scene.key(0)
+    assert lowalt_command(["remake", index, key]) == 2 and "has no surfaces" in capsys.readouterr().err
+    occluders.write(tmp_path / "occluders/dji-mini-2.npz", surfaces, "DJI Mini 2")
+    (tmp_path / "config.yaml").write_text(json.dumps({"run": "hidden"}))
+    card.write(index, tmp_path / "config.yaml")
+    assert lowalt_command(["remake", index, key]) == lowalt_command(["verify", index, "--remake", "1"]) == 0
+    (tmp_path / "occluders").rename(tmp_path / "elsewhere")
+    assert lowalt_command(["remake", index, key]) == 2
+    capsys.readouterr()
+    assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 0
+    assert "1 samples made again, equal in every byte" in capsys.readouterr().out
+    moved = surfaces | {"vertices": surfaces["vertices"] + 1.0}
+    occluders.write(tmp_path / "elsewhere/dji-mini-2.npz", moved, "DJI Mini 2")
+    assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 1
+    assert f"sample {key}: its signal comes out otherwise" in capsys.readouterr().out

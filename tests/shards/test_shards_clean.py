@@ -1,0 +1,248 @@
+"""Recipe shards: clean echoes once a motion model, read as the signal shards whose samples they stand for."""
+
+import json
+import math
+import tarfile
+
+import numpy as np
+import pytest
+import yaml
+from test_shards_card import CONFIG
+
+from dataset import SEED, SNRS, build
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
+from lowalt.noise.chunk import noisy_signals
+from lowalt.recognition.views import ShardSamples, cache_shard, facts_of
+from lowalt.shards import ShardSet, clean
+from lowalt.shards.__main__ import main
+from lowalt.shards.card import main as card
+from lowalt.shards.record import npy
+from lowalt.shards.sample_table import map_samples
+from lowalt.shards.sigmf import main as sigmf
+from lowalt.shards.verify import faults
+from lowalt.shards.write import ChunkSamples, write_shard
+from lowalt.spectra import NAMES
+from pictures import NETWORK
+
+STATIONS = list(NETWORK["stations"])
+
+
+@pytest.fixture(scope="module")
+def recipes(tmp_path_factory):
+    folder = build(tmp_path_factory.mktemp("recipe") / "shards", "recipe")
+    (folder.parent / "config.yaml").write_text(yaml.safe_dump(CONFIG))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def published(recipes, tmp_path_factory):
+    folder = build(tmp_path_factory.mktemp("published") / "shards", "recipe", inputs=False)
+    arguments = ["--index", str(folder / "index.json"), "--config", str(recipes.parent / "config.yaml")]
+    card([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
+    return folder
+
+
+@pytest.fixture(scope="module")
+def noised(recipes):
+    """The same samples as a data set of signal shards, noise added by the noise stage."""
+    from lowalt.motion import read_table
+
+    folder = recipes.parent / "noised"
+    folder.mkdir()
+    shards = []
+    for group in ("seen", "unseen"):
+        rows = read_table(recipes / f"{group}.csv")
+        echoes = np.stack([np.load(recipes / f"{group}.{name}.npy") for name in STATIONS])
+        np.save(folder / f"{group}.npy", noisy_signals(echoes, rows, STATIONS, [3.0, np.inf], SEED))
+        for fold in ("train", "val", "test"):
+            shards.append(str(folder / f"{group}-{fold}-00000.tar"))
+            settings = json.dumps({**{k: CONFIG[k] for k in ("seed", "network", "split")}, "snr_db": SNRS,
+                                   "shards": {"kind": "signal"}})  # fmt: skip
+            main(["write", "--settings", settings, "--motion", str(recipes / f"{group}.csv"), "--signals",
+                  str(folder / f"{group}.npy"), "--fold", fold, "--out", shards[-1]])  # fmt: skip
+    render = json.dumps({name: CONFIG[name] for name in ("network", "spectra", "images")})
+    main(["index", "--settings", render, "--shards", *shards, "--out", str(folder / "index.json")])
+    return folder
+
+
+def test_every_sample_is_the_one_of_the_signal_shards_under_the_same_number(recipes, noised):
+    found, expected = ShardSet(recipes / "index.json"), ShardSet(noised / "index.json")
+    assert (found.keys == expected.keys).all() and (found.snrs_db == expected.snrs_db).all() and len(found) == 24
+    for number in range(len(found)):
+        assert found.members(number) == expected.members(number)
+        assert found.record(number) == expected.record(number)
+        assert (found.signal(number) == expected.signal(number)).all()
+    assert (found.tile(5) == expected.tile(5)).all()
+    assert (found.images(7, 64, ["B"]) == expected.images(7, 64, ["B"])).all()
+    with pytest.raises(InputError, match="kind 'recipe', expected 'image'"):
+        found.png(0)
+
+
+def test_training_sees_the_same_samples(recipes, noised, tmp_path):
+    folds = {("seen", "train"), ("unseen", "train")}
+    pair = [
+        ShardSamples(folder / "index.json", [len(NAMES) * station for station in range(3)], folds, 24, True)
+        for folder in (recipes, noised)
+    ]
+    for name in ("key", "label", "snr_db", "model", "range_m"):
+        assert (getattr(pair[0].facts, name) == getattr(pair[1].facts, name)).all()
+    some = np.array([3, 1, 2])
+    assert (pair[0].views(some) == pair[1].views(some)).all()
+    for folder in (recipes, noised):
+        cache_shard(folder / "index.json", "seen-val-00000.tar", 24, tmp_path / f"{folder.name}.npz")
+    assert (tmp_path / "shards.npz").read_bytes() == (tmp_path / "noised.npz").read_bytes()
+    assert len(facts_of(ShardSet(recipes / "index.json"), np.arange(4))) == 4
+
+
+def test_each_motion_model_is_stored_once(recipes, noised):
+    with tarfile.open(recipes / "seen-train-00000.tar") as archive:
+        names = archive.getnames()
+    rows = map_samples(recipes / "seen-train-00000.npz")
+    models = {key.decode().rpartition("-snr")[0] for key in rows["key"].tolist()}
+    assert sorted(names) == sorted(f"{model}{end}" for model in models for end in (".clean.npy", ".json"))
+    # A quarter of a signal shard's bytes would be four SNRs; two SNRs share each echo here.
+    sizes = [ShardSet(folder / "index.json").index["shards"] for folder in (recipes, noised)]
+    whole = [sum(rows["size"].astype(float)) for rows in (rows, map_samples(noised / "seen-train-00000.npz"))]
+    stored = sum({int(row["offset"]): int(row["size"]) for row in rows}.values())
+    assert whole[0] == 2 * stored and stored == pytest.approx(whole[1] / 2, rel=0.02)
+    assert sum(entry["samples"] for entry in sizes[0]) == 24
+
+
+def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
+    from dataset import motion_rows
+
+    rows, split = motion_rows("unseen"), {"by": "sample", "train": 2, "val": 1, "test": 1}
+    echoes = np.ones((3, 400), np.complex64)
+    network = Network.from_settings(NETWORK)
+    seen = []
+    for fold in ("train", "val", "test"):
+        path = tmp_path / f"unseen-{fold}-00000.tar"
+        chunk = ChunkSamples(rows, [3.0, 8.0, np.inf], split, SEED, network)
+        write_shard(path, chunk, fold, "recipe", lambda *_: (npy(echoes), {}))
+        with tarfile.open(path) as archive:
+            for name in archive.getnames():
+                if name.endswith(".json"):
+                    entry = json.load(archive.extractfile(name))
+                    seen += [(entry["model"], snr) for snr in clean.sample_snrs(entry)]
+    assert sorted(seen) == [(model, snr) for model in range(4) for snr in (3.0, 8.0, np.inf)]
+
+
+def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
+    from dataset import motion_rows
+
+    rows = [row | {"fold": "train"} for row in motion_rows("unseen", 1)]
+    echoes, powers = np.full((3, 1, 400), 1 + 1j, np.complex64), np.array([[1e-3], [2.0], [0.0]])
+    split, network = {"by": "motion", "train": 1, "val": 1, "test": 1}, Network.from_settings(NETWORK)
+    write_shard(
+        tmp_path / "unseen-train-00000.tar", ChunkSamples(rows, [3.0], split, 3, network, powers=powers), "train",
+        "recipe", lambda *_: (npy(echoes[:, 0]), {}),
+    )  # fmt: skip
+    with tarfile.open(tmp_path / "unseen-train-00000.tar") as archive:
+        name = next(name for name in archive.getnames() if name.endswith(".json"))
+        entry = json.load(archive.extractfile(name))
+    expected = noisy_signals(echoes, rows, STATIONS, [3.0], 3, powers)[0, 0]
+    found = clean.noisy(entry, echoes[:, 0], STATIONS, 3.0)
+    assert (found == expected).all() and (found[2] == 1 + 1j).all() and found[1].std() > found[0].std() > 0
+    assert clean.POWER not in json.loads(clean.unpacked(entry, 3.0))
+    with pytest.raises(InputError, match="expected 8"):
+        clean.unpacked(entry, 8.0)
+
+
+def test_a_scene_with_a_canceller_gives_the_samples_of_its_signal_shards(tmp_path):
+    from test_dataset import configuration
+
+    from lowalt.shards.build import write_run
+    from lowalt.shards.dataset import Dataset
+
+    effects = {"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}, "canceller": {"kind": "mean"}}
+    config = configuration(effects=effects)
+    config["echo"] = {**config["echo"], "tolerance": 1e-3}
+    config["targets"] = {**config["targets"], "select": ["Owl"]}
+    config["motion"] = {**config["motion"], "models": 4}
+    scene = Dataset(config)
+    for kind in ("signal", "recipe"):
+        write_run(scene, tmp_path / kind, kind)
+    stored, packed = (ShardSet(tmp_path / kind / "shards" / "index.json") for kind in ("signal", "recipe"))
+    assert len(stored) == 8 and [stored.members(n) for n in range(8)] == [packed.members(n) for n in range(8)]
+    with pytest.raises(InputError, match="cell_noise"):
+        clean.refuse({"cell_noise": {}})
+    clean.refuse(effects)
+
+
+def test_damage_is_named_with_every_sample_that_it_reaches(published, tmp_path):
+    import shutil
+
+    folder = shutil.copytree(published, tmp_path / "copy")
+    assert list(faults(folder / "index.json")) == []
+    rows = map_samples(folder / "seen-train-00000.npz")
+    path, row = folder / "seen-train-00000.tar", rows[-1]
+    # The table's last sample belongs to a model that is not the last in the archive.
+    assert row["offset"] < rows["offset"].max()
+    data = bytearray(path.read_bytes())
+    data[int(row["data_offset"]) + 200] ^= 1
+    path.write_bytes(data)
+    lines = [line for line in faults(folder / "index.json") if path.name in line and "sample" in line]
+    assert not [line for line in faults(folder / "index.json") if "archive" in line]
+    model = row["key"].decode().rpartition("-snr")[0]
+    assert sorted(lines) == [
+        f"{path.name}: sample {model}-{level} is damaged (SHA-256 differs)" for level in ("snr003", "snrinf")
+    ]
+    with pytest.raises(InputError, match=model):
+        shards = ShardSet(folder / "index.json", ["seen"], ["train"])
+        shards.signal(len(shards) - 1)
+
+
+def test_webdataset_gives_the_samples_of_signal_shards(published, noised):
+    webdataset = pytest.importorskip("webdataset")
+    stored = ShardSet(noised / "index.json", ["seen"], ["train"])
+    numbers = {key.decode(): number for number, key in enumerate(stored.keys.tolist())}
+    path = str(published / "seen-train-00000.tar")
+    for decoding in (False, True):
+        pipeline = webdataset.WebDataset(path, shardshuffle=False)
+        pipeline = pipeline.decode() if decoding else pipeline
+        found = list(pipeline.compose(clean.samples))
+        assert sorted(sample["__key__"] for sample in found) == sorted(numbers)
+        for sample in found:
+            number = numbers[sample["__key__"]]
+            assert sample["json"] == stored.record(number)
+            assert (sample["npy"].view(np.complex64)[..., 0] == stored.signal(number)).all()
+
+
+def test_the_hubs_library_reads_clean_echoes_by_the_card(published, tmp_path, monkeypatch):
+    from test_shards_tools import loaded
+
+    rows = loaded(published, tmp_path, monkeypatch, str(published), "unseen")["test"]
+    assert len(rows) == 4
+    for row in rows:
+        assert row["json"]["snr_db"] == [3.0, math.inf] and row["json"]["noise"] == [True, False]
+        assert np.array(row["clean.npy"], np.float32).shape == (3, 400, 2)
+
+
+def test_card_croissant_and_sigmf_tell_of_recipes(published, noised, tmp_path, mlcroissant):
+    text = (published / "README.md").read_text()
+    assert "KEY.clean.npy" in text and "lowalt.shards.clean.samples" in text and "{" not in text.split("```")[0]
+    data = mlcroissant.Dataset(str(published / "croissant.json"))
+    assert not data.metadata.issues.errors and not data.metadata.issues.warnings
+    assert len(list(data.records("samples"))) == 24 and len(list(data.records("labelled"))) == 24
+    for folder in (published, noised):
+        sigmf(["--index", str(folder / "index.json"), "--out", str(tmp_path / folder.name)])
+    for name in STATIONS:
+        pair = [(tmp_path / folder.name / f"{name}.sigmf-data").read_bytes() for folder in (published, noised)]
+        assert pair[0] == pair[1]
+
+
+def test_a_missing_file_of_echoes_is_named(recipes, tmp_path):
+    settings = json.dumps({**{k: CONFIG[k] for k in ("seed", "network", "split")}, "snr_db": SNRS,
+                           "shards": {"kind": "recipe"}})  # fmt: skip
+    arguments = ["write", "--settings", settings, "--motion", str(recipes / "seen.csv"), "--fold", "train",
+                 "--out", str(tmp_path / "seen-train-00000.tar")]  # fmt: skip
+    paths = [str(recipes / f"seen.{name}.npy") for name in STATIONS]
+    other = str(recipes / "unseen.A.npy")
+    for given, message in (
+        ([], "--echoes: missing"), (["--echoes", *paths[:2]], "2 files"), (["--echoes", *paths[:2], other], "unseen"),
+        (["--echoes", *paths, "--powers", *paths], "--powers: shape"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=message):
+            main([*arguments, *given])
+    assert not list(tmp_path.iterdir())

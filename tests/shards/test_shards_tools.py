@@ -1,0 +1,97 @@
+"""Other people's tools read the shards: the hub's library, Croissant's and SigMF's."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from test_shards_card import CONFIG
+
+from dataset import build
+from lowalt.files.errors import InputError
+from lowalt.shards import ShardSet
+from lowalt.shards.card import main as card
+from lowalt.shards.sigmf import main as sigmf
+
+
+@pytest.fixture(scope="module", params=["image", "signal"])
+def published(request, tmp_path_factory):
+    folder = build(tmp_path_factory.mktemp(request.param) / "shards", request.param, inputs=False)
+    (folder.parent / "config.yaml").write_text(yaml.safe_dump(CONFIG))
+    card(["--index", str(folder / "index.json"), "--config", str(folder.parent / "config.yaml"),
+          "--date", "2026-01-31", "--url", "https://example.org/trial"])  # fmt: skip
+    return folder
+
+
+def loaded(folder, tmp_path, monkeypatch, *names):
+    """The data set as the hub's library reads it from a folder, no internet asked."""
+    monkeypatch.setenv("HF_HOME", str(tmp_path))
+    monkeypatch.setenv("HF_DATASETS_OFFLINE", "1")
+    datasets = pytest.importorskip("datasets")
+    datasets.disable_progress_bars()
+    return datasets.load_dataset(*names, cache_dir=str(tmp_path / "cache"))
+
+
+def test_the_hubs_library_reads_every_protocol_by_the_card(published, tmp_path, monkeypatch):
+    shards = ShardSet(published / "index.json")
+    numbers = {key.decode(): number for number, key in enumerate(shards.keys.tolist())}
+    counts = {"seen": {"train": 12, "validation": 6, "test": 6}, "unseen": {"train": 8, "validation": 4, "test": 8}}
+    for protocol, expected in counts.items():
+        found = loaded(published, tmp_path, monkeypatch, str(published), protocol)
+        assert {split: len(rows) for split, rows in found.items()} == expected
+        assert found["test"].features["json"]["label"].names == list(shards.classes)
+        for row in found["test"]:
+            number = numbers[row["__key__"]]
+            assert row["json"] == shards.record(number)
+            if shards.kind == "signal":
+                stored = np.array(row["npy"], np.float32).view(np.complex64)[..., 0]
+                assert (stored == shards.signal(number)).all()
+            else:
+                assert (np.asarray(row["png"]) == shards.tile(number)).all()
+
+
+def test_the_cards_front_matter_is_what_the_hub_wants(published):
+    front = yaml.safe_load((published / "README.md").read_text().split("---")[1])
+    assert front["language"] == ["en"]
+    assert [config["config_name"] for config in front["configs"]] == ["seen", "unseen"]
+    assert front["configs"][0]["default"] is True
+
+
+def test_croissant_is_of_version_1_1_and_has_no_fault(published, mlcroissant):
+    text = json.loads((published / "croissant.json").read_text())
+    assert text["conformsTo"].endswith("/1.1")
+    data = mlcroissant.Dataset(str(published / "croissant.json"))
+    assert not data.metadata.issues.errors and not data.metadata.issues.warnings
+    shards = ShardSet(published / "index.json")
+    assert [row["samples/key"] for row in data.records("samples")] == shards.keys.tolist()
+    labels = dict(zip((key.decode() for key in shards.keys.tolist()), shards.labels.tolist(), strict=True))
+    rows = list(data.records("labelled"))
+    assert {row["labelled/key"].decode(): row["labelled/label"] for row in rows} == labels
+    for row in rows if shards.kind == "image" else []:
+        number = shards.keys.tolist().index(row["labelled/key"])
+        assert (np.asarray(row["labelled/content"]) == shards.tile(number)).all()
+
+
+def test_sigmf_recordings_hold_every_signal_with_its_annotation(published, tmp_path):
+    shards = ShardSet(published / "index.json")
+    arguments = ["--index", str(published / "index.json"), "--out", str(tmp_path)]
+    if shards.kind == "image":
+        with pytest.raises(InputError, match="expected 'signal'"):
+            sigmf(arguments)
+        return
+    library = pytest.importorskip("sigmf")
+    sigmf(arguments)
+    network = shards.index["render"]["network"]
+    for place, station in enumerate(network["stations"]):
+        recording = library.sigmffile.fromfile(str(tmp_path / f"{station}.sigmf-meta"))
+        recording.validate()
+        assert recording.get_global_field("core:datatype") == "cf32_le"
+        assert recording.get_global_field("core:sample_rate") == 1 / network["symbol_interval_s"]
+        assert recording.get_capture_info(0)["core:frequency"] >= network["carrier_hz"]
+        annotations = recording.get_annotations()
+        assert len(annotations) == len(shards)
+        for number in (0, 5, len(shards) - 1):
+            note = annotations[number]
+            signal = recording.read_samples(note["core:sample_start"], note["core:sample_count"])
+            assert (signal == shards.signal(number)[place]).all()
+            assert note["lowalt:key"] == shards.keys[number].decode()

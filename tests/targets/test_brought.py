@@ -1,0 +1,229 @@
+"""Settings that a file brings, each damaged in many ways and signed again: refused in one line, or the same result."""
+
+import copy
+import json
+import math
+import resource
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from lowalt.__main__ import main
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
+from lowalt.recognition import checkpoint, model_file, runs, samples, zoo
+from lowalt.recognition.__main__ import main as recognition
+from lowalt.shards import ShardSet, index
+from lowalt.shards.build import write_run
+from lowalt.shards.dataset import Dataset
+from lowalt.shards.remake import opened, place_of
+from lowalt.tiles.tile_files import Tiles
+from small_configuration import configuration
+from trainings import SCHEME, SETTINGS, write_views
+
+DAMAGE = (
+    None,
+    True,
+    -1,
+    0,
+    0.5,
+    10**30,
+    20_000,
+    math.nan,
+    "",
+    "x\ny",
+    "../x",
+    [],
+    {},
+    [[]],
+    [-1],
+    {"x": 1},
+    ["a", "a"],
+)
+RUNS = "def run(size):\n    open('made', 'w').close()\n"
+
+
+@pytest.fixture
+def signals(tmp_path, monkeypatch):
+    """Signals of the default network, in the folder in which the commands run."""
+    path = tmp_path / "a.npy"
+    np.save(path, np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4).astype(np.complex64))
+    return path
+
+
+def leaves(value, path=()):
+    """Paths of all values in nested mappings and lists, inner ones too."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, entry in inner:
+        yield (*path, key)
+        yield from leaves(entry, (*path, key))
+
+
+def damaged(block):
+    """Copies of a block, each with one value damaged, dropped or joined by an unknown key; each value in a few ways."""
+    for turn, path in enumerate(leaves(block)):
+        for new in (*DAMAGE, "drop", "add")[turn % 5 :: 5]:
+            found = copy.deepcopy(block)
+            inner = found
+            for key in path[:-1]:
+                inner = inner[key]
+            if new == "drop":
+                del inner[path[-1]]
+            elif new == "add" and isinstance(inner, dict):
+                inner["unknown"] = 1
+            else:
+                inner[path[-1]] = new
+            yield path, new, found
+
+
+def line_of(call, *given):
+    """What a call returns, or the one line with which it refuses."""
+    try:
+        return call(*given)
+    except InputError as error:
+        assert str(error) and "\n" not in str(error)
+        return "refused"
+
+
+@pytest.mark.parametrize("part", ["model", "input"])
+def test_a_model_file_with_a_damaged_setting_is_refused_in_one_line_or_answers_the_same(part, signals, tmp_path):
+    from lowalt.recognition.one_sample import predict
+
+    content, path = model_file.read(zoo.ZOO / "default-seen.safetensors"), tmp_path / "a.safetensors"
+
+    def asked():
+        """The answer of the file."""
+        model, settings = zoo.opened(path)
+        return list(predict(model, signals, settings).values()) if settings else "refused"
+
+    model_file.write(path, content)
+    good, counted = asked(), {"refused": 0, "same": 0}
+    for where, new, block in damaged(getattr(content, part)):
+        model_file.write(path, replace(content, **{part: block}))
+        found = line_of(asked)
+        counted["refused" if found == "refused" else "same"] += 1
+        # Other images, or fewer stations, change the answer, as they may.
+        if part == "model" and where[:2] != ("scheme", "stations"):
+            assert found in ("refused", good), (where, new)
+        assert found == "refused" or np.isfinite(found).all(), (where, new)
+    assert counted["refused"] > 3 * counted["same"] > 0
+
+
+def test_a_checkpoint_with_a_damaged_setting_is_refused_in_one_line_or_the_same(trained, tmp_path):
+    identity, state = checkpoint.load(trained / "model.pt")
+    weights, path = state.pop("weights"), tmp_path / "a.pt"
+    image = torch.zeros(1, 4, 32, 32, dtype=torch.uint8)
+    plain = json.loads(json.dumps(state))
+    with torch.inference_mode():
+        good = runs.load(trained / "model.pt").model(image)
+        for where, new, block in damaged(plain):
+            checkpoint.save(path, identity, {**block, "weights": weights})
+            found = line_of(runs.load, path)
+            assert found == "refused" or torch.equal(found.model(image), good), (where, new)
+
+
+def test_an_index_with_a_damaged_setting_is_refused_in_one_line_or_makes_samples(tmp_path):
+    write_run(Dataset(configuration(effects={"receiver_noise": {}, "adc": {"bits": 8}})), tmp_path, "signal")
+    path = tmp_path / "shards/index.json"
+    whole = json.loads(path.read_text())
+    key = ShardSet(path).keys[0].decode()
+    counted = {"refused": 0, "made": 0}
+    for _, _, block in damaged({name: whole[name] for name in ("kind", "render", "echo")}):
+        content = {**whole, **block}
+        content["sha256"] = index._checksum(content)
+        path.write_text(json.dumps(content))
+
+        def remade():
+            """Faults of a sample made again by the index as it is now."""
+            remaker = opened(path)
+            return remaker.faults(place_of(remaker.shards, key))
+
+        counted["refused" if line_of(remade) == "refused" else "made"] += 1
+    assert counted["refused"] > 3 * counted["made"] > 0
+
+
+def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, capsys, signals):
+    identity, state = checkpoint.load(trained / "model.pt")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "code.py").write_text(RUNS)
+    state["network"] = {**state["network"], "backbone": "code.py:run"}
+    checkpoint.save("a.pt", identity, state)
+    content = model_file.of_run("a.pt")
+    model_file.write("a.safetensors", content)
+    in_scheme = {**content.model, "scheme": {**content.model["scheme"], "backbone": "code.py:run"}}
+    model_file.write("b.safetensors", replace(content, model=in_scheme))
+    for name in ("a.pt", "a.safetensors", "b.safetensors"):
+        assert main(["predict", name, str(signals)]) == 2
+        told = capsys.readouterr().err
+        assert told.count("\n") == 1 and "which a file may not choose; expected `--backbone FILE.py:FUNCTION`" in told
+    for out in ("a.onnx", "a.pt2", "b.safetensors"):
+        with pytest.raises(InputError, match="may not choose"):
+            recognition(["export", "--settings", "{}", "--model", "a.pt", "--out", out])
+    with pytest.raises(InputError, match="may not choose"):
+        zoo.main(["--model", "a.pt", "--views", "none", "--name", "a"])
+    assert not (tmp_path / "made").exists()
+    with pytest.raises(InputError, match=r"code\.py:run"):
+        runs.load("a.pt", "code.py:run")
+    assert (tmp_path / "made").exists()
+
+
+def test_a_model_on_code_of_its_user_answers_where_he_names_it(tmp_path, monkeypatch):
+    from test_recognition import GOOD
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(GOOD)
+    block = {**SETTINGS["network"], "backbone": "mine.py:small", "heads": 5}
+    fresh = runs.built(SCHEME, block, 32, "gray", 4)
+    state = {name: SETTINGS[name] for name in ("size", "seed", "colour_map", "classes")}
+    state |= {"scheme": SCHEME.record, "protocol": "seen", "network": block, "weights": fresh.state_dict()}
+    checkpoint.save("a.pt", "{}", state)
+    image = torch.randint(0, 255, (2, 4, 32, 32), dtype=torch.uint8)
+    with torch.inference_mode():
+        assert torch.allclose(runs.load("a.pt", "mine.py:small").model(image), fresh.eval()(image), atol=1e-5)
+
+
+def test_a_network_larger_than_its_weights_takes_no_memory(trained, tmp_path):
+    identity, state = checkpoint.load(trained / "model.pt")
+    large = {"hidden": 65536, "intra_depth": 64, "inter_depth": 64, "feed_forward": 64.0}
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for name in ("vit_giant_patch14_224", "test_vit2"):
+        state["network"] = {**state["network"], **large, "backbone": name}
+        checkpoint.save(tmp_path / "a.pt", identity, state)
+        with pytest.raises(InputError, match=r"do not fit its network|not a trained model"):
+            runs.load(tmp_path / "a.pt")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
+
+
+def test_facts_of_other_shapes_offsets_in_words_and_null_bytes_are_refused_in_one_line(tmp_path):
+    views, tiles, text = (tmp_path / name for name in ("views.npz", "tiles.npz", "a.yaml"))
+    with np.load(write_views(views, 5)) as data:
+        good = dict(data)
+    for name, value in (("range_m", np.array(1.0)), ("label", good["label"].astype(str)), ("fold", np.array("train"))):
+        np.savez(views, **{**good, name: value})
+        assert line_of(samples.ViewSamples, [views], [0], {("seen", "train")}) == "refused"
+    np.savez(tiles, data=np.zeros(6, np.uint8), offsets=np.array(["0", "6"]))
+    assert line_of(Tiles, tiles) == "refused"
+    text.write_bytes(bytes(9))
+    assert line_of(load_yaml, text) == "refused"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_weights_that_are_not_finite_are_refused(value, trained, tmp_path):
+    identity, state = checkpoint.load(trained / "model.pt")
+    name = next(iter(state["weights"]))
+    state["weights"][name] = torch.full_like(state["weights"][name], value)
+    checkpoint.save(tmp_path / "a.pt", identity, state)
+    with pytest.raises(InputError, match=f"{name} has a NaN or an infinity"):
+        runs.load(tmp_path / "a.pt")
+
+
+def test_a_folder_or_an_archive_is_no_sample(tmp_path, capsys):
+    (tmp_path / "a.png").mkdir()
+    with (tmp_path / "a.npy").open("wb") as file:
+        np.savez(file, x=np.zeros(3, complex))
+    for name, word in (("a.png", "no file at"), ("a.npy", "an archive of arrays")):
+        assert main(["predict", "default-seen", str(tmp_path / name)]) == 2
+        told = capsys.readouterr().err
+        assert told.count("\n") == 1 and word in told

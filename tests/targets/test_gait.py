@@ -1,0 +1,165 @@
+"""The built-in pedestrians: what the published model says, rigid bones, a seamless cycle, people who differ."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
+from lowalt.targets import cloud as clouds
+from lowalt.targets import gait, gait_walk
+from lowalt.targets.make import make
+from lowalt.targets.records import load_table, merge, read_records
+from lowalt.targets.skeleton import FEET, NODES, PARENTS, rotation, stature_m
+
+ROOT = Path(__file__).parents[2]
+TABLE = {name: row for name, row in load_table(ROOT / "config/targets.csv").items() if row["category"] == "Pedestrian"}
+HEIGHTS = {name: row["hgt_m"] for name, row in TABLE.items()}
+RECORDS = read_records(ROOT / "config/targets/pedestrian.yaml")
+
+
+def built(name: str, **changes) -> clouds.Cloud:
+    return clouds.check(gait.gait_cloud(merge(TABLE[name], RECORDS[name] | changes, name), 0), name)
+
+
+@pytest.fixture(scope="module")
+def people() -> dict[str, clouds.Cloud]:
+    return {name: built(name) for name in RECORDS}
+
+
+def test_every_published_pedestrian_has_a_record():
+    assert set(RECORDS) == set(HEIGHTS)
+    assert sum(record["gait"] == "walk" for record in RECORDS.values()) == 8
+
+
+def test_cycle_length_and_duration_are_the_published_ones():
+    # Boulic et al. 1990: R_c = 1.346 sqrt(RV), T_c = R_c / RV, T_s = 0.752 T_c - 0.143.
+    assert gait_walk.timing(1.0) == pytest.approx((1.346, 1.346, (0.752 * 1.346 - 0.143) / 1.346))
+    assert gait_walk.timing(2.25)[0] == pytest.approx(1.346 * 1.5)
+
+
+@pytest.mark.parametrize(
+    ("rv", "phase", "degrees"),
+    [
+        (1.0, 0.9, (25, None, None)), (1.0, 0.5, (-15, None, 8)), (1.0, 0.75, (None, 70, None)),
+        (0.25, 0.9, (12.5, None, None)), (0.25, 0.75, (None, 35, None)), (0.25, 0.08, (None, None, -10.5)),
+        (1.0, 0.17, (None, 3, None)), (1.0, 0.85, (None, None, -3)), (3.0, 0.70, (None, 65, None)),
+        (3.0, 0.1, (30, None, None)), (3.0, 0.4, (None, 3, 5)),
+    ],
+)  # fmt: skip
+def test_leg_passes_through_the_published_control_points(rv, phase, degrees):
+    for found, wanted in zip(gait_walk.leg(rv, np.array([phase])), degrees, strict=True):
+        if wanted is not None:
+            assert np.degrees(found[0]) == pytest.approx(wanted)
+
+
+@given(rv=st.sampled_from([0.5, 1.3]))
+@settings(max_examples=2)
+def test_the_three_speed_ranges_join_without_a_step(rv):
+    phase = np.linspace(0, 1, 101)
+    below, above = rv - 1e-9, rv + 1e-9
+    for curve in (gait_walk.leg, gait_walk.arm):
+        for left, right in zip(curve(below, phase), curve(above, phase), strict=True):
+            # At 1.3 one control point of the hip becomes two, which bends the curve between points by 0.6 degrees.
+            assert np.abs(left - right).max() < (0.012 if rv == 1.3 and curve is gait_walk.leg else 1e-5)
+    assert np.abs(gait_walk.shift(below, phase) - gait_walk.shift(above, phase)).max() < 1e-6
+
+
+def test_stature_and_length_of_every_bone_hold_in_every_frame(people):
+    for name, cloud in people.items():
+        bones = gait.bones_m(HEIGHTS[name])
+        assert stature_m(bones) == pytest.approx(HEIGHTS[name], rel=1e-12)
+        parents = list(PARENTS[1:])
+        lengths = np.linalg.norm(cloud.track[:, 1:] - cloud.track[:, parents], axis=2)
+        assert np.abs(lengths - np.linalg.norm(bones[1:], axis=1)).max() < 1e-13
+
+
+def test_walkers_reach_their_published_height_within_two_percent(people):
+    for name, cloud in people.items():
+        if name.startswith("Walking"):
+            extent = np.ptp(cloud.track[..., 2], axis=1)
+            assert np.abs(extent / HEIGHTS[name] - 1).max() < 0.02
+
+
+def test_cycle_closes_in_position_and_velocity(people):
+    for cloud in people.values():
+        # The step over the seam and its change look like every other step and change.
+        steps = np.linalg.norm(np.diff(cloud.track, axis=0, append=cloud.track[:1]), axis=2)
+        turns = np.diff(cloud.track, n=2, axis=0, append=cloud.track[:2])
+        change = np.linalg.norm(turns, axis=2).max(axis=1)
+        assert steps[-1].max() < 1.2 * steps[:-1].max()
+        assert change[-2:].max() <= 1.2 * change[:-2].max()
+
+
+def test_clouds_are_the_default_s_to_the_byte(tmp_path):
+    """Each bone, angle and time of the built-in walks and runs is that of the kept run."""
+    kept = dict(line.split()[::-1] for line in (ROOT / "results/reference/default.sha256").read_text().splitlines())
+    seed = load_yaml(ROOT / "config/default.yaml")["seed"]
+    for name in RECORDS:
+        clouds.write(tmp_path / "cloud.npz", make(merge(TABLE[name], RECORDS[name], name), None, seed))
+        found = hashlib.sha256((tmp_path / "cloud.npz").read_bytes()).hexdigest()
+        assert found == kept[f"clouds/{slug(name)}.npz"], name
+
+
+def test_left_side_is_the_right_side_half_a_cycle_later():
+    track, _, _ = gait.cycle_m("walk", 1.7, 1.3, 200)
+    mirrored = np.roll(track, 100, axis=0) * [-1, 1, 1]
+    paired = [name for name in NODES if name[0] in "lr" and name not in ("root", "lowerback", "lowerneck")]
+    swap = [NODES.index("lr"[name[0] == "l"] + name[1:]) if name in paired else NODES.index(name) for name in NODES]
+    assert np.abs(mirrored[:, swap] - track).max() < 1e-9
+
+
+def test_walkers_foot_stands_while_the_body_passes(people):
+    for cloud in people.values():
+        fastest = np.linalg.norm(np.diff(cloud.track[:, FEET], axis=0), axis=2).max() * cloud.record["track_rate_hz"]
+        assert cloud.record["stance_foot_speed_mps"] < 0.65 < 0.25 * fastest
+
+
+def test_people_differ_in_height_speed_cadence_and_stride(people):
+    facts = [
+        (c.record["stature_m"], c.record["track_speed_mps"], c.record["cadence_steps_per_min"]) for c in people.values()
+    ]
+    assert len(set(facts)) == len(facts)
+    for name, cloud in people.items():
+        record = cloud.record
+        assert record["stride_m"] / record["cycle_s"] == pytest.approx(record["speed_mps"])
+        assert record["track_rate_hz"] == pytest.approx(len(cloud.track) / record["cycle_s"])
+        assert record["origin_height_m"] == pytest.approx(-cloud.track[..., 2].min())
+        if name.startswith("Walking"):
+            assert 85 < record["cadence_steps_per_min"] < 125
+        else:
+            assert record["cadence_steps_per_min"] == pytest.approx(169.6)
+
+
+def test_runner_flies_and_walker_never_does():
+    for kind, speed, flies in (("run", 3.0, True), ("walk", 1.3, False)):
+        track, _, _ = gait.cycle_m(kind, 1.7, speed, 200)
+        lowest = track[..., 2].min(axis=1) - track[..., 2].min()
+        assert bool(lowest.max() > 0.06) is flies
+
+
+@given(st.sampled_from("xyz"), st.floats(-7, 7))
+def test_rotation_is_a_right_handed_rotation(axis, angle):
+    matrix = rotation(axis, np.array(angle))
+    assert np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-15)
+    unit = np.eye(3)["xyz".index(axis)]
+    side = np.roll(unit, 1)
+    assert np.dot(np.cross(side, matrix @ side), unit) == pytest.approx(np.sin(angle), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({"gait": "hop"}, "hop"), ({"speed_mps": "fast"}, "speed_mps"), ({"speed_mps": 5.0}, "relative speed"),
+        ({"stature_m": 176}, "stature_m"), ({"gait": None}, "walk, run"), ({"speed": 1.0}, "unknown key"),
+    ],
+)  # fmt: skip
+def test_bad_records_are_refused_by_name(changes, names):
+    with pytest.raises(InputError, match=names) as error:
+        built("Walking Pedestrian 1", **changes)
+    assert "Walking Pedestrian 1" in str(error.value)

@@ -1,0 +1,86 @@
+"""The schema of records: it knows the keys that the code knows, describes each, and the page of keys shows them."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lowalt.files.errors import InputError
+from lowalt.targets import bird, record_schema, uav
+from lowalt.targets.builtin import MODULES
+from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.mesh_record import ALL_AXES, SIZES
+from lowalt.targets.records import SOURCES, load_table, merge
+
+ROOT = Path(__file__).parents[2]
+TABLE = load_table(ROOT / "config/targets.csv")
+SCHEMA = record_schema.schema()
+
+
+def test_sections_are_the_sources_and_their_keys_those_of_the_code():
+    assert set(SCHEMA["sources"]) == {record_schema.COMMON, *SOURCES}
+    models = SCHEMA["models"]
+    assert {model["like"] for model in models.values()} == set(MODULES)
+    assert {name for name, model in models.items() if model["like"] == "UAV"} == set(uav.LAYOUTS)
+    assert {key for model in models.values() for key in model.get("keys", [])} < set(record_schema.keys("builtin"))
+    kinds = {kind for name in models for kind in record_schema.figures(name).values()}
+    assert kinds == {"length", "ratio", "offset", "count", "whole"}
+    definitions = SCHEMA["$defs"]
+    assert definitions["unit"]["anyOf"][0]["enum"] == list(UNITS_M)
+    assert set(definitions["flap"]["properties"]) == set(bird.FLAP)
+    mesh = SCHEMA["sources"]["mesh"]["properties"]
+    assert mesh["size_is"]["enum"] == [*SIZES, ALL_AXES]
+
+
+def test_the_page_of_keys_describes_every_key_and_every_figure():
+    page = record_schema.page(SCHEMA)
+    for section in SCHEMA["sources"].values():
+        for name, key in section["properties"].items():
+            assert f"| `{name}`" in page and key["description"] in page
+    for name in SCHEMA["models"]:
+        assert f"| {name} |" in page
+        assert all(f"`{figure}` ({kind})" in page for figure, kind in record_schema.figures(name).items())
+
+
+def test_pictures_and_files_that_the_page_names_are_there():
+    import re
+
+    page = (ROOT / "design/targets.md").read_text()
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page)
+    assert len(pictures) >= 2 and all((ROOT / "design" / name).is_file() for name in pictures)
+    for name in re.findall(r"`((?:config|src)/[^`*{]+\.(?:yaml|csv|py))`", page):
+        assert (ROOT / name).is_file(), name
+
+
+def test_a_key_without_meaning_is_refused():
+    bare = SCHEMA | {"sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
+    with pytest.raises(InputError, match="gait has no description"):
+        record_schema.page(bare)
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "change", "message"),
+    [
+        ("pedestrian", "Walking Pedestrian 1", {"person": 3}, "here: person: value 3, expected type string"),
+        (
+            "uav",
+            "DJI Mini 2",
+            {"sources": {"maker": 1, "authors": "x"}},
+            "here: sources.maker: value 1, expected type string",
+        ),
+        ("uav", "DJI Mini 2", {"colour": "red"}, r"unknown key\(s\) \['colour'\]"),
+        ("uav", "DJI Mini 2", {"like": "Boat"}, "like: value 'Boat', expected one of"),
+    ],
+)
+def test_values_of_another_type_are_refused_by_key(file, name, change, message):
+    record = yaml.safe_load((ROOT / f"config/targets/{file}.yaml").read_text())[name]
+    assert merge(TABLE[name], record, "here")
+    with pytest.raises(InputError, match=message):
+        merge(TABLE[name], record | change, "here")
+
+
+def test_all_shipped_records_of_files_fit_the_schema():
+    real = yaml.safe_load((ROOT / "config/targets/real.yaml").read_text())
+    assert len(real) >= 15
+    for name, record in real.items():
+        merge(TABLE[name], record, name)

@@ -1,0 +1,204 @@
+"""Records: what is merged, what overrides what, and every fault refused by file, subtype, key and value."""
+
+import copy
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.targets.make import make
+from lowalt.targets.records import load_records, load_table, merge, missing_inputs, read_records, source_files
+
+CONFIG = Path(__file__).parents[2] / "config"
+TABLE = CONFIG / "targets.csv"
+FILES = [CONFIG / "targets" / f"{name}.yaml" for name in ("uav", "bird", "vehicle", "pedestrian")]
+
+
+@pytest.fixture(scope="module")
+def written():
+    """The records of all files as written."""
+    return {name: record for file in FILES for name, record in read_records(file).items()}
+
+
+def load(tmp_path, records):
+    """The merged records of one overriding file after the embedded ones."""
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(records, sort_keys=False))
+    return load_records(TABLE, [*FILES, tmp_path / "mine.yaml"])
+
+
+def test_all_forty_in_the_tables_order_with_their_published_values():
+    records = load_records(TABLE, FILES)
+    assert list(records) == list(load_table(TABLE)) and len(records) == 40
+    mini = records["DJI Mini 2"]
+    assert mini["published"]["size_m"] == 0.2192 and mini["published"]["n_rotors_or_wings"] == 4
+    assert mini["published"]["len_m"] is None and mini["published"]["freq_hi_hz"] == 256.0
+    assert (mini["category"], mini["group"], mini["points"], mini["rcs_m2_per_point"]) == ("UAV", "seen", 171, 1.0)
+    assert mini["figures"]["propeller_diameter"]["si"] == 0.109
+    assert records["EH 216 S"]["group"] == "unseen"
+    assert missing_inputs(records, None) == [] and source_files(mini, None) == []
+
+
+def test_a_later_file_replaces_whole_records(tmp_path, written):
+    mine = copy.deepcopy(written["Crow"]) | {"points": 50}
+    del mine["sources"]
+    mine["figures"]["length"][2] = mine["figures"]["span"][2] = "estimate"
+    records = load(tmp_path, {"Crow": mine})
+    assert records["Crow"]["points"] == 50 and "sources" not in records["Crow"]
+    assert records["Eagle"]["points"] == 134
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"source": "clay"}, r"Crow: source is 'clay', expected one of"),
+        ({"colour": "black"}, r"Crow: record: unknown key\(s\) \['colour'\]"),
+        ({"points": 0}, "Crow: points: value 0, expected at least 1"),
+        ({"points": 12.5}, r"Crow: points: value 12\.5"),
+        ({"points": True}, "Crow: points: value True"),
+        ({"rcs_m2_per_point": -1}, "Crow: rcs_m2_per_point: value -1, expected at least 0"),
+        ({"model": "plane"}, r"Crow: model is 'plane', expected one of \['bird'\]"),
+        ({"size_is": "weight"}, r"Crow: size_is is 'weight', expected one of"),
+        ({"moving_share": 1.0}, r"Crow: moving_share: value 1\.0, expected less than 1"),
+        ({"flap": {"speed": 3}}, r"Crow: flap: unknown key\(s\) \['speed'\]"),
+        ({"flap": {"mean_deg": "up"}}, r"Crow: flap\.mean_deg: value 'up', expected type number"),
+        ({"figures": {"length": [46, "cm", "reference"]}}, r"Crow: figures \[.*missing or unknown"),
+        ({"coaxial": True}, r"Crow: \['coaxial'\] are not for model bird, expected \['flap'\] at most"),
+    ],
+)
+def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, message):
+    with pytest.raises(InputError, match=message) as refusal:
+        load(tmp_path, {"Crow": written["Crow"] | change})
+    assert "mine.yaml" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("figure", "message"),
+    [
+        (
+            [46, "furlong", "reference"],
+            r"figures\.length: unit is 'furlong', expected one of \['mm', 'cm', 'm', 'in'\]",
+        ),
+        ([46, 1, "reference"], r"figures\.length: unit is '1'"),
+        ([-46, "cm", "reference"], r"figures\.length: value is -46, expected a positive number"),
+        ([float("nan"), "cm", "reference"], r"figures\.length\.0: value 'nan', expected type number"),
+        (
+            [46, "cm", "hearsay"],
+            r"figures\.length: source is 'hearsay', expected 'estimate' or one of \['authors'",
+        ),
+        (46, r"figures\.length: value 46, expected type array \(\[value, unit, source\]\)"),
+    ],
+)
+def test_wrong_figures_are_refused(tmp_path, written, figure, message):
+    record = copy.deepcopy(written["Crow"])
+    record["figures"]["length"] = figure
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, {"Crow": record})
+
+
+@pytest.mark.parametrize(
+    ("name", "figure", "value", "message"),
+    [
+        (
+            "DJI Mini 4 Pro",
+            "spacing_ratio",
+            [1.6, 1, "estimate"],
+            r"propeller_diameter is 0\.157 m, expected less than",
+        ),
+        ("DJI Avata", "motor_diagonal", [30, "cm", "maker"], r"motor diagonal is 0\.3 m in a craft of 0\.2048 m"),
+        ("EH 216 S", "propeller_diameter", [6, "m", "estimate"], r"propeller_diameter is 6 m, expected less than"),
+        ("Wild goose", "neck", [0.7, 1, "estimate"], r"add up to 1\.06 of the length"),
+        ("Owl", "wrist", [1.2, 1, "estimate"], r"figures\.wrist is 1\.2, expected 0\.1 to 0\.9"),
+        ("Owl", "span", [10, "cm", "reference"], r"figures\.span is 0\.1 m"),
+        ("Audi A6L 2019", "wheel_base", [4.5, "m", "maker"], r"are 5\.41 m, expected less than the 5\.0 m length"),
+        ("Audi A6L 2019", "track", [2, "m", "maker"], r"figures\.track is 2 m"),
+        ("Audi A6L 2019", "roof_rear", [0.3, 1, "estimate"], r"expected rising from 0\.18 to 1"),
+        ("Audi A6L 2019", "hood_height", [0.9, 1, "estimate"], r"expected rising and below 1"),
+    ],
+)
+def test_impossible_shapes_are_refused(tmp_path, written, name, figure, value, message):
+    record = copy.deepcopy(written[name])
+    record["figures"][figure] = value
+    with pytest.raises(InputError, match=rf"mine\.yaml: {name}: .*{message}"):
+        load(tmp_path, {name: record})
+
+
+def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written):
+    quad = written["Type-A Firefighting UAV"]
+    with pytest.raises(InputError, match="model is tanker, expected n_rotors_or_wings 4 in its row, not 6"):
+        load(tmp_path, {"DJI Matrice 600 Pro": quad})
+    with pytest.raises(InputError, match=r"\['coaxial'\] are not for model folding, expected \[\] at most"):
+        load(tmp_path, {"DJI Mini 2": written["DJI Mini 2"] | {"coaxial": True}})
+    lifted = {"size_is": "span over ducts", "figures": {**quad["figures"]}}
+    del lifted["figures"]["motor_diagonal"]
+    with pytest.raises(InputError, match=r"size_is is 'span over ducts', expected one of .* with model tanker"):
+        load(tmp_path, {"Type-A Firefighting UAV": quad | lifted})
+
+
+def test_too_few_points_for_the_parts_are_refused(tmp_path, written):
+    for name, points in (("DJI Mini 2", 8), ("Owl", 4)):
+        record = load(tmp_path, {name: written[name] | {"points": points}})[name]
+        with pytest.raises(InputError, match=f"{name}: {points} points for 5 parts leave none for the body"):
+            make(record, None, 1)
+
+
+def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"mine\.yaml: unknown subtype 'Dodo', expected a key `row` or one of"):
+        load(tmp_path, {"Dodo": {"source": "builtin"}})
+    with pytest.raises(InputError, match=r"no record for \['AITO M9 2024'"):
+        load_records(TABLE, [file for file in FILES if file.stem != "vehicle"])
+    twice = tmp_path / "twice.yaml"
+    twice.write_text("Crow: {source: builtin}\nOwl: {source: builtin}\nCrow: {source: gait}\n")
+    with pytest.raises(InputError, match=r"twice\.yaml: key 'Crow' stands twice \(line 3\)"):
+        read_records(twice)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("- Crow", "expected a mapping"),
+        ("Crow: 3", "expected a mapping"),
+        ("Crow: {", "not YAML"),
+        ("Crow: {source: gait, source: mesh}", "'source' stands twice"),
+        ("", "expected a mapping"),
+    ],
+)
+def test_files_that_hold_no_records_are_refused(tmp_path, text, message):
+    (tmp_path / "bad.yaml").write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_records(tmp_path / "bad.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("size_m", "size", r"columns \['size', 'size_m'\] missing or unknown"),
+        ("0.2192", "-1", r"DJI Mini 2: size_m is '-1', expected a positive number"),
+        ("0.2192", "big", r"DJI Mini 2: size_m is 'big'"),
+        ("UAV,1,", "4x4,1,", r"table of targets: category '4x4', expected a letter"),
+        ("DJI Mini 4 Pro", "DJI Mini 2", r"DJI Mini 2: named twice"),
+    ],
+)
+def test_wrong_tables_are_refused(tmp_path, old, new, message):
+    (tmp_path / "table.csv").write_text(TABLE.read_text().replace(old, new))
+    with pytest.raises(InputError, match=message):
+        load_table(tmp_path / "table.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("/abs/m.amc", "inside the folder"), ("../m.amc", "inside the folder"), ("C:m.amc", "inside the folder"),
+     ("m{1}.amc", "expected a name without"), ("m\n.amc", "expected a name without")],
+)  # fmt: skip
+def test_a_file_outside_the_folder_or_of_a_name_that_the_workflow_cannot_pass_on_is_refused(name, words):
+    row = load_table(TABLE)["Walking Pedestrian 1"]
+    for files in ({"skeleton": "s.asf", "motion": name}, {"skeleton": name, "motion": "m.amc"}):
+        with pytest.raises(InputError, match=rf"here: file is .*{words}"):
+            merge(row, {"source": "mocap", **files}, "here")
+
+
+def test_slugs_are_file_names_and_unique():
+    names = list(load_table(TABLE))
+    assert slug("Ramphastidae (toucan)") == "ramphastidae-toucan" and slug("EH 216 S") == "eh-216-s"
+    assert len({slug(name) for name in names}) == len(names)

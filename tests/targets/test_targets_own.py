@@ -1,0 +1,197 @@
+"""Own targets: a mesh is inspected, a record is drafted from it, and the draft becomes the right cloud at once."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from PIL import Image
+
+from lowalt.__main__ import main
+from lowalt.files.errors import InputWarning
+from lowalt.report.figures.target_picture import target_animation
+from lowalt.targets.cloud import read
+from lowalt.targets.guesses import clusters, guessed_axes, guessed_unit
+from lowalt.targets.inspection import described, inspect_mesh
+from lowalt.targets.make import make
+from lowalt.targets.mesh_files import read_mesh
+from lowalt.targets.mesh_scene import selected
+from lowalt.targets.records import load_table, merge, read_records
+from meshes import box, quadrotor
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize(("blades", "unit", "metres"), [(False, "in", 0.0254), (True, "mm", 0.001)])
+def test_a_quadrotor_s_four_propellers_are_found_and_drafted(blades, unit, metres, tmp_path):
+    quadrotor(blades, 1 / metres).export(tmp_path / "craft.stl")
+    out = tmp_path / "craft.yaml"
+    command = ["target", "new", str(tmp_path / "craft.stl"), "--subtype", "DJI Inspire 2", "--inputs", str(tmp_path)]
+    assert main([*command, "--unit", unit, "--out", str(out)]) == 0
+    # The draft takes the shorter side for the front and marks that as a guess; the user knows better.
+    assert "front: y  # GUESSED" in out.read_text()
+    out.write_text(out.read_text().replace("front: y", "front: x"))
+    parts = yaml.safe_load(out.read_text())["DJI Inspire 2"]["parts"]
+    assert sorted(parts) == ["body", "front left rotor", "front right rotor", "rear left rotor", "rear right rotor"]
+    made = tmp_path / "own.npz"
+    assert main(["target", "make", str(out), "--inputs", str(tmp_path), "--out", str(made)]) == 0
+    cloud = read(made)
+    factor = cloud.record["published"]["size_m"] / np.hypot(0.24, 0.2)
+    # The file's x is the front, so its y is the left.
+    places = sorted([x, y] for x in (-0.1, 0.1) for y in (-0.12, 0.12))
+    found = sorted(np.round(cloud.hinges[1:, :2] / factor, 2).tolist())
+    np.testing.assert_allclose(found, places, atol=1e-9)
+    assert abs(cloud.axes[1:, 2]) == pytest.approx(1, abs=1e-3)
+    assert Image.open(made.with_suffix(".png")).size[0] > 1000
+
+
+def test_blades_that_touch_are_one_rotor_and_separate_ones_are_not(tmp_path):
+    quadrotor(True).export(tmp_path / "craft.stl")
+    found = inspect_mesh(tmp_path / "craft.stl", "UAV")
+    rotors = [part for part in found.components if part.guess == "rotor"]
+    assert len(rotors) == 8
+    assert sorted(len(group) for group in clusters(rotors, 2)) == [2, 2, 2, 2]
+    assert len(clusters(rotors, 2, touching=False)) == 8
+
+
+def test_an_alike_plate_at_another_height_is_no_rotor(tmp_path):
+    whole = trimesh.util.concatenate([quadrotor(False), box((0.12, 0.012, 0.004), (0, 0, -0.06))])
+    whole.export(tmp_path / "craft.stl")
+    rotors = [part for part in inspect_mesh(tmp_path / "craft.stl", "UAV").components if part.guess == "rotor"]
+    assert sorted(round(float(part.centre[2]), 3) for part in rotors) == [0.05] * 4
+
+
+def test_a_car_s_wheels_are_found_by_their_shape_among_other_pieces(tmp_path):
+    shapes = [box((1.8, 4.5, 1.0), (0, 0, 0.9)), box((0.6, 0.6, 0.6), (0, 0, 1.8)), box((0.2, 0.1, 0.1), (1.1, 1, 1))]
+    for x, y in ((-0.8, 1.4), (0.8, 1.4), (-0.8, -1.4), (0.8, -1.4)):
+        wheel = trimesh.creation.cylinder(radius=0.33, height=0.2, sections=48)
+        wheel.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+        wheel.apply_translation((x, y, 0.33))
+        shapes.append(wheel)
+    trimesh.util.concatenate(shapes).export(tmp_path / "car.ply")
+    found = inspect_mesh(tmp_path / "car.ply", "Vehicle")
+    assert (found.unit, found.unit_from, found.up, found.front) == ("m", "guessed from the size", "z", "y")
+    wheels = [part for part in found.components if part.guess]
+    assert {part.guess for part in wheels} == {"wheel"} and len(wheels) == 4
+    assert sorted(tuple(np.sign(part.centre[:2])) for part in wheels) == [(-1, -1), (-1, 1), (1, -1), (1, 1)]
+    assert described(found).count("may be a wheel") == 4 and "category Vehicle" in described(found)
+
+
+@pytest.mark.parametrize(
+    ("size", "category", "unit"),
+    [(0.3, "UAV", "m"), (300, "UAV", "mm"), (180, "Vehicle", "in"), (460, "Vehicle", "cm"), (4.6, "Vehicle", "m"),
+     (0.16, "Bird", "m"), (32.0, "Bird", "cm")],
+)  # fmt: skip
+def test_units_are_guessed_from_the_usual_sizes(size, category, unit):
+    assert guessed_unit(size, category) == unit
+
+
+def bird(scale: float = 1.0) -> trimesh.Trimesh:
+    """A body, two thin wings from 4 cm out and a tail that spreads wider than that, front along y, widest along x."""
+    shapes = [box((0.08, 0.25, 0.08)), box((0.12, 0.08, 0.01), (0, -0.16, 0.03))]
+    shapes += [box((0.3, 0.1, 0.01), (side * 0.18, 0.02, 0.03)) for side in (-1, 1)]
+    whole = trimesh.util.concatenate([shape.subdivide().subdivide().subdivide() for shape in shapes])
+    whole.apply_scale(scale)
+    return whole
+
+
+def test_a_bird_s_wings_are_drafted_where_its_body_ends(tmp_path):
+    bird(100).export(tmp_path / "bird.ply")
+    found = inspect_mesh(tmp_path / "bird.ply", "Bird")
+    assert (found.unit, found.up, found.front) == ("cm", "z", "y") and found.shoulder_m == pytest.approx(0.04, abs=0.01)
+    assert "wings    may begin 0.0" in described(found)
+    out = tmp_path / "bird.yaml"
+    assert main(["target", "new", str(tmp_path / "bird.ply"), "--subtype", "Crow", "--inputs", str(tmp_path), "--out",
+                 str(out)]) == 0  # fmt: skip
+    assert out.read_text().count("kind: wing") == out.read_text().count("wing: {kind") == 2
+    row = load_table(ROOT / "config/targets.csv")["Crow"]
+    cloud = make(merge(row, read_records(out)["Crow"], "here"), tmp_path, 1)
+    sides = {name: np.sign(cloud.points[cloud.part == part, 0]) for part, name in enumerate(cloud.names)}
+    assert (sides["right wing"] == 1).all() and (sides["left wing"] == -1).all()
+    # The tail stays with the body.
+    factor = np.ptp(cloud.points[:, 0]) / 0.66
+    assert cloud.points[cloud.part > 0, 1].min() > (-0.05 - 0.005) * factor
+
+
+def test_inspection_leaves_a_picture(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    quadrotor(False).export(tmp_path / "own {craft}.stl")
+    assert main(["target", "inspect", "own {craft}.stl"]) == 0
+    assert "picture  own {craft}-inspect.png" in capsys.readouterr().out
+    picture = Image.open(tmp_path / "own {craft}-inspect.png")
+    assert picture.size[0] > 1000 and len(picture.convert("RGB").getcolors(1 << 24)) > 20
+
+
+def test_a_car_without_wheels_is_asked_for_them_then_made_and_shown_with_a_warning(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    box((1.8, 4.5, 1.4), (0, 0, 0.7)).subdivide().export(tmp_path / "car.stl")
+    out, made = tmp_path / "car.yaml", tmp_path / "car.npz"
+    command = ["target", "new", str(tmp_path / "car.stl"), "--subtype", "AITO M9 2024", "--inputs", str(tmp_path)]
+    assert main([*command, "--out", str(out)]) == 2 and not out.exists()
+    assert "car.stl: 0 wheels found, expected 4; otherwise name each wheel's pieces" in capsys.readouterr().err
+    assert main([*command, "--out", str(out), "--wheels", "0"]) == 0
+    with pytest.warns(InputWarning, match="0 wheels, expected at least 3"):
+        assert main(["target", "make", str(out), "--inputs", str(tmp_path), "--out", str(made)]) == 0
+    assert made.with_suffix(".png").exists() and read(made).kinds == ("body",)
+
+
+def test_axes_are_guessed_from_the_extents():
+    assert guessed_axes(np.array([1.8, 1.5, 4.5]), "Vehicle") == ("y", "z")
+    assert guessed_axes(np.array([0.3, 0.3, 0.1]), "UAV") == ("z", "x")
+    assert guessed_axes(np.array([0.3, 0.05, 0.2]), "Bird") == ("y", "z")
+
+
+def test_groups_of_an_obj_and_instances_of_a_scene_have_names(tmp_path):
+    text, base = "", 0
+    for name, shape in (("hull", box((1, 1, 1))), ("left wheel", box((0.2, 0.1, 0.1), (3, 0, 0)))):
+        rows = [f"v {x} {y} {z}" for x, y, z in shape.vertices]
+        text += f"g {name}\n" + "\n".join(rows) + "\n"
+        text += "\n".join("f " + " ".join(str(i + 1 + base) for i in face) for face in shape.faces) + "\n"
+        base += len(rows)
+    (tmp_path / "car.obj").write_text(text)
+    found = read_mesh(tmp_path / "car.obj", "m", ["left wheel"])
+    assert np.ptp(found.vertices, axis=0) == pytest.approx([0.2, 0.1, 0.1])
+    scene = trimesh.Scene()
+    scene.add_geometry(box((0.2, 0.1, 0.1)), node_name="prop 0", geom_name="prop")
+    place = trimesh.transformations.translation_matrix((-1, 0, 0))
+    scene.graph.update(frame_to="prop 1", matrix=place, geometry="prop")
+    scene.export(tmp_path / "craft.glb")
+    both, one = selected(tmp_path / "craft.glb", ["prop"]), selected(tmp_path / "craft.glb", ["prop 1"])
+    assert len(both) == 2 and len(one) == 1
+    assert one[0].vertices.mean(axis=0) == pytest.approx([-1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["new", "{folder}/craft.stl", "--subtype", "Dodo", "--inputs", "{folder}"], "--subtype is 'Dodo'"),
+        (["new", "{folder}/craft.stl", "--subtype", "Crow", "--inputs", "{folder}/other"], "expected --inputs with it"),
+        (["new", "{folder}/craft.stl", "--subtype", "Walking Pedestrian 1", "--inputs", "{folder}"], "a pedestrian"),
+        (["inspect", "{folder}/nothing.stl"], "no file at"),
+        (["new", "{folder}/nothing.stl", "--subtype", "Crow", "--inputs", "{folder}"], "no file at"),
+        (["make", "{folder}/two.yaml", "--inputs", "{folder}"], "--subtype is None, expected one of"),
+        (["show", "{folder}/craft.stl"], "not a cloud file"),
+    ],
+)
+def test_wrong_commands_end_in_one_line_and_leave_nothing(arguments, words, tmp_path, capsys):
+    quadrotor(False).export(tmp_path / "craft.stl")
+    (tmp_path / "two.yaml").write_text("Crow: {source: builtin}\nOwl: {source: builtin}\n")
+    before = sorted(tmp_path.iterdir())
+    assert main(["target", *(word.format(folder=tmp_path) for word in arguments)]) == 2
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_the_motion_is_shown_as_frames():
+    rows = load_table(ROOT / "config/targets.csv")
+    record = merge(rows["DJI Inspire 2"], read_records(ROOT / "config/targets/uav.yaml")["DJI Inspire 2"], "built in")
+    picture = Image.open(io.BytesIO(target_animation(make(record, None, 1), ROOT / "config/default.yaml", count=4)))
+    frames = []
+    for number in range(picture.n_frames):
+        picture.seek(number)
+        frames.append(np.asarray(picture.convert("L"), int))
+    assert len(frames) == 4
+    assert abs(frames[1] - frames[0])[60:].max() > 100  # after a quarter of a turn the blades stand elsewhere

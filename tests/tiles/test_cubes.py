@@ -1,0 +1,240 @@
+"""Cubes: their range cells against the echo's definition, their noise, their truth, and the images made of them."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from lowalt.config.layers import canonical
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.echo import Rigid, echo_matrix
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.motion import poses, write_table
+from lowalt.noise.awgn import add_noise
+from lowalt.numerics.streams import stream
+from lowalt.scene.effects.detection import canceller
+from lowalt.shards.build import rows_of
+from lowalt.shards.dataset import Dataset
+from lowalt.spectra import Spectra, spectrum
+from lowalt.spectra.cube import TRUTH, Cube
+from lowalt.spectra.kinds import hrrp, range_doppler
+from lowalt.targets.cloud import write as write_cloud
+from lowalt.tiles.__main__ import main as tiles
+from lowalt.tiles.cubes import Cubes
+from lowalt.tiles.png import decode
+from lowalt.tiles.render import Renderer, split
+from lowalt.tiles.tile_files import Tiles
+from lowalt.workflow.refusals import refuse_cells
+from small_configuration import configuration
+
+SHOWN = {"hrrp": {"window": 2, "hop": 1, "cells": 9}, "range_doppler": {"cells": 9, "points": 512}}
+SNRS = [3.0, float("inf")]
+LAND = {"clutter": {"gamma": 0.5}, "canceller": {"kind": "mean"}}
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    """Two motion models of two subtypes with five images a station, at a band of cells of 0.6 m."""
+    config = configuration()
+    config["targets"]["select"] = ["DJI Mini 2", "Owl"]
+    config["motion"] |= {"models": 2, "models_per_chunk": 2}
+    config["split"] = {"by": "motion", "train": 1, "val": 0, "test": 1}
+    config["network"] |= {"subcarriers": 512, "subcarrier_spacing_hz": 480e3}
+    config["images"] |= {"size": 32}
+    config["spectra"] |= SHOWN
+    return Dataset(config)
+
+
+def without(config: dict) -> dict:
+    return config | {"spectra": {name: block for name, block in config["spectra"].items() if name not in SHOWN}}
+
+
+def truth(cube: Cube, name: str) -> np.ndarray:
+    return cube.truth[:, TRUTH.index(name)]
+
+
+def test_images_of_cells_come_after_the_other_three_which_stay_as_without_them(dataset):
+    three = Dataset(without(dataset.config), dataset.clouds)
+    for number in (0, 3):
+        sample, plain = dataset[number], three[number]
+        found, old = split(sample.image, 5).reshape(3, 5, 32, 32), split(plain.image, 3).reshape(3, 3, 32, 32)
+        assert (found[:, :3] == old).all() and (sample.signal == plain.signal).all()
+        assert sample.record == plain.record
+        # The chosen cell is the middle one, where the profile is brightest on average.
+        assert np.isin(found[:, 3].astype(float).mean(axis=2).argmax(axis=1), (15, 16)).all()
+
+
+def test_the_tiles_stage_draws_what_a_data_set_draws_on_the_spot(dataset, tmp_path):
+    chunk = next(iter(dataset.plan.chunks))
+    rows, block = rows_of(dataset, chunk), {name: dataset.config[name] for name in ("network", "spectra", "images")}
+    write_table(tmp_path / "motion.csv", rows)
+    clouds = [tmp_path / f"{slug(name)}.npz" for name in dataset.clouds]
+    for path, cloud in zip(clouds, dataset.clouds.values(), strict=True):
+        write_cloud(path, cloud)
+    for effects in ({}, LAND):
+        made = Dataset(dataset.config | {"effects": effects}, dataset.clouds).maker
+        signals = np.stack([[made.signal(row, snr) for snr in SNRS] for row in rows])
+        np.save(tmp_path / "noisy.npy", signals)
+        cubes = {"seed": dataset.plan.seed, "tolerance": None, "effects": effects, "snr_db": [3.0, "inf"]}
+        files = "--signals", tmp_path / "noisy.npy", "--motion", tmp_path / "motion.csv", "--clouds", *clouds
+        given = ["--settings", canonical({**block, "cubes": cubes}), *map(str, files)]
+        tiles([*given, "--out", str(tmp_path / "tiles.npz")])
+        found, again = Tiles(tmp_path / "tiles.npz"), pickle.loads(pickle.dumps(made))
+        pairs = [(row, level) for row in range(len(rows)) for level in range(2)]
+        for number, (row, level) in enumerate(pairs):
+            assert found[number] == again.png(signals[row, level], rows[row], SNRS[level])
+    assert decode(found[0])[0].shape == (3 * 32, 5 * 32)
+
+
+def test_cells_without_noise_are_those_of_the_echo_s_definition_and_the_chosen_ones_are_the_signal(dataset):
+    row, network = dataset.row(dataset.place(1)), dataset.maker.network
+    cloud = dataset.clouds[row["subtype"]]
+    motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
+    aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
+    signal = dataset.maker.signal(row, np.inf)
+    for place, cube in enumerate(dataset.maker.cubes(row, np.inf, signal)):
+        expected = echo_matrix(network, network.stations[place], motion, cloud.rcs_m2, aim, "cells")
+        assert abs(cube.cells - expected).max() < 1e-7 * abs(expected).max()
+        assert (cube.chosen == abs(expected).argmax(axis=1)).all() and (cube.signal == signal[place]).all()
+
+
+def test_noise_has_the_power_of_the_snr_in_every_cell_and_streams_of_its_own(dataset):
+    row, maker = dataset.row(dataset.place(1)), dataset.maker
+    signal, clean = maker.signal(row, 3.0), maker.signal(row, np.inf)
+    noisy, silent = maker.cubes(row, 3.0, signal), maker.cubes(row, np.inf, clean)
+    drawn = [cube.cells - still.cells for cube, still in zip(noisy, silent, strict=True)]
+    for place, noise in enumerate(drawn):
+        power = np.mean(abs(clean[place]) ** 2) / 10**0.3
+        np.testing.assert_allclose(np.mean(abs(noise) ** 2), power, rtol=0.02)
+        assert abs(np.mean(noise[:, 0] * noise[:, 1].conj())) < 0.2 * power
+        assert (noisy[place].signal == signal[place]).all()
+    assert not np.allclose(drawn[0] / abs(drawn[0]).max(), drawn[1] / abs(drawn[1]).max(), atol=0.1)
+    again = maker.cubes(row, 3.0, signal)
+    assert all((cube.cells == other.cells).all() for cube, other in zip(noisy, again, strict=True))
+    other = Cubes.from_settings(
+        {"seed": 6, "network": dataset.config["network"], "tolerance": None, "effects": {}}, dataset.clouds
+    ).of(row, 3.0, maker.network.stations[0], signal[0])
+    same = abs(other.cells - noisy[0].cells).max(axis=0) == 0
+    assert not same.any() and (other.signal == signal[0]).all()
+
+
+def test_noise_of_cells_passes_the_canceller_as_the_signal_s_does(dataset):
+    maker = Dataset(dataset.config | {"effects": LAND}, dataset.clouds).maker
+    row = dataset.row(dataset.place(1))
+    quiet, noisy = (maker.cubes(row, snr, maker.signal(row, snr))[0] for snr in (np.inf, 3.0))
+    power = maker.received(row)[1][0, 0]
+    rng = stream(dataset.plan.seed, "cells", row["subtype"], row["model"], "A", 3.0)
+    white = add_noise(np.zeros(quiet.cells.shape), 3.0, rng, power)
+    expected = canceller.filtered({**canceller.DEFAULTS, "kind": "mean"}, white)
+    others = np.arange(512) != quiet.chosen[:, None]
+    assert abs((noisy.cells - quiet.cells - expected)[others]).max() < 1e-6 * abs(expected).max()
+
+
+def test_truth_is_the_middle_of_the_target_as_each_station_sees_it(dataset):
+    place = dataset.place(1)
+    row, record = dataset.row(place), dataset.record(1)
+    network = dataset.maker.network
+    for station, cube in zip(network.stations, dataset.cubes(1), strict=True):
+        seen = record["geometry"][station.name]
+        assert abs(truth(cube, "range_m")[0] - seen["range_m"]) < 0.2
+        for name in ("psi", "omega"):
+            assert abs(truth(cube, name)[0] - seen[name]) < 1e-3
+        moved = np.gradient(truth(cube, "range_m"), network.times_s, edge_order=2)
+        np.testing.assert_allclose(truth(cube, "radial_mps"), moved, atol=1e-6 * abs(moved).max())
+        cells = np.rint(truth(cube, "range_m") / network.cell_m) % network.subcarriers
+        assert (truth(cube, "cell") == cells).all() and np.mean(abs(cells - cube.chosen) <= 1) > 0.9
+    assert row["subtype"] == place.subtype
+
+
+def test_a_range_doppler_map_peaks_at_the_range_and_folded_speed_of_an_echo():
+    symbols, interval_s, cells, wavelength_m = 400, 2.5e-3, 64, SPEED_OF_LIGHT / 4.9e9
+    times, fold = np.arange(symbols) * interval_s, wavelength_m / (4 * interval_s)
+    settings = range_doppler.Settings(9, 512)
+    for speed_mps in (-4.0, 0.0, 2.5, 9.0):
+        held = np.zeros((symbols, cells), np.complex64)
+        held[:, 22] = 3 * np.exp(-4j * np.pi * speed_mps * times / wavelength_m)
+        found = range_doppler.definition(Cube(held, np.full(symbols, 20), np.zeros((symbols, 5))), settings)
+        row, column = np.unravel_index(found.argmax(), found.shape)
+        folded = (speed_mps + fold) % (2 * fold) - fold
+        speeds = -np.fft.fftshift(np.fft.fftfreq(512, interval_s))[::-1] * wavelength_m / 2
+        assert row == 4 + 2 and abs(speeds[column] - folded) < 2 * fold / 512
+        assert 2.7 < found.max() <= 3.001  # between two speeds a Hann window loses up to a tenth
+    out = np.empty((9, 512), np.float32)
+    range_doppler.fill_cells(Cube(held, np.full(symbols, 20), np.zeros((symbols, 5))), settings, out)
+    np.testing.assert_allclose(out, found, rtol=1e-6)
+
+
+def test_a_range_profile_is_the_mean_power_around_the_chosen_cells():
+    rng = np.random.default_rng(1)
+    cells = (rng.normal(size=(40, 16)) + 1j * rng.normal(size=(40, 16))).astype(np.complex64)
+    cube = Cube(cells, rng.integers(0, 16, 40), np.zeros((40, 5)))
+    for settings in (hrrp.Settings(1, 1, 9), hrrp.Settings(5, 3, 9)):
+        found = hrrp.definition(cube, settings)
+        for column in (0, 7, found.shape[1] - 1):
+            powers = [
+                [abs(cells[n, (cube.chosen[n] + step) % 16]) ** 2 for step in range(-4, 5)]
+                for n in range(column, column + settings.window)
+            ]
+            np.testing.assert_allclose(found[:, column] ** 2, np.mean(powers, axis=0), rtol=1e-5)
+        out = np.empty(found.shape, np.float32)
+        hrrp.fill_cells(cube, settings, out)
+        np.testing.assert_allclose(out, found, rtol=1e-6)
+
+
+def test_axes_are_metres_and_metres_a_second(dataset):
+    network, station = dataset.maker.network, dataset.maker.network.stations[0]
+    (_, left, right), (_, low, high) = range_doppler.axes(range_doppler.Settings(9, 512), network, station)
+    assert right == -left == pytest.approx(SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s))
+    assert high == -low == pytest.approx(4 * SPEED_OF_LIGHT / (2 * 512 * 480e3))
+    assert hrrp.axes(hrrp.Settings(2, 1, 9), network, station)[0][2] == pytest.approx(398 * 2.5e-3)
+
+
+def test_a_signal_alone_gives_no_image_of_cells(dataset):
+    renderer = Renderer.from_settings({name: dataset.config[name] for name in ("network", "spectra", "images")})
+    signals = np.ones((3, renderer.network.symbols), np.complex64)
+    for ask in (lambda: renderer.tile(signals), lambda: renderer.some(signals, [3])):
+        with pytest.raises(InputError, match="made of range cells, and a signal alone"):
+            ask()
+    assert renderer.some(signals, [0]).shape == (1, 32, 32)
+
+
+@pytest.mark.parametrize("cells", [4, 1, 2.5, True])
+def test_cells_have_a_middle_and_neighbours(cells):
+    for make in (lambda: hrrp.Settings(1, 1, cells), lambda: range_doppler.Settings(cells, 512)):
+        with pytest.raises(InputError, match=r"cells is"):
+            make()
+
+
+def test_images_of_cells_ask_for_a_band_with_enough_cells_and_speeds_for_all_symbols():
+    Spectra(hrrp=hrrp.Settings(1, 1, 511)).check(400, 3, 512)
+    with pytest.raises(InputError, match="513, expected at most the 512"):
+        Spectra(hrrp=hrrp.Settings(1, 1, 513)).check(400, 3, 512)
+    with pytest.raises(InputError, match="points is 256, expected at least the 400"):
+        Spectra(range_doppler=range_doppler.Settings(9, 256)).check(400, 3, 512)
+    assert spectrum("range_doppler") is range_doppler
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"shards": {"kind": "signal"}}, "shards.kind 'signal'"),
+        ({"effects": {"slow_time": {"regrid": "nudft"}}}, "slow_time.regrid: 'nudft'"),
+    ],
+)
+def test_cells_are_refused_where_no_stage_makes_them(dataset, change, words):
+    refuse_cells(dataset.config)
+    with pytest.raises(InputError, match=words):
+        refuse_cells(dataset.config | change)
+    refuse_cells(without(dataset.config) | change)
+
+
+def test_symbols_that_were_not_received_are_zeros(dataset):
+    gaps = {"slow_time": {"tdd_period_s": 0.01, "downlink": 0.75}}
+    maker = Dataset(dataset.config | {"effects": gaps}, dataset.clouds).maker
+    row = dataset.row(dataset.place(1))
+    signal = maker.signal(row, np.inf)
+    cube = maker.cubes(row, np.inf, signal)[0]
+    lost = cube.chosen < 0
+    assert 0 < lost.sum() < len(lost) and not cube.cells[lost].any() and cube.cells[~lost].any(axis=1).all()
+    assert (cube.signal == signal[0]).all()

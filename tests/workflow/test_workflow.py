@@ -1,0 +1,249 @@
+"""The real workflow on a tiny overlay: it runs, repeats to the byte, and re-runs only what a change touches."""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from lowalt.config.layers import load_yaml
+from lowalt.config.network import Network
+from lowalt.echo import Rigid, echo_signal
+from lowalt.files.atomic import slug
+from lowalt.motion import poses, read_table
+from lowalt.targets.cloud import read
+from snakemake_runs import run
+from snakemake_texts import MODULE, RULES, SPY, declared
+
+pytest.importorskip("snakemake")
+pytestmark = pytest.mark.workflow
+
+ROOT = Path(__file__).parents[2]
+OVERLAY = {
+    "run": "test",
+    "targets": {"select": ["DJI Mini 2", "Crow", "NIO ET5T 2023", "Walking Pedestrian 5"]},
+    "motion": {"models": 6, "models_per_chunk": 3},
+    "split": {"train": 1, "val": 1, "test": 1},
+    "noise": {"snr_db": [8, float("inf")]},
+    "echo": {"job": "chunk"},
+}
+
+
+ODD = "o'brien läb $(touch y)"
+"""Name of a folder that a shell would take apart."""
+WHOLE = {
+    "recognition": {"schemes": ["A:VRP+TRP+VT"], "protocols": ["seen"], "training": {"steps": 2, "validate_every": 1}},
+}
+
+
+def workplace(folder: Path) -> Path:
+    """A copy of the project without results, so that a test may edit what it likes."""
+    for name in ("workflow", "config", "profiles", "src", "envs"):
+        shutil.copytree(ROOT / name, folder / name)
+    shutil.copy(ROOT / "Snakefile", folder)
+    (folder / ".venv").symlink_to(sys.prefix)
+    (folder / "imports").mkdir()
+    (folder / "src/sitecustomize.py").write_text(SPY)
+    (folder / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY))
+    return folder
+
+
+def snakemake(folder: Path, *arguments: str, cores: int = 2, status: int = 0) -> str:
+    """Run snakemake, by an interpreter in the workplace, and return what it printed."""
+    environment = {**os.environ, "PYTHONPATH": str(folder / "src")}
+    environment.pop("LOWALT_INPUTS", None)
+    environment |= {"LOWALT_TEST_IMPORTS": str(folder / "imports"), "LOWALT_TEST_PACKAGE": str(folder / "src/lowalt")}
+    program = f"sys.executable = {str(folder / '.venv/bin/python')!r}; snakemake.cli.main()"
+    line = ["--cores", str(cores), "--configfile", "overlay.yaml", *arguments]
+    found, text = run(folder, line, environment, program)
+    assert found == status, text[-6000:]
+    return text
+
+
+def planned(folder: Path, *arguments: str) -> set[str]:
+    """The rules a dry run would execute."""
+    text = snakemake(folder, "--dry-run", *arguments)
+    return set(re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE))
+
+
+def checksums(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file of a run's data set."""
+    base = folder / "results/test"
+    names = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy", "shards/*")
+    files = [path for name in names for path in base.glob(name)]
+    return {str(path.relative_to(base)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Path:
+    """A workplace whose data set is made, on two cores."""
+    folder = workplace(tmp_path_factory.mktemp("two-cores") / ODD)
+    snakemake(folder, "--", "data")
+    return folder
+
+
+def test_the_whole_workflow_runs_in_a_folder_of_an_odd_name(finished, tmp_path):
+    folder = tmp_path / ODD
+    shutil.copytree(finished, folder, symlinks=True)
+    (folder / "whole.yaml").write_text(yaml.safe_dump(WHOLE))
+    snakemake(folder, "--configfile", "overlay.yaml", "whole.yaml")
+    base = folder / "results/test"
+    assert json.loads((base / "report.json").read_text())["accuracy"] == "results/test/accuracy.csv"
+    assert "A:VRP+TRP+VT" in (base / "report.html").read_text()
+    assert not list(tmp_path.rglob("y"))
+
+
+def test_no_job_asks_for_the_network(finished):
+    """The run was made with the network refused; here the refusal itself is seen to work."""
+    environment = os.environ | {"PYTHONPATH": str(finished / "src"), "LOWALT_TEST_IMPORTS": str(finished / "imports")}
+    for program in ("import socket; socket.create_connection(('127.0.0.1', 9))", "import urllib.request as r; "
+                    "r.urlopen('http://localhost:9')"):  # fmt: skip
+        asked = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+        assert asked.returncode and "a job asked for the network" in asked.stderr
+
+
+@pytest.mark.slow
+def test_one_core_and_two_a_job_a_station_and_one_for_all_give_the_same_bytes(finished, tmp_path):
+    alone = workplace(tmp_path)
+    (alone / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY | {"echo": {"job": "station"}}))
+    snakemake(alone, "--", "data", cores=1)
+    found, other = checksums(finished), checksums(alone)
+    # The card states the configuration, and with it how echoes were split into jobs.
+    for name in ("shards/README.md", "shards/SHA256SUMS"):
+        assert found.pop(name) != other.pop(name)
+    assert len(found) > 30
+    assert other == found
+    jobs = {path.name for path in (finished / "results/test/benchmarks/echo").iterdir()}
+    assert jobs == {f"{path.stem}.jsonl" for path in (finished / "results/test/motion").iterdir()}
+
+
+def test_a_finished_run_has_nothing_to_do(finished):
+    assert planned(finished, "--", "data") == set()
+
+
+DOWNSTREAM = ["cloud", "motion", "echo", "noise", "tiles", "shard", "index", "card"]
+
+
+def following(first: str) -> set[str]:
+    """The rules from `first` on."""
+    return set(DOWNSTREAM[DOWNSTREAM.index(first) :])
+
+
+def test_a_shard_that_is_deleted_by_hand_is_made_again(finished):
+    shard = min((finished / "results/test/shards").glob("*.tar"))
+    away = shard.rename(shard.with_suffix(".away"))
+    rules, _ = planned(finished, "--", "data"), away.rename(shard)
+    assert rules - {"data"} == following("tiles")
+
+
+# Here jobs have really run; tests/workflow/test_workflow_reruns.py changes each setting and the code of each stage.
+def test_a_changed_setting_re_runs_its_stage_and_what_follows(finished, tmp_path):
+    path = tmp_path / "change.yaml"
+    path.write_text(yaml.safe_dump({"noise": {"snr_db": [9, float("inf")]}}))
+    rules = planned(finished, "--configfile", "overlay.yaml", str(path), "--", "data")
+    assert rules - {"data", "configuration", "gallery"} == following("noise")
+
+
+def test_edited_code_re_runs_its_stage_and_what_follows(finished):
+    path = finished / "src/lowalt/echo/api.py"
+    before = path.read_text()
+    path.write_text(before + "\n# edited\n")
+    try:
+        rules = planned(finished, "--", "data") - {"data"}
+    finally:
+        path.write_text(before)
+    assert rules == following("echo")
+
+
+def test_a_wrong_configuration_starts_no_job(tmp_path, finished):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(yaml.safe_dump({"targets": {"select": ["Dodo"]}}))
+    text = snakemake(finished, "--configfile", "overlay.yaml", str(path), "--", "data", status=2)
+    head, sentence = text.split("error: ")
+    assert sentence.startswith("targets.select: ['Dodo'], expected names of the table")
+    assert head.count("\n") <= 1 and sentence.strip().count("\n") == 0
+
+
+def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(finished, tmp_path):
+    folder = workplace(tmp_path)
+    # Copies keep their times, so that only what the effect touches is made again.
+    shutil.copytree(finished / "results", folder / "results")
+    shutil.copytree(finished / ".snakemake", folder / ".snakemake")
+    for name in ("src", "workflow", "config"):
+        shutil.copytree(finished / name, folder / name, dirs_exist_ok=True)
+    path = tmp_path / "scene.yaml"
+    path.write_text(yaml.safe_dump({"effects": {"rotor_spread": {}}}))
+    # One chunk is enough: it has a drone, which the effect is about, and a bird.
+    chunk = finished / "results/test/noisy/seen-00000.npy"
+    snakemake(folder, "--configfile", "overlay.yaml", str(path), "--", f"results/test/noisy/{chunk.name}")
+    changed = 0
+    for noisy in (chunk,):
+        rows = read_table(finished / "results/test/motion" / f"{noisy.stem}.csv")
+        before, after = np.load(noisy), np.load(folder / "results/test/noisy" / noisy.name)
+        for row, one, other in zip(rows, before, after, strict=True):
+            assert (one.tobytes() != other.tobytes()) == (row["category"] == "UAV")
+            changed += row["category"] == "UAV"
+    assert changed == 3 < len(rows)
+
+
+def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
+    seen = {}
+    for path in (finished / "imports").iterdir():
+        command, *files = path.read_text().split("\n")
+        rule = RULES.get(command) or RULES.get(command.split()[0])
+        if rule:
+            seen.setdefault(rule, set()).update(files)
+    assert set(seen) == set(RULES.values()) - {"gallery"}
+    for rule, imported in seen.items():
+        assert imported <= declared(rule), rule
+        assert "files/errors.py" in imported
+
+
+def test_any_one_sample_is_made_again_alone_from_its_row(finished):
+    base = finished / "results/test"
+    network = Network.from_settings(load_yaml(finished / "config/default.yaml")["network"])
+    number, row = 1, read_table(base / "motion/unseen-00001.csv")[1]
+    cloud = read(base / "clouds" / f"{slug(row['subtype'])}.npz")
+    motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
+    aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
+    alone = echo_signal(network, network.station("B"), motion, cloud.rcs_m2, aim).signal
+    stored = np.load(base / "echo/unseen-00001/B.npy")[number]
+    np.testing.assert_array_equal(alone.astype(np.complex64), stored)
+
+
+def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, tmp_path):
+    (tmp_path / "Snakefile").write_text(MODULE.format(root=finished))
+    environment = {**os.environ, "PYTHONPATH": str(finished / "src")}
+    status, text = run(tmp_path, ["--cores", "2"], environment)
+    assert status == 0, text
+    for name in ("motion/unseen-00001.csv", "clouds/crow.npz"):
+        path = tmp_path / "results/test" / name
+        if path.exists():
+            assert path.read_bytes() == (finished / "results/test" / name).read_bytes(), name
+    size = (finished / "results/test/motion/unseen-00001.csv").stat().st_size
+    assert int((tmp_path / "size.txt").read_text()) == size
+    assert not (tmp_path / "config").exists()
+
+
+def test_the_catalogue_s_snakefile_plans_the_same_run(finished):
+    """Of a finished data set nothing is left to do, whichever of the two files is read; the default is all there is."""
+    words = (ROOT / "workflow/Snakefile").read_text().split("rule default:")[1].split()
+    assert words == ["default_target:", "True", "input:", "rules.all.input,"]
+    text = snakemake(finished, "--dry-run", "--snakefile", "workflow/Snakefile", "--", "data")
+    assert "Nothing to be done" in text and not re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE)
+
+
+def test_snakemake_s_own_report_shows_figures_and_tables(finished, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(finished, folder, symlinks=True)
+    snakemake(folder, "--", "clouds")
+    snakemake(folder, "--report", "report.html", "--", "clouds")
+    page = (folder / "report.html").read_text()
+    assert "results/test/clouds.png" in page and "Calibration point clouds of all subtypes" in page

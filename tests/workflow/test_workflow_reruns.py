@@ -1,0 +1,247 @@
+"""Reruns are minimal and explained: for every change the jobs of a dry run are those that a model of the stages names.
+
+The finished run is made by `snakemake --touch`: empty files, but every job recorded with its settings, inputs and code,
+which is all that Snakemake's decisions rest on. The model of what follows from what is written down here again, job by
+job, and knows nothing of the Snakefile.
+"""
+
+import json
+import os
+import re
+
+import pytest
+import yaml
+from test_workflow import ROOT, workplace
+
+from rerun_model import (
+    CARD,
+    CHUNKS,
+    CLOUD,
+    DISTANCES,
+    ECHO,
+    EVALUATE,
+    GALLERY,
+    GROUPS,
+    INDEX,
+    MANIFEST,
+    MESH,
+    MOTION,
+    NOISE,
+    OVERLAY,
+    REPORT,
+    SETTINGS,
+    SHARD,
+    TABLES,
+    TILES,
+    TRAIN,
+    TRAININGS,
+    VIEWS,
+    WHOLE,
+    Change,
+    added,
+    code,
+    grown,
+    next_jobs,
+    with_what_follows,
+)
+from snakemake_runs import run
+from snakemake_texts import declared
+
+pytest.importorskip("snakemake")
+pytestmark = pytest.mark.workflow
+
+TRAINING = {"recognition": {"training": {"steps": 50}}}
+CHANGES = {
+    # The settings of each stage.
+    "seed": Change(WHOLE - MANIFEST, overlay={"seed": 5}),
+    "tilt": Change(MOTION, overlay={"motion": {"tilt_deg": 10.0}}),
+    "guard subcarriers": Change(ECHO | TILES | SHARD | INDEX, overlay={"network": {"guard_subcarriers": 20}}),
+    "tolerance": Change(ECHO, overlay={"echo": {"tolerance": 1e-3}}),
+    "scene": Change(ECHO, ("power.npy",), overlay={"effects": {"adc": {}}}),
+    "SNR list": Change(NOISE | SHARD, overlay={"noise": {"snr_db": [9, float("inf")]}}),
+    "spectra": Change(TILES | INDEX, overlay={"spectra": {"vrp": {"hop": 2}}}),
+    "colour map": Change(TILES | INDEX | TRAIN, overlay={"images": {"colour_map": "magma"}}),
+    "more motion models": Change(
+        set(), ("Missing output files",), overlay={"motion": {"models": 30}}, expected=grown("00002")
+    ),
+    "an SNR added": Change(
+        set(),
+        ("Missing output files",),
+        overlay={"added": [{"snr_db": [13]}]},
+        expected=added("s1", GROUPS, motion=False),
+    ),
+    "a subtype added": Change(
+        set(),
+        ("Missing output files",),
+        overlay={"added": [{"subtypes": ["AITO M9 2024"]}]},
+        expected=added("t1", ["seen"], motion=True) | {("cloud", "aito-m9-2024")},
+    ),
+    "a station more": Change(
+        {("echo", *chunk, "D") for chunk in CHUNKS} | NOISE | TILES | SHARD | INDEX | MANIFEST,
+        ("Missing output files", "Params have changed", "Set of input files has changed"),
+        overlay={"network": {"stations": {"D": {"position_m": [800.0, 800.0, 25.0], "normal_deg": 225.0}}}},
+    ),
+    "split": Change(SHARD, overlay={"split": {"val": 2, "train": 7}}),
+    "kind of shards": Change(
+        set(),
+        overlay={"shards": {"kind": "signal"}},
+        expected=with_what_follows(SHARD | SETTINGS | MANIFEST, images=False),
+    ),
+    "training steps": Change(TRAIN, overlay=TRAINING),
+    "network": Change(TRAIN, overlay={"recognition": {"network": {"heads": 2}}}),
+    "augmentation": Change(TRAIN, overlay={"recognition": {"augmentation": {"mirror": 0.0}}}),
+    "nodes": Change(
+        TRAIN, ("'lowalt.recognition.nodes', '2', '1'",), overlay={"recognition": {"processes": 2, "nodes": 2}}
+    ),
+    "evaluation batch": Change(EVALUATE, overlay={"recognition": {"evaluation": {"batch": 32}}}),
+    "protocol": Change(
+        TABLES | MANIFEST, ("Set of input files has changed",), overlay={"recognition": {"protocols": ["unseen"]}}
+    ),
+    "scheme": Change(
+        TABLES | MANIFEST, ("Set of input files has changed",), overlay={"recognition": {"schemes": ["ABC:VRP+TRP+VT"]}}
+    ),
+    "a second training seed": Change(
+        {(rule, *training[:2], "1") for rule in ("train", "evaluate") for training in TRAININGS} | TABLES | MANIFEST,
+        ("Missing output files",),
+        overlay={"recognition": {"seeds": [0, 1]}},
+    ),
+    # Files of the user.
+    "a target's record": Change(
+        {("cloud", "crow")},
+        edit=("config/targets/bird.yaml", "length: [0.348, m, authors]", "length: [0.349, m, authors]"),
+    ),
+    "a target's published row": Change(
+        {("cloud", "nio-et5t-2023"), *((work) for work in MOTION if work[1] == "unseen"), *REPORT},
+        edit=("config/targets.csv", "NIO ET5T 2023,,4,,,,,,4.8,", "NIO ET5T 2023,,4,,,,,,4.9,"),
+    ),
+    "a mesh": Change({("cloud", "dji-mini-2")}, (MESH,), edit=(f"inputs/{MESH}", "", "edited\n")),
+    "the table of schemes": Change(TRAIN | TABLES, ("config/schemes.csv",), edit=("config/schemes.csv", "", "\n")),
+    "published accuracy": Change(
+        TABLES | REPORT, ("published_accuracy.csv",), edit=("config/published_accuracy.csv", "", "\n")
+    ),
+    "text of the report": Change(REPORT, ("page.html",), edit=("src/lowalt/report/page.html", "", "<!-- -->\n")),
+    # The code of each stage.
+    "code of clouds": code("targets/bird.py", CLOUD),
+    "code of the gallery": code("targets/gallery.py", GALLERY),
+    "code of motion": code("motion/__main__.py", MOTION),
+    "code of echoes": code("echo/__main__.py", ECHO),
+    "code of noise": code("noise/__main__.py", NOISE),
+    "code of tiles": code("tiles/png.py", TILES | TRAIN | EVALUATE | VIEWS | SHARD),
+    "code of shards": code("shards/write.py", SHARD | INDEX),
+    "code of the card": code("shards/card.py", CARD),
+    "code of views": code("recognition/views.py", VIEWS | TRAIN | EVALUATE),
+    "code of training": code("recognition/training.py", TRAIN | EVALUATE),
+    "code of tables": code("recognition/tables.py", TABLES),
+    "code of distances": code("recognition/distances.py", DISTANCES),
+    "code of the report": code("report/pivots.py", REPORT),
+    "nothing": Change(set(), ()),
+}
+
+QUICK = (
+    "seed", "scene", "more motion models", "an SNR added", "a subtype added", "a station more", "kind of shards",
+    "protocol", "a second training seed", "a target's record", "a mesh", "the table of schemes", "text of the report",
+    "code of tiles", "nothing",
+)  # fmt: skip
+"""Changes that are planned in every run of the tests. What the others rest on stands in the rule files, see the tests
+of the settings and of the code of each rule."""
+SLOW = [name for name in CHANGES if name not in QUICK]
+DRIVER = """
+import contextlib, io, json, os, sys
+from pathlib import Path
+from snakemake.cli import main
+
+for name, (overlay, edit) in json.loads(Path("changes.json").read_text()).items():
+    Path("change.yaml").write_text(overlay)
+    if edit:
+        path, old, new = Path(edit[0]), edit[1], edit[2]
+        before, times = path.read_text(), path.stat()
+        path.write_text(before.replace(old, new, 1) if old else before + new)
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            main(["--cores", "1", "--dry-run", "--configfile", "overlay.yaml", "change.yaml"])
+        except SystemExit as end:
+            print("exit", end.code)
+    if edit:
+        path.write_text(before)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    Path("said").mkdir(exist_ok=True)
+    Path("said", name + ".txt").write_text(said.getvalue())
+"""
+
+
+def snakemake(folder, *arguments):
+    environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
+    status, text = run(folder, ["--cores", "1", "--configfile", "overlay.yaml", *arguments], environment)
+    assert status == 0, text[-4000:]
+    return text
+
+
+def jobs(text):
+    """The jobs of a dry run as (rule, wildcards except the run's name), each with the reason that is named."""
+    found = {}
+    for rule, body in re.findall(r"^(?:local)?rule (\w+):\n((?:    .*\n)*)", text, re.MULTILINE):
+        if rule == "all":
+            continue
+        rule = "echo" if rule == "echo_in_scene" else rule
+        wildcards = re.search(r"^    wildcards: (.*)$", body, re.MULTILINE)
+        names = dict(pair.split("=", 1) for pair in wildcards[1].split(", ")) if wildcards else {}
+        names.pop("run", None)
+        order = ("subtype", "size", "protocol", "scheme", "train_seed", "group", "fold", "part", "station")
+        found[(rule, *(names[name] for name in order if name in names))] = body[body.index("reason:") :]
+    return found
+
+
+@pytest.fixture(scope="module")
+def dry_runs(tmp_path_factory, request):
+    """What a dry run says after each change of a finished run that a test of this session asks about."""
+    asked = {item.callspec.params.get("name") for item in request.session.items if hasattr(item, "callspec")}
+    folder = workplace(tmp_path_factory.mktemp("reruns"))
+    (folder / "src/sitecustomize.py").unlink()
+    # One subtype has meshes of the user; a dry run asks only whether they are there and what they hold.
+    record = yaml.safe_load((ROOT / "config/targets/real.yaml").read_text())["DJI Mini 2"]
+    (folder / "mesh.yaml").write_text(yaml.safe_dump({"DJI Mini 2": record}))
+    for part in record["parts"].values():
+        path = folder / "inputs" / part["meshes"][0]["file"]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("solid\n")
+    records = yaml.safe_load((ROOT / "config/default.yaml").read_text())["targets"]["records"]
+    overlay = OVERLAY | {"targets": OVERLAY["targets"] | {"records": [*records, "mesh.yaml"]}}
+    (folder / "overlay.yaml").write_text(yaml.safe_dump(overlay))
+    text = snakemake(folder, "--dry-run")
+    assert set(jobs(text)) == WHOLE
+    for line in re.findall(r"^    (?:output|benchmark|log): (.*)$", text, re.MULTILINE):
+        for name in line.split(", "):
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if path.name == "figures":  # the report's folder of plots
+                path.mkdir()
+            else:
+                path.write_text(name)
+    snakemake(folder, "--touch", "--forceall")
+    plan = {name: (yaml.safe_dump(change.overlay), change.edit) for name, change in CHANGES.items() if name in asked}
+    (folder / "changes.json").write_text(json.dumps(plan))
+    environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
+    status, text = run(folder, [], environment, DRIVER)
+    assert status == 0, text[-4000:]
+    return {name: (folder / "said" / f"{name}.txt").read_text() for name in plan}
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+def test_a_change_re_runs_the_jobs_that_it_touches_and_names_the_reason(dry_runs, name):
+    change, found = CHANGES[name], jobs(dry_runs[name])
+    missing, more = change.jobs - set(found), set(found) - change.jobs
+    assert (sorted(missing), sorted(more)) == ([], []), dry_runs[name][-600:]
+    # A job that follows from another names that one's files; the others must name the change itself.
+    followers = with_what_follows({after for job in change.jobs for after in next_jobs(job)})
+    reasons = [found[job] for job in change.jobs - followers - TILES - SETTINGS - MANIFEST]
+    assert all(any(word in reason for word in change.reasons) for reason in reasons), "\n".join(reasons)
+    assert all(any(word in reason for reason in found.values()) for word in change.reasons)
+
+
+@pytest.mark.parametrize("name", [name for name in CHANGES if name.startswith("code of")])
+def test_a_rule_declares_the_source_files_that_are_edited_here(name):
+    """Its jobs then run again, as after an edit of `code of tiles` and after one of real jobs in test_workflow.py."""
+    change = CHANGES[name]
+    file = change.edit[0].removeprefix("src/lowalt/")
+    assert all(file in declared(rule) for rule in {job[0] for job in change.first})

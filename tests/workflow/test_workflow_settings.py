@@ -1,0 +1,137 @@
+"""Settings of stages (`lowalt.workflow.stage_settings`), options of commands and the report's manifest."""
+
+import json
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from configured import parts
+from lowalt.config.layers import plain
+from lowalt.files.yaml_files import load_yaml
+from lowalt.report.inputs import KEPT, OPTIONAL
+from lowalt.report.inputs import Inputs as ReportInputs
+from lowalt.workflow.stage_settings import Settings
+from snakemake_texts import body
+
+ROOT = Path(__file__).parents[2]
+SETTINGS_OF = {
+    "cloud": "cloud", "motion": "motion", "echo": "echo", "echo_in_scene": "echo_in_scene", "noise": "noise",
+    "tiles": "images", "shard": "shard", "index": "index", "configuration": "configuration", "views": "views",
+    "train": "training", "evaluate": "evaluation", "report": "report",
+}  # fmt: skip
+
+
+class Job(SimpleNamespace):
+    """Wildcards of a job, read as attributes or asked for by name, as Snakemake gives them."""
+
+    def get(self, name, default=None):
+        return getattr(self, name, default)
+
+
+CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
+
+
+@pytest.fixture(autouse=True)
+def checkout(monkeypatch):
+    """Paths of the default configuration are relative to the checkout."""
+    monkeypatch.chdir(ROOT)
+
+
+@pytest.mark.parametrize(
+    ("overlay", "changed"),
+    [
+        ({"motion": {"tilt_deg": 10.0}}, {"motion", "cost_table"}),
+        ({"noise": {"snr_db": [9]}}, {"noise", "shard", "views"}),
+        ({"tiles": {"reduced": [48]}}, {"views"}),
+        ({"images": {"gamma": 0.7}}, {"images"}),
+        ({"images": {"colour_map": "magma"}}, {"images", "training"}),
+        ({"recognition": {"training": {"steps": 7}}}, {"training"}),
+        ({"recognition": {"evaluation": {"batch": 7}}}, {"evaluation"}),
+        ({"split": {"val": 2, "train": 7}}, {"shard"}),
+        ({"echo": {"tolerance": 1e-3}}, {"echo", "echo_in_scene"}),
+    ],
+)
+def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay, changed):
+    job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="24", train_seed="3", get=lambda key, default: 3)
+    names = (
+        "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "views",
+        "training", "evaluation", "seed",
+    )  # fmt: skip
+    before, after = parts()[2], parts(overlay)[2]
+    assert {name for name in names if getattr(before, name)(job) != getattr(after, name)(job)} == changed
+    # The whole configuration stands next to the results and in the report.
+    assert before.configuration(job) != after.configuration(job) and before.report(job) != after.report(job)
+
+
+@pytest.mark.parametrize("rule", SETTINGS_OF)
+def test_each_rule_is_given_the_settings_of_its_stage(rule):
+    block = re.search(r"^    params:\n((?:        .*\n)+)", body(rule), re.MULTILINE)[1]
+    assert re.search(r"^        settings=(.*?),?$", block, re.MULTILINE)[1] == f"settings.{SETTINGS_OF[rule]}"
+
+
+def test_settings_of_different_jobs_differ_and_are_json():
+    _, _, settings = parts()
+    one, other = (SimpleNamespace(run="default", group=group, part="00000") for group in ("seen", "unseen"))
+    drawn = [set(json.loads(settings.motion(job))["published"]) for job in (one, other, one)]
+    assert drawn[0] == drawn[2] and drawn[0].isdisjoint(drawn[1])
+    assert json.loads(settings.configuration(one)) == plain(load_yaml("config/default.yaml"))
+
+
+def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
+    """Texts are kept, so a key that leaves out what a job differs by would hand it another job's text."""
+    run, _, settings = parts({"added": [{"snr_db": [1.5]}], "tiles": {"reduced": [24]}})
+    scheme = next(one.slug for one in run.trained if one.name == "ABC:VRP+TRP+VT")
+    common = {"run": run.name, "scheme": scheme}
+    chunks = [name.split("-", 1) for name in ("seen-00000", "seen-00001", run.plan.chunks[-1])]
+    rest = [
+        ("A", "crow", "24", "seen", "0"), ("B", "owl", "48", "unseen", "0"), ("B", "crow", "24", "unseen", "1"),
+        ("A", "owl", "24", "unseen", "0"),
+    ]  # fmt: skip
+    names = ("station", "subtype", "size", "protocol", "train_seed")
+    jobs = [
+        Job(**common, group=group, part=part, **dict(zip(names, one, strict=True)))
+        for group, part in chunks
+        for one in rest
+    ]
+    stages = [
+        "cloud", "motion", "echo", "noise", "shard", "views", "training", "images", "index",
+    ]  # fmt: skip
+    for stage in stages:
+        told = [getattr(settings, stage)(job) for job in jobs]
+        assert told == [getattr(Settings(run), stage)(job) for job in jobs]
+        assert (len(set(told)) > 1) == (stage not in ("images", "index"))
+
+
+def test_tiles_of_range_cells_follow_the_seed_and_the_snrs():
+    """Their noise is drawn from both; tiles of signals alone need neither."""
+    job, cells = (
+        Job(run="default", group="seen", part="00000"),
+        {"spectra": {"hrrp": {"window": 1, "hop": 1, "cells": 9}}},
+    )
+    changes = [{}, {"seed": 2}, {"noise": {"snr_db": [3.0]}}]
+    plain, of_cells = ([parts({**block, **change})[2].images(job) for change in changes] for block in ({}, cells))
+    assert len(set(plain)) == 1 and len(set(of_cells)) == 3
+
+
+def test_the_report_s_files_are_a_manifest_that_the_report_takes():
+    shown = {
+        "cost": "config/schemes.csv",
+        "accuracy": "config/cost/accuracy.csv",
+        "published": "config/published_accuracy.csv",
+    }
+    for overlay, names in (
+        ({"report": {"cost": None}}, set()),
+        (
+            {"report": shown, "recognition": {"transfer": ["other"]}},
+            {"transfer", "accuracy_cost", "echo_cost"},
+        ),
+    ):
+        _, products, _ = parts(overlay)
+        files = ReportInputs(products.report(CHUNK)).files
+        kept = {name for name in files if name.startswith("kept_")}
+        assert kept == {f"kept_{name}" for name in KEPT}
+        assert names == (set(files) & set(OPTIONAL)) - {"published", "predictions"} - kept
+        assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
+    assert "src/lowalt/report/sections/accuracy.html" in products.page_templates(CHUNK)
