@@ -34,8 +34,8 @@ from lowalt.shards import ShardSet
 DATA = Path("results/several")
 HERE = Path(__file__).parent
 COLUMNS = ("scheme", "class", "average_precision_percent", "low", "high", "beside_percent", "beside_low",
-           "beside_high", "share_percent", "seeds", "samples")  # fmt: skip
-STEPS, BATCH, RATE = 1000, 32, 2e-3
+           "beside_high", "share_percent", "beside_share_percent", "seeds", "samples")  # fmt: skip
+STEPS, BATCH, RATE = 600, 32, 2e-3
 
 
 def present(facts: Facts, config: dict, classes: list[str], class_of: dict[str, str]) -> np.ndarray:
@@ -61,6 +61,7 @@ def answered(job: tuple[schemes.Scheme, int], config: dict, classes: list[str], 
     block = config["recognition"]
     train, test = (trainings.images_of(DATA, scheme, folds("seen", part), block["size"]) for part in ("train", "test"))
     wanted = torch.from_numpy(present(train.facts, config, classes, class_of)).float()
+    torch.set_num_threads(1)
     torch.manual_seed(seed)
     model = built(scheme, block["network"], block["size"], config["images"]["colour_map"], len(classes))
     optimiser = torch.optim.AdamW(model.parameters(), RATE, weight_decay=0.05)
@@ -112,10 +113,11 @@ def rows_of(name: str, found: np.ndarray, wanted: np.ndarray, facts: Facts, clas
     drawn = [np.concatenate([members[model] for model in rng.integers(len(members), size=len(members))])
              for _ in range(200)]  # fmt: skip
     low, high = np.quantile([precisions(found, wanted, facts.label, rows) for rows in drawn], (0.025, 0.975), axis=0)
-    shares = [*wanted.mean(0), wanted.mean()]
+    beside = [wanted[facts.label != number, number].mean() for number in range(len(classes))]
+    shares = [[*wanted.mean(0), wanted.mean()], [*beside, np.mean(beside)]]
     return [
         [name, kind, *(f"{100 * bound[place, number]:.1f}" for place in (0, 1) for bound in (value, low, high)),
-         f"{100 * shares[number]:.1f}", len(found), len(every)]
+         *(f"{100 * share[number]:.1f}" for share in shares), len(found), len(every)]
         for number, kind in enumerate([*classes, "mean"])
     ]  # fmt: skip
 
