@@ -17,7 +17,7 @@ LONG = (
     "test_house", "test_dataset", "test_workflow_locks", "test_classes", "test_effects_occlusion",
     "test_recognition_sharing", "test_recognition_memory",
     "test_report_plots", "test_effects_every", "test_attacks", "test_recordings_unseen", "test_benchmarks_long_run",
-    "test_skips", "test_workflow_board", "test_turns", "test_targets_more",
+    "test_skips", "test_workflow_board", "test_jit_turns", "test_targets_more",
 )  # fmt: skip
 
 

@@ -20,7 +20,6 @@ from torch import nn
 
 import trainings
 from lowalt.config.command import run
-from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.numerics.streams import stream
 from lowalt.recognition import schemes
@@ -52,13 +51,9 @@ def present(facts: Facts, config: dict, classes: list[str], class_of: dict[str, 
 
 
 def answered(job: tuple[schemes.Scheme, int], config: dict, classes: list[str], class_of: dict[str, str]) -> np.ndarray:
-    """Train one network and return its probabilities (test samples, classes); they are kept, and read where they are
-    kept already. job: a scheme and a training seed; the rest as of `present`."""
-    scheme, seed = job
-    path = DATA / f"several/{scheme.slug}-{seed}.npy"
-    if path.is_file():
-        return np.load(path)
-    block = config["recognition"]
+    """Train one network and return its probabilities (test samples, classes). job: a scheme and a training seed; the
+    rest as of `present`."""
+    (scheme, seed), block = job, config["recognition"]
     train, test = (trainings.images_of(DATA, scheme, folds("seen", part), block["size"]) for part in ("train", "test"))
     wanted = torch.from_numpy(present(train.facts, config, classes, class_of)).float()
     torch.set_num_threads(1)
@@ -80,11 +75,7 @@ def answered(job: tuple[schemes.Scheme, int], config: dict, classes: list[str], 
     model.eval()
     with torch.inference_mode():
         parts = np.array_split(np.arange(len(test.facts)), -(-len(test.facts) // 256))
-        found = torch.cat([model(torch.from_numpy(test.views(part))).sigmoid() for part in parts]).numpy()
-    path.parent.mkdir(exist_ok=True)
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        np.save(file, found)
-    return found
+        return torch.cat([model(torch.from_numpy(test.views(part))).sigmoid() for part in parts]).numpy()
 
 
 def precisions(found: np.ndarray, wanted: np.ndarray, label: np.ndarray, rows: np.ndarray) -> np.ndarray:

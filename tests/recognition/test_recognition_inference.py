@@ -129,3 +129,12 @@ def test_a_model_in_fp32_on_a_processor_computes_the_same_as_matrix_products():
     assert [type(layer) for layer in placed] == [MatrixProduct, nn.ReLU, MatrixProduct]
     assert placed[0].weight.is_contiguous(memory_format=torch.channels_last)
     torch.testing.assert_close(placed(images), expected, rtol=1e-5, atol=1e-6)
+
+
+def test_more_processes_than_gpus_are_refused(monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
+    monkeypatch.setenv("WORLD_SIZE", "2")
+    monkeypatch.setenv("LOCAL_RANK", "1")
+    with pytest.raises(InputError, match=r"process 1 of this machine finds 1 GPUs"):
+        Machine.here("fp32")

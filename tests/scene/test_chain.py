@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.effects import PLACES, called, dotted
+from lowalt.scene.effects.channel import interference
 from lowalt.scene.observe import observe
 from lowalt.scene.response import response
-from scenes import A, network, scene, target, view_of
+from scenes import A, B, network, scene, target, view_of
 
 
 def data_of(name, radio):
@@ -69,6 +71,40 @@ def test_a_late_echo_begins_with_the_previous_symbol():
     found = received_signal(asked, A, cloud, row).signal
     assert abs(found - strongest(truth)).max() < 1e-10 * abs(truth).max()
     assert abs(found - received_signal(scene({}, radio), A, cloud, row).signal).max() > 0.1 * abs(found).max()
+
+
+def test_an_early_signal_ends_with_the_prefix_of_the_next_symbol():
+    radio, rng = network(symbols=3), np.random.default_rng(4)
+    count, frequencies = radio.subcarriers, (np.arange(radio.subcarriers) - 16) * 120e3
+    whole, early, prefix_s = rng.normal(size=(3, count)) + 1j * rng.normal(size=(3, count)), 5, 0.6e-6
+    found = waveform.windowed(radio, prefix_s, whole, -early, lambda name: data_of(name, radio))
+    for n, i in np.ndindex(3, count):
+        t = i / (count * 120e3)
+        # The next symbol's prefix is the end of its useful part: its time starts a prefix earlier.
+        late = i >= count - early
+        sent = data_of("next waveform", radio)[n] if late else data_of("waveform", radio)[n]
+        shift_s = t - prefix_s if late else t
+        sample = (whole[n] * sent * np.exp(2j * np.pi * frequencies * shift_s)).sum() / count
+        assert found[n, i] == pytest.approx(sample)
+
+
+def test_other_stations_are_heard_from_mast_to_mast_and_leak_by_their_levels():
+    cloud, row = target(np.random.default_rng(5))
+    shared = replace(B, frequency_hz=A.frequency_hz)
+
+    def unknown(stations, **changes):
+        """What station A hears of the others."""
+        asked = scene({"interference": {"sigma_ppm": 0.0, "sigma_s": 0.0, **changes}}, network(stations=stations))
+        return interference.heard(asked.effects[0].settings, SceneSample(asked, observe(asked, A, cloud, row)))
+
+    alone, weak, full = (unknown((A, shared), loss_db=loss) for loss in (400.0, 20.0, 0.0))
+    assert abs(alone).max() > 0
+    np.testing.assert_allclose(full - alone, 10 * (weak - alone), atol=1e-12 * abs(full).max())
+    # B's sub-band does not overlap with A's: only its leakage is heard.
+    leaked, less = (unknown((A, B), leakage_db=level) for level in (45.0, 55.0))
+    np.testing.assert_allclose(leaked, np.sqrt(10) * less, rtol=1e-12)
+    at_level = np.mean(abs(unknown((A, B), leakage_db=0.0)) ** 2)
+    assert at_level == pytest.approx(np.mean(abs(full) ** 2), rel=0.1)
 
 
 def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():

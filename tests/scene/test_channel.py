@@ -196,6 +196,12 @@ def test_the_ground_reflects_as_fresnel_says_from_the_mirror_image(polarisation)
     np.testing.assert_allclose(path.station_m, place * [1, 1, -1])
 
 
+def test_ground_that_is_not_given_is_medium_dry_at_the_carrier():
+    assert ground_reflection.ground(ground_reflection.DEFAULTS, 1e9) == (15.0, 0.035)
+    assert ground_reflection.ground(ground_reflection.DEFAULTS, 4.9e9) == pytest.approx((12.8, 0.467), rel=2e-3)
+    assert ground_reflection.ground(ground_reflection.DEFAULTS | {"permittivity": 3.0}, 1e9) == (3.0, 0.035)
+
+
 def test_rough_ground_loses_its_coherent_part_as_heights_say():
     view, settings = seen(), ground_reflection.DEFAULTS | {"roughness_m": 0.01}
     (smooth,), (rough,) = (ground_reflection.paths(settings | {"roughness_m": r}, view) for r in (0.0, 0.01))

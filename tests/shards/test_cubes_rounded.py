@@ -15,7 +15,9 @@ from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, card, faults
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
+from lowalt.shards.hub import features
 from lowalt.shards.stored_cubes import restored, rounded
+from lowalt.spectra.cube import TRUTH
 from lowalt.workflow import space
 from lowalt.workflow.refusals import refuse_cells
 
@@ -46,9 +48,15 @@ def test_cells_that_are_zero_stay_zero():
     assert not whole.any() and step > 0 and not restored(whole, step).any()
 
 
-def scene(number: str | None) -> dict:
-    """A configuration of cubes of one subtype, stored as a number."""
-    config = configuration(shards={"kind": "cube", **({"number": number} if number else {})})
+def test_cells_that_are_not_finite_are_refused():
+    for value in (np.nan, np.inf):
+        with pytest.raises(InputError, match="not finite"):
+            rounded(np.full((2, 3), value, np.complex64))
+
+
+def scene(cells: str | None) -> dict:
+    """A configuration of cubes of one subtype, stored as a type."""
+    config = configuration(shards={"kind": "cube", **({"cells": cells} if cells else {})})
     config["targets"]["select"] = ["DJI Mini 2"]
     return config
 
@@ -122,7 +130,7 @@ def test_the_size_that_is_said_is_the_files_size(number, written, datasets, tmp_
 def test_explain_says_the_size_first(tmp_path, capsys):
     overlay = tmp_path / "cube.yaml"
     overlay.write_text(json.dumps(plain({
-        "run": "cube", "shards": {"kind": "cube", "number": "int16"}, "targets": {"select": ["DJI Mini 2"]},
+        "run": "cube", "shards": {"kind": "cube", "cells": "int16"}, "targets": {"select": ["DJI Mini 2"]},
         "motion": {"models": 10, "models_per_chunk": 10}, "noise": {"snr_db": [3, 13]},
     })))  # fmt: skip
     assert main(["explain", str(overlay), "--no-table"]) == 0
@@ -132,7 +140,24 @@ def test_explain_says_the_size_first(tmp_path, capsys):
     assert said["samples"] == 20 and said["bytes"] == 20 * said["sample_bytes"]
 
 
-def test_a_number_is_refused_for_shards_of_another_kind():
+def test_a_type_of_cells_is_refused_for_shards_of_another_kind():
     refuse_cells(scene("int16"))
-    with pytest.raises(InputError, match=r"shards\.number: 'int16' and shards\.kind 'signal', expected kind 'cube'"):
-        refuse_cells(scene("int16") | {"shards": {"kind": "signal", "number": "int16"}})
+    with pytest.raises(InputError, match=r"shards\.cells: 'int16' and shards\.kind 'signal', expected kind 'cube'"):
+        refuse_cells(scene("int16") | {"shards": {"kind": "signal", "cells": "int16"}})
+
+
+def test_cubes_with_companions_have_a_card_that_types_their_truth(tmp_path):
+    config = scene(None) | {"effects": {"companions": {"subtypes": ["DJI Mini 2"], "count": [0, 2], "spread_m": 9.0}}}
+    dataset = Dataset(config)
+    write_run(dataset, tmp_path, "cube")
+    (tmp_path / "config.yaml").write_text(json.dumps({"run": "company"}))
+    card.write(tmp_path / "shards/index.json", tmp_path / "config.yaml")
+    shards = ShardSet(tmp_path / "shards/index.json")
+    assert (
+        {len(shards.cubes(number)[0].others) for number in range(len(shards))}
+        == {len(shards.record(number)["companions"]) for number in range(len(shards))}
+        != {0}
+    )
+    cube = next(entry for entry in features(shards)[2]["struct"] if entry["name"] == "cube")
+    others = next(entry for entry in cube["struct"][0]["struct"] if entry["name"] == "others")
+    assert [entry["name"] for entry in others["list"]] == list(TRUTH)

@@ -1,5 +1,6 @@
 """Mesh files are read as viewers show them: indices, polygons, strips, quantised and skinned surfaces, stated units."""
 
+import base64
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +101,15 @@ def test_quantised_places_are_fractions_of_their_type(tmp_path):
     assert piece.names == ("here", "shape")
     turned = 2 * TETRAHEDRON[:, [1, 0, 2]] * [-1, 1, 1]  # a quarter turn about z
     np.testing.assert_allclose(piece.vertices, turned, atol=1e-9)
+
+
+def test_a_buffer_in_the_text_of_the_file_is_read_and_a_turn_of_zeros_is_none(tmp_path):
+    places, corners = TETRAHEDRON.astype("<f4"), FACES.ravel().astype("<u2")
+    text = base64.b64encode(places.tobytes() + corners.tobytes()).decode()
+    buffer = {"byteLength": places.nbytes + corners.nbytes, "uri": f"data:application/octet-stream;base64,{text}"}
+    head = {"buffers": [buffer], "nodes": [{"mesh": 0, "rotation": [0, 0, 0, 0]}]}
+    (piece,) = pieces(glb(tmp_path / "a.glb", head, POSITION=places, indices=corners))
+    np.testing.assert_allclose(piece.vertices, places)
 
 
 def test_a_skin_s_joints_place_it_and_its_own_node_does_not(tmp_path):

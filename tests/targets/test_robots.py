@@ -55,6 +55,22 @@ def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
         assert min(turned, 180 - turned) < 6
 
 
+def test_a_urdf_of_a_long_chain_that_hangs_on_an_undeclared_world_is_placed(tmp_path):
+    links = "".join(f'<link name="l{n}"/>' for n in range(40))
+    ends = [("world", "l0"), *((f"l{n}", f"l{n + 1}") for n in range(39))]
+    fixed = "".join(
+        f'<joint name="j{n}" type="fixed"><origin xyz="0 0 0.1"/><parent link="{parent}"/>'
+        f'<child link="{child}"/></joint>'
+        for n, (parent, child) in enumerate(ends)
+    )
+    turns = """<link name="prop"><visual><geometry><cylinder radius="0.1" length="0.01"/></geometry></visual></link>
+<joint name="turn" type="continuous"><parent link="l39"/><child link="prop"/><axis xyz="0 0 1"/></joint>"""
+    (tmp_path / "mast.urdf").write_text(f'<robot name="mast">{links}{fixed}{turns}</robot>')
+    turning, surfaces = joints(tmp_path / "mast.urdf", tmp_path)
+    assert list(turning) == ["prop"]
+    assert surfaces["prop"].reshape(-1, 3)[:, 2].mean() == pytest.approx(4.0, abs=0.01)
+
+
 def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     (tmp_path / "base").mkdir()
     (tmp_path / "top").mkdir()

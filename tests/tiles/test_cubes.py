@@ -1,6 +1,8 @@
 """Cubes: their range cells against the echo's definition, their noise, their truth, and the images made of them."""
 
+import io
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from lowalt.numerics.streams import stream
 from lowalt.scene.effects.detection import canceller
 from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
+from lowalt.shards.stored_cubes import cubes_of, of_cubes
 from lowalt.spectra import Spectra, spectrum
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.spectra.kinds import hrrp, range_doppler
@@ -238,3 +241,22 @@ def test_symbols_that_were_not_received_are_zeros(dataset):
     lost = cube.chosen < 0
     assert 0 < lost.sum() < len(lost) and not cube.cells[lost].any() and cube.cells[~lost].any(axis=1).all()
     assert (cube.signal == signal[0]).all()
+
+
+@pytest.mark.parametrize("number", ["complex64", "int16"])
+def test_each_target_in_the_beam_has_a_truth_of_its_own_which_shards_keep(dataset, number):
+    company = {"companions": {"subtypes": ["Owl"], "count": [2, 2], "spread_m": 8.0}}
+    settings = {"seed": 1, "network": dataset.config["network"], "tolerance": None, "effects": company}
+    row, network = dataset.row(dataset.place(1)), dataset.maker.network
+    # The labelled target reflects nothing, so what is seen is a companion.
+    makers = [Cubes.from_settings(settings, dataset.clouds, empty=dark) for dark in (True, False)]
+    dark, whole = (maker.of(row, np.inf, network.stations[0]) for maker in makers)
+    assert len(dark.others) == 2 and (dark.truth == whole.truth).all()
+    cell = TRUTH.index("cell")
+    seen = abs(dark.cells).argmax(axis=1)
+    assert min(np.median(abs(other[:, cell] - dark.truth[:, cell])) for other in dark.others) > 4
+    assert np.mean(np.min([abs(seen - other[:, cell]) for other in dark.others], axis=0) <= 2) > 0.95
+    stored, facts = of_cubes([whole], replace(network, stations=network.stations[:1]), number)
+    (back,) = cubes_of({"cube": facts}, np.lib.format.read_array(io.BytesIO(stored)))
+    for kept, other in zip((back.truth, *back.others), (whole.truth, *whole.others), strict=True):
+        np.testing.assert_allclose(kept, other, atol=5.1e-7)

@@ -1,5 +1,6 @@
 """Options of commands and settings of stages in scenes (`lowalt.workflow.options`, `stage_settings`)."""
 
+import itertools
 import json
 import re
 from dataclasses import replace
@@ -137,6 +138,21 @@ def test_effects_that_do_not_fit_together_are_refused_and_so_are_links_without_a
     links = {"A-B": {"transmit": "A", "receive": "B"}}
     with pytest.raises(InputError, match=r"links between two stations, expected effects\.direct_path"):
         run_of({"network": {"stations": links}})
+    # However weak the direct path is, also where there is none.
+    for loss_db, name in itertools.product((0.0, None), ("background_channel", "interference", "transmit_leakage")):
+        effects = {"direct_path": {"loss_db": loss_db}, name: {}}
+        with pytest.raises(InputError, match=rf"\['{name}'\] are not modelled between two stations"):
+            run_of({"network": {"stations": links}, "effects": effects})
+
+
+def test_ground_whose_properties_are_not_given_is_known_at_some_carriers_only():
+    run_of({"effects": {"ground_reflection": {}}})
+    given = {"permittivity": 5.0, "conductivity_s_m": 0.1}
+    band = {"carrier_hz": 12e9, "symbol_interval_s": 1e-3}
+    run_of({"network": band, "effects": {"ground_reflection": given}})
+    for lacking in ({}, {"permittivity": 5.0}, {"conductivity_s_m": 0.1}):
+        with pytest.raises(InputError, match="medium dry ground is known from 1 to 10 GHz, station A sends at 12 GHz"):
+            run_of({"network": band, "effects": {"ground_reflection": lacking}})
 
 
 def test_trainings_are_those_of_each_scheme_s_protocols_and_seeds(tmp_path):

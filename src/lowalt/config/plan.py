@@ -26,7 +26,7 @@ RECORD_BYTES = 2048
 PIXEL_BYTES = 0.5
 """Bytes that a shard holds for each pixel of a tile: at most so many were measured."""
 CELL_BYTES = {"complex64": 8, "int16": 4}
-"""Bytes of a range cell of a cube, by the number that it is stored as."""
+"""Bytes of a range cell of a cube, by the type that it is stored as."""
 TRUTH_BYTES = 47
 """Bytes of the record for what is true of a cube at one symbol: the chosen cell and five numbers of six decimals."""
 
@@ -63,9 +63,9 @@ def _refuse_tracks(config: dict) -> None:
         raise InputError(f"effects: {jumping} together with motion.looks, expected none of {list(JUMPING)}")
 
 
-def cube_number(config: dict) -> str:
-    """Return the number as which the cells of cubes are stored: "complex64" or "int16"."""
-    return config["shards"].get("number", "complex64")
+def cell_type(config: dict) -> str:
+    """Return the type as which the range cells of cubes are stored: "complex64" or "int16"."""
+    return config["shards"].get("cells", "complex64")
 
 
 def sample_bytes(config: dict) -> int:
@@ -77,7 +77,7 @@ def sample_bytes(config: dict) -> int:
         data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
     elif kind == "cube":
         record += TRUTH_BYTES * symbols
-        data = 128 + CELL_BYTES[cube_number(config)] * symbols * config["network"]["subcarriers"]
+        data = 128 + CELL_BYTES[cell_type(config)] * symbols * config["network"]["subcarriers"]
     else:
         data = 128 + 8 * symbols
     whole = 2 * BLOCKSIZE + sum(size + -size % BLOCKSIZE for size in (record, data))

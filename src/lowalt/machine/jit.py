@@ -135,7 +135,7 @@ class _DigestCache(FunctionCache):
 
         # In a folder of its own: tools that list kept machine code see no other file.
         path = Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock"
-        return FileLock(path, timeout=PATIENCE_S)
+        return FileLock(path, timeout=PATIENCE_S, fallback_to_soft=False)
 
     def _index_key(self, sig, codegen):
         """Numba's key, the digest of the code, the fields of named tuples among the arguments, and a missing entry."""

@@ -1,7 +1,8 @@
 """A GPU of one's own: jobs of one process that run on a machine at the same time never share a GPU.
 
 A job locks one file a GPU, and the system frees the lock of a job that ends. Processes that torchrun starts take the
-visible GPUs in order instead; `recognition.gpu` lets the scheduler keep those free.
+visible GPUs in order and lock none: on one machine let one such training run at a time, by `recognition.gpu: true` and
+`--resources gpu=N` with N its processes.
 """
 
 import contextlib

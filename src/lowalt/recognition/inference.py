@@ -45,7 +45,7 @@ class Machine:
         """Return this process's machine: a GPU where there is one, and no other job's; gloo (CPU) or nccl (GPU) under
         torchrun, whose ranks take the visible GPUs in order.
 
-        precision: "auto", "bf16" or "fp32".
+        precision: "auto", "bf16" or "fp32". Raises: InputError where a rank finds no GPU left.
         """
         gpu = torch.cuda.is_available()
         ranks = int(os.environ.get("WORLD_SIZE", "1"))
@@ -53,6 +53,11 @@ class Machine:
         if gpu and ranks == 1:
             every = range(torch.cuda.device_count())
             place = gpus.claimed(tuple(str(torch.cuda.get_device_properties(number).uuid) for number in every))
+        elif gpu and place >= torch.cuda.device_count():
+            raise InputError(
+                f"recognition.processes: process {place} of this machine finds {torch.cuda.device_count()} GPUs, expected "
+                "no more processes than GPUs"
+            )
         device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
             distributed.init_process_group("nccl" if gpu else "gloo")

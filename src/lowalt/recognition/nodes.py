@@ -41,6 +41,8 @@ def main(arguments: list[str]) -> None:
 
     Raises: InputError outside Slurm; SystemExit with the status of srun where that is not 0.
     """
+    if len(arguments) < 3:
+        raise InputError(f"arguments {arguments}, expected NODES COUNT MODULE")
     nodes, count, *module = arguments
     job = os.environ.get("SLURM_JOB_ID")
     if not job or not shutil.which("srun"):

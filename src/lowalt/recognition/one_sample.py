@@ -30,7 +30,7 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
 
 
 def _named(path: Path, call: Callable[..., Any], *arguments: object) -> Any:
-    """Return call(*given); a refusal of it gets the file's name in front."""
+    """Return call(*arguments); a refusal of it gets the file's name in front."""
     try:
         return call(*arguments)
     except InputError as error:

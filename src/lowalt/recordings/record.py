@@ -1,6 +1,6 @@
 """The record of a recording: a short YAML file with the facts that the samples do not hold.
 
-Its keys stand in the definition `recording` of `config/brought.schema.yaml`, each with its unit and meaning.
+Its keys stand in the definition `recording` of `lowalt/config/brought.schema.yaml`, each with its unit and meaning.
 """
 
 from dataclasses import dataclass

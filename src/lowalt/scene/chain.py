@@ -7,7 +7,7 @@ effect, time samples without anything that reaches into them.
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -86,8 +86,9 @@ class SceneSample:
             return routes(view, paths, self.weight)
         return self.weight(view)
 
+    @cached_property
     def targets(self) -> list[View]:
-        """Return the view of the target and of every companion, under the same beams at the same instants."""
+        """The view of the target and of every companion, under the same beams at the same instants."""
         view, result = self.view, [self.view]
         for name, companions in offered(self.channel, "companions").items():
             cloud = self.clouds.get(view.cloud.subtype, view.cloud)
@@ -132,8 +133,8 @@ class SceneSample:
         late, network = np.zeros(view.places.shape[:2], np.int64), self.scene.network
         for late_samples in offered(self.channel, "late_samples").values():
             late = late_samples(view)
-        prefix_s = waveform.prefix_length_s(self.settings.get("cyclic_prefix", {}).get("prefix_s"), network)
 
+        @cache
         def on_air(name: str) -> np.ndarray:
             """The subcarriers on the air at every instant of each symbol."""
             return np.repeat(self.on_air(name), len(delays_s), axis=0)
@@ -143,7 +144,7 @@ class SceneSample:
         for lost in np.unique(late).tolist():
             some = np.repeat(factor * (late == lost), len(delays_s), axis=-2)
             echo = response(moved, paths, some, **self._waves)
-            samples += waveform.windowed(network, prefix_s, echo, lost, on_air)
+            samples += waveform.windowed(network, self.prefix_s, echo, lost, on_air)
         return np.einsum("nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), -1), weights)
 
     def _standing(self, name: str, echo: np.ndarray) -> np.ndarray:
@@ -162,10 +163,10 @@ class SceneSample:
         still = {name: scatter(self.view, self.draws(name)) for name, scatter in scattering}
         unknown = [heard(self) for heard in offered(self.channel, "heard").values()]
         if offered(self.channel, "instants") or offered(self.channel, "late_samples"):
-            samples = sum(map(self._samples, self.targets()))
+            samples = sum(map(self._samples, self.targets))
             samples = sum((self._standing(*each) for each in still.items()), samples)
         else:
-            total = sum(still.values(), sum(map(self.echo, self.targets())))
+            total = sum(still.values(), sum(map(self.echo, self.targets)))
             if not unknown and not self.receiver and not offered(self.transmitter, "aired"):
                 return total
             samples = waveform.transmit(total, self.look.aired)
@@ -186,7 +187,7 @@ class SceneSample:
         """The range cells (N, M) of the received symbols behind the receiver, before detection."""
         picking = offered(self.transmitter, "range_cells")
         range_cells = next(iter(picking.values()), waveform.range_cells)
-        return self._received(range_cells(self.arrived()))
+        return self._present(range_cells(self.arrived()))
 
     def filtered(self, detection: Sequence[NamedEffect]) -> np.ndarray:
         """Return the range cells (N, M) behind the filters of these detection effects."""
@@ -228,15 +229,20 @@ class SceneSample:
         dark = replace(self.view.cloud, rcs_m2=np.zeros_like(self.view.cloud.rcs_m2))
         return SceneSample(self.scene, replace(self.view, cloud=dark), self.clouds, self.power)
 
-    def own_cell(self) -> np.ndarray:
-        """Return the range cell (N,) of the target's middle at each received symbol, on the direct path."""
-        ways_m = self.view.ways_m(self.view.places.mean(axis=1))
+    def true_cell(self, view: View) -> np.ndarray:
+        """Return the range cell (N,) of the middle of a view's target at each received symbol, on the direct path."""
+        ways_m = view.ways_m(view.places.mean(axis=1))
         cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
-        return self._received(cells)
+        return self._present(cells)
 
-    def _received(self, symbols: np.ndarray) -> np.ndarray:
+    def _present(self, symbols: np.ndarray) -> np.ndarray:
         """Those of the symbols (N, ...) that are received."""
         return symbols if self.view.sampling is None else symbols[self.view.sampling.present]
+
+    @property
+    def prefix_s(self) -> float:
+        """The cyclic prefix's length (s), that of `cyclic_prefix` or NR's."""
+        return waveform.prefix_length_s(self.settings.get("cyclic_prefix", {}).get("prefix_s"), self.scene.network)
 
     @property
     def name(self) -> str:

@@ -9,6 +9,8 @@ from lowalt.scene.effects import called
 
 STILL = ("clutter", "background_channel", "transmit_leakage", "direct_path")
 """Effects that add something that stands still."""
+UNKNOWN_ON_LINKS = ("background_channel", "interference", "transmit_leakage")
+"""Effects that are not modelled between two stations."""
 
 
 class CheckedScene(NamedTuple):
@@ -37,6 +39,12 @@ def check(config: dict) -> CheckedScene:
     if links and "direct_path" not in config["effects"]:
         raise InputError(
             f"network.stations: {links} are links between two stations, expected effects.direct_path in the same scene"
+        )
+    refused = [name for name in UNKNOWN_ON_LINKS if name in scene.effects]
+    if links and refused:
+        raise InputError(
+            f"effects: {refused} are not modelled between two stations, expected none of them in a network with the "
+            f"links {links}"
         )
     if scene.network.guard_subcarriers < 0 and "interference" not in scene.effects:
         raise InputError(

@@ -143,7 +143,7 @@ def finding(
     """
     cloud, row, surfaces = explained
     sample = SceneSample(scene, observe(scene, station, cloud, row, surfaces), clouds)
-    target_cell, empty = sample.own_cell(), sample.without_target()
+    target_cell, empty = sample.true_cell(sample.view), sample.without_target()
     behind, rest = sample.filtered(sample.detection), empty.filtered(sample.detection)
     at_target = (behind - rest)[np.arange(len(target_cell)), target_cell]
     loudest = float((abs(rest) ** 2).mean(axis=0).max())

@@ -90,10 +90,8 @@ def observe(
         network, station, cloud, row, times_s, motion, places, moved, origin_m, element=element, occluders=occluders,
         sampling=sampling,
     )  # fmt: skip
-    # The ends of a link of another network are not among this one's stations.
-    ends = [*network.stations, *filter(None, (station.transmitter, station.receiver, station))]
-    stations = {end.name: end for end in ends if end.transmitter is None}
+    stations = [end for end in network.stations if end.transmitter is None]
     for name, beams in offered(scene.effects, "beams").items():
-        drawn = {end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations.values()}
+        drawn = {end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations}
         view = replace(view, beams=drawn)
     return view

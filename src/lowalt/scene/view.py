@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -119,7 +120,7 @@ class View:
     sampling: Sampling | None = None
     """Instants of all symbols and which are received, None for all at n T_r."""
 
-    @property
+    @cached_property
     def normals(self) -> np.ndarray:
         """Every point's unit normal (N, L, 3), global frame, NaN where unknown."""
         if "node" in self.cloud.kinds:
@@ -154,7 +155,12 @@ class View:
         """Return the element's amplitude gain toward images (N, L, 3) over that toward the points, (N, L) or 1."""
         if self.element is None:
             return 1.0
-        return np.sqrt(gain(self.element, self.station, images) / gain(self.element, self.station, self.places))
+        return np.sqrt(gain(self.element, self.station, images) / self._gain)
+
+    @cached_property
+    def _gain(self) -> np.ndarray:
+        """The element's power gain (N, L) toward the points."""
+        return gain(self.element, self.station, self.places)
 
     def at(self, times_s: np.ndarray) -> "View":
         """Return the same target seen at other times (K,) s of the look."""

@@ -57,6 +57,11 @@ def prefix_length_s(prefix_s: float | None, network: Network) -> float:
     return NORMAL_PREFIX / network.subcarrier_spacing_hz if prefix_s is None else prefix_s
 
 
+def baseband_hz(network: Network) -> np.ndarray:
+    """Return each subcarrier's frequency from the local oscillator, (m - M // 2) df (Hz), shape (M,)."""
+    return (np.arange(network.subcarriers) - network.subcarriers // 2) * network.subcarrier_spacing_hz
+
+
 def windowed(
     network: Network, prefix_s: float, response: np.ndarray, late: int, on_air: Callable[[str], np.ndarray]
 ) -> np.ndarray:
@@ -65,9 +70,8 @@ def windowed(
     late: negative where the last samples are the next symbol's already; on_air: subcarriers (N, M) on the air in the
     "waveform", the "previous waveform" and the "next waveform". The previous symbol ends a prefix before the window.
     """
-    samples, count = transmit(response, on_air("waveform")), network.subcarriers
-    baseband_hz = (np.arange(count) - count // 2) * network.subcarrier_spacing_hz
-    turn = np.exp(2j * np.pi * baseband_hz * prefix_s)
+    samples = transmit(response, on_air("waveform"))
+    turn = np.exp(2j * np.pi * baseband_hz(network) * prefix_s)
     if late > 0:
         samples[:, :late] = transmit(response * turn, on_air("previous waveform"))[:, :late]
     if late < 0:
@@ -109,9 +113,8 @@ class Look:
 
     @cached_property
     def baseband_hz(self) -> np.ndarray:
-        """Frequency of each subcarrier from the local oscillator, (m - M // 2) df (Hz), shape (M,)."""
-        count = self.network.subcarriers
-        return (np.arange(count) - count // 2) * self.network.subcarrier_spacing_hz
+        """Frequency of each subcarrier from the local oscillator (Hz), shape (M,)."""
+        return baseband_hz(self.network)
 
     @property
     def oscillator_hz(self) -> float:

@@ -6,6 +6,7 @@
 from lowalt.config.classes import stated
 from lowalt.config.command import dispatch, parser, pick, run
 from lowalt.config.network import Network
+from lowalt.config.plan import CELL_BYTES, cell_type
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.shards.content import clean_content, cube_content, noisy_content
@@ -39,14 +40,18 @@ def write(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     settings = options.settings
     classes, canceller, echo = _classes(settings), settings.pop("canceller", None), settings.pop("echo", {})
-    beside = {"companions": settings.pop("companions")} if "companions" in settings else {}
+    company = {name: settings.pop(name) for name in ("companions",) if name in settings}
     seed, network, snrs, split, shards = pick(settings, "seed", "network", "snr_db", "split", "shards")
-    kind, _, number = pick({"largest_mb": None, "number": "complex64", **shards}, "kind", "largest_mb", "number")
+    kind, _, cells = pick(
+        {"largest_mb": None, "cells": cell_type({"shards": shards}), **shards}, "kind", "largest_mb", "cells"
+    )
     if not 0 <= options.piece[0] < options.piece[1]:
         raise InputError(f"--piece: {options.piece}, expected 0 <= NUMBER < COUNT")
     if kind not in KINDS:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
-    rows = [accompanied(row, beside, seed) for row in read_table(options.motion)]
+    if cells not in CELL_BYTES:
+        raise InputError(f"shards.cells is {cells!r}, expected one of {list(CELL_BYTES)}")
+    rows = [accompanied(row, company, seed) for row in read_table(options.motion)]
     scene, powers = {"seed": seed, "network": network, **echo}, None
     snrs, network = [float(snr) for snr in snrs], Network.from_settings(network)
     if kind == "recipe":
@@ -54,7 +59,7 @@ def write(arguments: list[str]) -> None:
     elif kind == "cube":
         clouds = {cloud.subtype: cloud for cloud in map(read_cloud, options.clouds)}
         cubes = Cubes.from_settings(scene, clouds, read_all(options.occluders) if options.occluders else None)
-        content = cube_content(options.signals, cubes, rows, snrs, number)
+        content = cube_content(options.signals, cubes, rows, snrs, cells)
     else:
         content = noisy_content(kind, options.signals, options.tiles, network, (len(rows), len(snrs)))
     samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, canceller)

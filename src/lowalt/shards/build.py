@@ -11,7 +11,7 @@ import numpy as np
 
 from lowalt.config.command import run
 from lowalt.config.layers import SCHEMA, load
-from lowalt.config.plan import cube_number
+from lowalt.config.plan import cell_type
 from lowalt.files.atomic import slug
 from lowalt.motion.table import write_table
 from lowalt.shards.clean import refuse
@@ -56,7 +56,7 @@ def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
     """Write the motion table and the shards of one chunk; return the shards' paths."""
     plan, maker, rows = dataset.plan, dataset.maker, rows_of(dataset, chunk)
-    how = cube_number(dataset.config)
+    cells = cell_type(dataset.config)
     levels = plan.chunk(chunk).snrs
     group, _, part = chunk.partition("-")
     if chunk in plan.sources:
@@ -68,7 +68,7 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
         """The data of one sample, row `number` at SNR `level` of the chunk, and what its record says of its cubes."""
         if kind == "recipe":
             return npy(maker.received(rows[number])[0]), {}
-        return maker.data(kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], how)
+        return maker.data(kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], cells)
 
     powers, effects = None, maker.echo["effects"]
     canceller = (effects["canceller"] or {}) if "canceller" in effects else None

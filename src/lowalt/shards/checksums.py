@@ -33,9 +33,10 @@ def _text(sums: dict[str, str]) -> str:
 def write(index_path: str | Path, index: dict) -> None:
     """Write SHA256SUMS next to an index whose data card is complete.
 
-    The shards are not read again: their checksums are those of the index.
+    The shards are not read again: their checksums are those of the index. A file of former cards is removed.
     """
     folder = Path(index_path).parent
+    (folder / FORMER).unlink(missing_ok=True)
     card = {name: sha256(folder / name) for name in (*CARD, Path(index_path).name)}
     with replacing(folder / NAME) as temporary:
         temporary.write_text(_text(_of_index(index) | card))

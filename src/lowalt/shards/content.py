@@ -71,11 +71,11 @@ def clean_content(
 
 
 def cube_content(
-    path: str | None, cubes: Cubes, rows: Sequence[dict], snrs: Sequence[float], number: str
+    path: str | None, cubes: Cubes, rows: Sequence[dict], snrs: Sequence[float], cell_type: str
 ) -> Content:  # fmt: skip
     """Return the content of cube shards from the chunk's noisy signals and what makes their cubes.
 
-    path: of the noisy signals; number: how cells are stored, "complex64" or "int16".
+    path: of the noisy signals; cell_type: as which cells are stored, "complex64" or "int16".
     Raises: InputError naming the option or file that is missing or does not fit.
     """
     network = cubes.scene.network
@@ -84,6 +84,6 @@ def cube_content(
     def content(model: int, level: int) -> tuple[bytes, dict]:
         """The cubes of one sample and what its record says of them."""
         heard = zip(network.stations, signals[model, level], strict=True)
-        return of_cubes([cubes.of(rows[model], snrs[level], *each) for each in heard], network, number)
+        return of_cubes([cubes.of(rows[model], snrs[level], *each) for each in heard], network, cell_type)
 
     return content

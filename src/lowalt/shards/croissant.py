@@ -62,6 +62,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     table: path, bytes and sha256 of the table of samples; facts: name, description, version, license, and further
     properties that are known (url, datePublished). Paths are relative to the folder of the description.
     """
+    classes = ", ".join(f"{number} {name}" for number, name in enumerate(stated(index)))
     kind, inside = index["kind"], [{"@id": entry["name"]} for entry in index["shards"]]
     files = [
         _file(entry, "application/x-tar",
@@ -85,7 +86,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
         "conformsTo": "http://mlcommons.org/croissant/1.1",
         "isLiveDataset": False,
         "distribution": files + sets,
-        "recordSet": [_samples(table["path"], stated(index)), _labelled(kind, table["path"], data_type, meaning)],
+        "recordSet": [_samples(table["path"], classes), _labelled(kind, table["path"], classes, data_type, meaning)],
     }
 
 
@@ -113,32 +114,31 @@ def _records(name: str, meaning: str, fields: list[dict], **more: dict) -> dict:
     }  # fmt: skip
 
 
-def _column(table: str, name: str, classes: str = "{}") -> dict:
+def _column(table: str, name: str, classes: str) -> dict:
     """A field that is a column of the table of samples."""
     data_type, meaning = FIELDS[name]
     source = {"fileObject": {"@id": table}, "extract": {"column": name}}
     return {"name": name, "description": meaning.format(classes), "dataType": data_type, "source": source}
 
 
-def _samples(table: str, classes: tuple[str, ...]) -> dict:
-    """The record set with one row for each sample, from the table."""
-    numbered = ", ".join(f"{number} {name}" for number, name in enumerate(classes))
-    fields = [_column(table, name, numbered) for name in FIELDS]
+def _samples(table: str, classes: str) -> dict:
+    """The record set with one row for each sample, from the table; classes: with their numbers, as one text."""
+    fields = [_column(table, name, classes) for name in FIELDS]
     meaning = "All samples, without their images or signals."
     return _records("samples", meaning, fields, key={"@id": "samples/key"})
 
 
-def _labelled(kind: str, table: str, data_type: str, meaning: str) -> dict:
+def _labelled(kind: str, table: str, classes: str, data_type: str, meaning: str) -> dict:
     """The record set with one row for each sample: its image, signal or echo next to what the table says of it."""
 
     def member(name: str) -> dict:
         """A property of a member of the shards."""
         return {"fileSet": {"@id": f"{kind}s"}, "extract": {"fileProperty": name}}
 
-    file = _column(table, "file")
+    file = _column(table, "file", classes)
     fields = [
         {**file, "source": member("filename"), "references": file["source"]},
-        *(_column(table, name) for name in ("key", "label", "category", "snr_db")),
+        *(_column(table, name, classes) for name in ("key", "label", "category", "snr_db")),
         {"name": "content", "description": meaning, "dataType": data_type, "source": member("content")},
     ]
     return _records("labelled", f"The {kind} of every sample with its label.", fields)

@@ -16,7 +16,7 @@ import numpy as np
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
-from lowalt.config.plan import GROUPS, Plan, cube_number, motion_block
+from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located, shipped
@@ -216,7 +216,7 @@ class Dataset:
         "signal" and "recipe", which hold the same)."""
         place = self.place(number)
         row, signal = self.row(place), self.made_signal(place)
-        data, cubes = self.maker.data(kind, signal, row, place.snr_db, cube_number(self.config))
+        data, cubes = self.maker.data(kind, signal, row, place.snr_db, cell_type(self.config))
         return self.made_record(place, cubes), data
 
     def cubes(self, number: int) -> list[Cube]:

@@ -6,7 +6,8 @@ from fnmatch import fnmatchcase
 from lowalt.config.splits import FOLDS
 from lowalt.shards.read import ShardSet
 from lowalt.shards.sample_table import EXTENSIONS
-from lowalt.shards.stored_cubes import number_of
+from lowalt.shards.stored_cubes import cell_type_of
+from lowalt.spectra.cube import TRUTH
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
 
@@ -62,6 +63,9 @@ def features(shards: ShardSet) -> list[dict]:
             return {"name": name, "dtype": names}
         if isinstance(value, dict):
             return {"name": name, "struct": [typed(*item) for item in value.items()]}
+        if name == "others":
+            # The first sample may have no companion.
+            return {"name": name, "list": [{"name": column, "list": "float64"} for column in TRUTH]}
         if isinstance(value, list):
             return {"name": name, "list": DTYPES[type(value[0])] if value else "string"}
         return {"name": name, "dtype": DTYPES[type(value)]}
@@ -70,7 +74,7 @@ def features(shards: ShardSet) -> list[dict]:
     data: dict = {"dtype": "image"}
     if shards.kind != "image":
         # Numbers lie in as many lists as the array has axes.
-        axes = {"list": {"list": {"list": "int16" if number_of(entry) == "int16" else "float32"}}}
+        axes = {"list": {"list": {"list": "int16" if cell_type_of(entry) == "int16" else "float32"}}}
         data = {"list": axes} if shards.kind == "cube" else axes
     return [typed("__key__", ""), typed("__url__", ""), typed("json", entry),
             {"name": EXTENSIONS[shards.kind], **data}]  # fmt: skip

@@ -147,15 +147,15 @@ class Maker:
         return encode(self.tile(signal, row, snr_db), self.images.palette)
 
     def data(
-        self, kind: str, signal: np.ndarray, row: dict, snr_db: float, number: str = "complex64"
+        self, kind: str, signal: np.ndarray, row: dict, snr_db: float, cell_type: str
     ) -> tuple[bytes, dict]:  # fmt: skip
         """Return the data of one sample as a shard of a kind holds it, and what its record says of its cubes.
 
-        kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations, symbols); number: how
-        the cells of cubes are stored, "complex64" or "int16".
+        kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations, symbols);
+        cell_type: as which the cells of cubes are stored, "complex64" or "int16".
         """
         if kind == "image":
             return self.png(signal, row, snr_db), {}
         if kind == "cube":
-            return of_cubes(self.cubes(row, snr_db, signal), self.network, number)
+            return of_cubes(self.cubes(row, snr_db, signal), self.network, cell_type)
         return npy(signal), {}

@@ -14,7 +14,7 @@ from lowalt.numerics.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
 from lowalt.shards.record import accompanied, record, row_of
-from lowalt.shards.stored_cubes import number_of
+from lowalt.shards.stored_cubes import cell_type_of
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.occluders import read_all
 
@@ -83,7 +83,7 @@ class Remaker:
         """
         row, snr_db = row_of(entry)
         seed, signal = entry["seed"], self.signal(entry)
-        data, cubes = self._maker(seed).data(self.shards.kind, signal, row, snr_db, number_of(entry))
+        data, cubes = self._maker(seed).data(self.shards.kind, signal, row, snr_db, cell_type_of(entry))
         row = accompanied(row, self.shards.index["echo"]["effects"], seed)
         return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes, cubes), data
 

@@ -51,7 +51,7 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
 
 
 def _entry(key: str, number: int, model: int, snr_db: float, span: Span) -> tuple:
-    """Return a sample's row of the table (`table.SAMPLE`); number: its label."""
+    """Return a sample's row of the table (`sample_table.SAMPLE`); number: its label."""
     digest = np.frombuffer(span.sha256, np.uint8)
     return key, number, model, snr_db, span.offset, span.size, *span.record, *span.data, digest
 

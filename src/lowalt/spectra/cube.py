@@ -11,11 +11,13 @@ station, the direction cosines along the array's horizontal and vertical axis, a
 
 class Cube(NamedTuple):
     """cells: (N, M) complex64, range cells of c / (2 M df) metres, zeros where no symbol was received; chosen: (N,)
-    int64, the cell that the receiver chose, -1 where no symbol was received; truth: (N, 5) float64, columns `TRUTH`."""
+    int64, the cell that the receiver chose, -1 where no symbol was received; truth: (N, 5) float64, columns `TRUTH`;
+    others: the same of each companion in the beam, in the order in which records name them."""
 
     cells: np.ndarray
     chosen: np.ndarray
     truth: np.ndarray
+    others: tuple[np.ndarray, ...] = ()
 
     @property
     def signal(self) -> np.ndarray:

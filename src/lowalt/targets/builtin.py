@@ -7,7 +7,7 @@ from lowalt.config.classes import like
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.targets import bird, record_schema, uav, vehicle
-from lowalt.targets.assemble import assemble
+from lowalt.targets.assemble import allot, assemble
 from lowalt.targets.cloud import Cloud
 
 MODULES = {"UAV": uav, "Bird": bird, "Vehicle": vehicle}
@@ -60,6 +60,7 @@ def check_record(merged: dict, where: str) -> dict:
     result = merged | {"figures": resolved, "moving_share": share}
     if fault := MODULES[category].fault(result):
         raise InputError(f"{where}: {fault}")
+    allot(MODULES[category].parts(result)[0], result["points"], share, where)
     return result
 
 

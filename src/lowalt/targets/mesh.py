@@ -74,7 +74,7 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
 def _thinned(pool: Pool, count: int, where: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Return a part's points and normals (count, 3): those that bound it, then others spread evenly by `thin`."""
     if len(pool.points) < count:
-        raise InputError(f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a larger one")
+        raise InputError(f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a larger part")
     pick = np.arange(len(pool.points))
     if len(pick) > pool.corners + THINNED * count:
         pick = pool.corners + rng.choice(len(pick) - pool.corners, THINNED * count, replace=False)

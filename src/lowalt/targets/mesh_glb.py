@@ -4,13 +4,13 @@ trimesh leaves normalised integers, skins and morphs out; pygltflib hands on the
 reader ends the process on a skin. Source: Khronos, glTF 2.0 (sections 3.6, 3.7, 4.4) and KHR_mesh_quantization.
 """
 
+import base64
 import json
 import struct
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
@@ -40,10 +40,14 @@ class _Glb:
     def _view(self, index: int, kind: str, width: int, count: int, offset: int) -> np.ndarray:
         """`count` elements of `width` numbers of a buffer view, as they are stored."""
         view = self.list("bufferViews")[_natural(index)]
-        if "uri" in self.list("buffers")[_natural(view["buffer"])]:
-            raise ValueError("its data lies in another file, expected all in one")
+        data = self.binary
+        if uri := self.list("buffers")[_natural(view["buffer"])].get("uri"):
+            head, _, text = uri.partition(";base64,")
+            if not head.startswith("data:"):
+                raise ValueError("its data lies in another file, expected all in one")
+            data = base64.b64decode(text)
         start, length = _natural(view.get("byteOffset", 0)), _natural(view["byteLength"])
-        data, size = self.binary[start : start + length], np.dtype(kind).itemsize
+        data, size = data[start : start + length], np.dtype(kind).itemsize
         # NumPy refuses a shape that leaves the bytes of the view.
         return np.ndarray((count, width), kind, data, offset, (view.get("byteStride") or size * width, size))
 
@@ -134,7 +138,13 @@ def _local(node: dict) -> np.ndarray:
     """A node's own place (4, 4): its matrix, or its translation, rotation and scale."""
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
-    place, turn = np.eye(4), Rotation.from_quat(node.get("rotation", [0, 0, 0, 1])).as_matrix()
+    place = np.eye(4)
+    x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
+    turn = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
     place[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
     place[:3, 3] = node.get("translation", [0, 0, 0])
     return place

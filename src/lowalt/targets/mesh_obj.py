@@ -31,8 +31,9 @@ def read_obj(path: Path) -> list[Piece]:
         word, _, rest = line.strip().partition(" ")
         try:
             if word == "v":
-                x, y, z = map(float, rest.split()[:3])
-                places.append([x, y, z])
+                places.append([*map(float, rest.split()[:3])])
+                if len(places[-1]) < 3:
+                    raise ValueError("fewer than three coordinates")
             elif word == "f":
                 face = [int(corner.split("/", 1)[0]) for corner in rest.split("#", 1)[0].split()]
                 # A negative index counts back from the vertices so far.

@@ -76,8 +76,11 @@ class _Model:
         """The place (4, 4) of a frame."""
         if frame == "":
             return np.eye(4)
-        if depth > DEEPEST or frame not in self.frames:
-            raise ValueError(f"frame {frame!r} is unknown or hangs on itself")
+        if frame not in self.frames:
+            raise ValueError(f"frame {frame!r} is unknown")
+        # A joint of a URDF is a frame between two links.
+        if depth > 2 * DEEPEST:
+            raise ValueError(f"frame {frame!r} hangs on itself, or is deeper than {DEEPEST} links")
         above, in_above = self.frames[frame]
         return portable.product(self.place(above, depth + 1), in_above)
 
@@ -91,6 +94,7 @@ class _Model:
             parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
             name, along, limit = joint.get("name", child), joint.find("axis"), joint.find("limit")
             frame = f"{name} joint"
+            self.frames.setdefault(parent, ("", np.eye(4)))  # such as the world, which need not be a link
             self.frames[frame], self.frames[child] = (parent, _pose(joint)), (frame, np.eye(4))
             axis = numbers(along.get("xyz") if along is not None else None, 3, (1, 0, 0))
             limits = (limit.get("lower", "0"), limit.get("upper", "0")) if limit is not None else (None, None)

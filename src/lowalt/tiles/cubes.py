@@ -15,6 +15,7 @@ from lowalt.scene.chain import SceneSample
 from lowalt.scene.effects import called
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.set_noise import in_all_cells
+from lowalt.scene.view import View
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud, cloud_of
 
@@ -54,7 +55,7 @@ class Cubes:
         noise of the other cells has the same power and a stream of its own for each subtype, model, station and SNR.
         Raises: InputError naming the sample that cannot be computed.
         """
-        clean, chosen, truth, power_w = self._seen(row, snr_db, station)
+        clean, chosen, truths, power_w = self._seen(row, snr_db, station)
         cells = clean.astype(np.complex64)
         if not self.every_cell and not np.isposinf(snr_db):
             rng = stream(self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
@@ -66,10 +67,10 @@ class Cubes:
         if signal is not None:
             there = np.flatnonzero(chosen >= 0)
             cells[there, chosen[there]] = signal[there]
-        return Cube(cells, chosen, truth)
+        return Cube(cells, chosen, truths[0], truths[1:])
 
-    def _seen(self, row: dict, snr_db: float, station: Station) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Clean cells (N, M), chosen cells (N,), truth and the power (W) that SNRs refer to."""
+    def _seen(self, row: dict, snr_db: float, station: Station) -> tuple[np.ndarray, np.ndarray, tuple, float]:
+        """Clean cells (N, M), chosen cells (N,), the truth of every target and the power (W) that SNRs refer to."""
         key = row["subtype"], row["model"], station.name, snr_db if self.every_cell else None
         if key not in self._clean:
             while len(self._clean) >= self.kept:
@@ -87,15 +88,18 @@ class Cubes:
         cells = np.zeros((len(received.cell), self.scene.network.subcarriers), np.complex128)
         seen = sample.without_target() if self.empty else sample
         cells[there] = seen.filtered(sample.detection)
-        target_cell = np.full(len(cells), -1)
-        target_cell[there] = sample.own_cell()
-        return cells, received.cell, np.column_stack([truth(sample), target_cell]), received.power
+        truths = []
+        for target in sample.targets:
+            true_cell = np.full(len(cells), -1)
+            true_cell[there] = sample.true_cell(target)
+            truths.append(np.column_stack([truth(target), true_cell]))
+        return cells, received.cell, tuple(truths), received.power
 
 
-def truth(sample: SceneSample) -> np.ndarray:
+def truth(view: View) -> np.ndarray:
     """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each symbol, (N, 4)."""
-    station, middle = sample.view.station, sample.view.places.mean(axis=1)
-    moved = np.gradient(middle, sample.view.times_s, axis=0, edge_order=2)
+    station, middle = view.station, view.places.mean(axis=1)
+    moved = np.gradient(middle, view.times_s, axis=0, edge_order=2)
     ends = [station] if station.transmitter is None else [station, station.transmitter]
     ways = [middle - np.asarray(end.position_m) for end in ends]
     ranges = [np.linalg.norm(way, axis=1) for way in ways]

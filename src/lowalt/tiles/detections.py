@@ -20,7 +20,8 @@ def detections(
 
     A value of the range-Doppler map is detected where it is the largest of its neighbours and exceeds the mean of the
     `training` cells on either side, beyond `guard` cells, by the factor that noise passes with probability
-    `false_alarm`. It is the target's where it is within one cell and two speeds of what is true at some symbol.
+    `false_alarm`. It is the target's where it is within one cell and two speeds of what is true at some symbol; for a
+    companion give `cube._replace(truth=cube.others[0])`.
     Source: Finn & Johnson 1968; Richards 2014, 6.5.
     """
     symbols, count = cube.cells.shape

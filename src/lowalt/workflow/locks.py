@@ -63,7 +63,7 @@ class Owner:
 
 def guarded(folder: Path) -> FileLock:
     """Return the lock under which one process at a time looks at the locks of a folder and changes them."""
-    return FileLock(folder / "lowalt.guard")
+    return FileLock(folder / "lowalt.guard", fallback_to_soft=False)
 
 
 def record(locks: Path, number: int) -> Path:
@@ -80,7 +80,7 @@ def numbers(locks: Path) -> list[int]:
 def held(path: Path) -> bool:
     """Return whether a process of this machine holds a record locked."""
     try:
-        with FileLock(path, timeout=0):
+        with FileLock(path, timeout=0, fallback_to_soft=False):
             return False
     except Timeout:
         return True
@@ -151,10 +151,13 @@ def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> tuple[int, Fi
     record until it is released. Raises: OSError where a file cannot be written or the file system locks none.
     """
     number = next(number for number in count() if number not in numbers(locks))
-    holding = FileLock(record(locks, number), timeout=0)
+    holding = FileLock(record(locks, number), timeout=0, fallback_to_soft=False)
     try:
         holding.acquire()
-        record(locks, number).write_text(json.dumps(asdict(owner)))
+        with record(locks, number).open("w") as file:
+            file.write(json.dumps(asdict(owner)))
+            file.flush()
+            os.fsync(file.fileno())
         for kind in KINDS:
             (locks / f"{number}.{kind}.lock").write_text("".join(f"{key}\n" for key in keys[kind]))
     except OSError:

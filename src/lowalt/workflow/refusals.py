@@ -94,10 +94,10 @@ def refuse_input(config: dict) -> None:
 
 def refuse_cells(config: dict) -> None:
     """Refuse spectra of range cells where shards hold signals alone, cubes of symbols that gaps interpolate, and a
-    number of cubes for other shards."""
-    kind, shown, number = config["shards"]["kind"], of_cells(config["spectra"]), config["shards"].get("number")
-    if number and kind != "cube":
-        raise InputError(f"shards.number: {number!r} and shards.kind {kind!r}, expected kind 'cube'")
+    type of cells for other shards."""
+    kind, shown, cells = config["shards"]["kind"], of_cells(config["spectra"]), config["shards"].get("cells")
+    if cells and kind != "cube":
+        raise InputError(f"shards.cells: {cells!r} and shards.kind {kind!r}, expected kind 'cube'")
     if shown and kind not in ("image", "cube"):
         raise InputError(
             f"spectra: {shown} and shards.kind {kind!r}, expected 'image' or 'cube': signals hold one cell"

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.config.plan import Plan, cube_number, sample_bytes
+from lowalt.config.plan import Plan, cell_type, sample_bytes
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import free_bytes
 from lowalt.files.errors import InputError, SpaceError
@@ -45,20 +45,20 @@ def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -
 
 def cubes_size(config: dict, plan: Plan) -> dict:
     """Return what a data set of cubes takes: its `samples`, the bytes of one (`sample_bytes`) and of all (`bytes`), and
-    the `number` that a range cell is stored as.
+    the type that its `cells` are stored as.
 
     Empty for shards of other kinds.
     """
     if config["shards"]["kind"] != "cube":
         return {}
     each, count = sample_bytes(config), plan.samples
-    return {"number": cube_number(config), "samples": count, "sample_bytes": each, "bytes": count * each}
+    return {"cells": cell_type(config), "samples": count, "sample_bytes": each, "bytes": count * each}
 
 
 def cubes_sentence(size: dict) -> str:
     """Return `cubes_size` as one line."""
     each, whole = size["sample_bytes"] / 1e6, size["bytes"] / 1e9
-    samples = f"{size['samples']} samples, {size['number']}"
+    samples = f"{size['samples']} samples, {size['cells']}"
     return f"cube shards: {each:.2f} MB a sample, {whole:.3f} GB in all ({samples})"
 
 

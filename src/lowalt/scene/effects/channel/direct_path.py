@@ -18,9 +18,6 @@ SOURCE = (
 )
 DEFAULTS = {"loss_db": 0.0}
 
-MONOSTATIC = "background_channel", "interference", "transmit_leakage"
-"""Effects that are modelled for a station that hears itself only."""
-
 
 def idle(settings: dict) -> bool:
     """Return whether the direct path is lost; links hear their target alone."""
@@ -28,12 +25,9 @@ def idle(settings: dict) -> bool:
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a network without links, or effects that are not modelled between two stations."""
+    """Raise InputError for a network without links."""
     if all(station.transmitter is None for station in scene.network.stations):
         raise InputError("effects.direct_path: no station of the network is a link, expected {transmit, receive}")
-    refused = sorted(set(MONOSTATIC) & set(scene.effects))
-    if refused:
-        raise InputError(f"effects.direct_path: {refused} are not modelled between two stations, expected none of them")
 
 
 def offset_cells(settings: dict, view: View) -> float:

@@ -9,6 +9,7 @@ from scipy.special import i0e
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.files.errors import InputError
 from lowalt.scene import series
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.fresnel import fresnel
@@ -17,11 +18,13 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "Fresnel coefficients of a lossy half space: ITU-R P.527, and Balanis, Advanced Engineering Electromagnetics, "
-    "section 5.3; medium dry ground at 4.9 GHz: ITU-R P.2040-3, Table 3; rough surface: Miller, Brown & Vegh, New "
+    "section 5.3; medium dry ground: ITU-R P.2040-3, Table 3; rough surface: Miller, Brown & Vegh, New "
     "derivation for the rough-surface reflection coefficient and for the distribution of sea-wave elevations, IEE "
     "Proc. F 131, 1984"
 )
-DEFAULTS = {"permittivity": 12.8, "conductivity_s_m": 0.467, "roughness_m": 0.0, "polarisation": "vertical"}
+DEFAULTS = {"permittivity": None, "conductivity_s_m": None, "roughness_m": 0.0, "polarisation": "vertical"}
+KNOWN_GHZ = 1.0, 10.0
+"""Carriers between which the properties of medium dry ground are known, which stand for those not given."""
 
 
 def idle(settings: dict) -> bool:
@@ -30,8 +33,26 @@ def idle(settings: dict) -> bool:
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a station in or below the ground."""
+    """Raise InputError for a station in or below the ground, or at a carrier whose ground must be given."""
     above_ground("ground_reflection", scene.network)
+    low, high = KNOWN_GHZ
+    for station in scene.network.stations:
+        carrier_ghz = radar(scene.network, station).centre_hz / 1e9
+        if None in (settings["permittivity"], settings["conductivity_s_m"]) and not low <= carrier_ghz <= high:
+            raise InputError(
+                f"effects.ground_reflection: medium dry ground is known from {low:g} to {high:g} GHz, station "
+                f"{station.name} sends at {carrier_ghz:.3g} GHz: expected permittivity and conductivity_s_m"
+            )
+
+
+def ground(settings: dict, frequency_hz: float) -> tuple[float, float]:
+    """Return permittivity and conductivity (S/m): those given, else medium dry ground's at this frequency.
+
+    Source: ITU-R P.2040-3, Table 3: 15 f^-0.1 and 0.035 f^1.63 S/m, f in GHz.
+    """
+    known = 15.0 * (frequency_hz / 1e9) ** -0.1, 0.035 * (frequency_hz / 1e9) ** 1.63
+    asked = settings["permittivity"], settings["conductivity_s_m"]
+    return tuple(usual if value is None else value for value, usual in zip(asked, known, strict=True))
 
 
 def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndarray:
@@ -56,8 +77,8 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
 
     def reflected(sine: np.ndarray) -> np.ndarray:
         """Coefficient of the rough ground at grazing angles of this sine."""
-        material = settings["permittivity"], settings["conductivity_s_m"], frequency, settings["polarisation"]
-        return fresnel(sine, *material) * roughness(sine, settings["roughness_m"], frequency)
+        smooth = fresnel(sine, *ground(settings, frequency), frequency, settings["polarisation"])
+        return smooth * roughness(sine, settings["roughness_m"], frequency)
 
     coefficient = series.at(reflected, sine) * view.relative_gain(images)
     return [ImagePath(images, coefficient, station_m * mirror)]

@@ -20,7 +20,7 @@ from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
 from lowalt.scene.effects.receiver.offsets import of_stations
 from lowalt.scene.set_noise import white
-from lowalt.scene.waveform import prefix_length_s, windowed
+from lowalt.scene.waveform import baseband_hz, windowed
 
 SOURCE = (
     "3GPP TS 38.104, 6.6.3 (adjacent channel leakage ratio of base stations, 45 dB below 7 GHz; here the same at any "
@@ -58,19 +58,18 @@ def heard(settings: dict, sample: SceneSample) -> np.ndarray:
     view, network = sample.view, sample.view.network
     total = np.zeros((network.symbols, network.subcarriers), np.complex128)
     errors = of_stations(settings, network, sample.draws("link_offset"))
-    prefix_s = prefix_length_s(sample.settings.get("cyclic_prefix", {}).get("prefix_s"), network)
     step_hz, middle, count = network.subcarrier_spacing_hz, network.subcarriers // 2, network.subcarriers
     number, rate_hz = np.arange(count), count * step_hz
     for sends in network.stations:
         if sends.name == view.station.name:
             continue
         ppm, shift_s = np.subtract(errors[sends.name], errors[view.station.name])
-        ramp, data = np.exp(-2j * np.pi * (number - middle) * step_hz * shift_s), sent(settings, sample, sends)
+        ramp, data = np.exp(-2j * np.pi * baseband_hz(network) * shift_s), sent(settings, sample, sends)
         samples = np.zeros_like(total)
         for response, delay_s in arrivals(settings, sample, sends):
             late_s = delay_s + shift_s
-            late = min(np.ceil(late_s * rate_hz), 0) + max(np.ceil((late_s - prefix_s) * rate_hz), 0)
-            samples += windowed(network, prefix_s, response * ramp, int(np.clip(late, -count, count)), data)
+            late = min(np.ceil(late_s * rate_hz), 0) + max(np.ceil((late_s - sample.prefix_s) * rate_hz), 0)
+            samples += windowed(network, sample.prefix_s, response * ramp, int(np.clip(late, -count, count)), data)
         turn_hz = 1e-6 * ppm * (view.station.frequency_hz + middle * step_hz)
         within = np.exp(2j * np.pi * turn_hz * number / rate_hz)
         total += samples * within * np.exp(2j * np.pi * turn_hz * view.times_s)[:, None]

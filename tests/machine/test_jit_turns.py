@@ -40,3 +40,11 @@ def test_a_kernel_waits_for_the_process_that_compiles_it(tmp_path):
         with pytest.raises(subprocess.TimeoutExpired):
             run.wait(4)
     assert run.communicate(timeout=60)[0].strip() == "1"
+
+
+def test_a_process_goes_on_without_its_turn_after_some_patience(tmp_path):
+    (tmp_path / "slow_kernel.py").write_text(KERNEL)
+    path = start(tmp_path, "import slow_kernel; print(slow_kernel.twice._cache.turn.lock_file)").communicate()[0]
+    hurried = f"import lowalt.machine.jit; lowalt.machine.jit.PATIENCE_S = 0.3; {CALL}"
+    with FileLock(path.strip()):
+        assert start(tmp_path, hurried).communicate(timeout=60)[0].strip() == "1"
