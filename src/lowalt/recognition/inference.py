@@ -56,8 +56,8 @@ class Machine:
         elif gpu and place >= torch.cuda.device_count():
             count = torch.cuda.device_count()
             raise InputError(
-                f"recognition.processes: process {place} of this machine finds {count} GPUs, expected no more processes "
-                "than GPUs"
+                f"recognition.processes: process {place} of this machine finds {count} GPUs, "
+                "expected no more processes than GPUs"
             )
         device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
