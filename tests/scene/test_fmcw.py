@@ -81,10 +81,16 @@ def test_a_mixer_images_a_range_cell_in_its_mirror_and_a_converter_bounds_its_sa
     assert len(np.unique(coarse.real.round(15))) == len(np.unique(coarse.imag.round(15))) == 2
 
 
-def test_without_an_effect_that_needs_samples_nothing_of_the_waveform_is_drawn():
-    found = sample({"phase_noise": {"shared": False}, "canceller": {"kind": "pulse"}}, radio({**SWEEP, "samples": 128}))
-    assert found.look.data is None and found.look.aired is None
-    assert abs(found.received().signal).max() > 0
+def test_white_phase_noise_fills_the_bandwidth_of_the_samples():
+    white = {"points": [[1.0, -80.0]], "shared": False, "loop_hz": 0.0}
+    network = radio({**SWEEP, "samples": 128}, symbols=100)
+    found, clean = (sample(effects, network).arrived() for effects in ({"phase_noise": white}, {}))
+    assert np.angle(found / clean).var() == pytest.approx(1e-8 * 128 / 400e-6, rel=0.05)
+
+
+def test_a_detector_begins_at_the_range_cell_that_the_beam_points_at():
+    found = sample({"detector": {"range_error_m": 0.0, "training": 8}}, radio({**SWEEP, "samples": 64}), x_m=20.0)
+    assert abs(found.received().cell - found.true_cell(found.view)).max() <= 1
 
 
 @pytest.mark.parametrize("kind", ["fmcw", "cw"])

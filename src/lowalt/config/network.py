@@ -157,7 +157,8 @@ class Network:
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         keys = {
-            "carrier_hz", *OFDM, "symbol_interval_s", "symbols", "transmit_array", "receive_array", "power_w", "stations",
+            *OFDM, "carrier_hz", "symbol_interval_s", "symbols", "transmit_array", "receive_array", "power_w",
+            "stations",
         }  # fmt: skip
         waveform = block.get("waveform", {"kind": "ofdm"})
         block = {key: value for key, value in (block | band(block)).items() if key != "waveform"}
