@@ -26,12 +26,12 @@ def variance(settings: dict, bandwidth_hz: float) -> float:
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) plus circular white Gaussian noise, k T df F a subcarrier of OFDM, k T F times
-    the sample rate a sample of FMCW.
+    """Return samples (N, M) plus circular white Gaussian noise, k T df F a subcarrier.
 
     A subcarrier is the sum of M samples and a range cell the mean of M subcarriers: both a sample and a cell have 1/M
-    of a subcarrier's noise. Unit-norm receive weights leave one antenna's noise; the link budget's power is the
-    network's `power_w` a subcarrier. Source: Friis 1944 (noise figure).
+    of a subcarrier's noise. A sample of an FMCW sweep takes a subcarrier's place, and the sample rate that of df.
+    Unit-norm receive weights leave one antenna's noise; the link budget's power is the network's `power_w` a
+    subcarrier. Source: Friis 1944 (noise figure).
     """
     power = variance(settings, look.network.noise_bandwidth_hz) / look.network.subcarriers
     return samples + white(rng, power, samples.shape)
