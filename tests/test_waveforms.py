@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo import echo_matrix
 
 
@@ -18,15 +18,17 @@ def delays(places: np.ndarray) -> np.ndarray:
     return 2 * np.linalg.norm(places - [0.0, 0.0, 25.0], axis=-1) / SPEED_OF_LIGHT
 
 
-def radar(subcarriers: int, spacing_hz: float) -> Network:
+def radar(**waveform) -> Network:
     """One station of single elements at 24 GHz."""
-    station = Station("A", (0.0, 0.0, 25.0), 0.0, 24e9)
-    return Network(24e9, spacing_hz, subcarriers, 0, 0.5e-3, 400, (1, 1), (1, 1), 1.0, (station,))
+    return Network.from_settings({
+        "carrier_hz": 24e9, "waveform": waveform, "symbol_interval_s": 0.5e-3, "symbols": 400, "transmit_array": [1, 1],
+        "receive_array": [1, 1], "power_w": 1.0, "stations": {"A": {"position_m": [0, 0, 25], "normal_deg": 0}},
+    })  # fmt: skip
 
 
 @pytest.mark.parametrize("speed_mps", [-3.0, 0.5])
 def test_one_subcarrier_is_a_continuous_wave(speed_mps):
-    network = radar(1, 120e3)
+    network = radar(kind="cw")
     places = moving(network, speed_mps)
     found = echo_matrix(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0), "subcarriers")[:, 0]
     tau = delays(places)
@@ -39,7 +41,7 @@ def test_the_subcarriers_of_a_band_are_the_samples_of_an_fmcw_sweep(speed_mps):
     """Against dechirped samples with motion during the sweep and the residual video phase: equal but for a shift of
     f_D T in range, below a tenth of a cell here, and a phase of the whole look."""
     samples, sweep_hz, sweep_s = 128, 150e6, 50e-6
-    network = radar(samples, sweep_hz / samples)
+    network = radar(kind="fmcw", sweep_hz=sweep_hz, sweep_s=sweep_s, samples=samples)
     places, slope = moving(network, speed_mps), sweep_hz / sweep_s
     found = echo_matrix(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0), "cells")
     within_s = np.arange(samples) * sweep_s / samples

@@ -12,6 +12,7 @@ from pathlib import Path
 import yaml
 
 from lowalt.config.command import parser, run
+from lowalt.config.network import OFDM
 from lowalt.config.schema import faults, plain
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
@@ -78,15 +79,29 @@ def _settle(block: dict, schema: dict) -> None:
             block[key] = _as_meant(value, entry)
 
 
+def _without_ofdm(network: dict) -> None:
+    """Take the embedded default's subcarriers out of a network whose waveform has none, and a waveform that is OFDM."""
+    if network.get("waveform") == {"kind": "ofdm"}:
+        del network["waveform"]
+    elif "waveform" in network:
+        default = load_yaml(shipped(DEFAULT))["network"]
+        for key in OFDM:
+            if network.get(key) == default[key]:
+                del network[key]
+
+
 def check(config: dict, schema_path: str | Path) -> dict:
     """Return the configuration if it fits the schema, without nulls that take out what a lower layer has.
 
     A layer of configuration can only add keys to a mapping, so a null removes one that may be left out, such as a
-    station, a spectrum, a start or an effect. A number may be written 28e9.
+    station, a spectrum, a start or an effect. A number may be written 28e9. Where the waveform has no subcarriers,
+    those of the embedded default go.
     The configuration is changed in place. Raises: InputError with one line a fault.
     """
     schema = load_yaml(schema_path)
     _settle(config, schema)
+    if isinstance(config.get("network"), dict):
+        _without_ofdm(config["network"])
     lines = faults(config, schema)
     if lines:
         raise InputError("configuration refused: " + "\n  ".join(lines))

@@ -80,12 +80,47 @@ def masts_m(block: dict) -> list[list[float]]:
     return [place["position_m"][:2] for place in block["stations"].values() if "position_m" in place]
 
 
+TERMS = {"ofdm": set(), "fmcw": {"sweep_hz", "sweep_s", "samples"}, "cw": set()}
+"""What a waveform says of itself beside its kind."""
+OFDM = ("subcarriers", "subcarrier_spacing_hz", "guard_subcarriers")
+"""Keys of a `network` block that only OFDM has."""
+
+
+def band(block: dict) -> dict:
+    """Return the keys `OFDM` of a `network` block, whose waveform may state its band in other terms.
+
+    Sample m of an FMCW sweep is measured at the frequency of subcarrier m; a continuous wave is one subcarrier whose
+    symbol lasts from one sample to the next.
+    Raises: InputError naming the key and value that is missing, unknown or contradicts the waveform.
+    """
+    waveform = block.get("waveform", {"kind": "ofdm"})
+    kind, terms = waveform.get("kind"), set(waveform) - {"kind"}
+    if kind not in TERMS or terms != TERMS[kind]:
+        expected = " or ".join(f"{{{', '.join([f'kind: {name}', *sorted(TERMS[name])])}}}" for name in TERMS)
+        raise InputError(f"network.waveform: {waveform}, expected {expected}")
+    given = {key: block[key] for key in OFDM if key in block}
+    if kind == "ofdm":
+        return given
+    if given:
+        raise InputError(f"network: {given} together with a waveform of kind {kind!r}, expected none of {list(OFDM)}")
+    interval_s = block.get("symbol_interval_s", math.inf)
+    if kind == "cw":
+        return dict(zip(OFDM, (1, 1 / interval_s, 0), strict=True))
+    if waveform["sweep_s"] > interval_s:
+        raise InputError(
+            f"network.waveform: sweep_s is {waveform['sweep_s']:g}, expected at most symbol_interval_s, {interval_s:g}"
+        )
+    return dict(zip(OFDM, (waveform["samples"], waveform["sweep_hz"] / waveform["samples"], 0), strict=True))
+
+
 @dataclass(frozen=True)
 class Network:
     """The stations and the signal they share.
 
     `transmit` and `receive` are (horizontal, vertical) element counts; `power` is rho P, the power
-    that each subcarrier carries for sensing (W, 1 by default); a symbol carries `subcarriers` times as much.
+    that each subcarrier carries for sensing (W, 1 by default); a symbol carries `subcarriers` times as much, while an
+    FMCW sweep or a continuous wave has `power` at each instant. `waveform` is "ofdm", "fmcw" or "cw"; `sweep_s` is how
+    long the samples of an FMCW sweep take, which is a symbol then.
     Source: paper, section II-A and V-A.
     """
 
@@ -99,6 +134,8 @@ class Network:
     receive: tuple[int, int]
     power: float
     stations: tuple[Station, ...]
+    waveform: str = "ofdm"
+    sweep_s: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("carrier_hz", "subcarrier_spacing_hz", "symbol_interval_s", "power"):
@@ -120,9 +157,11 @@ class Network:
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         keys = {
-            "carrier_hz", "subcarrier_spacing_hz", "subcarriers", "guard_subcarriers", "symbol_interval_s",
-            "symbols", "transmit_array", "receive_array", "power_w", "stations",
+            *OFDM, "carrier_hz", "symbol_interval_s", "symbols", "transmit_array", "receive_array", "power_w",
+            "stations",
         }  # fmt: skip
+        waveform = block.get("waveform", {"kind": "ofdm"})
+        block = {key: value for key, value in (block | band(block)).items() if key != "waveform"}
         if set(block) != keys:
             raise InputError(f"network: keys {sorted(set(block) ^ keys)} missing or unknown")
         step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block["subcarrier_spacing_hz"]
@@ -154,6 +193,8 @@ class Network:
             receive=tuple(block["receive_array"]),
             power=block["power_w"],
             stations=tuple(stations),
+            waveform=waveform["kind"],
+            sweep_s=waveform.get("sweep_s"),
         )
 
     def station(self, name: str) -> Station:
@@ -170,6 +211,16 @@ class Network:
     def times_s(self) -> np.ndarray:
         """Symbol times n T_r (s), shape (symbols,)."""
         return np.arange(self.symbols) * self.symbol_interval_s
+
+    @property
+    def symbol_rate_hz(self) -> float:
+        """One over the time that the samples of a symbol or sweep take (Hz): of OFDM the subcarrier spacing."""
+        return self.subcarrier_spacing_hz if self.sweep_s is None else 1 / self.sweep_s
+
+    @property
+    def noise_bandwidth_hz(self) -> float:
+        """Bandwidth (Hz) whose noise a value of Eq. 24 has: a subcarrier's, or the sample rate of an FMCW sweep."""
+        return self.symbol_rate_hz * (1 if self.sweep_s is None else self.subcarriers)
 
     @property
     def cell_m(self) -> float:

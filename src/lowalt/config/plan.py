@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from tarfile import BLOCKSIZE
 
+from lowalt.config.network import band
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError, instead
 
@@ -77,7 +78,7 @@ def sample_bytes(config: dict) -> int:
         data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
     elif kind == "cube":
         record += TRUTH_BYTES * symbols
-        data = 128 + CELL_BYTES[cell_type(config)] * symbols * config["network"]["subcarriers"]
+        data = 128 + CELL_BYTES[cell_type(config)] * symbols * band(config["network"])["subcarriers"]
     else:
         data = 128 + 8 * symbols
     whole = 2 * BLOCKSIZE + sum(size + -size % BLOCKSIZE for size in (record, data))

@@ -135,9 +135,10 @@ class SceneSample:
             late = late_samples(view)
 
         @cache
-        def on_air(name: str) -> np.ndarray:
+        def on_air(name: str) -> np.ndarray | None:
             """The subcarriers on the air at every instant of each symbol."""
-            return np.repeat(self.on_air(name), len(delays_s), axis=0)
+            aired = self.on_air(name)
+            return None if aired is None else np.repeat(aired, len(delays_s), axis=0)
 
         samples = np.zeros((len(moved.times_s), network.subcarriers), np.complex128)
         # Points that lose equally many samples of the window share one response.
@@ -250,14 +251,16 @@ class SceneSample:
         row = self.view.row
         return f"{row['subtype']}, model {row['model']}, station {self.view.station.name}"
 
-    def _data(self, name: str) -> np.ndarray:
-        """The data (N, M) of the stream of this name: QPSK unless an effect chooses them."""
+    def _data(self, name: str) -> np.ndarray | None:
+        """The data (N, M) of the stream of this name: QPSK unless an effect chooses them, none but in OFDM."""
         network = self.scene.network
+        if network.waveform != "ofdm":
+            return None
         for draw in offered(self.transmitter, "data").values():
             return draw(network.symbols, network.subcarriers, self.draws(name))
         return waveform.qpsk(self.draws(name), network.symbols, network.subcarriers)
 
-    def on_air(self, name: str) -> np.ndarray:
+    def on_air(self, name: str) -> np.ndarray | None:
         """Return the subcarriers (N, M) on the air whose data come of the stream of this name.
 
         They are the "waveform", the "previous waveform", the "next waveform", or those of another station.

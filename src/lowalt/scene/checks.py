@@ -1,5 +1,6 @@
 """Checks of a scene before any job starts: whether its effects fit its network, its noise and each other."""
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 from lowalt.config.network import Network
@@ -11,6 +12,14 @@ STILL = ("clutter", "background_channel", "transmit_leakage", "direct_path")
 """Effects that add something that stands still."""
 UNKNOWN_ON_LINKS = ("background_channel", "interference", "transmit_leakage")
 """Effects that are not modelled between two stations."""
+
+OF_OFDM = (
+    "data_symbols", "power_amplifier", "comb_pilots", "cyclic_prefix", "interference", "link_offset", "timing_offset",
+    "clock_offset", "carrier_offset",
+)  # fmt: skip
+"""Effects on OFDM's data, its prefix, or a receiver that does not mix with what is sent."""
+UNKNOWN_OF = {"ofdm": (), "fmcw": OF_OFDM, "cw": (*OF_OFDM, "symbol_motion", "clutter")}
+"""Effects that are not modelled with a waveform; a continuous wave has one sample and no range cells."""
 
 
 class CheckedScene(NamedTuple):
@@ -46,6 +55,7 @@ def check(config: dict) -> CheckedScene:
             f"effects: {refused} are not modelled between two stations, expected none of them in a network with the "
             f"links {links}"
         )
+    refuse_unknown_of(scene.network, scene.effects)
     if scene.network.guard_subcarriers < 0 and "interference" not in scene.effects:
         raise InputError(
             f"network.guard_subcarriers: {scene.network.guard_subcarriers}, sub-bands overlap, expected "
@@ -75,6 +85,16 @@ def check(config: dict) -> CheckedScene:
         if hasattr(effect.module, "check"):
             effect.module.check(effect.settings, scene)
     return scene
+
+
+def refuse_unknown_of(network: Network, names: Collection[str]) -> None:
+    """Raise InputError for effects of these names that are not modelled with the network's waveform."""
+    refused = [name for name in UNKNOWN_OF[network.waveform] if name in names]
+    if refused:
+        raise InputError(
+            f"effects: {refused} are not modelled with network.waveform of kind {network.waveform!r}, expected none of "
+            "them"
+        )
 
 
 def above_ground(effect: str, network: Network) -> None:

@@ -1,7 +1,7 @@
 """The levels of one sample at one station, as a link budget lists them: watts and gains in decibels.
 
-Powers are those of one subcarrier, as the echo's amplitudes are. A range cell is the mean of M subcarriers, so an echo
-keeps its level in its cell, while noise falls by 10 lg M.
+Powers are those of one subcarrier, or of one sample of an FMCW sweep, as the echo's amplitudes are. A range cell is the
+mean of M of them, so an echo keeps its level in its cell, while noise falls by 10 lg M.
 """
 
 import math
@@ -53,7 +53,7 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
     gains = [1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m))
              for end in ends.values()]  # fmt: skip
     budget = [
-        Level("transmit power, one subcarrier", dbm(network.power), "dBm"),
+        Level(f"transmit power, {_one(view)}", dbm(network.power), "dBm"),
         Level("transmit array", decibels(math.prod(network.transmit)), "dB"),
         Level("receive array", decibels(math.prod(network.receive)), "dB"),
         *(Level(f"element {name}", decibels(gain), "dBi") for name, gain in zip(ends, gains, strict=True)),
@@ -63,13 +63,19 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
     ]  # fmt: skip
     # A station's element counts twice.
     expected_dbm = sum(level.value for level in budget) + (0.0 if link else decibels(gains[0]))
+    whole = Level(f"transmit power, {network.subcarriers} subcarriers", dbm(network.power * network.subcarriers), "dBm")
     return [
-        Level(f"transmit power, {network.subcarriers} subcarriers", dbm(network.power * network.subcarriers), "dBm"),
+        *([whole] if network.waveform == "ofdm" else []),
         *budget,
         Level("expected echo", expected_dbm, "dBm"),
         Level("echo of this sample, mean |Y_bin|^2", dbm(echo_w), "dBm"),
         *_beside(view, {effect.name: effect for effect in effects}, 0.5 * (out_m + back_m), expected_dbm),
     ]
+
+
+def _one(view: View) -> str:
+    """What the echo's amplitudes are those of."""
+    return "one subcarrier" if view.network.waveform == "ofdm" else "one sample"
 
 
 def _beside(view: View, effects: dict[str, NamedEffect], range_m: float, expected_dbm: float) -> list[Level]:
@@ -89,19 +95,19 @@ def _beside(view: View, effects: dict[str, NamedEffect], range_m: float, expecte
     if "background_channel" in effects:
         effect = effects["background_channel"]
         usual_w = effect.module.usual_power(effect.settings, view)
-        result.append(Level("background, one subcarrier, median of draws", dbm(usual_w), "dBm"))
+        result.append(Level(f"background, {_one(view)}, median of draws", dbm(usual_w), "dBm"))
     if view.station.transmitter is not None and "direct_path" in effects:
         direct = effects["direct_path"].module.scatter(effects["direct_path"].settings, view, None)
-        result.append(Level("direct path, one subcarrier", dbm(float(np.mean(abs(direct) ** 2))), "dBm"))
+        result.append(Level(f"direct path, {_one(view)}", dbm(float(np.mean(abs(direct) ** 2))), "dBm"))
     if "transmit_leakage" in effects:
         leaked_dbm = dbm(network.power) - effects["transmit_leakage"].settings["isolation_db"]
-        result.append(Level("transmit leakage, one subcarrier", leaked_dbm, "dBm"))
+        result.append(Level(f"transmit leakage, {_one(view)}", leaked_dbm, "dBm"))
     if "receiver_noise" in effects:
         effect = effects["receiver_noise"]
-        noise_dbm = dbm(effect.module.variance(effect.settings, network.subcarrier_spacing_hz))
+        noise_dbm = dbm(effect.module.variance(effect.settings, network.noise_bandwidth_hz))
         cell_dbm = noise_dbm - decibels(network.subcarriers)
         result += [
-            Level("noise, one subcarrier", noise_dbm, "dBm"),
+            Level(f"noise, {_one(view)}", noise_dbm, "dBm"),
             Level("noise, one range cell", cell_dbm, "dBm"),
             Level("expected echo over noise, in a range cell", expected_dbm - cell_dbm, "dB"),
         ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.numerics.streams import stream
+from lowalt.scene.checks import refuse_unknown_of
 from lowalt.scene.effects import NamedEffect, offered, placed
 from lowalt.scene.view import Perturbations, View, located
 from lowalt.targets.cloud import Cloud
@@ -26,6 +27,9 @@ class Scene:
     seed: int
     tolerance: float | None
     effects: tuple[NamedEffect, ...]
+
+    def __post_init__(self) -> None:
+        refuse_unknown_of(self.network, [effect.name for effect in self.effects])
 
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""

@@ -1,7 +1,8 @@
-"""The OFDM waveform of a look: the data sent, the samples received, and the receiver's view of both.
+"""The waveform of a look: the data sent, the samples received, and the receiver's view of both.
 
-Samples are the complex baseband around the station's local oscillator, which stands at subcarrier M // 2 as in NR
-(3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept.
+Samples of OFDM are the complex baseband around the station's local oscillator, which stands at subcarrier M // 2 as in
+NR (3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept.
+Other radars send no data (None): they mix the echo with what they send, and subcarrier m of Eq. 24 is sample m.
 """
 
 from collections.abc import Callable
@@ -30,20 +31,24 @@ def qpsk(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray
     return QPSK[words.view(np.uint8)[:count] >> 6].reshape(symbols, subcarriers)
 
 
-def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
+def transmit(response: np.ndarray, data: np.ndarray | None) -> np.ndarray:
     """Return the received time samples (N, M) of frequency responses (N, M) that carried `data` (N, M).
 
     Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
-    response's. Source: 3GPP TS 38.211, 5.3.1.
+    response's; without data it is response[i] / sqrt(M). Source: 3GPP TS 38.211, 5.3.1.
     """
+    if data is None:
+        return response / np.sqrt(response.shape[-1])
     return fft.ifft(fft.ifftshift(response * data, axes=-1), axis=-1, overwrite_x=True)
 
 
-def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
+def demodulate(samples: np.ndarray, data: np.ndarray | None) -> np.ndarray:
     """Return the responses (N, M) of time samples (N, M) that carried `data` (N, M): the inverse of `transmit`.
 
     The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
     """
+    if data is None:
+        return samples * np.sqrt(samples.shape[-1])
     return fft.fftshift(fft.fft(samples, axis=-1), axes=-1) / data
 
 
@@ -63,7 +68,7 @@ def baseband_hz(network: Network) -> np.ndarray:
 
 
 def windowed(
-    network: Network, prefix_s: float, response: np.ndarray, late: int, on_air: Callable[[str], np.ndarray]
+    network: Network, prefix_s: float, response: np.ndarray, late: int, on_air: Callable[[str], np.ndarray | None]
 ) -> np.ndarray:
     """Return the time samples (N, M) of a response (N, M) whose first `late` samples are still the previous symbol's.
 
@@ -85,9 +90,9 @@ class Look:
 
     network: Network
     station: Station
-    data: np.ndarray
-    """(N, M) complex128, the data, of mean power one."""
-    aired: np.ndarray
+    data: np.ndarray | None
+    """(N, M) complex128, the data, of mean power one; None where the waveform has none."""
+    aired: np.ndarray | None
     """(N, M) subcarriers on the air: the data, as an amplifier distorts them."""
     times_s: np.ndarray
     """(N,) s, start of each symbol's useful part."""
@@ -98,12 +103,17 @@ class Look:
 
     @property
     def sample_s(self) -> float:
-        """Time between two samples, 1 / (M df) (s)."""
+        """Time between two samples, of OFDM 1 / (M df) (s)."""
+        return 1 / (self.network.subcarriers * self.network.symbol_rate_hz)
+
+    @property
+    def cell_s(self) -> float:
+        """Delay of a range cell, 1 / (M df) (s)."""
         return 1 / (self.network.subcarriers * self.network.subcarrier_spacing_hz)
 
     @cached_property
     def within_s(self) -> np.ndarray:
-        """Time i / (M df) of each sample in its symbol (s), shape (M,)."""
+        """Time of each sample from its symbol's beginning (s), shape (M,)."""
         return np.arange(self.network.subcarriers) * self.sample_s
 
     @cached_property

@@ -61,7 +61,7 @@ def choose(settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rn
     gate, alpha = np.arange(-settings["gate_cells"], settings["gate_cells"] + 1), settings["gain"]
     beta = alpha * alpha / (2.0 - alpha)
     error_s = 2 * settings["range_error_m"] / SPEED_OF_LIGHT * rng.standard_normal()
-    place, rate, result = (look.delay_s + error_s) / look.sample_s, 0.0, np.empty(len(cells), np.int64)
+    place, rate, result = (look.delay_s + error_s) / look.cell_s, 0.0, np.empty(len(cells), np.int64)
     for n, powers in enumerate(allowed):
         place += rate
         middle = int(np.floor(place + 0.5))

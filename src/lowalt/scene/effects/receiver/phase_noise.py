@@ -54,11 +54,11 @@ def check(settings: dict, scene: CheckedScene) -> None:
         offsets = [offset for offset, _ in settings[key]]
         if not offsets or offsets[0] <= 0 or any(later <= earlier for earlier, later in pairwise(offsets)):
             raise InputError(f"effects.phase_noise.{key}: offsets {offsets}, expected positive and rising (Hz)")
-    least_s = 4 * SPLIT / (scene.network.subcarriers * scene.network.subcarrier_spacing_hz)
+    least_s = 4 * SPLIT / (scene.network.subcarriers * scene.network.symbol_rate_hz)
     if scene.network.symbol_interval_s < least_s:
         raise InputError(
             f"effects.phase_noise: network.symbol_interval_s is {scene.network.symbol_interval_s:g}, expected at least "
-            f"{4 * SPLIT} samples of 1 / (M df), {least_s:g}"
+            f"{4 * SPLIT} samples, {least_s:g}"
         )
 
 
@@ -120,8 +120,8 @@ def phase(settings: dict, look: Look, rng: np.random.Generator) -> np.ndarray:
     shared: transmitter and receiver have one oscillator, so that phi(t) - phi(t - tau) is left, with the delay tau of
     the target's reference point; all echoes are taken to have it. On a link two oscillators add their noise.
     """
-    network, (symbols, samples) = look.network, look.data.shape
-    spacing, interval_s = network.subcarrier_spacing_hz, network.symbol_interval_s
+    network, symbols, samples = look.network, len(look.times_s), look.network.subcarriers
+    spacing, interval_s = network.symbol_rate_hz, network.symbol_interval_s
     line_hz, turns, blend = slow_grid(symbols, interval_s, 1 / spacing, samples)
     frequency, width, cosines = fast_grid(SPLIT / interval_s, spacing, samples)
     slow_power = 2 * density(settings, line_hz) * line_hz[0]

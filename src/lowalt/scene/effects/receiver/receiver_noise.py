@@ -20,17 +20,18 @@ def idle(settings: dict) -> bool:
     return settings["temperature_k"] == 0
 
 
-def variance(settings: dict, spacing_hz: float) -> float:
-    """Return the noise power k T df F of one subcarrier (W); a range cell, the mean of M subcarriers, has 1/M of it."""
-    return BOLTZMANN * settings["temperature_k"] * spacing_hz * 10 ** (settings["noise_figure_db"] / 10)
+def variance(settings: dict, bandwidth_hz: float) -> float:
+    """Return the noise power k T B F of one subcarrier (W); a range cell, the mean of M subcarriers, has 1/M of it."""
+    return BOLTZMANN * settings["temperature_k"] * bandwidth_hz * 10 ** (settings["noise_figure_db"] / 10)
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return samples (N, M) plus circular white Gaussian noise, k T df F a subcarrier.
 
     A subcarrier is the sum of M samples and a range cell the mean of M subcarriers: both a sample and a cell have 1/M
-    of a subcarrier's noise. Unit-norm receive weights leave one antenna's noise; the link budget's power is the
-    network's `power_w` a subcarrier. Source: Friis 1944 (noise figure).
+    of a subcarrier's noise. A sample of an FMCW sweep takes a subcarrier's place, and the sample rate that of df.
+    Unit-norm receive weights leave one antenna's noise; the link budget's power is the network's `power_w` a
+    subcarrier. Source: Friis 1944 (noise figure).
     """
-    power = variance(settings, look.network.subcarrier_spacing_hz) / look.network.subcarriers
+    power = variance(settings, look.network.noise_bandwidth_hz) / look.network.subcarriers
     return samples + white(rng, power, samples.shape)
