@@ -55,4 +55,5 @@ def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
         panel.set_ylabel(axes.upwards[0] if cells or not column else "", fontsize=8)
         panel.set_xlabel(axes.across[0] if cells or row == shape[0] - 1 else "", fontsize=8)
         panel.tick_params(labelsize=7)
+        panel.locator_params(axis="x", nbins=6)
     return png(drawn)
