@@ -45,10 +45,7 @@ def read_obj(path: Path) -> list[Piece]:
         except (ValueError, OverflowError) as error:
             raise InputError(f"{path}: line {number}: {line.strip()[:60]!r} cannot be read ({error})") from None
     vertices = np.array(places, float).reshape(-1, 3)
-    try:
-        faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
-    except OverflowError as error:
-        raise InputError(f"{path}: {error}") from None
+    faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
     owner, pieces = np.array(owners, int)[polygon], []
     # trimesh's own names of materials, from the last to the first, which records may have.
     base = next((names[0] for names in keys if names[0]), path.name)

@@ -12,7 +12,7 @@ import numpy as np
 
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import existing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
 from lowalt.targets.mocap_motion import Motion
 from lowalt.targets.skeleton import NODES, PARENTS, rotation, stature_m
@@ -129,7 +129,7 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
     stack: list[str] = []
     joints: list[tuple[str, str, np.ndarray, list[str]]] = []
     words = iter(re.sub(r"#.*", "", head).split())
-    try:
+    with reading(path, "BVH motion"):
         for word in words:
             if word in ("ROOT", "JOINT", "End"):
                 name = next(words)  # after End the word Site
@@ -149,8 +149,6 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
         if not (frames and 1e-5 <= step <= 1 and len(values) == frames * width and np.isfinite(values).all()):
             raise ValueError(f"{len(values)} finite numbers, expected {frames} frames of {width}, {step} s apart")
         places = _followed(joints, values.reshape(frames, width))
-    except (ValueError, TypeError, IndexError, KeyError, StopIteration, OverflowError, RuntimeError) as error:
-        raise InputError(f"{path}: not a readable BVH motion ({type(error).__name__}: {error})") from None
     return places, 1 / step
 
 

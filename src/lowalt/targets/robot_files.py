@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
 from lowalt.targets.robot_geometry import DEEPEST, Files, Robot, numbers, place_of, primitive, shown
 from lowalt.targets.robot_mjcf import mjcf
@@ -208,17 +208,13 @@ def read_robot(path: Path, inputs: Path) -> Robot:
     files = Files(inputs)
     links = _Links(files)
     readers = {"robot": links.urdf, "sdf": links.sdf, "gazebo": links.sdf, "mujoco": partial(mjcf, files=files)}
-    try:
+    with reading(path, "description"):
         root = files.parsed(path)
         if root.tag not in readers:
             raise ValueError(f"<{root.tag}>, expected one of {sorted(readers)}")
         if any("xacro" in str(item.tag) or re.search(r"\$[{(]|\{\{", str(item.attrib)) for item in root.iter()):
             raise ValueError(f"it holds macros, expected what they expand to: {TEMPLATES['.xacro']}")
         robot = readers[root.tag](root, path.resolve().parent)
-    except InputError as error:
-        raise InputError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
-    except (ValueError, LookupError, AttributeError, TypeError, ArithmeticError, OSError, RecursionError) as error:
-        raise InputError(f"{path}: not a readable description ({type(error).__name__}: {error})") from None
     surfaces = [triangles for of_link in robot.surfaces.values() for triangles in of_link]
     if not sum(map(len, surfaces)) or not all(np.isfinite(triangles).all() for triangles in surfaces):
         raise InputError(f"{path}: no surface of finite places, expected links with visual geometry")
