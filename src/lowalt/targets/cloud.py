@@ -213,8 +213,7 @@ def read(path: str | Path) -> Cloud:
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
         record = json.loads(str(arrays.pop("record")))
-        kinds = tuple(str(value) for value in arrays.pop("kinds"))
-        names = tuple(str(value) for value in arrays.pop("names"))
+        kinds, names = (tuple(map(str, arrays.pop(name))) for name in ("kinds", "names"))
         cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a cloud file ({error})") from error
