@@ -34,9 +34,9 @@ from lowalt.tiles.settings import Images
 
 def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
     """Refuse groups and folds that no data set has. Raises: InputError naming them."""
-    for what, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
+    for option, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
         if set(names) - set(known):
-            raise InputError(f"{what} {names}, expected some of {known}")
+            raise InputError(f"{option} {names}, expected some of {known}")
 
 
 class ShardSet:

@@ -81,10 +81,10 @@ class Cloud:
         return [index for index, name in enumerate(self.kinds) if name == kind]
 
 
-def _need(good: bool, what: str) -> None:
-    """Raise InputError with the message `what` unless `good`."""
+def _need(good: bool, message: str) -> None:
+    """Raise InputError with the message unless `good`."""
     if not good:
-        raise InputError(what)
+        raise InputError(message)
 
 
 def _near(places: np.ndarray) -> bool:

@@ -33,15 +33,15 @@ def check(section: str, record: dict, where: str) -> None:
     """
     from lowalt.config.schema import faults  # slow to import, and a cloud is made without it
 
-    if found := faults(record, {"$defs": schema()["$defs"], **schema()["sources"][section]}, "record"):
-        raise InputError(f"{where}: {found[0]}")
+    if wrong := faults(record, {"$defs": schema()["$defs"], **schema()["sources"][section]}, "record"):
+        raise InputError(f"{where}: {wrong[0]}")
 
 
 def figures(model: str) -> dict[str, str]:
     """Return the figures that a built-in model needs by name, each a length, ratio, offset, count or whole number."""
     sets = [schema()["figures"][item] if isinstance(item, str) else item
             for item in schema()["models"][model]["figures"]]  # fmt: skip
-    return {name: kind for each in sets for name, kind in each.items()}
+    return {name: kind for needed in sets for name, kind in needed.items()}
 
 
 def record_files(record: dict) -> list[str]:
