@@ -128,7 +128,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
     name_backbone(line)
     options = line.parse_args(arguments)
-    from lowalt.recognition.sources import Source
+    from lowalt.recognition.sample_sources import Source
 
     trained = load(options.model, options.backbone)
     pairs = folds(trained.protocol, "validation")

@@ -8,7 +8,7 @@ from lowalt.config.network import Network
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 from lowalt.noise.__main__ import load_echoes, load_powers
-from lowalt.shards.record import npy
+from lowalt.shards.sample_record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.shards.write import Content
 from lowalt.tiles.cubes import Cubes

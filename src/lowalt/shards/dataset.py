@@ -26,8 +26,8 @@ from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import refuse_unknown
-from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
+from lowalt.shards.sample_record import accompanied, record, sample_key
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import records_of

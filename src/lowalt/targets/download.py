@@ -10,8 +10,8 @@ import hashlib
 from pathlib import Path
 
 from lowalt.config.command import run
-from lowalt.files.download import download, fetch_each
 from lowalt.files.errors import InputError
+from lowalt.files.pinned_download import download, fetch_each
 from lowalt.files.yaml_files import load_yaml
 
 OFFICIAL = "http://mocap.cs.cmu.edu/subjects"
