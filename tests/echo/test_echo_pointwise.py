@@ -1,7 +1,6 @@
 """The pointwise kernel by the interpreter: every point's amplitude and range, cells and paths."""
 
 import math
-from types import SimpleNamespace
 
 import mpmath
 import numpy as np
@@ -16,7 +15,7 @@ from small_echo import TAU, pieces, places, prepared, seen
 
 TERMS = interpreted(terms.terms)
 NO_PATHS = results.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
-MATRIX = interpreted(results.matrix)
+MATRIX, ROOM = interpreted(results.matrix), interpreted(results.room)
 
 
 def shuffled(motion):
@@ -41,8 +40,8 @@ def test_every_point_s_amplitude_range_and_risk_are_those_of_the_paper(kind):
     view = seen(there, motion)
     away = np.linalg.norm((places(motion) - places_of_reference(motion)).astype(float), axis=-1)
     for n in range(2):
-        e, z, u, risk = np.empty((count, 3)), np.empty(count, complex), np.empty(count), np.empty(count)
-        assert TERMS(there.scene, there.radio, there.refs[n], n, there.aims, e, z, u, risk) == 0
+        e, z, u, risk = points = ROOM(there.scene, NO_PATHS)
+        assert TERMS(there.scene, there.radio, there.refs[n], n, there.aims, points) == 0
         peak = there.peak * np.sqrt(weights(count)) / view.range_m[n].astype(float) ** 2
         assert (abs(z - wanted[n]) < 2e-13 * peak).all()
         assert abs(u - (cells[n] - there.refs[n, CELL])).max() < 1e-14 * 30
@@ -61,8 +60,8 @@ def test_the_first_point_in_the_station_is_named():
     motion = MOTIONS["points"].copy()
     motion[1, [3, 5]] = (4.0, -7.0, 25.0)
     there = prepared(motion)
-    room = np.empty((28, 3)), np.empty(28, complex), np.empty(28), np.empty(28)
-    found = [TERMS(there.scene, there.radio, there.refs[n], n, there.aims, *room) for n in range(2)]
+    points = ROOM(there.scene, NO_PATHS)
+    found = [TERMS(there.scene, there.radio, there.refs[n], n, there.aims, points) for n in range(2)]
     assert found == [0, 4]
     for cells, out in ((True, np.empty((2, 64), complex)), (False, np.empty((2, 64), complex))):
         assert MATRIX(there.scene, there.radio, there.refs, there.aims, NO_PATHS, cells, out) == 28 + 4
@@ -183,14 +182,11 @@ def test_a_path_s_gain_weighs_each_point_s_own_risk():
     motion = MOTIONS["points"]
     there = prepared(motion, weights(28))
     gains = np.random.default_rng(1).uniform(1, 2, (2, 1, 28)) * np.array([1, -1j])[:, None, None]
-    room = np.empty((28, 3)), np.empty(56, complex), np.empty(56), np.empty(56)
-    symbol = interpreted(results.symbol)
-    symbol(there.scene, there.radio, there.refs[1], 1, there.aims, results.Paths(np.zeros((2, 1, 1)), gains), *room)
-    alone = SimpleNamespace(risk=np.empty(28))
-    TERMS(
-        there.scene, there.radio, there.refs[1], 1, there.aims, room[0], np.empty(28, complex), np.empty(28), alone.risk
-    )
-    np.testing.assert_allclose(room[3].reshape(2, 28), alone.risk * abs(gains[:, 0]), rtol=1e-13)
+    paths = results.Paths(np.zeros((2, 1, 1)), gains)
+    over_paths, alone = ROOM(there.scene, paths), ROOM(there.scene, NO_PATHS)
+    interpreted(results.symbol)(there.scene, there.radio, there.refs[1], 1, there.aims, paths, over_paths)
+    TERMS(there.scene, there.radio, there.refs[1], 1, there.aims, alone)
+    np.testing.assert_allclose(over_paths.risk.reshape(2, 28), alone.risk * abs(gains[:, 0]), rtol=1e-13)
 
 
 def test_without_paths_all_cells_and_subcarriers_are_those_of_the_direct_one():
