@@ -139,6 +139,11 @@ def test_no_name_of_a_class_stands_for_two_things():
     assert not {name for name, count in defined.items() if count > 1}
 
 
+def test_no_base_name_of_a_module_stands_for_two_modules():
+    names = Counter(path.name for path in python_files("src/lowalt") if not path.name.startswith("__"))
+    assert not {name for name, count in names.items() if count > 1}
+
+
 def test_no_tracked_file_is_large_or_names_this_machine():
     tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
     if tracked.returncode:

@@ -75,15 +75,6 @@ def strongest(z, u, base, count, sums):
 
 
 @PLAIN
-def shift(z, u, l, radar, delay, gain):  # noqa: E741
-    """Return amplitude and range in cells of point l over a path `delay` (s) longer and `gain` times as strong."""
-    turn = radar.centre_hz * delay
-    turn -= np.rint(turn)
-    later = complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
-    return z[l] * gain * later, u[l] + radar.bandwidth_hz * delay
-
-
-@PLAIN
 def room(scene, paths):
     """Return empty `PointTerms` for the points of a scene over all paths."""
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
@@ -105,7 +96,10 @@ def symbol(scene, radar, ref, n, aims, paths, out):
         for l in range(count):  # noqa: E741
             delay = paths.delays[k, n % paths.delays.shape[1], l % paths.delays.shape[2]]
             gain = paths.gains[k, n % paths.gains.shape[1], l % paths.gains.shape[2]]
-            z[k * count + l], u[k * count + l] = shift(z, u, l, radar, delay, gain)
+            turn = radar.centre_hz * delay
+            turn -= np.rint(turn)
+            later = complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
+            z[k * count + l], u[k * count + l] = z[l] * gain * later, u[l] + radar.bandwidth_hz * delay
             risk[k * count + l] = risk[l] * abs(gain)
     return 0
 
@@ -117,14 +111,14 @@ def signal(scene, radar, refs, symbols, aims, paths, found, risks):
     Returns 0, or n L + l + 1 where point l stands in the station at symbol n.
     """
     points, sums = room(scene, paths), np.empty((radar.subcarriers, 2))
-    z, u = points.z, points.u
     for n in symbols:
         fault = symbol(scene, radar, refs[n], n, aims, paths, points)
         if fault:
             return n * len(points.e) + fault
         base = int(refs[n, CELL])
-        found.values[n], found.cells[n], found.ties[n], found.gaps[n] = strongest(z, u, base, radar.subcarriers, sums)
-        found.totals[n], risks[n] = np.abs(z).sum(), points.risk.sum()
+        answer = strongest(points.z, points.u, base, radar.subcarriers, sums)
+        found.values[n], found.cells[n], found.ties[n], found.gaps[n] = answer
+        found.totals[n], risks[n] = np.abs(points.z).sum(), points.risk.sum()
     return 0
 
 
