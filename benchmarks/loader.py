@@ -32,7 +32,7 @@ from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet
 from lowalt.shards.index import build
-from lowalt.shards.record import npy
+from lowalt.shards.sample_record import npy
 from lowalt.shards.sample_table import map_samples, table_path
 from lowalt.shards.verify import shard_faults
 from lowalt.shards.write import ChunkSamples, write_shard

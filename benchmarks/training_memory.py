@@ -16,7 +16,7 @@ from torch._subclasses.fake_tensor import FakeTensorMode
 
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import network
+from lowalt.recognition import recogniser
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.objective import descent
 from lowalt.recognition.recipe import check
@@ -45,9 +45,9 @@ def kept_bytes(config: dict, accumulate: int, again: bool) -> tuple[int, int]:
         held[storage._cdata] = storage.nbytes()
         return value
 
-    model = network.Recogniser(scheme, {**block["network"], "weights": "none"}, block["size"], palettes, 4).train()
+    model = recogniser.Recogniser(scheme, {**block["network"], "weights": "none"}, block["size"], palettes, 4).train()
     if again:
-        network.checkpoint_activations(model)
+        recogniser.checkpoint_activations(model)
     with FakeTensorMode(allow_non_fake_inputs=True) as fake:
         states = [fake.from_tensor(value) for value in (*model.parameters(), *model.buffers())]
         own = {value.untyped_storage()._cdata for value in states}

@@ -10,11 +10,10 @@ import posixpath
 import re
 from pathlib import Path
 
+from key_pages import configuration_page, records_page
 from mkdocs.structure.files import File
 
-from lowalt.config import schema_page
 from lowalt.files.yaml_files import load_yaml
-from lowalt.targets import record_schema
 
 ROOT = Path(__file__).parents[1]
 DOCS = "docs/"
@@ -72,12 +71,8 @@ def pages(nav: list | dict | str) -> list[str]:
 
 def on_files(files, config):
     """Add the navigation's pages that lie outside docs/, and the files to which any page links."""
-    made = {
-        CONFIGURATION: schema_page.page(load_yaml(ROOT / CONFIGURATION)),
-        RECORDS: record_schema.page(record_schema.schema()),
-    }
-    for schema, text in made.items():
-        files.append(File.generated(config, KEYS[schema], content=text))
+    for schema, page in ((CONFIGURATION, configuration_page), (RECORDS, records_page)):
+        files.append(File.generated(config, KEYS[schema], content=page(load_yaml(ROOT / schema))))
     named = [in_repository(uri) for uri in pages(config.nav) if uri not in KEYS.values()]
     wanted = set(named)
     for name in named:

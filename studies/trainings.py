@@ -10,8 +10,8 @@ from typing import NamedTuple
 from lowalt.config.layers import load
 from lowalt.recognition import runs, tables
 from lowalt.recognition.evaluated import Evaluated
-from lowalt.recognition.network import built
 from lowalt.recognition.protocols import evaluated_folds, folds
+from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, ViewSamples
 from lowalt.recognition.schemes import Scheme
 from lowalt.shards import ShardSet

@@ -20,7 +20,7 @@ import numpy as np
 from lowalt.config.layers import load
 from lowalt.numerics.streams import stream
 from lowalt.motion.drawing import draw, region_polygon
-from lowalt.noise.chunk import noisy_signals
+from lowalt.noise.noisy_signals import noisy_signals
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 from lowalt.tiles.render import Renderer

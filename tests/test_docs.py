@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from key_pages import configuration_page
 
 from lowalt.__main__ import main
-from lowalt.config import schema_page
 from lowalt.config.layers import load
 from lowalt.files.errors import InputError
 from lowalt.scene.effects import PLACES
@@ -181,12 +181,12 @@ def test_every_effect_stands_on_the_page_of_scenes():
 def test_the_page_of_keys_says_type_range_and_meaning_of_inner_keys():
     inner = {"type": ["number", "null"], "minimum": 2, "description": "a | b"}
     block = {"type": "object", "description": "things", "additionalProperties": {"properties": {"far_m": inner}}}
-    text = schema_page.page({"properties": {"seed": {"type": "integer", "description": "root"}, "sites": block}})
+    text = configuration_page({"properties": {"seed": {"type": "integer", "description": "root"}, "sites": block}})
     assert "| `seed` | integer | root |\n" in text
     assert "## sites\n\nThings.\n" in text
     assert "| `NAME.far_m` | number or null, at least 2 | a \\| b |\n" in text
     with pytest.raises(InputError, match="properties"):
-        schema_page.page({"type": "object"})
+        configuration_page({"type": "object"})
 
 
 def test_links_lead_to_the_same_files_in_the_site_as_in_the_repository(monkeypatch):

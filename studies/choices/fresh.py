@@ -17,7 +17,7 @@ from lowalt.recognition.made import stations_of, views_of
 from lowalt.recognition.samples import Facts, Samples, fingerprint
 from lowalt.recognition.schemes import columns_in
 from lowalt.shards.dataset import Dataset, Place
-from lowalt.shards.record import sample_key
+from lowalt.shards.sample_record import sample_key
 from lowalt.spectra.catalogue import named
 
 STRIDE = 2**31

@@ -32,11 +32,11 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.numerics.streams import stream
 from lowalt.recognition.fusion import FUSIONS, AttentionFusion
-from lowalt.recognition.network import Recogniser
+from lowalt.recognition.recogniser import Recogniser
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.schemes import SPECTRA, Scheme
 from lowalt.shards import ShardSet
-from lowalt.shards.record import row_of
+from lowalt.shards.sample_record import row_of
 from lowalt.tiles import colour_map
 
 SCALE_M = 50.0
@@ -178,5 +178,5 @@ class HeightRecogniser(Recogniser):
 
 
 def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) -> HeightRecogniser:
-    """Return a network with fresh weights; arguments as of `lowalt.recognition.network.built`."""
+    """Return a network with fresh weights; arguments as of `lowalt.recognition.recogniser.built`."""
     return HeightRecogniser(scheme, block, size, np.stack([colour_map(colours)] * len(SPECTRA)), classes)

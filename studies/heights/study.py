@@ -17,7 +17,7 @@ from heights import Heights, built, of_run
 
 import trainings
 from lowalt.config.command import run
-from lowalt.recognition.network import built as plain
+from lowalt.recognition.recogniser import built as plain
 from lowalt.recognition.samples import Samples, joined_sources
 from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named
 

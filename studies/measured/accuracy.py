@@ -21,8 +21,8 @@ from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recordings.library import Library
 from lowalt.recordings.twin_network import Windows, facts, rendered, simulated, train
 from lowalt.tiles import join
+from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import encode
-from lowalt.tiles.settings import Images
 
 RECOGNITION = ("radar", "seed", "set", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
 ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")

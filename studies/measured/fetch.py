@@ -12,8 +12,8 @@ from pathlib import Path
 
 from lowalt.config.command import run
 from lowalt.files.atomic import sha256
-from lowalt.files.download import download, fetch_each
 from lowalt.files.errors import InputError
+from lowalt.files.pinned_download import download, fetch_each
 from lowalt.files.yaml_files import load_yaml
 
 SOURCES = Path(__file__).with_name("sources.yaml")

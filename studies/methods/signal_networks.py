@@ -13,7 +13,7 @@ from torch import nn
 from lowalt.config.command import pick
 from lowalt.files.errors import InputError
 from lowalt.recognition.fusion import Fused, encoder
-from lowalt.recognition.network import KEYS
+from lowalt.recognition.recogniser import KEYS
 from lowalt.recognition.schemes import Scheme
 
 # Channels, symbols of the kernel and symbols from output to output of each layer.

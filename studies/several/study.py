@@ -24,8 +24,8 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.numerics.streams import stream
 from lowalt.recognition import schemes
 from lowalt.recognition.augment import augment
-from lowalt.recognition.network import built
 from lowalt.recognition.protocols import folds
+from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Facts
 from lowalt.scene.effects.channel.companions import listed
 from lowalt.shards import ShardSet

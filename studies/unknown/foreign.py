@@ -7,7 +7,7 @@ import numpy as np
 
 import trainings
 from lowalt import Dataset
-from lowalt.noise.chunk import noisy_signals
+from lowalt.noise.noisy_signals import noisy_signals
 from lowalt.numerics.streams import stream
 from lowalt.recognition import samples
 from lowalt.recognition.made import DatasetSamples

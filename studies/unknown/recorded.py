@@ -39,7 +39,7 @@ from lowalt.recordings.record import Record
 from lowalt.recordings.scenes import MARGIN, samples, stretch
 from lowalt.recordings.twin import Twin
 from lowalt.recordings.windows import at_symbol_rate
-from lowalt.tiles.settings import Images
+from lowalt.tiles.image_settings import Images
 
 FOLDER = Path("config/measured")
 SCORES = {"largest probability": rejection.probability, "energy": rejection.energy}

@@ -16,7 +16,7 @@ from lowalt.numerics.streams import digest
 from lowalt.shards import ShardSet, index
 from lowalt.shards import write as shard_module
 from lowalt.shards.dataset import Dataset
-from lowalt.shards.record import sample_key
+from lowalt.shards.sample_record import sample_key
 from lowalt.shards.sample_table import SAMPLE, map_samples, table_path
 from lowalt.shards.tar import Writer
 from lowalt.targets.records import records_of

@@ -12,8 +12,8 @@ from lowalt.echo.fast.cell_kernel import PLACES, cell_polynomials
 from lowalt.echo.fast.error_model import pointwise_bound
 from lowalt.echo.fast.range_bounds import norm
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
-from lowalt.echo.pointwise import sums as sums_of_points
-from lowalt.echo.pointwise.sums import far_bound
+from lowalt.echo.pointwise import results
+from lowalt.echo.pointwise.results import far_bound
 from lowalt.echo.pointwise.terms import cell_sum
 from lowalt.echo.radar import Exact, constants
 
@@ -86,8 +86,8 @@ def test_cells_are_added_by_eights_before_all_of_them_are_computed(monkeypatch):
     )
     amplitudes = np.linalg.svd(cells[32:34])[2][-1].conj()
     sums = np.full((count, 2), np.nan)
-    monkeypatch.setattr(sums_of_points, "strongest_of", sums_of_points.strongest_of.py_func)
-    value, cell, _, lead = sums_of_points.strongest.py_func(amplitudes, places, 0, count, sums)
+    monkeypatch.setattr(results, "strongest_of", results.strongest_of.py_func)
+    value, cell, _, lead = results.strongest.py_func(amplitudes, places, 0, count, sums)
     truth = abs(cells @ amplitudes)
     assert truth[32:34].max() < 1e-12 * truth.max() and cell == (truth.argmax() - 32) % count
     assert abs(value) == pytest.approx(truth.max(), rel=1e-12) and 0 <= lead <= np.diff(np.sort(truth)[-2:]) + 1e-12

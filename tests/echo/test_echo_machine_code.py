@@ -10,7 +10,7 @@ import pytest
 import lowalt
 from forks import printed
 from lowalt.echo.fast.driver import run
-from lowalt.echo.pointwise.sums import matrix
+from lowalt.echo.pointwise.results import matrix
 from lowalt.machine.jit import INNER, LEAN, _DigestCache, digest
 
 PROGRAM = """
@@ -27,7 +27,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(package).parent))
 from lowalt.machine.jit import digest
 from lowalt.echo.fast.driver import run
-from lowalt.echo.pointwise.sums import matrix
+from lowalt.echo.pointwise.results import matrix
 path.write_text(kept)
 print(digest(run.py_func), digest(matrix.py_func))
 """

@@ -1,7 +1,6 @@
 """The pointwise kernel by the interpreter: every point's amplitude and range, cells and paths."""
 
 import math
-from types import SimpleNamespace
 
 import mpmath
 import numpy as np
@@ -10,12 +9,13 @@ import pytest
 from driven_echo import truth_of, weights
 from interpreted import interpreted
 from lowalt.echo.fast.workspace import Found
-from lowalt.echo.pointwise import reference_range, sums, terms
+from lowalt.echo.pointwise import reference_range, results, terms
 from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN
 from small_echo import TAU, pieces, places, prepared, seen
 
 TERMS = interpreted(terms.terms)
-NO_PATHS = sums.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
+NO_PATHS = results.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
+MATRIX, ROOM = interpreted(results.matrix), interpreted(results.room)
 
 
 def shuffled(motion):
@@ -40,8 +40,8 @@ def test_every_point_s_amplitude_range_and_risk_are_those_of_the_paper(kind):
     view = seen(there, motion)
     away = np.linalg.norm((places(motion) - places_of_reference(motion)).astype(float), axis=-1)
     for n in range(2):
-        e, z, u, risk = np.empty((count, 3)), np.empty(count, complex), np.empty(count), np.empty(count)
-        assert TERMS(there.scene, there.radio, there.refs[n], n, there.aims, e, z, u, risk) == 0
+        e, z, u, risk = points = ROOM(there.scene, NO_PATHS)
+        assert TERMS(there.scene, there.radio, there.refs[n], n, there.aims, points) == 0
         peak = there.peak * np.sqrt(weights(count)) / view.range_m[n].astype(float) ** 2
         assert (abs(z - wanted[n]) < 2e-13 * peak).all()
         assert abs(u - (cells[n] - there.refs[n, CELL])).max() < 1e-14 * 30
@@ -60,15 +60,13 @@ def test_the_first_point_in_the_station_is_named():
     motion = MOTIONS["points"].copy()
     motion[1, [3, 5]] = (4.0, -7.0, 25.0)
     there = prepared(motion)
-    room = np.empty((28, 3)), np.empty(28, complex), np.empty(28), np.empty(28)
-    found = [TERMS(there.scene, there.radio, there.refs[n], n, there.aims, *room) for n in range(2)]
+    points = ROOM(there.scene, NO_PATHS)
+    found = [TERMS(there.scene, there.radio, there.refs[n], n, there.aims, points) for n in range(2)]
     assert found == [0, 4]
     for cells, out in ((True, np.empty((2, 64), complex)), (False, np.empty((2, 64), complex))):
-        assert (
-            interpreted(sums.matrix)(there.scene, there.radio, there.refs, there.aims, NO_PATHS, cells, out) == 28 + 4
-        )
+        assert MATRIX(there.scene, there.radio, there.refs, there.aims, NO_PATHS, cells, out) == 28 + 4
     risks = np.zeros(2)
-    signal = interpreted(sums.signal)
+    signal = interpreted(results.signal)
     assert (
         signal(there.scene, there.radio, there.refs, np.arange(2), there.aims, NO_PATHS, Found.empty(2), risks)
         == 28 + 4
@@ -148,7 +146,7 @@ def test_paths_delay_and_weaken_every_point_s_wave(kind):
     there = prepared(motion, weights(28))
     delays = rng.uniform(0, 3e-7, PATHS[kind][0])
     gains = rng.normal(size=PATHS[kind][1]) + 1j * rng.normal(size=PATHS[kind][1])
-    paths = sums.Paths(delays, gains)
+    paths = results.Paths(delays, gains)
     z, cells, _ = truth_of(there, motion)
     net, number = there.net, np.arange(64)
     centre = 5.2e9 + 31.5 * 120e3
@@ -159,15 +157,15 @@ def test_paths_delay_and_weaken_every_point_s_wave(kind):
     wanted = (waves * weight).sum((1, 3)).T
     out = np.full((2, 64), np.nan + 0j)
     arguments = there.scene, there.radio, there.refs, there.aims, paths
-    assert interpreted(sums.matrix)(*arguments, False, out) == 0
+    assert MATRIX(*arguments, False, out) == 0
     scale = abs(wanted).max()
     assert abs(out - wanted).max() < 1e-11 * scale
-    assert interpreted(sums.matrix)(*arguments, True, out) == 0
+    assert MATRIX(*arguments, True, out) == 0
     inverse = np.exp(2j * np.pi * (np.outer(number, number) % 64) / 64) / 64
     truth = (wanted @ inverse).astype(complex)
     assert abs(out - truth).max() < 1e-11 * scale
     found, risks = Found.empty(2), np.zeros(2)
-    signal = interpreted(sums.signal)
+    signal = interpreted(results.signal)
     assert signal(there.scene, there.radio, there.refs, np.array([1, 0]), there.aims, paths, found, risks) == 0
     best = abs(truth).argmax(1)
     assert (found.cells == best).all() and abs(found.values - truth[[0, 1], best]).max() < 1e-11 * scale
@@ -184,14 +182,11 @@ def test_a_path_s_gain_weighs_each_point_s_own_risk():
     motion = MOTIONS["points"]
     there = prepared(motion, weights(28))
     gains = np.random.default_rng(1).uniform(1, 2, (2, 1, 28)) * np.array([1, -1j])[:, None, None]
-    room = np.empty((28, 3)), np.empty(56, complex), np.empty(56), np.empty(56)
-    symbol = interpreted(sums.symbol)
-    symbol(there.scene, there.radio, there.refs[1], 1, there.aims, sums.Paths(np.zeros((2, 1, 1)), gains), *room)
-    alone = SimpleNamespace(risk=np.empty(28))
-    TERMS(
-        there.scene, there.radio, there.refs[1], 1, there.aims, room[0], np.empty(28, complex), np.empty(28), alone.risk
-    )
-    np.testing.assert_allclose(room[3].reshape(2, 28), alone.risk * abs(gains[:, 0]), rtol=1e-13)
+    paths = results.Paths(np.zeros((2, 1, 1)), gains)
+    over_paths, alone = ROOM(there.scene, paths), ROOM(there.scene, NO_PATHS)
+    interpreted(results.symbol)(there.scene, there.radio, there.refs[1], 1, there.aims, paths, over_paths)
+    TERMS(there.scene, there.radio, there.refs[1], 1, there.aims, alone)
+    np.testing.assert_allclose(over_paths.risk.reshape(2, 28), alone.risk * abs(gains[:, 0]), rtol=1e-13)
 
 
 def test_without_paths_all_cells_and_subcarriers_are_those_of_the_direct_one():
@@ -200,11 +195,11 @@ def test_without_paths_all_cells_and_subcarriers_are_those_of_the_direct_one():
     _, _, wanted = truth_of(there, motion)
     out, other = np.full((2, 64), np.nan + 0j), np.full((2, 64), np.nan + 0j)
     arguments = there.scene, there.radio, there.refs, there.aims, NO_PATHS
-    assert interpreted(sums.matrix)(*arguments, True, out) == 0 == interpreted(sums.matrix)(*arguments, False, other)
+    assert MATRIX(*arguments, True, out) == 0 == MATRIX(*arguments, False, other)
     assert abs(out - wanted).max() < 1e-12 * abs(wanted).max()
     assert abs(np.fft.ifft(other, axis=1) - out).max() < 1e-12 * abs(out).max()
     found, risks = Found.empty(2), np.zeros(2)
-    interpreted(sums.signal)(there.scene, there.radio, there.refs, np.array([1]), there.aims, NO_PATHS, found, risks)
+    interpreted(results.signal)(there.scene, there.radio, there.refs, np.array([1]), there.aims, NO_PATHS, found, risks)
     assert found.values[0] == 0 and found.cells[1] == abs(out[1]).argmax() and risks[0] == 0 < risks[1]
     assert found.values[1] == pytest.approx(out[1, found.cells[1]], rel=1e-12)
     order = np.sort(abs(out[1]))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from interpreted import interpreted
-from lowalt.echo.pointwise import arg_max, sums
+from lowalt.echo.pointwise import arg_max, results
 from small_echo import TAU
 
-STRONGEST = interpreted(sums.strongest)
-FAR_BOUND = interpreted(sums.far_bound)
+STRONGEST = interpreted(results.strongest)
+FAR_BOUND = interpreted(results.far_bound)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -21,7 +21,7 @@ from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import TURN_RADPS, Cell, model_rows
 from lowalt.shards.dataset import Dataset, Place
-from lowalt.shards.record import record, row_of
+from lowalt.shards.sample_record import record, row_of
 from lowalt.shards.write import select
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.workflow.stage_settings import Settings

@@ -9,7 +9,7 @@ from torch import nn
 
 from lowalt.files.errors import InputError
 from lowalt.recognition import fusion as fusion_of
-from lowalt.recognition import network, own_backbone, schemes
+from lowalt.recognition import own_backbone, recogniser, schemes
 
 BLOCK = {
     "backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4, "feed_forward": 2,
@@ -35,7 +35,7 @@ number = 3
 """
 
 
-def recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", **changes):
+def small_recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", **changes):
     torch.manual_seed(0)
     row = {
         "scheme": "x",
@@ -45,7 +45,7 @@ def recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", **chang
         "backbone": "",
         "protocols": "seen",
     }
-    return network.Recogniser(schemes.scheme(row, "test", "ABC"), {**BLOCK, **changes}, SIZE, PALETTES, 4).eval()
+    return recogniser.Recogniser(schemes.scheme(row, "test", "ABC"), {**BLOCK, **changes}, SIZE, PALETTES, 4).eval()
 
 
 def images(samples, views, seed=0):
@@ -56,7 +56,7 @@ def images(samples, views, seed=0):
 @torch.inference_mode()
 @pytest.mark.parametrize(("stations", "spectra"), [("A", "VT"), ("B", "VRP+TRP+VT"), ("AC", "TRP"), ("ABC", "VRP+VT")])
 def test_tokens_are_the_backbones_features_of_each_view_in_its_place(stations, spectra):
-    model = recogniser(stations, spectra)
+    model = small_recogniser(stations, spectra)
     count = (len(stations), len(spectra.split("+")))
     index = images(3, count[0] * count[1])
     tokens = model.tokens(index)
@@ -74,7 +74,7 @@ def test_tokens_are_the_backbones_features_of_each_view_in_its_place(stations, s
 @torch.inference_mode()
 def test_each_spectrum_is_coloured_by_its_own_palette():
     palettes = np.stack([np.full((256, 3), value, np.uint8) for value in (10, 20, 30)])
-    layer = network.Palettes(palettes, (0, 2), (0.0,) * 3, (1.0,) * 3)
+    layer = recogniser.Palettes(palettes, (0, 2), (0.0,) * 3, (1.0,) * 3)
     colours = layer(images(2, 4).unflatten(1, (2, 2)))
     assert colours.shape == (2, 2, 2, 3, SIZE, SIZE)
     assert torch.allclose(colours[:, :, 0], torch.tensor(10 / 255))
@@ -84,7 +84,7 @@ def test_each_spectrum_is_coloured_by_its_own_palette():
 @pytest.mark.parametrize("shape", [(2, 256, 3), (1, 256, 3), (3, 255, 3), (3, 256, 4), (3, 256)])
 def test_palettes_that_leave_a_spectrum_without_colours_are_refused(shape):
     with pytest.raises(InputError, match="palettes"):
-        network.Palettes(np.zeros(shape, np.uint8), (0, 2), (0.0,) * 3, (1.0,) * 3)
+        recogniser.Palettes(np.zeros(shape, np.uint8), (0, 2), (0.0,) * 3, (1.0,) * 3)
 
 
 @torch.inference_mode()
@@ -98,7 +98,7 @@ def test_pooling_is_mean_within_a_station_and_max_between_stations():
 
 @torch.inference_mode()
 def test_stations_may_be_swapped_and_spectra_may_not():
-    model = recogniser()
+    model = small_recogniser()
     index = images(4, 9)
     turned = index.unflatten(1, (3, 3))[:, [2, 0, 1]].flatten(1, 2)
     swapped = index.unflatten(1, (3, 3))[:, :, [1, 0, 2]].flatten(1, 2)
@@ -110,7 +110,7 @@ def test_stations_may_be_swapped_and_spectra_may_not():
 
 @torch.inference_mode()
 def test_a_station_alone_answers_as_if_it_were_the_only_one():
-    model = recogniser()
+    model = small_recogniser()
     index = images(4, 9)
     together, alone = model(index, alone=True)
     torch.testing.assert_close(together, model(index))
@@ -122,7 +122,7 @@ def test_a_station_alone_answers_as_if_it_were_the_only_one():
 
 @torch.inference_mode()
 def test_samples_do_not_see_each_other():
-    model = recogniser()
+    model = small_recogniser()
     index = images(4, 9)
     torch.testing.assert_close(model(index)[1:2], model(index[1:2]), atol=1e-5, rtol=1e-4)
 
@@ -130,22 +130,22 @@ def test_samples_do_not_see_each_other():
 def test_parameter_counts_follow_from_the_shapes():
     width, wide = 64, 128
     layer = 4 * width * width + 4 * width + 2 * width * wide + wide + width + 4 * width
-    features = recogniser("A", "VRP", "mean", hidden=0)
+    features = small_recogniser("A", "VRP", "mean", hidden=0)
     assert features.backbone.num_features == width
-    base = network.parameters(features.backbone)
+    base = recogniser.parameters(features.backbone)
     linear = 4 * width + 4
-    assert network.parameters(features) == base + linear
+    assert recogniser.parameters(features) == base + linear
     for spectra, depth in (("VRP", 1), ("VRP+TRP+VT", 1), ("VRP+TRP+VT", 3)):
-        model = recogniser("ABC", spectra, intra_depth=depth)
+        model = small_recogniser("ABC", spectra, intra_depth=depth)
         modality = (spectra.count("+") + 1) * width
         encoders = (depth + 1) * layer + 2 * 2 * width
-        assert network.parameters(model) == base + modality + encoders + linear
-    hidden = recogniser("A", "VRP", "mean", hidden=16)
-    assert network.parameters(hidden) == base + (width + 1) * 16 + (16 + 1) * 4
+        assert recogniser.parameters(model) == base + modality + encoders + linear
+    hidden = small_recogniser("A", "VRP", "mean", hidden=16)
+    assert recogniser.parameters(hidden) == base + (width + 1) * 16 + (16 + 1) * 4
 
 
 def test_encoders_normalise_first_and_last():
-    model = recogniser()
+    model = small_recogniser()
     for encoder in (model.fusion.intra, model.fusion.inter):
         assert encoder.layers[0].norm_first
         assert isinstance(encoder.norm, nn.LayerNorm)
@@ -156,7 +156,7 @@ def test_encoders_normalise_first_and_last():
     "name", ["test_resnet", "test_vit", "test_convnext", "test_efficientnet", "mobilenetv3_small_050"]
 )
 def test_any_kind_of_backbone_trains_a_step(name):
-    model = recogniser("AB", "VRP+VT", backbone=name, heads=1).train()
+    model = small_recogniser("AB", "VRP+VT", backbone=name, heads=1).train()
     model(images(2, 4)).square().sum().backward()
     assert all(value.grad is not None and value.grad.isfinite().all() for value in model.parameters())
 
@@ -170,7 +170,7 @@ def test_a_row_of_the_table_chooses_its_own_backbone():
         "backbone": "test_vit",
         "protocols": "seen",
     }
-    model = network.Recogniser(
+    model = recogniser.Recogniser(
         schemes.scheme(row, "test", "ABC"), {**BLOCK, "backbone": "test_resnet"}, SIZE, PALETTES, 4
     )
     assert type(model.backbone).__name__ == "VisionTransformer"
@@ -187,7 +187,7 @@ def test_a_row_of_the_table_chooses_its_own_backbone():
 )
 def test_wrong_settings_are_refused_by_name(changes, words):
     with pytest.raises(InputError, match=words):
-        recogniser(**changes)
+        small_recogniser(**changes)
 
 
 def test_weights_come_from_a_local_file_also_at_another_size(tmp_path: Path):
@@ -197,11 +197,11 @@ def test_weights_come_from_a_local_file_also_at_another_size(tmp_path: Path):
 
     source = create_model("test_vit2", img_size=48)
     save_file(source.state_dict(), tmp_path / "weights.safetensors")
-    model = recogniser(weights=str(tmp_path / "weights.safetensors"))
+    model = small_recogniser(weights=str(tmp_path / "weights.safetensors"))
     torch.testing.assert_close(model.backbone.patch_embed.proj.weight, source.patch_embed.proj.weight)
     (tmp_path / "broken.safetensors").write_bytes(b"not weights")
     with pytest.raises(InputError, match=r"broken\.safetensors"):
-        recogniser(weights=str(tmp_path / "broken.safetensors"))
+        small_recogniser(weights=str(tmp_path / "broken.safetensors"))
 
 
 @pytest.fixture
@@ -217,7 +217,7 @@ def test_only_a_python_file_with_a_function_is_one_s_own():
 
 
 def test_the_module_gives_its_features_and_learns(file):
-    made = network.backbone(f"{file}:small", "none", 24)
+    made = recogniser.backbone(f"{file}:small", "none", 24)
     assert made.num_features == 5 and made.training and made.pretrained_cfg["std"] == (0.5, 0.5, 0.5)
     assert made(torch.zeros(4, 3, 24, 24)).shape == (4, 5)
     # The trial of the module leaves no trace in its running means.
@@ -236,16 +236,16 @@ def test_the_module_gives_its_features_and_learns(file):
 )
 def test_a_wrong_name_is_refused(file, name, message):
     with pytest.raises(InputError, match=message):
-        network.backbone(name.format(file=file), "none", 24)
+        recogniser.backbone(name.format(file=file), "none", 24)
 
 
 def test_weights_of_a_library_do_not_fit_a_module_of_one_s_own(file):
     with pytest.raises(InputError, match="expected 'none'"):
-        network.backbone(f"{file}:small", "hub", 24)
+        recogniser.backbone(f"{file}:small", "hub", 24)
 
 
 def test_a_file_with_a_fault_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.py").write_text("def small(size:\n")
     with pytest.raises(InputError, match=r"bad\.py:small.*SyntaxError"):
-        network.backbone(f"{tmp_path}/bad.py:small", "none", 24)
+        recogniser.backbone(f"{tmp_path}/bad.py:small", "none", 24)

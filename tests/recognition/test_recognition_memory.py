@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from lowalt.files.errors import InputError
-from lowalt.recognition import inference, network, objective, recipe, runs
+from lowalt.recognition import inference, objective, recipe, recogniser, runs
 from lowalt.recognition.ahead import Augmented, ReadAhead, Unchanged
 from lowalt.recognition.schemes import SPECTRA
 from lowalt.tiles import colour_map
@@ -22,9 +22,9 @@ def gradients(views, backbone="test_vit2", again=False, dropout=0.0, **changes):
     """Gradients of one batch by name, its loss, and the bytes of activations kept for the gradient."""
     torch.manual_seed(4)
     block = {**SETTINGS["network"], "backbone": backbone, "dropout": dropout}
-    model = network.Recogniser(SCHEME, block, 32, PALETTES, 4).train()
+    model = recogniser.Recogniser(SCHEME, block, 32, PALETTES, 4).train()
     if again:
-        network.checkpoint_activations(model)
+        recogniser.checkpoint_activations(model)
     source = sources(views)["train"]
     images, labels = torch.from_numpy(source.views(np.arange(10))), torch.from_numpy(source.facts.label[:10])
     kept = []

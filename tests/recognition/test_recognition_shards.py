@@ -12,11 +12,11 @@ from dataset import RENDER, SNRS, build
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, network, one_sample, predictions, runs, samples, schemes, score, views
+from lowalt.recognition import checkpoint, one_sample, predictions, recogniser, runs, samples, schemes, score, views
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.protocols import folds
 from lowalt.shards import ShardSet
-from lowalt.shards.record import row_of
+from lowalt.shards.sample_record import row_of
 from lowalt.tiles import reduced, resize
 from lowalt.tiles.__main__ import main as tiles_main
 
@@ -35,7 +35,7 @@ def dataset(tmp_path_factory):
 def model(tmp_path_factory):
     torch.manual_seed(1)
     palettes = np.zeros((3, 256, 3), np.uint8)
-    weights = network.Recogniser(SCHEME, BLOCK, SIZE, palettes, 4).state_dict()
+    weights = recogniser.Recogniser(SCHEME, BLOCK, SIZE, palettes, 4).state_dict()
     path = tmp_path_factory.mktemp("model") / "model.pt"
     # The palettes are part of the weights: a model keeps the colours it was trained on.
     about = {

@@ -18,7 +18,7 @@ from lowalt.report import viewer, viewer_echoes
 from lowalt.report.figures.style import embedded
 from lowalt.report.page import assembled, rendered
 from lowalt.shards import ShardSet
-from lowalt.shards.record import sample_key
+from lowalt.shards.sample_record import sample_key
 from lowalt.tiles.png import encode
 from pages import browsed, sound
 

@@ -30,7 +30,7 @@ def test_it_is_the_sum_over_every_element_path_and_subcarrier(squint, wavefront,
     images, coefficient = places * [1, 1, -1], rng.uniform(-1, 1, (5, 11)) + 0.3j
     factor = rng.uniform(0, 1, (5, 11))
     truth = reference_effects.subcarriers(
-        radio, A, places, rcs, aim, [(images, coefficient)], factor, squint, wavefront
+        radio, A, places, rcs * factor**2, aim, [(images, coefficient)], squint, wavefront
     )
     found = response(
         view_of(radio, places, rcs, aim), [ImagePath(images, coefficient)], factor, squint=squint, wavefront=wavefront
@@ -87,7 +87,7 @@ def test_turned_beams_keep_the_phase_of_the_arrays_middles(squint, wavefront):
     aims = np.array([[60, 20, 25], [60, 30, 25], [55, 20, 28], [60, 20, 25]], float)
     found = response(view_of(radio, places, rcs, aims), squint=squint, wavefront=wavefront)
     for n, aim in enumerate(aims):
-        truth = reference_effects.subcarriers(radio, A, places[n : n + 1], rcs, aim, (), 1.0, squint, wavefront)[0]
+        truth = reference_effects.subcarriers(radio, A, places[n : n + 1], rcs, aim, (), squint, wavefront)[0]
         toward = (aim - A.position_m) / np.linalg.norm(aim - np.array(A.position_m))
         first = (aims[0] - A.position_m) / np.linalg.norm(aims[0] - np.array(A.position_m))
         # Both arrays of 4 x 2 elements half a wavelength apart, their middles 1.5 and 0.5 elements from the corner.

@@ -21,7 +21,7 @@ from lowalt.motion import write_table
 from lowalt.shards import ShardSet
 from lowalt.shards.__main__ import main
 from lowalt.shards.read import complex_signals
-from lowalt.shards.record import npy, row_of
+from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import map_samples, table_path
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.tiles import decode, resize, split

@@ -12,12 +12,12 @@ from test_shards_card import CONFIG
 from dataset import SEED, SNRS, build
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.noise.chunk import noisy_signals
+from lowalt.noise.noisy_signals import noisy_signals
 from lowalt.recognition.views import ShardSamples, cache_shard, facts_of
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
 from lowalt.shards.card import main as card
-from lowalt.shards.record import npy
+from lowalt.shards.sample_record import npy
 from lowalt.shards.sample_table import map_samples
 from lowalt.shards.sigmf import main as sigmf
 from lowalt.shards.verify import faults

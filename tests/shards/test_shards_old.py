@@ -16,8 +16,8 @@ import pytest
 from lowalt.files.errors import InputError
 from lowalt.recognition.views import cache_shard, facts_of
 from lowalt.shards import ShardSet, card
-from lowalt.shards.record import row_of
 from lowalt.shards.remake import opened
+from lowalt.shards.sample_record import row_of
 from lowalt.shards.verify import faults, shard_faults
 
 OLD = Path(__file__).parents[1] / "data" / "format_1"

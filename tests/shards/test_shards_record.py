@@ -11,7 +11,7 @@ import pytest
 from dataset import SEED, motion_rows
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.shards.record import geometry, record, row_of, sample_key, snr_label
+from lowalt.shards.sample_record import geometry, record, row_of, sample_key, snr_label
 from lowalt.shards.tar import Writer
 from pictures import NETWORK
 

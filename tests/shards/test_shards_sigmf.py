@@ -10,7 +10,7 @@ import pytest
 from dataset import RENDER, motion_rows, pack
 from lowalt.shards import ShardSet
 from lowalt.shards.index import build
-from lowalt.shards.record import sample_key
+from lowalt.shards.sample_record import sample_key
 from lowalt.shards.sigmf import main
 from pictures import NETWORK
 

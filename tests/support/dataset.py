@@ -11,7 +11,7 @@ from lowalt.config.network import Network
 from lowalt.motion import COLUMNS, write_table
 from lowalt.shards import card
 from lowalt.shards.__main__ import main
-from lowalt.shards.record import npy
+from lowalt.shards.sample_record import npy
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.tiles import encode, tile_files
 from pictures import IMAGES, NETWORK, SPECTRA, echoes, renderer

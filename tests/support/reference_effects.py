@@ -31,12 +31,12 @@ def one_way(network, station, shape, places, aim_m, f, squint, wavefront):
     return total * np.exp(-2j * np.pi * f / C * r)
 
 
-def subcarriers(network, station, places, rcs_m2, aim_m, paths=(), factor=1.0, squint=False, wavefront=False):
-    """Y (N, M) of points at `places` (N, L, 3); paths: further paths (places (N, L, 3), coefficient)."""
+def subcarriers(network, station, places, rcs_m2, aim_m, paths=(), squint=False, wavefront=False):
+    """Y (N, M) of points at `places` (N, L, 3); rcs_m2: (L,) or (N, L); paths: further ones (places, coefficient)."""
     elements = np.prod(network.transmit) * np.prod(network.receive)
     scale = np.sqrt(network.power / elements) * C / network.carrier_hz / (4 * np.pi) ** 1.5
     f = station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
-    strength = scale * np.sqrt(rcs_m2) * np.broadcast_to(factor, places.shape[:2])
+    strength = scale * np.sqrt(np.broadcast_to(rcs_m2, places.shape[:2]))
     result = np.zeros((len(places), network.subcarriers), complex)
     for n in range(len(places)):
         for m in range(network.subcarriers):

@@ -13,7 +13,7 @@ from lowalt.motion import poses, read_table, write_table
 from lowalt.motion.drawing import draw, region_polygon
 from lowalt.motion.poses import positions
 from lowalt.numerics.streams import stream
-from lowalt.shards.record import record, row_of
+from lowalt.shards.sample_record import record, row_of
 from lowalt.targets.cloud import cloud_of, extent, scaled
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from key_pages import records_page
 
 from lowalt.files.errors import InputError
 from lowalt.targets import bird, record_schema, uav
@@ -33,7 +34,7 @@ def test_sections_are_the_sources_and_their_keys_those_of_the_code():
 
 
 def test_the_page_of_keys_describes_every_key_and_every_figure():
-    page = record_schema.page(SCHEMA)
+    page = records_page(SCHEMA)
     for section in SCHEMA["sources"].values():
         for name, key in section["properties"].items():
             assert f"| `{name}`" in page and key["description"] in page
@@ -55,7 +56,7 @@ def test_pictures_and_files_that_the_page_names_are_there():
 def test_a_key_without_meaning_is_refused():
     bare = SCHEMA | {"sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
     with pytest.raises(InputError, match="gait has no description"):
-        record_schema.page(bare)
+        records_page(bare)
 
 
 @pytest.mark.parametrize(

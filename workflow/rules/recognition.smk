@@ -68,7 +68,7 @@ rule train:
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
-            "lowalt.recognition.sources",
+            "lowalt.recognition.sample_sources",
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
@@ -106,7 +106,7 @@ rule evaluate:
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
-            "lowalt.recognition.sources",
+            "lowalt.recognition.sample_sources",
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
@@ -164,7 +164,7 @@ rule transfer_evaluate:
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
-            "lowalt.recognition.sources",
+            "lowalt.recognition.sample_sources",
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",

@@ -12,7 +12,7 @@ from lowalt.config.layers import overlaid
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset, Place
-from lowalt.shards.record import sample_key
+from lowalt.shards.sample_record import sample_key
 from lowalt.tiles.png import encode
 
 

@@ -15,11 +15,11 @@ from lowalt.files.atomic import existing, replacing, slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
-from lowalt.targets.draft import chosen, drafted, refuse_miscount, row_lines
+from lowalt.targets.draft import chosen, drafted, refuse_miscount
 from lowalt.targets.guesses import UNUSUAL, USUAL_M
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
-from lowalt.targets.mesh_record import MOVING_KIND, body_axes
+from lowalt.targets.mesh_record import MOVING_KIND
 from lowalt.targets.records import estimates, load_table, merge, read_records, with_row
 from lowalt.targets.robot_files import is_description, read_robot
 from lowalt.targets.robots import category_of, drafted_robot, parts_of, write_parts
@@ -152,7 +152,7 @@ def _robot(options: argparse.Namespace, name: str, row: dict, table: dict) -> tu
                 raise InputError(f"{options.file}: {len(joints)} {kind}s turn, {name} has {count}: leave --subtype out "
                                  "for a row of its own, or choose a target with as many")  # fmt: skip
             names = (name, options.file.name, file)
-            return drafted_robot(robot, joints, triangles, category, table, names, not row), path.read_bytes()
+            return drafted_robot(robot, joints, triangles, category, table, names), path.read_bytes()
         # As where a drone is one mesh: its pieces are looked at.
         options.up, options.front, options.unit = options.up or "z", options.front or "x", "m"
         return _draft(options, path, file, name, row, category, table), path.read_bytes()
@@ -181,13 +181,8 @@ def _draft(
 
         _write(picture, inspection_picture(seen, numbered=True))
         raise
-    frame = body_axes(seen.front, seen.up)
-    extent = np.abs(frame @ (seen.high - seen.low))
-    hubs = np.array([frame[:2] @ group.centre for group in groups]).reshape(-1, 2)
-    wheel = max((float(group.extent.max()) for group in groups), default=None)
-    lines = [] if row else row_lines(category, extent, hubs, wheel, table)
-    named_axes = " ".join(axis for axis in ("up", "front") if getattr(options, axis))
-    return drafted(seen, name, file, lines, groups, named_axes)
+    stated_axes = [axis for axis in ("up", "front") if getattr(options, axis)]
+    return drafted(seen, name, file, table, groups, stated_axes)
 
 
 def _new(options: argparse.Namespace) -> Answer:

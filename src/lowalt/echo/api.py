@@ -7,7 +7,7 @@ import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo import refine
-from lowalt.echo.pointwise import sums
+from lowalt.echo.pointwise import results
 from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
@@ -75,7 +75,7 @@ def echo_signal(
         method = method._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
     if len(left):
         risks = np.zeros(len(refs))
-        check_fault(sums.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
+        check_fault(results.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
         share, direction = method.pointwise_bound
         found.bounds[left] = found.totals[left] * share + risks[left] * direction
         found.gaps[left] = np.maximum(found.gaps[left] - 2 * found.bounds[left], 0.0)
@@ -145,7 +145,7 @@ def echo_matrix(
         raise InputError(f"columns is {columns!r}, expected 'cells' or 'subcarriers'")
     scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)
     out = np.empty((len(refs), network.subcarriers), np.complex128)
-    fault = sums.matrix(scene, radio, refs, aims, routes, columns == "cells", out)
+    fault = results.matrix(scene, radio, refs, aims, routes, columns == "cells", out)
     check_fault(fault, scene, station, sample)
     return out
 
@@ -180,10 +180,10 @@ def prepared(network, station, motion, rcs_m2, aim_m, paths, sample):
     return scene, radio, refs, aims, _paths(paths, (len(refs), points), sample)
 
 
-def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) -> sums.Paths:
+def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) -> results.Paths:
     """Return the checked delays and gains of all paths."""
     if paths is None:
-        return sums.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
+        return results.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
     where = _named(sample)
     if len(paths) == 0:
         raise InputError(f"{where}paths is empty, expected at least one path")
@@ -201,7 +201,7 @@ def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) ->
                 ) from None
         widest = np.broadcast_shapes((1, 1), *(array.shape for array in arrays))
         result.append(np.stack([np.broadcast_to(array, widest) for array in arrays]))
-    return sums.Paths(*result)
+    return results.Paths(*result)
 
 
 def check_fault(fault: int, scene: EchoScene, station: Station, sample: str) -> None:

@@ -1,7 +1,9 @@
 """The exceptions for bad input: their message names the file, key or value, and what was expected instead."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 
 def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = "") -> str:
@@ -21,6 +23,20 @@ class BelowFloor(InputError):
 
 class SpaceError(InputError):
     """A disk or memory is too small; the message names the file or run, what it needs, and what is free."""
+
+
+@contextmanager
+def reading(path: str | Path, kind: str) -> Iterator[None]:
+    """Name the file in whatever its reader raises; libraries meet damaged files with exceptions of many types.
+
+    Raises: InputError, the reader's own one, or that the file is not a readable `kind`.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
+    except Exception as error:
+        raise InputError(f"{path}: not a readable {kind} ({type(error).__name__}: {error})") from None
 
 
 def in_one_line(error: Exception) -> str:

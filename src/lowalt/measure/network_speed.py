@@ -20,10 +20,10 @@ from lowalt.config.command import parser, pick, run
 from lowalt.files.atomic import replacing
 from lowalt.machine.hardware import describe
 from lowalt.machine.timing import least_s
-from lowalt.recognition import network, recipe
+from lowalt.recognition import recipe, recogniser
 from lowalt.recognition.inference import Machine
-from lowalt.recognition.network import built
 from lowalt.recognition.objective import objective
+from lowalt.recognition.recogniser import built
 from lowalt.recognition.schemes import TABLE, Scheme, named
 
 BATCHES = (1, 64)
@@ -96,7 +96,7 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
         # The first call compiles, or chooses and loads the GPU's kernels, once a training, so it is not timed.
         step()
     return {
-        "scheme": scheme.name, "size": settings["size"], "parameters": network.parameters(model), **times,
+        "scheme": scheme.name, "size": settings["size"], "parameters": recogniser.parameters(model), **times,
         "train_ms": 1e3 * least_s(step, limit_s, clock) / batch, "train_batch": batch, "precision": machine.precision,
         "threads": block["threads"], "batch": block["batch"], "steps": block["steps"],
         "backbone": scheme.backbone or settings["network"]["backbone"], "hardware": describe(),

@@ -58,7 +58,7 @@ def _add_source(line: ArgumentParser) -> None:
 def _source(options: Namespace):
     """Return the source of samples that a command line names, after a check of what is frozen."""
     from lowalt.recognition.freeze import verify
-    from lowalt.recognition.sources import Source
+    from lowalt.recognition.sample_sources import Source
 
     for sums in options.frozen:
         verify(sums)

@@ -18,8 +18,8 @@ def macro_f1(counts: np.ndarray) -> np.ndarray:
     counts = np.asarray(counts, dtype=float)
     hits, true, guessed = np.diagonal(counts, axis1=-2, axis2=-1), counts.sum(-1), counts.sum(-2)
     present = true > 0
-    each = np.where(present, 2 * hits / np.where(present, true + guessed, 1), 0)
-    return each.sum(-1) / np.maximum(present.sum(-1), 1)
+    f1 = np.where(present, 2 * hits / np.where(present, true + guessed, 1), 0)
+    return f1.sum(-1) / np.maximum(present.sum(-1), 1)
 
 
 def _counts(predictions: Predictions, chosen: np.ndarray, place: np.ndarray, models: int, classes: int) -> np.ndarray:

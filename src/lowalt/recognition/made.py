@@ -22,7 +22,7 @@ from lowalt.scene.set_noise import in_all_cells
 from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.maker import Maker
-from lowalt.shards.record import record, sample_key
+from lowalt.shards.sample_record import record, sample_key
 from lowalt.shards.write import select
 from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import named, of_cells

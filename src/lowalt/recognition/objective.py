@@ -23,8 +23,8 @@ def objective(
     if not weight:
         return criterion(logits.float(), labels)
     together, alone = logits
-    each = criterion(alone.float(), labels.repeat_interleave(stations))
-    return (criterion(together.float(), labels) + weight * each) / (1 + weight)
+    of_stations = criterion(alone.float(), labels.repeat_interleave(stations))
+    return (criterion(together.float(), labels) + weight * of_stations) / (1 + weight)
 
 
 def descent(

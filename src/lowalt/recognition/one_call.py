@@ -9,9 +9,9 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import inference, runs, zoo
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.protocols import folds
+from lowalt.recognition.sample_sources import Source
 from lowalt.recognition.schemes import named
 from lowalt.recognition.score import scores
-from lowalt.recognition.sources import Source
 from lowalt.shards import ShardSet
 
 

@@ -22,10 +22,10 @@ from lowalt.config.schema import check_brought
 from lowalt.files.atomic import replacing, sha256
 from lowalt.files.errors import InputError, in_one_line
 from lowalt.machine.hardware import describe
-from lowalt.recognition import checkpoint, inference, metrics, network, own_backbone, predictions, recipe
+from lowalt.recognition import checkpoint, inference, metrics, own_backbone, predictions, recipe, recogniser
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recognition.network import built
+from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
 from lowalt.recognition.training import Trainer, TrainingRun
@@ -78,7 +78,7 @@ def train(
             "protocol": protocol, "scheme": scheme.name, "seed": settings["seed"], "hardware": describe(),
             "backbone": scheme.backbone_of(settings["network"]),
             "weights": settings["network"]["weights"],
-            "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
+            "parameters": recogniser.parameters(model), "train_samples": len(samples["train"].facts),
             "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
             "train_processor_s": busy, "size": settings["size"], "steps": at.steps, "batch": block["batch"],
             "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,

@@ -98,10 +98,10 @@ def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, wh
     return [len(spectra) * station + list(spectra).index(NAMES[number]) for station, number in pairs]
 
 
-def _indices(text: str, parts: list[str], known: tuple[str, ...], what: str, where: str) -> tuple[int, ...]:
+def _indices(text: str, parts: list[str], known: tuple[str, ...], kind: str, where: str) -> tuple[int, ...]:
     """Return the sorted places of names among the known ones; refuse an unknown name or one given twice."""
     if not parts or len(set(parts)) != len(parts) or not set(parts) <= set(known):
-        raise InputError(f"{where}: {what} {text!r}, expected some of {known}, each once")
+        raise InputError(f"{where}: {kind} {text!r}, expected some of {known}, each once")
     return tuple(sorted(known.index(part) for part in parts))
 
 

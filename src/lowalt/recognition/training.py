@@ -18,7 +18,7 @@ from torch import nn
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import Reporter
-from lowalt.recognition import checkpoint, network
+from lowalt.recognition import checkpoint, recogniser
 from lowalt.recognition.ahead import Augmented, ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
@@ -85,7 +85,7 @@ class Trainer:
             names = [classes[label] for label in missing]
             raise InputError(f"training: no training sample of {names}, expected some of each")
         if self.block["activation_checkpointing"]:
-            network.checkpoint_activations(model)
+            recogniser.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
         shared = over_ranks(model) if machine.ranks > 1 else model
         plain = not machine.gpu and not self.block["compile"] and machine.precision == "fp32"

@@ -105,7 +105,7 @@ def kept(
     size = len(model_file.packed(reduced))
     if size >= LARGEST_BYTES:
         raise InputError(f"--model: {size} bytes in 8 bits, expected less than {LARGEST_BYTES}")
-    exact, answering = (model_file.trained(each, model, trusted) for each in (content, reduced))
+    exact, answering = (model_file.trained(weights, model, trusted) for weights in (content, reduced))
     measured = held_against(exact, answering, samples)
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
@@ -128,7 +128,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
     name_backbone(line)
     options = line.parse_args(arguments)
-    from lowalt.recognition.sources import Source
+    from lowalt.recognition.sample_sources import Source
 
     trained = load(options.model, options.backbone)
     pairs = folds(trained.protocol, "validation")

@@ -14,7 +14,7 @@ from lowalt.recordings.record import Record
 from lowalt.recordings.twin import Twin
 from lowalt.recordings.twin_network import Windows, facts, rendered
 from lowalt.recordings.windows import windows
-from lowalt.tiles.settings import Images
+from lowalt.tiles.image_settings import Images
 
 TWINS = "config/measured/twins.yaml"
 TRAINED_RATIO = 1.25

@@ -14,16 +14,16 @@ from lowalt.config.layers import load_yaml, merge
 from lowalt.files.errors import InputError
 from lowalt.recognition.checkpoint import identity
 from lowalt.recognition.inference import Machine
-from lowalt.recognition.network import built
 from lowalt.recognition.recipe import check, seeded
+from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Facts, Samples
 from lowalt.recognition.schemes import named
 from lowalt.recognition.training import Trainer, TrainingRun
 from lowalt.recordings.library import Library
 from lowalt.recordings.twin import Twin
+from lowalt.tiles.image_settings import Images
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
-from lowalt.tiles.settings import Images
 
 
 class Windows(Samples):

@@ -20,8 +20,8 @@ from lowalt.report.figures.style import embedded
 from lowalt.report.figures.tile_axes import axes_of
 from lowalt.report.viewer_echoes import echoes, largest_speed
 from lowalt.shards import ShardSet
-from lowalt.shards.record import row_of
 from lowalt.shards.remake import Remaker
+from lowalt.shards.sample_record import row_of
 from lowalt.spectra import spectrum
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles import resize

@@ -67,8 +67,8 @@ class SceneSample:
                 continue
             if (view, name) not in self._factors:
                 ends = [(end, end.station) for end in view.ends()] if name in BY_END else [(view, self.view.station)]
-                each = [visible(end, self.scene.drawn(view.row, station, name)) for end, station in ends]
-                self._factors[view, name] = each[0] if len(each) == 1 else np.sqrt(each[0] * each[1])
+                factors = [visible(end, self.scene.drawn(view.row, station, name)) for end, station in ends]
+                self._factors[view, name] = factors[0] if len(factors) == 1 else np.sqrt(factors[0] * factors[1])
             result *= self._factors[view, name]
         return result
 
@@ -165,7 +165,7 @@ class SceneSample:
         unknown = [heard(self) for heard in offered(self.channel, "heard").values()]
         if offered(self.channel, "instants") or offered(self.channel, "late_samples"):
             samples = sum(map(self._samples, self.targets))
-            samples = sum((self._standing(*each) for each in still.items()), samples)
+            samples = sum((self._standing(name, response) for name, response in still.items()), samples)
         else:
             total = sum(still.values(), sum(map(self.echo, self.targets)))
             if not unknown and not self.receiver and not offered(self.transmitter, "aired"):

@@ -144,9 +144,9 @@ def finding(
     cloud, row, surfaces = explained
     sample = SceneSample(scene, observe(scene, station, cloud, row, surfaces), clouds)
     target_cell, empty = sample.true_cell(sample.view), sample.without_target()
-    behind, rest = sample.filtered(sample.detection), empty.filtered(sample.detection)
-    at_target = (behind - rest)[np.arange(len(target_cell)), target_cell]
-    loudest = float((abs(rest) ** 2).mean(axis=0).max())
+    received, background = sample.filtered(sample.detection), empty.filtered(sample.detection)
+    at_target = (received - background)[np.arange(len(target_cell)), target_cell]
+    loudest = float((abs(background) ** 2).mean(axis=0).max())
     with np.errstate(divide="ignore"):
         over_db = 10 * np.log10(np.mean(abs(at_target) ** 2) / loudest) if loudest > 0 else np.inf
     named, otherwise = {effect.name for effect in sample.detection}, {}
@@ -218,10 +218,10 @@ def _changed(config: dict, name: str) -> tuple[dict, str]:
     """
     effects = config["effects"]
     if name in effects:
-        rest = {key: value for key, value in effects.items() if key != name}
-        choices = [(config | {"effects": rest}, "")]
-        for other in rest:
-            fewer = {key: value for key, value in rest.items() if key != other}
+        others = {key: value for key, value in effects.items() if key != name}
+        choices = [(config | {"effects": others}, "")]
+        for other in others:
+            fewer = {key: value for key, value in others.items() if key != other}
             choices.append((config | {"effects": fewer}, f"and without {other}"))
     else:
         added = config | {"effects": effects | {name: {}}}
@@ -249,7 +249,7 @@ def _received(
                 received.append(received_signal(scene, scene.network.station(name), *explained, clouds))
                 times_s.append(time.process_time())
     shape = len(chosen), len(station_names)
-    signals, cells = (np.array([each[k] for each in received]).reshape(*shape, -1) for k in range(2))
+    signals, cells = (np.array([result[k] for result in received]).reshape(*shape, -1) for k in range(2))
     return signals, cells, 1e3 * np.diff(times_s).reshape(shape)
 
 
@@ -258,13 +258,13 @@ def verdict(findings: Sequence[Finding]) -> list[str]:
     share = _mean([finding.right for finding in findings])
     classes = list(dict.fromkeys(finding.category for finding in findings))
     of_class = {name: [finding for finding in findings if finding.category == name] for name in classes}
-    shares = ", ".join(f"{name} {_mean([each.right for each in mine]):.0%}" for name, mine in of_class.items())
+    shares = ", ".join(f"{name} {_mean([finding.right for finding in mine]):.0%}" for name, mine in of_class.items())
     lines = [f"The target's range cell, or one next to it, is chosen in {share:.0%} of the symbols: {shares}."]
-    over_db = {name: _mean([each.over_db for each in mine]) for name, mine in of_class.items()}
+    over_db = {name: _mean([finding.over_db for finding in mine]) for name, mine in of_class.items()}
     if any(math.isfinite(level) for level in over_db.values()):
         texts = (f"{name} {abs(level):.1f} dB {'above' if level >= 0 else 'below'}" for name, level in over_db.items())
         lines.append(f"Behind the filters the target is, against the loudest cell of all else: {', '.join(texts)} it.")
-    better = {name: _mean([each.otherwise[name] for each in findings]) for name in findings[0].otherwise}
+    better = {name: _mean([finding.otherwise[name] for finding in findings]) for name in findings[0].otherwise}
     best = max(better, key=better.__getitem__)
     if share < FOUND and better[best] > share + 0.05:
         lines.append(f"With {best} it would be {better[best]:.0%}.")
@@ -303,8 +303,8 @@ def suggested(overlay: dict, changes: Sequence[Change], least: float) -> str:
 
     overlay: the scene's own blocks.
     """
-    rest = {key: value for key, value in overlay.items() if key != "effects"}
-    lines = [yaml.safe_dump(rest, sort_keys=False).rstrip()] if rest else []
+    others = {key: value for key, value in overlay.items() if key != "effects"}
+    lines = [yaml.safe_dump(others, sort_keys=False).rstrip()] if others else []
     kept = [change for change in changes if change.named and not change.signal <= least]
     lines.append(f"# Effects that change a signal by more than {least:g} of its root mean square, and by how much.")
     lines.append("effects:" if kept else "effects: {}")

@@ -149,15 +149,15 @@ def _walk(boxes, triangles, closed, ray, bundle, free, last):
     triangles (F, 9) follow each other. last: the leaf to begin with, 0 for none.
     """
     leaves = len(boxes) // 2
-    each, node = len(triangles) // leaves, 1
-    if last > 0 and not _left(triangles, (last - leaves) * each, each, closed, ray, free):
+    size, node = len(triangles) // leaves, 1
+    if last > 0 and not _left(triangles, (last - leaves) * size, size, closed, ray, free):
         return last
     while True:
         if _can_meet(bundle, boxes[node]):
             if node < leaves:
                 node *= 2
                 continue
-            if _meets(ray, free, boxes[node]) and not _left(triangles, (node - leaves) * each, each, closed, ray, free):
+            if _meets(ray, free, boxes[node]) and not _left(triangles, (node - leaves) * size, size, closed, ray, free):
                 return node
         # The next node that is not inside this one.
         node += 1

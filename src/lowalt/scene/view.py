@@ -48,8 +48,8 @@ class Perturbations(NamedTuple):
     def _total(self, name: str, times_s: np.ndarray) -> np.ndarray | None:
         """The sum (K, 3) of those of the changes' tables (G, 3) that there are, None for none."""
         tables = [table for change in self.changes if (table := getattr(change, name)) is not None]
-        columns = [[np.interp(times_s, self.grid_s, column) for column in table.T] for table in tables]
-        return sum(np.stack(each, axis=1) for each in columns) if columns else None
+        interpolated = [[np.interp(times_s, self.grid_s, column) for column in table.T] for table in tables]
+        return sum(np.stack(columns, axis=1) for columns in interpolated) if interpolated else None
 
 
 @VECTOR

@@ -11,7 +11,7 @@ from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.shards.content import clean_content, cube_content, noisy_content
 from lowalt.shards.index import build
-from lowalt.shards.record import accompanied
+from lowalt.shards.sample_record import accompanied
 from lowalt.shards.sample_table import KINDS
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import read as read_cloud

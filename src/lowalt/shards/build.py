@@ -17,7 +17,7 @@ from lowalt.motion.table import write_table
 from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
-from lowalt.shards.record import npy
+from lowalt.shards.sample_record import npy
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import write as write_cloud
 

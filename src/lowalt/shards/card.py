@@ -111,10 +111,10 @@ def write_samples(shards: ShardSet, path: Path) -> None:
 def description(shards: ShardSet) -> str:
     """Return the data set in one paragraph."""
     stations = station_names(shards.index["render"]["network"])
-    what = WHAT[shards.kind].format(stations=len(stations), columns=len(shards.spectra))
+    contents = WHAT[shards.kind].format(stations=len(stations), columns=len(shards.spectra))
     return (
         f"Simulated echoes of low-altitude targets ({', '.join(map(plural, shards.classes))}) at the base stations "
-        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {what}, "
+        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {contents}, "
         "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target "
         "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."
     )

@@ -15,9 +15,9 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.noise.chunk import noisy_signals
+from lowalt.noise.noisy_signals import noisy_signals
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
-from lowalt.shards.record import encoded, sample_key
+from lowalt.shards.sample_record import encoded, sample_key
 
 POWER = "power_w"
 """Field of the record for the power (W) that SNRs refer to, a number a station; absent where it is the echoes' own."""

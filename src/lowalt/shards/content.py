@@ -8,7 +8,7 @@ from lowalt.config.network import Network
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 from lowalt.noise.__main__ import load_echoes, load_powers
-from lowalt.shards.record import npy
+from lowalt.shards.sample_record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.shards.write import Content
 from lowalt.tiles.cubes import Cubes
@@ -84,6 +84,7 @@ def cube_content(
     def content(model: int, level: int) -> tuple[bytes, dict]:
         """The cubes of one sample and what its record says of them."""
         heard = zip(network.stations, signals[model, level], strict=True)
-        return of_cubes([cubes.of(rows[model], snrs[level], *each) for each in heard], network, cell_type)
+        row, snr_db = rows[model], snrs[level]
+        return of_cubes([cubes.of(row, snr_db, station, signal) for station, signal in heard], network, cell_type)
 
     return content

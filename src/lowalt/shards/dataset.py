@@ -26,8 +26,8 @@ from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import refuse_unknown
-from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
+from lowalt.shards.sample_record import accompanied, record, sample_key
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import records_of
@@ -137,13 +137,13 @@ class Dataset:
 
     def _place(self, number: int) -> Place:
         """Return the place of the sample with this number, counted over all folds."""
-        rest, level = divmod(number, len(self.plan.snrs))
+        position, level = divmod(number, len(self.plan.snrs))
         for group in self.groups:
             names = self.plan.groups[group]
-            if rest < len(names) * self.plan.models:
-                model, index = divmod(rest, len(names))
+            if position < len(names) * self.plan.models:
+                model, index = divmod(position, len(names))
                 return Place(group, names[index], model, self.plan.snrs[level])
-            rest -= len(names) * self.plan.models
+            position -= len(names) * self.plan.models
         raise IndexError(number)
 
     def place(self, number: int) -> Place:

@@ -86,6 +86,6 @@ def front(shards: ShardSet, name: str, license_name: str) -> dict:
     return {
         "pretty_name": name, "license": license_name.lower(), "language": ["en"],
         "task_categories": ["image-classification"], "configs": protocols,
-        "dataset_info": [{"config_name": each["config_name"], "features": features(shards)} for each in protocols],
+        "dataset_info": [{"config_name": block["config_name"], "features": features(shards)} for block in protocols],
         "tags": TAGS,
     }  # fmt: skip

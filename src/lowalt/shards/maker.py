@@ -10,19 +10,19 @@ import numpy as np
 
 from lowalt.config.network import Network
 from lowalt.echo.chunk import clean_signals
-from lowalt.noise.chunk import noisy_signals
+from lowalt.noise.noisy_signals import noisy_signals
 from lowalt.scene.lateness import lateness
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
-from lowalt.shards.record import npy
+from lowalt.shards.sample_record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import of_cells
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles.cubes import Cubes
+from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
-from lowalt.tiles.settings import Images
 
 KEPT = 16
 """Motion models whose clean echoes are kept by default, 10 kB each; a model's samples differ only in their noise."""

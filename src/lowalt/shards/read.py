@@ -21,22 +21,22 @@ from lowalt.files.errors import InputError
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
-from lowalt.shards.record import npy, row_of
+from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import map_samples, table_path
 from lowalt.shards.stored_cubes import cubes_of
 from lowalt.spectra.catalogue import named, of_cells
 from lowalt.spectra.cube import Cube
+from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
-from lowalt.tiles.settings import Images
 
 
 def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
     """Refuse groups and folds that no data set has. Raises: InputError naming them."""
-    for what, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
+    for option, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
         if set(names) - set(known):
-            raise InputError(f"{what} {names}, expected some of {known}")
+            raise InputError(f"{option} {names}, expected some of {known}")
 
 
 class ShardSet:

@@ -13,7 +13,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
-from lowalt.shards.record import accompanied, record, row_of
+from lowalt.shards.sample_record import accompanied, record, row_of
 from lowalt.shards.stored_cubes import cell_type_of
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.occluders import read_all

@@ -13,7 +13,7 @@ import numpy as np
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.shards.clean import complex_signals
-from lowalt.shards.record import npy, parts_of
+from lowalt.shards.sample_record import npy, parts_of
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.tiles.tile_files import npy_header
 

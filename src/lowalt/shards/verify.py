@@ -88,8 +88,8 @@ def _locate(path: Path, samples: np.ndarray, expected: int) -> Iterator[str]:
                 yield f"sample {key} is damaged (SHA-256 differs)"
                 named = True
         file.seek(end)
-        rest = file.read()
-    if rest.strip(b"\0") or len(rest) < 2 * BLOCKSIZE:
+        tail = file.read()
+    if tail.strip(b"\0") or len(tail) < 2 * BLOCKSIZE:
         yield "the end of the archive is damaged"
     elif not named:
         yield "SHA-256 differs"

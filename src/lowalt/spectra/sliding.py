@@ -21,9 +21,10 @@ def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:
 
 
 @njit(cache=True)
-def _level(re, im, rows, stride, count, points, cosine, sine, out_re, out_im):
-    """One level of decimation in time: `rows` sub-spectra become 2 `rows`, `count` start times are filled."""
-    single = re.shape[0] == 1
+def _level(re, im, stride, cosine, sine, out_re, out_im):
+    """One level of decimation in time: sub-spectra by start time become twice as many in out_re and out_im."""
+    single, points = re.shape[0] == 1, cosine.size
+    rows, count = out_re.shape[0] // 2, out_re.shape[1]
     for q in range(rows):
         c = cosine[(q * stride) % points]
         s = sine[(q * stride) % points]
@@ -40,9 +41,10 @@ def _level(re, im, rows, stride, count, points, cosine, sine, out_re, out_im):
 
 
 @njit(cache=True)
-def _last(re, im, rows, count, points, cosine, sine, out):
-    """The last level (stride 1) straight to magnitudes, (2 rows, count)."""
+def _last(re, im, cosine, sine, out):
+    """The last level (stride 1) straight to magnitudes."""
     single = re.shape[0] == 1
+    rows, count = out.shape[0] // 2, out.shape[1]
     for q in range(rows):
         c = cosine[q]
         s = sine[q]
@@ -78,11 +80,11 @@ def fourier_magnitudes(re, im, window, points, cosine, sine, out):
         starts = count + stride - 1
         b_re = np.empty((2 * rows, starts), re.dtype)
         b_im = np.empty((2 * rows, starts), re.dtype)
-        _level(a_re, a_im, rows, stride, starts, points, cosine, sine, b_re, b_im)
+        _level(a_re, a_im, stride, cosine, sine, b_re, b_im)
         a_re, a_im = b_re, b_im
         rows *= 2
         stride //= 2
-    _last(a_re, a_im, rows, count, points, cosine, sine, out)
+    _last(a_re, a_im, cosine, sine, out)
 
 
 @njit(cache=True)

@@ -50,11 +50,8 @@ def _propeller(
     Rotors share their points by the area of their blades.
     """
     diameter, chord, count = size
-    shell = blade(diameter / 2, chord)
-    if sense < 0:
-        shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
     axis = tuple(float(value) for value in sense * facing[:, 2])
-    shells = (shell.mapped(facing).moved(hub),)
+    shells = (blade(diameter, chord, sense).mapped(facing).moved(hub),)
     return Part(name, "rotor", shells, hub, axis, copies=int(count), weight=diameter * chord * count)
 
 

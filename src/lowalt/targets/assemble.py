@@ -69,16 +69,6 @@ def _tips(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points), np.array(normals)
 
 
-def _exposed(points: np.ndarray, normals: np.ndarray, part: Part) -> np.ndarray:
-    """Whether each point (L, 3), a hair along its normal, is outside all of the part's shells and its cuts."""
-    # A millionth of the part's size clears the point's own shell and no other.
-    outward = points + 1e-6 * np.ptp(points) * normals
-    hidden = np.zeros(len(points), bool)
-    for shell in (*part.shells, *part.cuts):
-        hidden |= inside(shell, outward)
-    return ~hidden
-
-
 def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` points (count, 3) on the part's outer skin and their unit normals (count, 3).
 
@@ -93,7 +83,9 @@ def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.nd
         farthest = portable.norm(tips - np.array(part.hinge)).argmax()
         tips, facing = tips[farthest : farthest + 1], facing[farthest : farthest + 1]
     points, normals = np.concatenate([tips, points]), np.concatenate([facing, normals])
-    seen = _exposed(points, normals, part)
+    # A millionth of the part's size along the normal clears the point's own shell and no other.
+    outward = points + 1e-6 * np.ptp(points) * normals
+    seen = ~np.any([inside(shell, outward) for shell in (*part.shells, *part.cuts)], axis=0)
     kept = min(int(seen[: len(tips)].sum()), count)
     points, normals = points[seen], normals[seen]
     chosen = thin(points, count, rng, keep=range(kept))

@@ -81,10 +81,10 @@ class Cloud:
         return [index for index, name in enumerate(self.kinds) if name == kind]
 
 
-def _need(good: bool, what: str) -> None:
-    """Raise InputError with the message `what` unless `good`."""
+def _need(good: bool, message: str) -> None:
+    """Raise InputError with the message unless `good`."""
     if not good:
-        raise InputError(what)
+        raise InputError(message)
 
 
 def _near(places: np.ndarray) -> bool:
@@ -213,8 +213,7 @@ def read(path: str | Path) -> Cloud:
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
         record = json.loads(str(arrays.pop("record")))
-        kinds = tuple(str(value) for value in arrays.pop("kinds"))
-        names = tuple(str(value) for value in arrays.pop("names"))
+        kinds, names = (tuple(map(str, arrays.pop(name))) for name in ("kinds", "names"))
         cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a cloud file ({error})") from error

@@ -7,7 +7,7 @@ rim.
 
 import numpy as np
 
-from lowalt.targets.limbs import circle, joint
+from lowalt.targets.limbs import both_sides, circle, joint
 
 WHEEL_M = 0.678
 """Diameter of a road wheel: ISO 5775 size 28-622, 622 mm and twice 28 mm."""
@@ -19,11 +19,8 @@ RIM = 8
 """Points on each rim."""
 CHAINS = (
     ("head", "neck", "chest", "pelvis"),
-    *(
-        (start, *(f"{side} {name}" for name in names))
-        for side in ("right", "left")
-        for start, names in (("neck", ("shoulder", "elbow", "hand")), ("pelvis", ("hip", "knee", "ankle", "foot")))
-    ),
+    *both_sides("neck", "shoulder", "elbow", "hand"),
+    *both_sides("pelvis", "hip", "knee", "ankle", "foot"),
     ("rear hub", "bracket", "saddle", "rear hub"), ("bracket", "steerer", "saddle"), ("steerer", "front hub"),
     *((*(f"{name} rim {point + 1}" for point in range(RIM)), f"{name} rim 1") for name in ("front", "rear")),
 )  # fmt: skip

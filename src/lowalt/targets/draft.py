@@ -3,6 +3,8 @@
 The draft is a YAML text with one record; it passes the checks of `mesh_record`, so a cloud can be made of it at once.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import yaml
 
@@ -140,19 +142,24 @@ def chosen(inspection: Inspection, words: list[str]) -> list[Group]:
 
 
 def drafted(
-    inspection: Inspection, subtype: str, file: str, row: list[str], groups: list[Group], given: str = ""
-) -> str:
+    inspection: Inspection, subtype: str, file: str, table: dict[str, dict], groups: list[Group],
+    stated_axes: Sequence[str] = (),
+) -> str:  # fmt: skip
     """Return a record file's text for a subtype, from an inspected mesh.
 
-    `file` is the mesh's path inside the folder of inputs, `row` the lines of a row of its own, `groups` the components
-    that move, `given` says which of "up" and "front" the user gave. Lines that end in CONFIRM hold guesses. Boxes take
-    moving parts out of the body; a bird's wings are the surface farther out than `shoulder_m`.
+    `file` is the mesh's path inside the folder of inputs, `table` of targets; a subtype that it lacks gets a row of its
+    own. `groups` are the components that move, `stated_axes` those of "up" and "front" that the user stated. Lines that
+    end in CONFIRM hold guesses. Boxes take moving parts out of the body; a bird's wings are the surface farther out
+    than `shoulder_m`.
     """
     category, kind = inspection.category, MOVING_KIND[inspection.category]
     groups = sorted(groups, key=lambda group: group[0].centre.tolist())
-    frame = body_axes(inspection.front, inspection.up)[:2]
-    hubs = np.array([frame @ group.centre for group in groups]).reshape(-1, 2)
-    marks = {name: "" if name in given else f"{CONFIRM}: {axis[-1]} or -{axis[-1]}"
+    frame = body_axes(inspection.front, inspection.up)
+    hubs = np.array([frame[:2] @ group.centre for group in groups]).reshape(-1, 2)
+    extent = np.abs(frame @ (inspection.high - inspection.low))
+    wheel_m = max((float(group.extent.max()) for group in groups), default=None)
+    row = row_lines(category, extent, hubs, wheel_m, table) if subtype not in table else []
+    marks = {name: "" if name in stated_axes else f"{CONFIRM}: {axis[-1]} or -{axis[-1]}"
              for name, axis in (("up", inspection.up), ("front", inspection.front))}  # fmt: skip
     parts = [
         f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
@@ -172,7 +179,7 @@ def drafted(
     settings = {
         "unit": f"{inspection.unit}{CONFIRM * (inspection.unit_from == 'guessed from the size')}",
         "up": f"{inspection.up}{marks['up']}", "front": f"{inspection.front}{marks['front']}",
-        "size_is": size_word(category, inspection.high - inspection.low, hubs),
+        "size_is": size_word(category, extent, hubs),
         "licence": "unknown  # the licence of the mesh",
     }  # fmt: skip
     return record_text(about, subtype, row, settings, parts)

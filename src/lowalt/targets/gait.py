@@ -47,11 +47,8 @@ def bones_m(stature_m: float) -> np.ndarray:
 
 
 def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
-    """Return the toes' pitch (rad): that of the foot while it points up, about a third of it where the heel is lifted.
-
-    The ball of the foot bends at push-off; otherwise the toes would enter the ground. The curve is an estimate and
-    continuously differentiable.
-    """
+    """The toes' pitch (rad): that of the foot while it points up, about a third of it where the heel is lifted."""
+    # The ball of the foot bends at push-off, else the toes would enter the ground. A smooth estimate.
     down, width = np.minimum(foot_rad, 0), np.radians(5)
     return np.maximum(foot_rad, 0) + 0.35 * down + 0.65 * width * (portable.exp(down / width) - 1)
 

@@ -247,8 +247,8 @@ def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[lis
     ways = [clusters(parts, up, touching=not count)]
     for index, part in enumerate(parts if count else ()):
         same = [other for other in parts if _alike(part, other)]
-        blades, rest = divmod(len(same), count)
-        if rest or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
+        blades, odd = divmod(len(same), count)
+        if odd or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
             continue
         places = np.delete(np.array([other.centre for other in same]), up, axis=1)
         label = fcluster(linkage(places, "average"), count, "maxclust")

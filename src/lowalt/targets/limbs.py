@@ -9,6 +9,11 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 
 
+def both_sides(start: str, *limb: str) -> list[tuple[str, ...]]:
+    """Return the names of the nodes of a right and a left limb that both begin at the node `start`."""
+    return [(start, *(f"{side} {name}" for name in limb)) for side in ("right", "left")]
+
+
 def joint(start: np.ndarray, end: np.ndarray, upper_m: float, lower_m: float, bend: float) -> np.ndarray:
     """Return where two bones meet (F, 3) that reach from `start` (F, 3) to `end` (F, 3), in a plane along y and z.
 

@@ -1,13 +1,10 @@
 """A target's calibration point cloud from its record, whatever source the record names."""
 
-import os
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from lowalt.config.command import parser, pick
 from lowalt.files.errors import InputError
-from lowalt.machine.environment import INPUTS
 from lowalt.targets.cloud import Cloud, check
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
@@ -41,15 +38,3 @@ def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
     of_files = (inputs,) if source in ("mesh", "mocap") else ()
     cloud_of = getattr(source_module(source), f"{source}_cloud")
     return check(cloud_of(record, *of_files, seed), record["subtype"])
-
-
-def options(module: str, description: str, arguments: list[str]) -> tuple[dict, Path | None, int, Path]:
-    """Return record, folder of inputs, seed and output file of a command line of this stage."""
-    line = parser(module, description)
-    folder = os.environ.get(INPUTS)
-    help_text = f"folder of the meshes and recordings the record names (default: ${INPUTS})"
-    line.add_argument("--inputs", type=Path, default=folder and Path(folder), help=help_text)
-    line.add_argument("--out", required=True, type=Path, help="file to write (.npz)")
-    asked = line.parse_args(arguments)
-    seed, record = pick(asked.settings, "seed", "record")
-    return record, asked.inputs, seed, asked.out

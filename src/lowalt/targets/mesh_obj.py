@@ -28,27 +28,24 @@ def read_obj(path: Path) -> list[Piece]:
     now = dict.fromkeys(NAMES, "")
     text = path.read_text(encoding="utf-8-sig", errors="replace").replace("\\\n", " ")
     for number, line in enumerate(text.splitlines(), 1):
-        word, _, rest = line.strip().partition(" ")
+        word, _, values = line.strip().partition(" ")
         try:
             if word == "v":
-                places.append([*map(float, rest.split()[:3])])
+                places.append([*map(float, values.split()[:3])])
                 if len(places[-1]) < 3:
                     raise ValueError("fewer than three coordinates")
             elif word == "f":
-                face = [int(corner.split("/", 1)[0]) for corner in rest.split("#", 1)[0].split()]
+                face = [int(corner.split("/", 1)[0]) for corner in values.split("#", 1)[0].split()]
                 # A negative index counts back from the vertices so far.
                 corners += [index - 1 if index > 0 else len(places) + index if index else -1 for index in face]
                 counts.append(len(face))
                 owners.append(keys.setdefault(tuple(now.values()), len(keys)))
             elif word in NAMES:
-                now[word] = rest.strip()
+                now[word] = values.strip()
         except (ValueError, OverflowError) as error:
             raise InputError(f"{path}: line {number}: {line.strip()[:60]!r} cannot be read ({error})") from None
     vertices = np.array(places, float).reshape(-1, 3)
-    try:
-        faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
-    except OverflowError as error:
-        raise InputError(f"{path}: {error}") from None
+    faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
     owner, pieces = np.array(owners, int)[polygon], []
     # trimesh's own names of materials, from the last to the first, which records may have.
     base = next((names[0] for names in keys if names[0]), path.name)

@@ -121,19 +121,16 @@ def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) 
                              f"of {smaller} samples), expected disjoint regions")  # fmt: skip
 
 
-def _made_wheel(part: dict, samples: tuple[np.ndarray, np.ndarray], frame: np.ndarray) -> Pool:
-    """Return the pool of a made wheel at its hinge, in the file's axes, mirrored on the left."""
-    diameter, width, hinge = *_wheel_size(part), np.array(part["hinge"], float)
+def _made_wheel(
+    size: tuple[float, float], hinge: np.ndarray, samples: tuple[np.ndarray, np.ndarray], frame: np.ndarray
+) -> Pool:
+    """The pool of a made wheel of a diameter and a width at its hinge, in the file's axes, mirrored on the left."""
+    diameter, width = size
     side = np.array([np.sign(portable.dot(frame[0], hinge)) or 1.0, 1, 1])
     points, normals = (portable.applied(frame.T, array * side) for array in samples)
     area = np.pi * diameter * (diameter / 2 + width)
     # `sample_part` puts the points that bound the wheel first, six of them.
     return Pool(points + hinge, normals, np.zeros(len(points), np.int64), 6, area)
-
-
-def _wheel_size(part: dict) -> tuple[float, float]:
-    """Return diameter and width (m) of a wheel that the record asks to be made."""
-    return part["wheel"]["diameter_m"], part["wheel"]["width_m"]
 
 
 def cut_parts(
@@ -150,12 +147,13 @@ def cut_parts(
     (body_name, body_part), *moving = record["parts"].items()
     mesh = surface(body_part, record, inputs_dir)
     body, pools = sampled(mesh, True), {}
-    made = {size: wheel(*size) for size in dict.fromkeys(_wheel_size(part) for _, part in moving if "wheel" in part)}
+    sizes = {name: (part["wheel"]["diameter_m"], part["wheel"]["width_m"]) for name, part in moving if "wheel" in part}
+    made = {size: wheel(*size) for size in dict.fromkeys(sizes.values())}
     for name, part in moving:
         if "region" in part:
             pools[name], body = cut(body, mesh, part["region"])
         elif "wheel" in part:
-            pools[name] = _made_wheel(part, made[_wheel_size(part)], frame)
+            pools[name] = _made_wheel(sizes[name], np.array(part["hinge"], float), made[sizes[name]], frame)
         else:
             pools[name] = sampled(surface(part, record, inputs_dir), False)
         if not len(pools[name].points):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 from lowalt.targets.mesh_collada import for_trimesh
 from lowalt.targets.mesh_glb import read_glb
 from lowalt.targets.mesh_obj import read_obj
@@ -51,13 +51,8 @@ def pieces(path: Path) -> list[Piece]:
     Raises: InputError naming the file and the reason where it cannot be read.
     """
     read = {".obj": read_obj, ".glb": read_glb, ".ply": read_ply}.get(path.suffix.lower(), _scene)
-    try:
+    with reading(path, f"{path.suffix} mesh"):
         return [piece for piece in read(path) if len(piece.faces)]
-    except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-    except Exception as error:  # readers raise exceptions of many types on damaged files
-        raise InputError(f"{path}: not a readable {path.suffix} mesh ({type(error).__name__}: {error})") from None
 
 
 def selected(path: Path, names: list[str] | None) -> list[Piece]:

@@ -22,11 +22,11 @@ SMALLEST_ROTOR_M = 0.01
 """Least diameter of a rotor at the target's final size: the smallest craft sold have propellers of 25 mm."""
 
 
-def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, row_m: float | None = None) -> None:
-    """Raise InputError if the size of `what` is more than the record's limit away from `wanted_m`; all in metres.
+def _refuse_size(record: dict, measure: str, size_m: float, wanted_m: float, row_m: float | None = None) -> None:
+    """Raise InputError if a size is more than the record's limit away from `wanted_m`; all in metres.
 
-    The error has the line to write: the unit with which the size fits best, or the size of a row of its own, `row_m` or
-    by default the size.
+    measure: what has the size, such as "the whole mesh". The error has the line to write: the unit with which the size
+    fits best, or the size of a row of its own, `row_m` or by default the size.
     """
     limit, unit = record["scale_limit"], record["unit"]
     if 1 / limit <= wanted_m / max(size_m, 1e-12) <= limit:
@@ -40,7 +40,7 @@ def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, row_m:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
         way = f"no unit fits: give it a row with its own size, `row: {{{key}: {row_m or size_m:.4g}}}`, or another file"
     raise InputError(
-        f"{record['subtype']}: {what} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
+        f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
         f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit {unit!r} right? {way}"
     )
 

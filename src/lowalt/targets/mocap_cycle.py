@@ -14,14 +14,11 @@ from lowalt.targets.skeleton import NODES
 FADE_S = 0.15
 """Length of the cross-fade that closes a cycle: about a quarter of a step, at most a sixth of the recording."""
 
-
 SHORTEST_S = 0.5
 """Shortest cycle that is looked for in a long recording: about two steps of the fastest sprinters."""
 
-
 SHORTEST_GAIT_S = 0.3
 """Shortest cycle that is accepted in a short recording: half of the shortest stride."""
-
 
 WALK_RATIO_S = (0.29, 0.62)
 """Step length (m) times the time of a step (s), of a person of USUAL_M: adults have 0.38 at every speed of walking and

@@ -12,7 +12,7 @@ import numpy as np
 
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import existing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
 from lowalt.targets.mocap_motion import Motion
 from lowalt.targets.skeleton import NODES, PARENTS, rotation, stature_m
@@ -49,14 +49,14 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
     """
     known = {_plain(name): name for name in reversed(list(joints)) if not name.endswith("/end")}
 
-    def joint(what: str, side: str = "", but: str = "") -> str:
+    def joint(part: str, side: str = "", but: str = "") -> str:
         """The name of a joint."""
-        for word in NAMES[what].split():
+        for word in NAMES[part].split():
             if (side, word) in known and known[side, word] != but:
                 return known[side, word]
         side = {"l": "left ", "r": "right "}.get(side, "")
         raise InputError(
-            f"{where}: no joint is called a {side}{what}, expected {NAMES[what].split()} among {sorted(joints)[:40]}"
+            f"{where}: no joint is called a {side}{part}, expected {NAMES[part].split()} among {sorted(joints)[:40]}"
         )
 
     places = {"root": joints[joint("root")]}
@@ -100,16 +100,16 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
     length = portable.norm(bones).mean(axis=0)
     mean = bones.mean(axis=0)
     size = portable.norm(mean)
-    rest = np.where((size > 0)[:, None], mean / np.where(size > 0, size, 1)[:, None] * length[:, None], 0.0)
-    unit = height_m / stature_m(rest) if height_m else 1.0
+    rest_bones = np.where((size > 0)[:, None], mean / np.where(size > 0, size, 1)[:, None] * length[:, None], 0.0)
+    unit = height_m / stature_m(rest_bones) if height_m else 1.0
     if not 0 < unit < np.inf:
         raise InputError(f"{where}: a body of no height, expected joints of a person")
-    return Motion(nodes[:, 0] * unit, _shortest(rest, bones), rest * unit, rate_hz)
+    return Motion(nodes[:, 0] * unit, _shortest(rest_bones, bones), rest_bones * unit, rate_hz)
 
 
-def _shortest(rest: np.ndarray, bones: np.ndarray) -> np.ndarray:
+def _shortest(rest_bones: np.ndarray, bones: np.ndarray) -> np.ndarray:
     """Return the rotations (F, N, 3, 3) that turn bones (N, 3) to the directions of bones (F, N, 3)."""
-    a = rest / np.maximum(portable.norm(rest), 1e-12)[:, None]
+    a = rest_bones / np.maximum(portable.norm(rest_bones), 1e-12)[:, None]
     b = bones / np.maximum(portable.norm(bones), 1e-12)[..., None]
     cross, cosine = np.cross(a, b), portable.dot(a, b)
     x, y, z = np.moveaxis(cross, -1, 0)
@@ -129,7 +129,7 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
     stack: list[str] = []
     joints: list[tuple[str, str, np.ndarray, list[str]]] = []
     words = iter(re.sub(r"#.*", "", head).split())
-    try:
+    with reading(path, "BVH motion"):
         for word in words:
             if word in ("ROOT", "JOINT", "End"):
                 name = next(words)  # after End the word Site
@@ -149,8 +149,6 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
         if not (frames and 1e-5 <= step <= 1 and len(values) == frames * width and np.isfinite(values).all()):
             raise ValueError(f"{len(values)} finite numbers, expected {frames} frames of {width}, {step} s apart")
         places = _followed(joints, values.reshape(frames, width))
-    except (ValueError, TypeError, IndexError, KeyError, StopIteration, OverflowError, RuntimeError) as error:
-        raise InputError(f"{path}: not a readable BVH motion ({type(error).__name__}: {error})") from None
     return places, 1 / step
 
 

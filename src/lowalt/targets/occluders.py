@@ -17,8 +17,9 @@ from lowalt.files.archives import write_arrays
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
+from lowalt.targets.__main__ import options
 from lowalt.targets.assemble import Part, turn
-from lowalt.targets.make import options, refuse_source
+from lowalt.targets.make import refuse_source
 from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, inside, merged
 

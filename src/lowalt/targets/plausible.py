@@ -23,35 +23,30 @@ single blade without its hub may have up to 1."""
 FEWEST_WHEELS = 3
 
 
-def _wheel_faults(wheel: Pool, low: float, high: float) -> Iterator[str]:
-    """What of a wheel's place, axis or shape is not that of a wheel; low, high: the body's height, from and to (m)."""
-    lowest, highest = wheel.points.min(axis=0), wheel.points.max(axis=0)
-    centre, (width, length, height) = (lowest[2] + highest[2]) / 2, highest - lowest
-    if centre > (low + high) / 2:
-        yield (f"its centre lies {centre - low:.3g} m above the lowest point of a body {high - low:.3g} m high, "
-               "expected the lower half: is `up` reversed?")  # fmt: skip
-    if abs(wheel.axis[0]) < ACROSS:
-        yield f"its axis is {np.round(wheel.axis, 3).tolist()} (right, front, up), expected right or left"
-    if width > ROUND * min(length, height):
-        yield (f"it measures {width:.3g} m along its axis and {length:.3g} x {height:.3g} m across, expected a wheel "
-               "that is thinnest along its axis")  # fmt: skip
-
-
-def _rotor_faults(rotor: Pool) -> Iterator[str]:
-    """Whether a rotor's hub is too far from the middle of its blades."""
-    low, high = rotor.points.min(axis=0), rotor.points.max(axis=0)
-    reach, away = float((high - low).max()), float(np.linalg.norm((low + high) / 2 - rotor.hinge))
-    if away > OFF_HUB * reach:
-        yield (f"its hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected the "
-               "hub")  # fmt: skip
-
-
-def _wing_faults(wing: Pool, middle: float) -> Iterator[str]:
-    """Whether the hinge of a wing on the body lies at the wing's tip; middle: of the body, to the right (m)."""
-    hinge, centre = wing.hinge[0] - middle, wing.points[:, 0].mean() - middle
-    if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
-        yield (f"its hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected the "
-               "hinge between body and wing")  # fmt: skip
+def _faults(kind: str, pool: Pool, body: np.ndarray) -> Iterator[str]:
+    """What of a part's place, axis or shape is not that of its kind; body (2, 3): the body's low and high corner."""
+    low, high = pool.points.min(axis=0), pool.points.max(axis=0)
+    middle, (width, length, height) = (low + high) / 2, high - low
+    if kind == "wheel":
+        below, above = body[:, 2]
+        if middle[2] > (below + above) / 2:
+            yield (f"its centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
+                   "high, expected the lower half: is `up` reversed?")  # fmt: skip
+        if abs(pool.axis[0]) < ACROSS:
+            yield f"its axis is {np.round(pool.axis, 3).tolist()} (right, front, up), expected right or left"
+        if width > ROUND * min(length, height):
+            yield (f"it measures {width:.3g} m along its axis and {length:.3g} x {height:.3g} m across, expected a "
+                   "wheel that is thinnest along its axis")  # fmt: skip
+    elif kind == "rotor":
+        reach, away = float((high - low).max()), float(np.linalg.norm(middle - pool.hinge))
+        if away > OFF_HUB * reach:
+            yield (f"its hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
+                   "the hub")  # fmt: skip
+    else:
+        hinge, centre = (place[0] - body[:, 0].mean() for place in (pool.hinge, pool.points.mean(axis=0)))
+        if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
+            yield (f"its hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected "
+                   "the hinge between body and wing")  # fmt: skip
 
 
 def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) -> Iterator[str]:
@@ -77,8 +72,8 @@ def refuse_implausible(
     `category` the published class that the target is like, `count` the rotors of its row.
     Raises: InputError naming `where`, the part, the measures and what was expected. Warns: InputWarning.
     """
-    body = next(pool.points for name, pool in parts.items() if kinds[name] == "body")
-    (left, _, low), (right, _, high) = body.min(axis=0), body.max(axis=0)
+    points = next(pool.points for name, pool in parts.items() if kinds[name] == "body")
+    body = np.stack([points.min(axis=0), points.max(axis=0)])
     of_kind: dict[str, list[Pool]] = {"rotor": [], "wheel": [], "wing": []}
     faults = []
     for name, pool in parts.items():
@@ -86,11 +81,7 @@ def refuse_implausible(
         if kind == "body" or (kind == "wing" and name in parents):
             continue
         of_kind[kind].append(pool)
-        if kind == "wheel":
-            of_part = _wheel_faults(pool, low, high)
-        else:
-            of_part = _rotor_faults(pool) if kind == "rotor" else _wing_faults(pool, (left + right) / 2)
-        faults += [f"{name}: {fault}" for fault in of_part]
+        faults += [f"{name}: {fault}" for fault in _faults(kind, pool, body)]
     if faults:
         raise InputError(f"{where}: " + "; ".join(faults))
     for doubt in _doubts(of_kind, category, count):

@@ -10,21 +10,15 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
-from lowalt.targets.limbs import joint
+from lowalt.targets.limbs import both_sides, joint
 
 STANCE = 0.42
 """Share of a stride in which a foot is on the ground."""
 CHAINS = (
     ("nose", "skull", "neck", "withers", "back", "loin", "croup", "tail", "tail tip"),
     ("neck", "chest", "belly", "loin"),
-    *(
-        (start, *(f"{side} {name}" for name in names))
-        for side in ("right", "left")
-        for start, names in (
-            ("withers", ("fore shoulder", "fore elbow", "fore wrist", "fore paw")),
-            ("croup", ("hind hip", "hind knee", "hind hock", "hind paw")),
-        )
-    ),
+    *both_sides("withers", "fore shoulder", "fore elbow", "fore wrist", "fore paw"),
+    *both_sides("croup", "hind hip", "hind knee", "hind hock", "hind paw"),
 )
 """Nodes that a line joins in pictures."""
 LIFT = 0.16

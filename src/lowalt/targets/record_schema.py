@@ -1,7 +1,4 @@
-"""The schema of a target's record: which keys each source knows, their types and meaning; the files that a record has.
-
-The page of the keys is written from it as `docs/site_pages.py` makes the site.
-"""
+"""What a target's record may say: the keys of each source with their types and meaning, and the files it may name."""
 
 import functools
 from pathlib import Path, PureWindowsPath
@@ -15,18 +12,6 @@ COMMON = "every record"
 FORBIDDEN = "{}\\"
 """Characters that a file's name must not have: Snakemake takes braces for a wildcard, and a backslash is a folder on
 Windows only."""
-
-HEAD = """\
-# Keys of target records
-
-Made from `src/lowalt/targets/records.schema.yaml`. What a record is, and how to write one:
-[Records of targets](../../design/targets.md), [A target of your own](../tutorials/target.md).
-
-"""
-_INSIDE = {
-    "Parts of a mesh (`parts`, each by its name)": "part", "Meshes of a part (`meshes`, a list)": "mesh",
-    "Regions (`region`, `drop`)": "region", "Wing beat (`flap`)": "flap",
-}  # fmt: skip
 
 
 @functools.cache
@@ -48,15 +33,15 @@ def check(section: str, record: dict, where: str) -> None:
     """
     from lowalt.config.schema import faults  # slow to import, and a cloud is made without it
 
-    if found := faults(record, {"$defs": schema()["$defs"], **schema()["sources"][section]}, "record"):
-        raise InputError(f"{where}: {found[0]}")
+    if wrong := faults(record, {"$defs": schema()["$defs"], **schema()["sources"][section]}, "record"):
+        raise InputError(f"{where}: {wrong[0]}")
 
 
 def figures(model: str) -> dict[str, str]:
     """Return the figures that a built-in model needs by name, each a length, ratio, offset, count or whole number."""
     sets = [schema()["figures"][item] if isinstance(item, str) else item
             for item in schema()["models"][model]["figures"]]  # fmt: skip
-    return {name: kind for each in sets for name, kind in each.items()}
+    return {name: kind for needed in sets for name, kind in needed.items()}
 
 
 def record_files(record: dict) -> list[str]:
@@ -75,32 +60,3 @@ def check_file_name(name: str, where: str) -> None:
         raise InputError(f"{where}: file is {name!r}, expected a path inside the folder of inputs")
     if wrong := sorted({letter for letter in name if letter in FORBIDDEN or not letter.isprintable()}):
         raise InputError(f"{where}: file is {name!r}, expected a name without {wrong}: rename the file")
-
-
-def page(content: dict) -> str:
-    """Return the page of a schema's keys as Markdown: those of every record, of each source, and of what stands inside.
-
-    Raises: InputError naming a key without a description.
-    """
-    sections = {"Every record" if name == COMMON else f"Source `{name}`": section
-                for name, section in content["sources"].items()}  # fmt: skip
-    sections |= {title: content["$defs"][name] for title, name in _INSIDE.items()}
-    lines = [HEAD]
-    for title, section in sections.items():
-        lines += [f"## {title}", "", "| key | meaning |", "|---|---|"]
-        for name, key in section["properties"].items():
-            if "description" not in key:
-                raise InputError(f"schema of records: {name} has no description, expected one line of meaning")
-            lines.append(f"| `{name}`{' (needed)' * (name in section.get('required', []))} | {key['description']} |")
-        lines.append("")
-    lines += [
-        "## Built-in models (`model`)",
-        "",
-        "| model | like | size_is | keys | figures |",
-        "|---|---|---|---|---|",
-    ]
-    for name, model in content["models"].items():
-        cells = [", ".join(model.get(key, [])) for key in ("size_is", "keys")]
-        needed = ", ".join(f"`{figure}` ({kind})" for figure, kind in figures(name).items())
-        lines.append(f"| {name} | {model['like']} | {' | '.join(cells)} | {needed} |")
-    return "\n".join([*lines, ""])

@@ -93,9 +93,9 @@ def records_of(targets: dict, inputs: str | Path | None = None) -> dict[str, dic
     inputs: the folder of the user's files, in which a record's files must stand where `where_missing` is "builtin".
     Raises: InputError as `load_records`.
     """
-    own = targets.get("own", {}).values()
+    own_files = targets.get("own", {}).values()
     falls = targets.get("where_missing") == "builtin"
-    return load_records(targets["table"], [*targets["records"], *own], inputs, falls)
+    return load_records(targets["table"], [*targets["records"], *own_files], inputs, falls)
 
 
 def load_records(

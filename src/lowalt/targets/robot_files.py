@@ -5,13 +5,14 @@ Sources: ROS, urdf/XML (link, joint); SDFormat 1.4 to 1.11 and its proposal on p
 """
 
 import re
+from functools import partial
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
 from lowalt.targets.robot_geometry import DEEPEST, Files, Robot, numbers, place_of, primitive, shown
 from lowalt.targets.robot_mjcf import mjcf
@@ -63,7 +64,7 @@ def _before_1_5(root: Element) -> bool:
     return float(root.get("version", "1.5")) < 1.45
 
 
-class _Model:
+class _Links:
     """Links and joints by scoped name, at frames that each have a place in another frame, resolved at the end."""
 
     def __init__(self, files: Files) -> None:
@@ -84,8 +85,8 @@ class _Model:
         above, in_above = self.frames[frame]
         return portable.product(self.place(above, depth + 1), in_above)
 
-    def urdf(self, root: Element, base: Path) -> None:
-        """Take the links and joints of a URDF: a joint stands on its parent, and its child in it."""
+    def urdf(self, root: Element, base: Path) -> Robot:
+        """The robot of a URDF: a joint stands on its parent, and its child in it."""
         for link in root.findall("link"):
             name = link.get("name", "")
             self.frames[name] = ("", np.eye(4))
@@ -99,9 +100,18 @@ class _Model:
             axis = numbers(along.get("xyz") if along is not None else None, 3, (1, 0, 0))
             limits = (limit.get("lower", "0"), limit.get("upper", "0")) if limit is not None else (None, None)
             self.joints.append((name, "", [parent, child], joint, axis, frame, limits))
+        return self.done()
 
-    def sdf(self, model: Element, base: Path, scope: str, place: tuple[str, np.ndarray], old: bool, depth: int) -> None:
-        """Take the links, frames, joints and inner models of an SDF; `scope` ends in :: where it has a name."""
+    def sdf(self, root: Element, base: Path) -> Robot:
+        """The robot of an SDF: its model, or the only one of its world, wherever the world has it."""
+        models = [*root.findall("model"), *root.findall("world/model")]
+        if len(models) != 1:
+            raise ValueError(f"{len(models)} models, expected one")
+        self.add(models[0], base, "", ("", np.eye(4)), _before_1_5(root), 0)
+        return self.done()
+
+    def add(self, model: Element, base: Path, scope: str, place: tuple[str, np.ndarray], old: bool, depth: int) -> None:
+        """Add the links, frames, joints and inner models of an SDF; `scope` ends in :: where it has a name."""
         if depth > DEEPEST:
             raise ValueError("models in a circle")
         inner = f"{scope}__model__ {len(self.frames)}"  # of merged models several have one scope
@@ -139,7 +149,7 @@ class _Model:
                 joint, turn = (child.findtext(word, "").strip() for word in ("jointName", "turningDirection"))
                 self.robot.senses[scope + joint] = turn
             elif child.tag == "model":
-                self.sdf(child, base, f"{name}::", placed(child, inner), old, depth + 1)
+                self.add(child, base, f"{name}::", placed(child, inner), old, depth + 1)
             elif child.tag == "include":
                 self.include(child, base, scope, placed(child, inner)[0], depth)
 
@@ -159,7 +169,7 @@ class _Model:
         merged = element.get("merge") == "true"
         name = scope if merged else f"{scope}{element.findtext('name') or model.get('name')}::"
         place = _pose(element if element.find("pose") is not None else model)
-        self.sdf(model, path.parent, name, (above, place), _before_1_5(root), depth + 1)
+        self.add(model, path.parent, name, (above, place), _before_1_5(root), depth + 1)
 
     def done(self) -> Robot:
         """The robot of all that was taken; of links without any `visual` the collision surfaces."""
@@ -181,24 +191,6 @@ class _Model:
         return self.robot
 
 
-def _urdf(root: Element, base: Path, files: Files) -> Robot:
-    """A robot of URDF."""
-    model = _Model(files)
-    model.urdf(root, base)
-    return model.done()
-
-
-def _sdf(root: Element, base: Path, files: Files) -> Robot:
-    """A robot of SDF: the model, or the only one of a world."""
-    models = [*root.findall("model"), *root.findall("world/model")]
-    if len(models) != 1:
-        raise ValueError(f"{len(models)} models, expected one")
-    model = _Model(files)
-    # The model's own pose is its place in a world, which does not count.
-    model.sdf(models[0], base, "", ("", np.eye(4)), _before_1_5(root), 0)
-    return model.done()
-
-
 def is_description(path: Path) -> bool:
     """Whether a file's name is that of a robot's description or of a template of one."""
     return path.suffix.lower() in (*KINDS, *TEMPLATES)
@@ -213,18 +205,16 @@ def read_robot(path: Path, inputs: Path) -> Robot:
     if path.suffix.lower() in TEMPLATES:
         how = TEMPLATES[path.suffix.lower()].replace("FILE", path.name)
         raise InputError(f"{path}: is a template, expected what it expands to: {how}")
-    files, readers = Files(inputs), {"robot": _urdf, "sdf": _sdf, "gazebo": _sdf, "mujoco": mjcf}
-    try:
+    files = Files(inputs)
+    links = _Links(files)
+    readers = {"robot": links.urdf, "sdf": links.sdf, "gazebo": links.sdf, "mujoco": partial(mjcf, files=files)}
+    with reading(path, "description"):
         root = files.parsed(path)
         if root.tag not in readers:
             raise ValueError(f"<{root.tag}>, expected one of {sorted(readers)}")
         if any("xacro" in str(item.tag) or re.search(r"\$[{(]|\{\{", str(item.attrib)) for item in root.iter()):
             raise ValueError(f"it holds macros, expected what they expand to: {TEMPLATES['.xacro']}")
-        robot = readers[root.tag](root, path.resolve().parent, files)
-    except InputError as error:
-        raise InputError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
-    except (ValueError, LookupError, AttributeError, TypeError, ArithmeticError, OSError, RecursionError) as error:
-        raise InputError(f"{path}: not a readable description ({type(error).__name__}: {error})") from None
+        robot = readers[root.tag](root, path.resolve().parent)
     surfaces = [triangles for of_link in robot.surfaces.values() for triangles in of_link]
     if not sum(map(len, surfaces)) or not all(np.isfinite(triangles).all() for triangles in surfaces):
         raise InputError(f"{path}: no surface of finite places, expected links with visual geometry")

@@ -85,13 +85,13 @@ class Files:
 
     def find(self, name: str, base: Path) -> Path:
         """Return the file that a description in the folder `base` names: relative, package://, model://."""
-        kind, slashes, rest = name.strip().partition("://")
-        if not slashes or kind == "file":
-            places = [base / (rest or name)]
-        elif kind in ("package", "model"):
-            head, _, tail = rest.partition("/")
+        scheme, slashes, location = name.strip().partition("://")
+        if not slashes or scheme == "file":
+            places = [base / (location or name)]
+        elif scheme in ("package", "model"):
+            head, _, tail = location.partition("/")
             above = [folder for folder in (base, *base.parents) if folder.is_relative_to(self.inputs)]
-            places = [place for folder in above for place in (folder / rest, folder / "models" / rest)]
+            places = [place for folder in above for place in (folder / location, folder / "models" / location)]
             places += [folder / tail for folder in above if folder.name == head]
         else:
             raise InputError(f"{name!r} is no file of the folder of inputs, expected a downloaded one")

@@ -106,19 +106,19 @@ def part_lines(robot: Robot, joints: dict[str, Joint], kind: str, file: str) -> 
 
 def drafted_robot(
     robot: Robot, joints: dict[str, Joint], triangles: dict[str, np.ndarray], category: str, table: dict[str, dict],
-    names: tuple[str, str, str], own: bool,
+    names: tuple[str, str, str],
 ) -> str:  # fmt: skip
     """Return a record file's text of a robot whose joints tell its moving parts.
 
-    names: the subtype, the file described and the GLB of the parts inside the folder of inputs; `own`: whether the
-    target gets a row of its own.
+    names: the subtype, the file described and the GLB of the parts inside the folder of inputs; a subtype that the
+    table of targets lacks gets a row of its own.
     """
     subtype, source, file = names
     corners = np.concatenate(list(triangles.values())).reshape(-1, 3)
     extent = np.ptp(corners, axis=0)[[1, 0, 2]]
     hubs = np.array([joint.hinge[:2] for joint in joints.values()]).reshape(-1, 2)
     across = [float(np.ptp(triangles[name].reshape(-1, 3), axis=0).max()) for name in joints]
-    row = row_lines(category, extent, hubs, max(across, default=None), table) if own else []
+    row = row_lines(category, extent, hubs, max(across, default=None), table) if subtype not in table else []
     settings = {"unit": "m", "up": "z", "front": "x", "size_is": size_word(category, extent, hubs),
                 "licence": "unknown  # the licence of the description"}  # fmt: skip
     about = [f"Drafted from {source}, whose surfaces {file} holds in metres: x front, y left, z up."]

@@ -38,15 +38,18 @@ def hubs(record: dict, figure: dict) -> np.ndarray:
     return reach * np.stack([right, front], 1)
 
 
-def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
-    """Return one propeller blade along +x for a rotor turning anticlockwise (leading edge at +y), hub at the origin.
+def blade(diameter: float, chord: float, sense: int) -> Surface:
+    """Return one propeller blade along +x, hub at the origin, for a rotor that turns anticlockwise (`sense` 1, leading
+    edge at +y) or clockwise (-1).
 
     The twist follows a constant pitch of two thirds of the diameter; the chord is largest at 0.35 of the radius.
     """
-    stations = np.array([root, 0.2, 0.35, 0.55, 0.75, 0.92, 1.0])
+    radius = diameter / 2
+    stations = np.array([0.08, 0.2, 0.35, 0.55, 0.75, 0.92, 1.0])
     chords = chord * np.array([0.55, 0.85, 1.0, 0.88, 0.68, 0.5, 0.25])
     twist = portable.arctan(4 / 3 / (2 * np.pi * np.maximum(stations, 0.2)))
-    return foil([(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10)
+    shell = foil([(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10)
+    return shell if sense > 0 else shell.mapped(np.diag([1.0, -1.0, 1.0]))
 
 
 def rotor(name: str, hub: np.ndarray, sense: int, figure: dict, layers: tuple[tuple[float, float], ...]) -> Part:
@@ -54,9 +57,7 @@ def rotor(name: str, hub: np.ndarray, sense: int, figure: dict, layers: tuple[tu
 
     layers: depth below the hub (m) and turn of each layer of blades.
     """
-    shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
-    if sense < 0:
-        shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
+    shell = blade(figure["propeller_diameter"], figure["blade_chord"], sense)
     # Turn the blade to the hub's direction and by a quarter turn more.
     far = np.sqrt(hub[0] * hub[0] + hub[1] * hub[1])
     sine, cosine = (hub[0] / far, -hub[1] / far) if far > 0 else (1.0, 0.0)

@@ -1,11 +1,11 @@
 """Images of spectra: index images, tiles of stations by spectra, palette PNG."""
 
 from lowalt.tiles.colour import colour_map, paint
+from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import decode, encode
 from lowalt.tiles.render import Renderer, join, split
 from lowalt.tiles.resample import resize, triangle
 from lowalt.tiles.scale import Scale
-from lowalt.tiles.settings import Images
 
 __all__ = [
     "Images",

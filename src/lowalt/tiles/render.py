@@ -17,10 +17,10 @@ from lowalt.spectra import Spectra, spectrum, windows
 from lowalt.spectra.cube import Cube
 from lowalt.spectra.interface import KnowsTimes, OfCells
 from lowalt.spectra.known_times import even
+from lowalt.tiles.image_settings import Images
 from lowalt.tiles.pixels import index_image
 from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
 from lowalt.tiles.scale import lookup
-from lowalt.tiles.settings import Images
 
 Source = np.ndarray | Cube
 """What an image is made of: a normalised signal (symbols,) or a normalised cube."""

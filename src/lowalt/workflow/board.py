@@ -116,8 +116,8 @@ def _running(job: Job, progress: Progress | None) -> str:
 def span(seconds: float) -> str:
     """Return a duration as minutes and seconds, or hours, minutes and seconds."""
     whole = max(0, round(seconds))
-    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+    hours, minutes, remainder = whole // 3600, whole // 60 % 60, whole % 60
+    return f"{hours}:{minutes:02}:{remainder:02}" if hours else f"{minutes}:{remainder:02}"
 
 
 def pace(per_second: float) -> str:

@@ -218,8 +218,8 @@ def schemes_of(config: dict) -> dict[str, Scheme]:
                 schemes[name] = _suited(config, name)
             except InputError as error:
                 able = _able(config) or "none: name a table of your own in recognition.table"
-                rest = f"; for this network and its spectra {block['table']} has {able}" * (slug(name) in known)
-                raise InputError(f"recognition.{key}: {name!r}: {error}{rest}") from None
+                advice = f"; for this network and its spectra {block['table']} has {able}" * (slug(name) in known)
+                raise InputError(f"recognition.{key}: {name!r}: {error}{advice}") from None
     trained = [schemes[name] for name in block["schemes"]]
     if len({scheme.name for scheme in trained}) < len(trained):
         raise InputError(f"recognition.schemes: {block['schemes']}, expected every scheme once")

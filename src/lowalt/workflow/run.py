@@ -17,7 +17,7 @@ from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import Scheme
 from lowalt.spectra import Spectra
 from lowalt.targets.records import missing_inputs, records_of
-from lowalt.tiles.settings import Images
+from lowalt.tiles.image_settings import Images
 from lowalt.workflow import refusals
 from lowalt.workflow.launch import Launch
 

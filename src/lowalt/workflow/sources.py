@@ -73,7 +73,7 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
             parent = name.rpartition(".")[0]
             todo += [*([parent] if parent else []), *_imports(_file(name))]
             if name == CATALOGUE:
-                todo += [f"lowalt.spectra.kinds.{one}" for one in spectra]
+                todo += [f"lowalt.spectra.kinds.{spectrum}" for spectrum in spectra]
     return tuple(sorted({_file(name) for name in seen}))
 
 

@@ -51,15 +51,15 @@ def cubes_size(config: dict, plan: Plan) -> dict:
     """
     if config["shards"]["kind"] != "cube":
         return {}
-    each, count = sample_bytes(config), plan.samples
-    return {"cells": cell_type(config), "samples": count, "sample_bytes": each, "bytes": count * each}
+    size, count = sample_bytes(config), plan.samples
+    return {"cells": cell_type(config), "samples": count, "sample_bytes": size, "bytes": count * size}
 
 
 def cubes_sentence(size: dict) -> str:
     """Return `cubes_size` as one line."""
-    each, whole = size["sample_bytes"] / 1e6, size["bytes"] / 1e9
+    sample_mb, total_gb = size["sample_bytes"] / 1e6, size["bytes"] / 1e9
     samples = f"{size['samples']} samples, {size['cells']}"
-    return f"cube shards: {each:.2f} MB a sample, {whole:.3f} GB in all ({samples})"
+    return f"cube shards: {sample_mb:.2f} MB a sample, {total_gb:.3f} GB in all ({samples})"
 
 
 def check(needed: float, folder: Path) -> None:

@@ -52,7 +52,7 @@ def far_moments(sines, place, moments, half, total, second, error, far):
 
 @LEAN
 def far_limit(far, distance, half, count):
-    """Return a bound of |sum| in every cell at least `distance` from the place; compare `sums.far_bound`.
+    """Return a bound of |sum| in every cell at least `distance` from the place; compare `results.far_bound`.
 
     g(x) = 1 / (M sin(pi x / M)) expanded to third order: |g'''| <= 6 (pi / M)^3 / (M sin^4(pi x / M)). All factors fall
     with distance up to M / 2; the sine is bounded from below by x - x^3 / 6.

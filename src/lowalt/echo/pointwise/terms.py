@@ -4,11 +4,23 @@ It serves the signal, all range cells, the subcarriers, extra paths, and the sym
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.echo.pointwise.reference_range import RANGE, REST, TURN
 from lowalt.machine.jit import LEAN, PLAIN
+
+
+class PointTerms(NamedTuple):
+    """What all points give at one symbol: places `e` (L, 3) m from the reference's point; complex amplitudes `z`
+    without the cell's own phase, ranges `u` in cells from the reference's cell, and risks (`terms`), each (L,), or
+    (paths * L,) with further paths."""
+
+    e: np.ndarray
+    z: np.ndarray
+    u: np.ndarray
+    risk: np.ndarray
 
 
 @PLAIN
@@ -59,22 +71,22 @@ def offsets(scene, n, place, e):
 
 
 @PLAIN
-def terms(scene, radar, ref, n, aims, e, z, u, risk):
-    """Fill z, u and risk (L,) with the share of each point at symbol n.
+def terms(scene, radar, ref, n, aims, out):
+    """Fill the first L entries of `out` (`PointTerms`) with the share of each point at symbol n.
 
-    z: complex amplitude without the cell's own phase; u: range in cells from the reference's cell; risk: peak amplitude
-    times (r_ref + |e|) / r, which grows with the rounding of the point's direction. ref: the symbol's row of
-    `reference_range.reference`; aims: direction cosines of the beams; e (L, 3): a work array.
+    ref: the symbol's row of `reference_range.reference`; aims: direction cosines of the beams. The risk is the peak
+    amplitude times (r_ref + |e|) / r, which grows with the rounding of the point's direction.
     Returns 0, or 1 + l where point l stands in the station. Source: paper Eqs. 7 and 24, steering sums as Chebyshev
     polynomials.
     """
     place = scene.translation[n, 0 if scene.rotation.shape[0] == 0 else scene.part[0]]
+    e, z, u, risk = out
     offsets(scene, n, place, e)
     phase_h = radar.kappa / 4.0 * (radar.transmit_h + radar.receive_h - 2)
     phase_v = radar.kappa / 4.0 * (radar.transmit_v + radar.receive_v - 2)
     cells = radar.cells
     peak = float(radar.transmit_h * radar.transmit_v) * float(radar.receive_h * radar.receive_v)
-    for l in range(len(z)):  # noqa: E741
+    for l in range(len(e)):  # noqa: E741
         x, y, w = ref[0] + e[l, 0], ref[1] + e[l, 1], ref[2] + e[l, 2]
         r2 = x * x + y * y + w * w
         if r2 == 0.0:

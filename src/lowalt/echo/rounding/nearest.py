@@ -11,7 +11,7 @@ import numpy as np
 
 from lowalt.echo.fast.layout import Layout
 from lowalt.echo.fast.workspace import Found
-from lowalt.echo.pointwise import sums as pointwise
+from lowalt.echo.pointwise import results as pointwise
 from lowalt.echo.radar import Radar
 from lowalt.echo.rounding import double
 from lowalt.echo.rounding.sums import ROWS, cell_value

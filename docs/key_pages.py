@@ -1,13 +1,14 @@
-"""The page of keys: a Markdown table for each block of the configuration, written from its schema.
+"""The pages of keys of the site, Markdown made of the two schemas: of the configuration, and of targets' records.
 
-`docs/site_pages.py` makes it as the site is built.
+`docs/site_pages.py` makes them as the site is built.
 """
 
 from collections.abc import Iterator
 
 from lowalt.files.errors import InputError
+from lowalt.targets.record_schema import COMMON, figures
 
-HEAD = """\
+CONFIGURATION_HEAD = """\
 # Keys of the configuration
 
 Made from `workflow/schemas/config.schema.yaml`. The values of the embedded default stand in
@@ -16,6 +17,18 @@ refused before any job starts. In an overlay, null takes out what a lower layer 
 an effect, wherever the key may be left out.
 """
 LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
+
+RECORDS_HEAD = """\
+# Keys of target records
+
+Made from `src/lowalt/targets/records.schema.yaml`. What a record is, and how to write one:
+[Records of targets](../../design/targets.md), [A target of your own](../tutorials/target.md).
+
+"""
+INSIDE = {
+    "Parts of a mesh (`parts`, each by its name)": "part", "Meshes of a part (`meshes`, a list)": "mesh",
+    "Regions (`region`, `drop`)": "region", "Wing beat (`flap`)": "flap",
+}  # fmt: skip
 
 
 def kind(entry: dict) -> str:
@@ -55,8 +68,8 @@ def cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
 
 
-def page(schema: dict) -> str:
-    """Return the page of a schema: single keys first, then a section for each block.
+def configuration_page(schema: dict) -> str:
+    """Return the page of the configuration's schema: single keys first, then a section for each block.
 
     Raises: InputError where the schema has no properties.
     """
@@ -68,10 +81,39 @@ def page(schema: dict) -> str:
         lines = list(rows(entry))
         if not lines:
             lines = [(key, value(entry), entry.get("description", ""))]
-        table = "".join(f"| `{name}` | {' | '.join(map(cell, rest))} |\n" for name, *rest in lines)
+        table = "".join(f"| `{name}` | {' | '.join(map(cell, cells))} |\n" for name, *cells in lines)
         if lines[0][0] == key:
             single += table
         else:
             about = cell(entry.get("description", ""))
             blocks += f"\n## {key}\n\n{about[:1].upper()}{about[1:]}.\n\n{title}{table}"
-    return f"{HEAD}\n{single}{blocks}"
+    return f"{CONFIGURATION_HEAD}\n{single}{blocks}"
+
+
+def records_page(schema: dict) -> str:
+    """Return the page of the keys of records: those of every record, of each source, and of what stands inside.
+
+    Raises: InputError naming a key without a description.
+    """
+    sections = {"Every record" if name == COMMON else f"Source `{name}`": section
+                for name, section in schema["sources"].items()}  # fmt: skip
+    sections |= {title: schema["$defs"][name] for title, name in INSIDE.items()}
+    lines = [RECORDS_HEAD]
+    for title, section in sections.items():
+        lines += [f"## {title}", "", "| key | meaning |", "|---|---|"]
+        for name, key in section["properties"].items():
+            if "description" not in key:
+                raise InputError(f"schema of records: {name} has no description, expected one line of meaning")
+            lines.append(f"| `{name}`{' (needed)' * (name in section.get('required', []))} | {key['description']} |")
+        lines.append("")
+    lines += [
+        "## Built-in models (`model`)",
+        "",
+        "| model | like | size_is | keys | figures |",
+        "|---|---|---|---|---|",
+    ]
+    for name, model in schema["models"].items():
+        cells = [", ".join(model.get(key, [])) for key in ("size_is", "keys")]
+        needed = ", ".join(f"`{figure}` ({kind})" for figure, kind in figures(name).items())
+        lines.append(f"| {name} | {model['like']} | {' | '.join(cells)} | {needed} |")
+    return "\n".join([*lines, ""])

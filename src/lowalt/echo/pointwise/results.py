@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.echo.pointwise.arg_max import NEAR_TIE, strongest_of
 from lowalt.echo.pointwise.reference_range import CELL
-from lowalt.echo.pointwise.terms import cell_phase, cell_sum, terms
+from lowalt.echo.pointwise.terms import PointTerms, cell_phase, cell_sum, terms
 from lowalt.machine.jit import PLAIN
 
 
@@ -75,19 +75,19 @@ def strongest(z, u, base, count, sums):
 
 
 @PLAIN
-def shift(z, u, l, radar, delay, gain):  # noqa: E741
-    """Return amplitude and range in cells of point l over a path `delay` (s) longer and `gain` times as strong."""
-    turn = radar.centre_hz * delay
-    turn -= np.rint(turn)
-    later = complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
-    return z[l] * gain * later, u[l] + radar.bandwidth_hz * delay
+def room(scene, paths):
+    """Return empty `PointTerms` for the points of a scene over all paths."""
+    count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
+    size = count * max(1, paths.delays.shape[0])
+    return PointTerms(np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size), np.empty(size))
 
 
 @PLAIN
-def symbol(scene, radar, ref, n, aims, paths, e, z, u, risk):
-    """Fill z, u, risk (L or L * paths) of symbol n with all paths; returns 1 + l for a point in the station, else 0."""
+def symbol(scene, radar, ref, n, aims, paths, out):
+    """Fill `out` (`PointTerms`) for symbol n with all paths; returns 1 + l for a point in the station, else 0."""
+    e, z, u, risk = out
     count = len(e)
-    fault = terms(scene, radar, ref, n, aims, e, z[:count], u[:count], risk[:count])
+    fault = terms(scene, radar, ref, n, aims, out)
     path_count = paths.delays.shape[0]
     if fault or path_count == 0:
         return fault
@@ -96,7 +96,10 @@ def symbol(scene, radar, ref, n, aims, paths, e, z, u, risk):
         for l in range(count):  # noqa: E741
             delay = paths.delays[k, n % paths.delays.shape[1], l % paths.delays.shape[2]]
             gain = paths.gains[k, n % paths.gains.shape[1], l % paths.gains.shape[2]]
-            z[k * count + l], u[k * count + l] = shift(z, u, l, radar, delay, gain)
+            turn = radar.centre_hz * delay
+            turn -= np.rint(turn)
+            later = complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
+            z[k * count + l], u[k * count + l] = z[l] * gain * later, u[l] + radar.bandwidth_hz * delay
             risk[k * count + l] = risk[l] * abs(gain)
     return 0
 
@@ -107,31 +110,27 @@ def signal(scene, radar, refs, symbols, aims, paths, found, risks):
 
     Returns 0, or n L + l + 1 where point l stands in the station at symbol n.
     """
-    count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
-    size = count * max(1, paths.delays.shape[0])
-    e, z, u, risk = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size), np.empty(size)
-    sums = np.empty((radar.subcarriers, 2))
+    points, sums = room(scene, paths), np.empty((radar.subcarriers, 2))
     for n in symbols:
-        fault = symbol(scene, radar, refs[n], n, aims, paths, e, z, u, risk)
+        fault = symbol(scene, radar, refs[n], n, aims, paths, points)
         if fault:
-            return n * count + fault
+            return n * len(points.e) + fault
         base = int(refs[n, CELL])
-        found.values[n], found.cells[n], found.ties[n], found.gaps[n] = strongest(z, u, base, radar.subcarriers, sums)
-        found.totals[n], risks[n] = np.abs(z).sum(), risk.sum()
+        answer = strongest(points.z, points.u, base, radar.subcarriers, sums)
+        found.values[n], found.cells[n], found.ties[n], found.gaps[n] = answer
+        found.totals[n], risks[n] = np.abs(points.z).sum(), points.risk.sum()
     return 0
 
 
 @PLAIN
 def matrix(scene, radar, refs, aims, paths, cells, out):
     """Fill out (N, M) with all range cells, or with subcarriers where `cells` is false; returns as `signal`."""
-    count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
-    size = count * max(1, paths.delays.shape[0])
-    total = radar.subcarriers
-    e, z, u, risk = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size), np.empty(size)
+    points, total = room(scene, paths), radar.subcarriers
+    z, u = points.z, points.u
     for n in range(len(refs)):
-        fault = symbol(scene, radar, refs[n], n, aims, paths, e, z, u, risk)
+        fault = symbol(scene, radar, refs[n], n, aims, paths, points)
         if fault:
-            return n * count + fault
+            return n * len(points.e) + fault
         base = int(refs[n, CELL])
         if cells:
             for j in range(total):
@@ -141,7 +140,7 @@ def matrix(scene, radar, refs, aims, paths, cells, out):
             # Phase of subcarrier m relative to the effective carrier; the share of whole cells is reduced in integers.
             whole = (((2 * m - (total - 1)) * (base % (2 * total))) % (2 * total)) / (2.0 * total)
             value = 0.0j
-            for l in range(size):  # noqa: E741
+            for l in range(len(z)):  # noqa: E741
                 turn = (m - 0.5 * (total - 1)) / total * u[l] + whole
                 turn -= np.rint(turn)
                 value += z[l] * complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
