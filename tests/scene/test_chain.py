@@ -16,6 +16,7 @@ from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.effects import PLACES, called, dotted
 from lowalt.scene.effects.channel import interference
+from lowalt.scene.effects.receiver.offsets import of_stations
 from lowalt.scene.observe import observe
 from lowalt.scene.response import response
 from scenes import A, B, network, scene, target, view_of
@@ -105,6 +106,35 @@ def test_other_stations_are_heard_from_mast_to_mast_and_leak_by_their_levels():
     np.testing.assert_allclose(leaked, np.sqrt(10) * less, rtol=1e-12)
     at_level = np.mean(abs(unknown((A, B), leakage_db=0.0)) ** 2)
     assert at_level == pytest.approx(np.mean(abs(full) ** 2), rel=0.1)
+
+
+@pytest.mark.parametrize(("model", "beside"), [(3, "next waveform"), (9, "previous waveform")])
+def test_another_station_is_heard_by_its_own_clock_and_oscillator(model, beside):
+    """Every time sample from what its sender has on the air by then: the symbol, the one before or the one after."""
+    shared = replace(B, frequency_hz=A.frequency_hz)
+    radio, (cloud, row) = network(symbols=3, stations=(A, shared)), target(np.random.default_rng(5), model=model)
+    asked = scene({"interference": {"sigma_ppm": 0.5, "sigma_s": 1e-6}}, radio)
+    settings, sample = asked.effects[0].settings, SceneSample(asked, observe(asked, A, cloud, row))
+    errors = of_stations(settings, radio, sample.draws("link_offset"))
+    ppm, shift_s = np.subtract(errors["B"], errors["A"])
+    data, frequencies = interference.sent(settings, sample, shared), (np.arange(32) - 16) * 120e3
+    truth, seen = np.zeros((3, 32), complex), set()
+    for whole, delay_s in interference.arrivals(settings, sample, shared):
+        for n, i in np.ndindex(3, 32):
+            t = i / (32 * 120e3)
+            sent_s = t - delay_s - shift_s
+            name, after_s = "waveform", 0.0
+            if sent_s < -sample.prefix_s:
+                name, after_s = "previous waveform", sample.prefix_s
+            if sent_s >= 1 / 120e3:
+                name, after_s = "next waveform", -sample.prefix_s
+            seen.add(name)
+            wave = np.exp(2j * np.pi * frequencies * (t - shift_s + after_s)) * data(name)[n]
+            instant = n * radio.symbol_interval_s + t
+            turn = np.exp(2j * np.pi * 1e-6 * ppm * (A.frequency_hz + 16 * 120e3) * instant)
+            truth[n, i] += turn * (np.broadcast_to(whole, (3, 32))[n] * wave).sum() / 32
+    assert seen == {"waveform", beside}
+    np.testing.assert_allclose(interference.heard(settings, sample), truth, atol=1e-9 * abs(truth).max())
 
 
 def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():
