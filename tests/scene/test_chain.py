@@ -51,12 +51,13 @@ def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample():
     assert abs(found - still).max() > 1e-3 * abs(still).max()
 
 
-def test_a_late_echo_begins_with_the_previous_symbol():
+@pytest.mark.parametrize("prefix_s", [None, 3e-7])
+def test_a_late_echo_begins_with_the_previous_symbol(prefix_s):
     radio = network(symbols=3)
     cloud, row = target(np.random.default_rng(1), 3, 20.0, x_m=330.0, rate_hz=0.0)
-    asked = scene({"cyclic_prefix": {}}, radio)
-    view = observe(asked, A, cloud, row)
-    data, before, prefix_s = data_of("waveform", radio), data_of("previous waveform", radio), 144 / 2048 / 120e3
+    asked = scene({"cyclic_prefix": {"prefix_s": prefix_s}}, radio)
+    view, prefix_s = observe(asked, A, cloud, row), prefix_s or 144 / 2048 / 120e3
+    data, before = data_of("waveform", radio), data_of("previous waveform", radio)
     count, baseband = radio.subcarriers, (np.arange(radio.subcarriers) - 16) * 120e3
     truth = np.zeros((3, count), complex)
     for point in range(3):
@@ -177,6 +178,12 @@ def test_the_catalogue_names_every_module_with_defaults_and_imports_none_that_is
     }
 
 
+def test_sampling_and_carrier_come_of_one_oscillator():
+    row, asked = target(np.random.default_rng(1))[1], scene({})
+    drawn = [asked.drawn(row, A, name).random() for name in ("clock_offset", "carrier_offset", "timing_offset")]
+    assert drawn[0] == drawn[1] != drawn[2] and drawn[0] != asked.drawn(row, B, "clock_offset").random()
+
+
 def test_unknown_effects_and_parameters_are_named():
     with pytest.raises(InputError, match="unknown effect 'fog'"):
         called({"fog": {}})
@@ -184,11 +191,10 @@ def test_unknown_effects_and_parameters_are_named():
         called({"adc": {"bit": 8}})
 
 
-def test_a_sample_without_its_target_keeps_its_noise_and_land():
+@pytest.mark.parametrize("noise", [{"receiver_noise": {}}, {"cell_noise": {"snr_db": 3.0}}])
+def test_a_sample_without_its_target_keeps_its_noise_and_land(noise):
     cloud, row = target(np.random.default_rng(6))
-    whole, echo = (
-        sample_of(effects, cloud, row) for effects in ({"receiver_noise": {}, "clutter": {}}, {"squint": {}})
-    )
+    whole, echo = (sample_of(effects, cloud, row) for effects in (noise | {"clutter": {}}, {"squint": {}}))
     empty = whole.without_target()
     difference = whole.cells - empty.cells
     alone = np.fft.ifft(echo.direct, axis=1)
