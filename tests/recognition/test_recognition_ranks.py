@@ -13,11 +13,11 @@ import torch
 from torch import nn
 
 from lowalt.config.layers import load_yaml
-from lowalt.recognition import batch_norm, checkpoint, predictions, schemes
+from lowalt.recognition import batch_norm, checkpoint, predictions, runs, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.workflow.launch import Launch
-from trainings import SETTINGS, with_training
+from trainings import SCHEME, SETTINGS, sources, with_training
 
 # One process imports torch, which takes seconds, and becomes two ranks by forks, with the variables that torchrun sets.
 # The slow tests below start them by torchrun itself.
@@ -115,6 +115,15 @@ def test_two_ranks_train_as_one_with_both_their_samples(both):
     assert apart["two"] < 1e-4 < 1e-3 < apart["half"]
     assert losses["two"] == pytest.approx(losses["one"], rel=1e-4)
     assert losses["half"] != pytest.approx(losses["one"], rel=1e-3)
+
+
+def test_a_rank_beside_the_first_writes_and_says_nothing(views, trained, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RANK", "1")
+    settings = with_training(steps=2, validate_every=1, checkpoint_s=0)
+    runs.train(sources(views), SCHEME, "seen", settings, tmp_path / "run", events=True)
+    block = {"batch": 64, "threads": 1, "precision": "fp32", "mirror": False}
+    runs.evaluate(runs.load(trained / "model.pt"), sources(views)["validation"], block, tmp_path / "some.csv")
+    assert not list(tmp_path.iterdir()) and not capsys.readouterr().err
 
 
 def launched(lines, processes):

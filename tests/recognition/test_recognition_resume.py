@@ -6,14 +6,16 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 import torch
 
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import checkpoint, recipe, runs, schemes
+from lowalt.recognition import checkpoint, recipe, runs, samples, schemes, training
 from lowalt.recognition.__main__ import main
+from lowalt.recognition.network import built
 from trainings import SCHEME, TRAINING, Killed, equal, kill_at, sources, train, with_training
 
 
@@ -39,6 +41,44 @@ def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp
             continue
     assert at[0] == 10**9
     assert equal(whole[0], parts[0]) and whole[1] == parts[1]
+
+
+def test_checkpoints_come_by_the_clock_and_the_time_spent_waiting_for_data_is_told(
+    views, tmp_path, monkeypatch, capsys
+):
+    """On a clock that stands still but for a second of reading and three of computing a step."""
+    clock = SimpleNamespace(now=0.0, monotonic=lambda: clock.now, process_time=lambda: clock.now)
+    monkeypatch.setattr(training, "time", clock)
+    monkeypatch.setattr(runs, "time", clock)
+
+    class Slow(samples.ViewSamples):
+        def changed(self, *given):
+            clock.now += 1
+            return super().changed(*given)
+
+    def compute(model, inputs):
+        clock.now += 3 if model.training else 0
+
+    def build(*given):
+        model = built(*given)
+        model.register_forward_pre_hook(compute)
+        return model
+
+    def run(**changes):
+        found = sources(views) | {"train": Slow([views], SCHEME.columns, {("seen", "train")})}
+        settings = with_training(steps=6, validate_every=6, **changes)
+        runs.train(found, SCHEME, "seen", settings, tmp_path, build=build)
+
+    step = kill_at(monkeypatch, 5)
+    with pytest.raises(Killed):
+        run(checkpoint_s=10)
+    assert checkpoint.load(tmp_path / "checkpoint.pt")[1]["at"]["steps"] == 3
+    monkeypatch.setattr(runs.Trainer, "_step", step)
+    run(checkpoint_s=1e9)
+    told = capsys.readouterr().err
+    assert "resumed at step 3" in told and "2 samples/s, 25.0 % of the time waiting for data" in told
+    record = json.loads((tmp_path / "run.json").read_text())
+    assert (record["waiting_share"], record["samples_per_s"], record["train_s"]) == (0.25, 2.0, 12.0)
 
 
 def killed_at(moments, views, folder, settings):

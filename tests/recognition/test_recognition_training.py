@@ -111,8 +111,11 @@ def test_arithmetic_is_bf16_only_where_the_processor_has_it(monkeypatch):
     assert (inference.arithmetic("fp32", "cpu"), inference.arithmetic("bf16", "cpu")) == ("fp32", "bf16")
 
 
-def test_early_stopping_counts_validations_without_gain(views, tmp_path):
-    settings = with_training(rate=0.0, steps=400, validate_every=2, patience=3)
+@pytest.mark.parametrize(("patience", "steps"), [(3, 400), (0, 8)])
+def test_early_stopping_counts_validations_without_gain_and_no_patience_asked_for_never_stops(
+    views, tmp_path, patience, steps
+):
+    settings = with_training(rate=0.0, steps=steps, validate_every=2, patience=patience)
     _, history = train(views, tmp_path, settings)
     assert len(history.splitlines()) == 1 + 4
 

@@ -16,6 +16,7 @@ from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.effects import PLACES, called, dotted
 from lowalt.scene.effects.channel import interference
+from lowalt.scene.effects.receiver.offsets import of_stations
 from lowalt.scene.observe import observe
 from lowalt.scene.response import response
 from scenes import A, B, network, scene, target, view_of
@@ -50,12 +51,13 @@ def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample():
     assert abs(found - still).max() > 1e-3 * abs(still).max()
 
 
-def test_a_late_echo_begins_with_the_previous_symbol():
+@pytest.mark.parametrize("prefix_s", [None, 3e-7])
+def test_a_late_echo_begins_with_the_previous_symbol(prefix_s):
     radio = network(symbols=3)
     cloud, row = target(np.random.default_rng(1), 3, 20.0, x_m=330.0, rate_hz=0.0)
-    asked = scene({"cyclic_prefix": {}}, radio)
-    view = observe(asked, A, cloud, row)
-    data, before, prefix_s = data_of("waveform", radio), data_of("previous waveform", radio), 144 / 2048 / 120e3
+    asked = scene({"cyclic_prefix": {"prefix_s": prefix_s}}, radio)
+    view, prefix_s = observe(asked, A, cloud, row), prefix_s or 144 / 2048 / 120e3
+    data, before = data_of("waveform", radio), data_of("previous waveform", radio)
     count, baseband = radio.subcarriers, (np.arange(radio.subcarriers) - 16) * 120e3
     truth = np.zeros((3, count), complex)
     for point in range(3):
@@ -107,6 +109,35 @@ def test_other_stations_are_heard_from_mast_to_mast_and_leak_by_their_levels():
     assert at_level == pytest.approx(np.mean(abs(full) ** 2), rel=0.1)
 
 
+@pytest.mark.parametrize(("model", "beside"), [(3, "next waveform"), (9, "previous waveform")])
+def test_another_station_is_heard_by_its_own_clock_and_oscillator(model, beside):
+    """Every time sample from what its sender has on the air by then: the symbol, the one before or the one after."""
+    shared = replace(B, frequency_hz=A.frequency_hz)
+    radio, (cloud, row) = network(symbols=3, stations=(A, shared)), target(np.random.default_rng(5), model=model)
+    asked = scene({"interference": {"sigma_ppm": 0.5, "sigma_s": 1e-6}}, radio)
+    settings, sample = asked.effects[0].settings, SceneSample(asked, observe(asked, A, cloud, row))
+    errors = of_stations(settings, radio, sample.draws("link_offset"))
+    ppm, shift_s = np.subtract(errors["B"], errors["A"])
+    data, frequencies = interference.sent(settings, sample, shared), (np.arange(32) - 16) * 120e3
+    truth, seen = np.zeros((3, 32), complex), set()
+    for whole, delay_s in interference.arrivals(settings, sample, shared):
+        for n, i in np.ndindex(3, 32):
+            t = i / (32 * 120e3)
+            sent_s = t - delay_s - shift_s
+            name, after_s = "waveform", 0.0
+            if sent_s < -sample.prefix_s:
+                name, after_s = "previous waveform", sample.prefix_s
+            if sent_s >= 1 / 120e3:
+                name, after_s = "next waveform", -sample.prefix_s
+            seen.add(name)
+            wave = np.exp(2j * np.pi * frequencies * (t - shift_s + after_s)) * data(name)[n]
+            instant = n * radio.symbol_interval_s + t
+            turn = np.exp(2j * np.pi * 1e-6 * ppm * (A.frequency_hz + 16 * 120e3) * instant)
+            truth[n, i] += turn * (np.broadcast_to(whole, (3, 32))[n] * wave).sum() / 32
+    assert seen == {"waveform", beside}
+    np.testing.assert_allclose(interference.heard(settings, sample), truth, atol=1e-9 * abs(truth).max())
+
+
 def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():
     cloud, row = target(np.random.default_rng(2))
     found, view = received_signal(scene({}), A, cloud, row), observe(scene({}), A, cloud, row)
@@ -147,6 +178,12 @@ def test_the_catalogue_names_every_module_with_defaults_and_imports_none_that_is
     }
 
 
+def test_sampling_and_carrier_come_of_one_oscillator():
+    row, asked = target(np.random.default_rng(1))[1], scene({})
+    drawn = [asked.drawn(row, A, name).random() for name in ("clock_offset", "carrier_offset", "timing_offset")]
+    assert drawn[0] == drawn[1] != drawn[2] and drawn[0] != asked.drawn(row, B, "clock_offset").random()
+
+
 def test_unknown_effects_and_parameters_are_named():
     with pytest.raises(InputError, match="unknown effect 'fog'"):
         called({"fog": {}})
@@ -154,11 +191,10 @@ def test_unknown_effects_and_parameters_are_named():
         called({"adc": {"bit": 8}})
 
 
-def test_a_sample_without_its_target_keeps_its_noise_and_land():
+@pytest.mark.parametrize("noise", [{"receiver_noise": {}}, {"cell_noise": {"snr_db": 3.0}}])
+def test_a_sample_without_its_target_keeps_its_noise_and_land(noise):
     cloud, row = target(np.random.default_rng(6))
-    whole, echo = (
-        sample_of(effects, cloud, row) for effects in ({"receiver_noise": {}, "clutter": {}}, {"squint": {}})
-    )
+    whole, echo = (sample_of(effects, cloud, row) for effects in (noise | {"clutter": {}}, {"squint": {}}))
     empty = whole.without_target()
     difference = whole.cells - empty.cells
     alone = np.fft.ifft(echo.direct, axis=1)

@@ -1,18 +1,24 @@
 """Every shipped scene's levels: the kept table is the code's and follows by hand."""
 
 import csv
+import functools
 import sys
 from math import log10, pi
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import scene_levels  # noqa: E402
 
-from lowalt.scene.effects.channel import cyclic_prefix  # noqa: E402
-from scenes import network  # noqa: E402
+from lowalt.scene import land  # noqa: E402
+from lowalt.scene.chain import SceneSample, received_signal  # noqa: E402
+from lowalt.scene.effects.channel import clutter, cyclic_prefix  # noqa: E402
+from lowalt.scene.levels import levels  # noqa: E402
+from lowalt.scene.observe import observe  # noqa: E402
+from scenes import A, network, scene, target  # noqa: E402
 
 SCENES = sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml"))
 
@@ -20,24 +26,22 @@ LINKED = "links", "triangle"
 """Scenes with links between stations."""
 
 
-def kept(scene: str) -> dict[str, float]:
-    """The kept table's levels of a scene."""
-    with (ROOT / "results/benchmarks/scene_levels.csv").open() as file:
-        return {row["level"]: float(row["value"]) for row in csv.DictReader(file) if row["scene"] == scene}
+@functools.cache
+def levels_of(name: str) -> dict[str, float]:
+    """The levels of a scene."""
+    return {level.name: level.value for level in scene_levels.scene_levels(ROOT, name)[1]}
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_kept_levels_of_a_scene_are_the_codes(name):
-    _, found = scene_levels.scene_levels(ROOT, name)
-    table = kept(name)
-    assert list(table) == [level.name for level in found]
-    for level in found:
-        assert table[level.name] == pytest.approx(level.value, abs=0.051), level.name
+    with (ROOT / "results/benchmarks/scene_levels.csv").open() as file:
+        table = {row["level"]: float(row["value"]) for row in csv.DictReader(file) if row["scene"] == name}
+    assert table == pytest.approx(levels_of(name), abs=0.051) and list(table) == list(levels_of(name))
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "fmcw"])
-def test_the_kept_levels_of_a_scene_follow_by_hand(name):
-    table, link = kept(name), name in LINKED
+def test_the_levels_of_a_scene_follow_by_hand(name):
+    table, link = levels_of(name), name in LINKED
     out, back = (415.6, 407.1) if link else (415.6, 415.6)
     noise_figure = 9.0 if name == "worst" else 7.0
     spacing_hz = 60e3 if name == "worst" else 120e3
@@ -62,8 +66,8 @@ def test_the_kept_levels_of_a_scene_follow_by_hand(name):
         assert table["loss beyond the cyclic prefix"] == 0.0
 
 
-def test_the_kept_levels_of_a_sweep_follow_by_hand():
-    table, out = kept("fmcw"), 25.1
+def test_the_levels_of_a_sweep_follow_by_hand():
+    table, out = levels_of("fmcw"), 25.1
     path, element = table[f"path out and back, {out} m, 1 m2"], table["element toward the target, each way"]
     # 12 dBm from each of 3 transmitters; the wave is 3.9446 mm long.
     assert path == pytest.approx(20 * log10(3.9446e-3) - 30 * log10(4 * pi) - 40 * log10(out), abs=0.06)
@@ -99,3 +103,20 @@ def test_what_comes_within_the_prefix_loses_nothing_and_later_echoes_their_share
     delays_s = [prefix_s + later / radio.subcarrier_spacing_hz for later in (-0.02, 0, 0.1, 2)]
     shares = [cyclic_prefix.lost(delay_s, prefix_s, radio) for delay_s in delays_s]
     assert shares == pytest.approx([0.0, 0.0, 0.1, 1.0])
+
+
+def test_the_loss_beyond_the_prefix_is_what_a_late_echo_loses():
+    (cloud, row), radio = target(np.random.default_rng(1), x_m=330.0), network(subcarriers=256)
+    late, whole = scene({"cyclic_prefix": {}}, radio), scene({}, radio)
+    power = [np.mean(abs(received_signal(each, A, cloud, row).signal) ** 2) for each in (late, whole)]
+    table = {level.name: level.value for level in levels(observe(late, A, cloud, row), late.effects, power[1])}
+    assert table["loss beyond the cyclic prefix"] == pytest.approx(10 * log10(power[0] / power[1]), abs=0.3) != 0
+
+
+def test_the_land_in_the_target_s_range_cell_is_that_of_the_cell_which_holds_the_target():
+    (cloud, row), asked = target(np.random.default_rng(1)), scene({"clutter": {}}, network())
+    sample = SceneSample(asked, observe(asked, A, cloud, row))
+    (cell,) = set(sample.true_cell(sample.view).tolist())
+    power_w = land.with_side_lobes(clutter.mean_power(asked.effects[0].settings, sample.view)[0], 32)
+    table = {level.name: level.value for level in levels(sample.view, asked.effects, sample.power)}
+    assert table["land, the target's range cell"] == pytest.approx(10 * log10(power_w[cell]) + 30)

@@ -1,5 +1,7 @@
 """Effects on motion: laws of the processes that move rotors and flying targets, read back out of what they draw."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
@@ -111,3 +113,64 @@ def test_thrust_points_where_the_craft_accelerates_to():
         _, pitch, roll = gusts.tilt(np.array([[right, front, 0.0]]), pitches=True)[0]
         thrust = attitude(0.0, pitch, roll) @ [0.0, 0.0, 1.0]
         np.testing.assert_allclose(thrust[:2] / thrust[2], np.array([right, front]) / 9.80665, rtol=0.01)
+
+
+def test_a_rotor_s_spread_is_a_share_of_its_own_rate(clouds):
+    cloud = clouds["DJI Mini 2"]
+    first, second = cloud.parts_of("rotor")[:2]
+    faster = replace(cloud, record=cloud.record | {"rate_factors": {cloud.names[second]: 5.4}})
+    plain, own = (
+        rotor_spread.perturb(rotor_spread.DEFAULTS, it, ROW, TIMES_S, stream(2, "f")).angle_rad
+        for it in (cloud, faster)
+    )
+    assert (plain[first] == own[first]).all()
+    np.testing.assert_allclose(own[second], 5.4 * plain[second], rtol=1e-12)
+
+
+def test_targets_answer_the_air_as_their_masses_drag_and_lift_say(clouds):
+    mini, crow, taxi = (clouds[name] for name in ("DJI Mini 2", "Crow", "EH 216 S"))
+    # A plate of 0.15 L^2 and a rotor drag of 0.465 / s at 0.3 m, that falls with the root of the length.
+    rate = 1.225 * 0.15 * 0.2192**2 * 10 / 0.249 + 0.465 * np.sqrt(0.3 / 0.2192)
+    assert flight.response_s(mini, 10.0) == pytest.approx([1 / rate] * 2)
+    # A lift to drag of 6, drag with the square of the speed: 6 V / (2 g).
+    assert flight.response_s(crow, 10.0)[0] == pytest.approx(60 / (2 * 9.80665))
+    assert [flight.attitude_s(cloud) for cloud in (mini, taxi)] == pytest.approx(
+        [0.1 * np.sqrt(0.2192 / 0.4), 0.1 * np.sqrt(5.2704 / 0.4)]
+    )
+
+
+def wind_of(seed):
+    """Where the wind of `blown` goes, (2,): the first draw of its stream."""
+    heading = stream(1, "gusts", seed).uniform(0, 2 * np.pi)
+    return np.array([np.cos(heading), np.sin(heading)])
+
+
+def test_who_drifts_with_the_wind_meets_turbulence_that_hardly_changes(clouds):
+    ahead = gusts.mean_wind_mps(ROW["z_m"], 7.7) * wind_of(0)
+    changed = []
+    for sign in (1, -1):
+        row = ROW | {"vx_mps": sign * ahead[0], "vy_mps": sign * ahead[1]}
+        tilt = gusts.perturb(gusts.DEFAULTS, clouds["DJI Mini 2"], row, TIMES_S, stream(1, "gusts", 0)).tilt_rad
+        changed.append(np.std(np.diff(tilt[:, 1:], axis=0)))
+    assert changed[0] < 0.2 * changed[1]
+
+
+def test_gusts_along_and_across_the_wind_have_nothing_to_do_with_each_other(clouds):
+    row, products = ROW | {"vx_mps": 0.0, "vy_mps": 0.0}, []
+    for seed in range(200):
+        drawn = gusts.perturb(gusts.DEFAULTS, clouds["DJI Mini 2"], row, TIMES_S[::40], stream(1, "gusts", seed))
+        (x, y), moved = wind_of(seed), drawn.offset_m[-1, :2]
+        along, across = moved @ [x, y], moved @ [-y, x]
+        # What a mistaken axis across has in common with the one along changes sign eight times in a circle.
+        products.append([np.sign(x * y * (x * x - y * y)) * along * across, along**2, across**2])
+    both, first, second = np.mean(products, axis=0)
+    assert abs(both) < 0.15 * np.sqrt(first * second)
+
+
+def test_where_the_nose_points_changes_no_thrust(clouds):
+    pushes = []
+    for yaw_rad in (0.4, 2.0, -1.0):
+        drawn = gusts.perturb(gusts.DEFAULTS, clouds["DJI Mini 2"], ROW | {"yaw_rad": yaw_rad}, TIMES_S, stream(1, "n"))
+        front, right = -np.tan(drawn.tilt_rad[:, 1]), np.tan(drawn.tilt_rad[:, 2])
+        pushes.append(np.stack([right, front, 0 * front], axis=1) @ attitude(yaw_rad, 0.0, 0.0).T)
+    np.testing.assert_allclose(pushes[1:], [pushes[0]] * 2, atol=1e-12)

@@ -19,6 +19,7 @@ from lowalt.scene.effects.receiver import (
     timing_offset,
     transmit_leakage,
 )
+from lowalt.scene.effects.receiver.offsets import of_stations
 from scenes import A, B, link, linked, network
 
 
@@ -83,6 +84,17 @@ def test_links_have_opposite_offsets_and_a_station_none():
     assert abs(there - echo(one, 2e-6)).max() > 0.1
     # Up to the leakage between subcarriers and the stations' sub-bands, one link undoes what the other does.
     np.testing.assert_allclose((there * back)[0], (echo(one, 2e-6) ** 2)[0], atol=1e-3)
+
+
+def test_a_sender_that_is_high_raises_lines_and_one_that_is_late_makes_echoes_late():
+    look, changes = look_of(linked(), link()), {"sigma_ppm": 0.01, "sigma_s": 2e-8}
+    errors = of_stations(changes, look.network, stream(3, "look"))
+    ppm, late_s = np.subtract(errors["A"], errors["B"])
+    late = heard(link_offset, changes | {"sigma_ppm": 0.0}, echo(look, 2e-6), look, stream(3, "look"))
+    np.testing.assert_allclose(late, echo(look, 2e-6 + late_s), atol=1e-12)
+    high = heard(link_offset, changes | {"sigma_s": 0.0}, echo(look, 2e-6), look, stream(3, "look"))
+    turns = np.angle(high[1:] / high[:-1]) / (2 * np.pi)
+    np.testing.assert_allclose(turns, 1e-6 * ppm * look.oscillator_hz * 2.5e-3, atol=1e-3)
 
 
 def test_noise_is_white_of_the_level_that_link_budget_and_snr_ask_for():

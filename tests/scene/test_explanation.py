@@ -1,0 +1,50 @@
+"""What a scene does to a sample, as `lowalt explain` says it: whose samples they are, and laws of what is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lowalt.scene import explanation
+from lowalt.shards.dataset import Dataset
+from scenes import A, scene, target
+from small_configuration import configuration
+
+
+def found(effects, **changes):
+    """The finding of the small target at station A."""
+    cloud, row = target(np.random.default_rng(1), **changes)
+    return explanation.finding(scene(effects), A, explanation.ExplainedSample(cloud, row, None), {})
+
+
+def test_samples_are_those_of_the_data_set_looks_of_a_track_included():
+    config = configuration()
+    config["targets"]["select"] = ["DJI Mini 2"]
+    config["motion"] |= {"looks": 2}
+    dataset = Dataset(config)
+    (sample,) = explanation.samples(config, None, [("DJI Mini 2", 3)])
+    row = next(dataset.row(place) for place in map(dataset.place, range(len(dataset))) if place.model == 3)
+    assert {name: sample.row[name] for name in row if row[name] == row[name]} == {
+        name: value for name, value in row.items() if value == value
+    }
+
+
+def test_a_target_a_hundred_times_as_strong_stands_20_db_higher_over_the_land():
+    cloud, row = target(np.random.default_rng(1))
+    weak, strong = (
+        explanation.finding(
+            scene({"clutter": {}}),
+            A,
+            explanation.ExplainedSample(replace(cloud, rcs_m2=by * cloud.rcs_m2), row, None),
+            {},
+        ).over_db
+        for by in (1, 100)
+    )
+    assert np.isfinite(weak) and strong == pytest.approx(weak + 20)
+
+
+def test_the_cell_beside_the_target_holds_it_at_the_end_of_ranges_too():
+    """An error of one cell to either side, where the target stands in cell 0: 32 cells of 39 m farther."""
+    always = {"cell_error": {"probability": 1.0, "spread_cells": 1}}
+    assert found(always).right == found(always, x_m=0.0, y_m=1249.0, z_m=10.0, vx_mps=0.0, vy_mps=0.0).right == 1.0
+    assert found({"cell_error": {"probability": 1.0, "spread_cells": 15}}).right < 0.5
