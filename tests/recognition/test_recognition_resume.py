@@ -15,7 +15,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, recipe, runs, samples, schemes, training
 from lowalt.recognition.__main__ import main
-from lowalt.recognition.network import built
+from lowalt.recognition.recogniser import built
 from trainings import SCHEME, TRAINING, Killed, equal, kill_at, sources, train, with_training
 
 
