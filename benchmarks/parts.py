@@ -25,7 +25,7 @@ from lowalt.shards.index import load
 
 BASE = {
     "targets": {"select": ["DJI Mini 2", "Crow", "AITO M9 2024", "Walking Pedestrian 1"]},
-    "motion": {"models": 100, "models_per_chunk": 100}, "tiles": {"reduced": []},
+    "motion": {"models": 50, "models_per_chunk": 50}, "tiles": {"reduced": []},
 }  # fmt: skip
 TARGET_LEVELS = {"effects": {"mean_cross_section": {}}}
 PARTS = {
@@ -35,7 +35,7 @@ PARTS = {
     "cubes, int16": {"shards": {"kind": "cube", "cells": "int16"}},
     "range-Doppler maps as well": {"spectra": {"range_doppler": {"cells": 65, "points": 512}}},
     "noise in every cell, CFAR detector": merge(TARGET_LEVELS, {"effects": {"cell_noise": {}, "detector": {}}}),
-    "ten looks a track": {"motion": {"models": 10, "models_per_chunk": 10, "looks": 10}},
+    "five looks a track": {"motion": {"models": 10, "models_per_chunk": 10, "looks": 5}},
     "one to three companions": {"effects": {"companions": {"count": [1, 3], "spread_m": 4.0, "speed_mps": 1.0}}},
 }
 COLUMNS = ("part", "samples", "ms_per_sample", "kb_per_sample", "hardware")
