@@ -268,7 +268,7 @@ def test_a_file_of_predictions_is_scored_against_the_shards_alone(tmp_path, monk
 
 
 def test_commands_for_data_do_not_import_torch():
-    names = ("__main__", "sources", "evaluated", "tables", "freeze", "score", "augment", "order")
+    names = ("__main__", "sample_sources", "evaluated", "tables", "freeze", "score", "augment", "order")
     lines = "; ".join(f"import lowalt.recognition.{name}" for name in names)
     code = f"{lines}; import sys; assert not any(name.split('.')[0] in ('torch', 'timm') for name in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
