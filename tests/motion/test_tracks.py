@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,8 +19,9 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.motion import positions, read_table, write_table
 from lowalt.motion.__main__ import main as motion
 from lowalt.motion.drawing import region_polygon
+from lowalt.motion.table import SCALE
 from lowalt.motion.track_files import path_of
-from lowalt.motion.tracks import TURN_RADPS, Cell, model_rows
+from lowalt.motion.tracks import TURN_RADPS, Cell, drawn_path, model_rows
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.sample_record import record, row_of
 from lowalt.shards.write import select
@@ -115,6 +117,44 @@ def test_a_drawn_path_is_made_of_coordinated_turns_inside_the_cell(dataset, subt
             np.testing.assert_allclose(place[1:, :2] - place[0, :2], steps[:, 999::1000].T, atol=1e-3 * speeds[0])
             rates.append(row["turn_radps"])
     assert -TURN_RADPS - 1e-9 <= min(rates) < -0.8 * TURN_RADPS and 0.8 * TURN_RADPS < max(rates) <= TURN_RADPS + 1e-9
+
+
+def test_a_target_turns_to_climb_the_other_way_while_it_can_still_go_on_for_a_look():
+    cell = Cell(np.array([[0.0, 0.0], [600.0, 0.0], [600.0, 600.0], [0.0, 600.0]]), np.zeros((0, 2)), 0.0)
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        row = {"x_m": 300.0, "y_m": 300.0, "z_m": rng.uniform(41, 45), "vx_mps": 3.0, "vy_mps": 1.0, "yaw_rad": 0.0}
+        path = drawn_path(rng, row | {"vz_mps": rng.uniform(-1, 1)}, cell, (40.0, 46.0), 30, 1.0)
+        ahead = path.place_m[:, 2] + path.velocity_mps[:, 2]
+        assert ahead.min() >= 40 and ahead.max() <= 46
+
+
+def test_rotors_with_rates_of_their_own_go_on_from_look_to_look(dataset):
+    cloud, masts = dataset.clouds["DJI Mini 2"], np.array(masts_m(dataset.config["network"]), float)
+    own = replace(cloud, record=cloud.record | {"rate_factors": {cloud.names[cloud.parts_of("rotor")[1]]: 1.37}})
+    settings, published = motion_block(dataset.config), TABLE["DJI Mini 2"]
+    rows = model_rows(1, own, published, masts, region_polygon(masts, None), settings, 0)
+    for row, after in itertools.pairwise(rows):
+        ends, starts = positions(own, row, np.array([1.0])), positions(own, after, np.array([0.0]))
+        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
+
+
+def test_along_a_log_a_larger_car_s_wheels_turn_more_slowly_and_a_full_circle_is_one_turn(dataset, tmp_path):
+    def circle(time_s):
+        angle = 2 * np.pi * time_s / 10
+        return np.stack([250 + 20 * np.cos(angle), 144 + 20 * np.sin(angle), 0 * time_s], axis=-1)
+
+    config = configuration(track=written(tmp_path / "log.csv", np.linspace(0, 12.5, 500), places=circle))
+    cloud, masts = dataset.clouds["NIO ET5T 2023"], np.array(masts_m(config["network"]), float)
+    corners, settings = region_polygon(masts, None), motion_block(config)
+    path = path_of(settings, corners, masts)
+    given = 1, cloud, TABLE["NIO ET5T 2023"], masts, corners
+    plain, sized = (
+        model_rows(*given, settings | sizes, 0, path) for sizes in ({}, {"sizes_m": {"Vehicle": [6.0, 9.0]}})
+    )
+    assert [row["turn_radps"] for row in plain] == pytest.approx([2 * np.pi / 10] * LOOKS, rel=1e-3)
+    scale = sized[0][SCALE]
+    assert scale > 1.2 and [row["rate_hz"] * scale for row in sized] == pytest.approx([row["rate_hz"] for row in plain])
 
 
 def test_a_track_is_in_one_fold_whole(dataset):

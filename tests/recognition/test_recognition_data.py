@@ -154,6 +154,8 @@ def test_samples_in_memory_are_those_written_and_no_others(tmp_path):
     assert (source.views(np.arange(len(source.facts))) == expected).all()
     assert set(zip(source.facts.group.tolist(), source.facts.fold.tolist(), strict=True)) == pairs
     assert (source.views(np.array([3, 1])) == expected[[3, 1]]).all()
+    parts = [samples.ViewSamples([tmp_path / name], [0, len(NAMES) + 2], pairs) for name in ("0.npz", "1.npz")]
+    assert samples.joined_sources(*parts).sha256() == source.sha256()
 
 
 def test_damaged_or_foreign_views_are_refused_by_name(tmp_path):

@@ -30,6 +30,8 @@ def test_range_and_aspect_are_those_of_the_nearest_station_used():
     assert found.range_m.tolist() == [90.0, 60.25] and found.aspect_deg == pytest.approx([math.degrees(0.5), 180.0])
     alone = predictions.from_facts(facts(), (2,), shares)
     assert alone.range_m[0] == 30.0 and math.isnan(alone.range_m[1])
+    others = predictions.from_facts(facts(), (1, 2), shares)
+    assert others.range_m.tolist() == [30.0, 60.25] and others.aspect_deg == pytest.approx([math.degrees(1.5), 180.0])
     assert found.guesses.tolist() == [0, 0] and found.correct.tolist() == [False, True]
     assert found.motion.tolist() == ["Crow/3", "Dove/4"]
     assert found.of({("unseen", "test"), ("seen", "val")}).key.tolist() == ["a", "b"]

@@ -13,12 +13,16 @@ import pytest
 import torch
 from timm.utils import ModelEmaV3
 from torch import nn
+from torch.optim.optimizer import register_optimizer_step_pre_hook
 
 from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, inference, recipe, runs, samples
 from lowalt.recognition import training as loop
+from lowalt.recognition.ahead import Augmented
 from lowalt.recognition.matrix_products import MatrixProduct
+from lowalt.recognition.objective import objective
 from lowalt.recognition.order import batches, epoch_order
+from lowalt.recognition.statistics import cross_entropy
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
 
 PATHS = os.pathsep.join(str(Path(__file__).parents[2] / folder) for folder in ("src", "tests/support"))
@@ -277,3 +281,74 @@ def test_seed_names_and_threads_fix_what_torch_draws():
     assert drawn[0] == drawn[1] and drawn[2] != drawn[0] != drawn[3]
     assert torch.get_num_threads() == 1 and torch.are_deterministic_algorithms_enabled()
     assert not torch.utils.deterministic.fill_uninitialized_memory
+
+
+def test_every_step_has_the_rate_of_its_share_and_a_gradient_no_longer_than_the_clip(views, tmp_path, request):
+    rates, lengths = [], []
+
+    def note(optimiser, *given):
+        rates.append([(group["lr"], group["factor"]) for group in optimiser.param_groups])
+        values = [value.grad.norm() for group in optimiser.param_groups for value in group["params"]]
+        lengths.append(float(torch.stack(values).norm()))
+
+    request.addfinalizer(register_optimizer_step_pre_hook(note).remove)
+    train(views, tmp_path, with_training(steps=4, validate_every=4, warmup=0.5, clip=0.01, backbone_rate=0.25))
+    for share, found in zip((0.5, 1.0, 0.5, 0.0), rates, strict=True):
+        assert all(rate == pytest.approx(3e-3 * share * factor) for rate, factor in found)
+    assert {factor for _, factor in rates[0]} == {1.0, 0.25} and lengths == pytest.approx([0.01] * 4, rel=1e-3)
+
+
+def test_the_weights_kept_are_the_averages_that_were_validated_last_of_equal_ones(views, trained, tmp_path):
+    found, validation = runs.load(trained / "model.pt").model, sources(views)["validation"]
+    machine, every = inference.Machine(torch.device("cpu"), "fp32"), np.arange(len(validation.facts))
+    answers = inference.probabilities(found, validation, every, machine, 8)
+    with (trained / "history.csv").open(newline="") as file:
+        history = [(float(row["validation_accuracy"]), float(row["validation_loss"])) for row in csv.DictReader(file)]
+    # Max takes the first of equal ones.
+    accuracy, loss = max(history[::-1], key=lambda row: row[0])
+    assert accuracy == np.mean(answers.argmax(1) == validation.facts.label)
+    assert loss == pytest.approx(cross_entropy(answers, validation.facts.label), rel=1e-4)
+    # Steps too small for any accuracy: the weights are those of a training that validates at its end alone.
+    often, once = (
+        train(views, tmp_path / str(after), with_training(steps=4, rate=1e-9, validate_every=after))[0]
+        for after in (1, 4)
+    )
+    assert equal(often, once)
+
+
+def test_augmentation_differs_from_step_to_step_and_rank_to_rank_and_comes_again(views):
+    source, numbers = sources(views)["train"], np.arange(16)
+    block = SETTINGS["augmentation"] | {"mask_time": 0.5}
+
+    def read(step, rank=0):
+        return Augmented(source, SCHEME.columns, block, (3, "a"), rank, 1)[step, np.tile(numbers, rank + 1)][0][:4]
+
+    assert (read(5) == read(5)).all() and (read(5) != read(6)).any()
+    both = [Augmented(source, SCHEME.columns, block, (3, "a"), rank, 2)[5, numbers.repeat(2)] for rank in (0, 1)]
+    assert (both[0][1] == both[1][1]).all() and (both[0][0] != both[1][0]).any()
+
+
+@pytest.mark.parametrize(("weight", "smoothing"), [(0.5, 0.2), (2.0, 0.0)])
+def test_the_loss_weighs_each_station_alone_against_all_together(weight, smoothing):
+    rng = np.random.default_rng(3)
+    together, alone = (torch.from_numpy(rng.normal(size=(count, 4))) for count in (3, 6))
+    labels = np.array([2, 0, 3])
+
+    class Model(nn.Module):
+        shape = 2, 1  # stations and spectra
+
+        def forward(self, images, **asked):
+            return together, alone
+
+    def entropy(logits, label):
+        shares = np.exp(logits) / np.exp(logits).sum()
+        wanted = (1 - smoothing) * np.eye(4)[label] + smoothing / 4
+        return -(wanted * np.log(shares)).sum()
+
+    all_together = np.mean([entropy(row, label) for row, label in zip(together.numpy(), labels, strict=True)])
+    # Samples one after the other, and the stations of each.
+    each = np.mean([entropy(row, labels[number // 2]) for number, row in enumerate(alone.numpy())])
+    block = {"alone": weight, "label_smoothing": smoothing}
+    machine = inference.Machine(torch.device("cpu"), "fp32")
+    found = objective(Model(), torch.zeros(3, 2, 8, 8), torch.from_numpy(labels), block, machine)
+    assert float(found) == pytest.approx((all_together + weight * each) / (1 + weight), rel=1e-6)

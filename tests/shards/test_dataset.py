@@ -207,6 +207,13 @@ def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
     assert (scene.signal(0) == expected[0]).all() and (scene.signal(1) == expected[1]).all()
 
 
+def test_a_sample_with_noise_in_all_cells_is_the_same_whatever_was_made_before(dataset):
+    config = configuration(effects={"cell_noise": {}}, noise={"snr_db": [3, 13]})
+    scenes = [Dataset(config, dataset.clouds, groups=["unseen"]) for _ in range(2)]
+    first, (_, again) = scenes[0].signal(1), [scenes[1].signal(number) for number in range(2)]
+    assert (first == again).all() and (first != scenes[0].signal(0)).any()
+
+
 def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(dataset, tmp_path, capsys):
     config = configuration(effects={"occlusion": {}})
     config["targets"]["select"] = ["DJI Mini 2"]

@@ -52,8 +52,22 @@ def test_an_echo_in_noise_is_found_at_its_range_and_folded_speed(dataset, speed_
     fold = SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s)
     assert best["true"] and best["cell"] == 51 and best["range_m"] == pytest.approx(51 * network.cell_m)
     assert abs(best["radial_mps"] - ((speed_mps + fold) % (2 * fold) - fold)) <= 2 * fold / network.symbols
+    # A Hann window spreads the noise of 2 over 400 symbols, 1.5 times as much as none: 21 dB below an echo of 1.
+    assert best["over_db"] == pytest.approx(10 * np.log10(network.symbols / (2 * 1.5)), abs=2)
     wrong = detections(held(network, cells, 54, speed_mps), network, station)[0]
     assert wrong["cell"] == 51 and not wrong["true"]
+    # Ranges wrap around: the last cell is beside the first.
+    beside = detections(held(network, np.roll(cells, -52, axis=1), 0, speed_mps), network, station)[0]
+    assert beside["cell"] == network.subcarriers - 1 and beside["true"]
+
+
+def test_a_target_longer_than_the_guard_hides_itself(dataset):
+    network = dataset.maker.network
+    cells = noise(network)
+    cells[:, 49:54] += 1
+    for guard, seen in ((0, False), (4, True)):
+        found = detections(held(network, cells, 51, 0), network, network.stations[0], 1e-4, guard, training=2)
+        assert (abs(found["cell"][found["over_db"] > 15] - 51) <= 2).any() == seen
 
 
 def test_a_target_is_detected_and_the_same_look_without_it_is_empty(dataset):
