@@ -4,7 +4,6 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from ablation import ABLATION
 from accuracy import ACCURACY, RECOGNITION
 from comparison import DISTANCES, FIGURES
 
@@ -57,13 +56,12 @@ def page(folder: Path) -> str:
     """Return the page of the tables measured-*.csv and pictures in a folder.
 
     Every recording's answers by all networks together stand there, the least right first, beside its spectra.
-    Raises: InputError for a table that is missing, but for that of the ablation, or one that lacks a column.
+    Raises: InputError for a table that is missing or lacks a column.
     """
     figures = read_csv(folder / "measured-figures.csv", *FIGURES)
     distances = read_csv(folder / "measured-distances.csv", *DISTANCES)
     recognition = read_csv(folder / "measured-recognition.csv", *RECOGNITION)
     accuracy = read_csv(folder / "measured-accuracy.csv", *ACCURACY)
-    ablation = folder / "measured-ablation.csv"
     classes = []
     for label in (label for label in CATEGORIES if label in {row["label"] for row in figures}):
         rows = [row for row in figures if row["label"] == label]
@@ -78,6 +76,5 @@ def page(folder: Path) -> str:
     html = templates().from_string(TEMPLATE.read_text()).render(
         classes=classes, categories=CATEGORIES, accuracy=[row for row in accuracy if row["class"] == "balanced"],
         answers=[(row, _address(folder / f"spectra-{row['set']}-{row['file']}.png")) for row in answers],
-        ablation=read_csv(ablation, *ABLATION) if ablation.is_file() else [],
     )  # fmt: skip
     return assembled(TITLE, [{"id": "measured", "title": TITLE, "html": html}])

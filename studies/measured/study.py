@@ -1,10 +1,10 @@
 """Recordings of real radars held against the twins of these radars.
 
-    python studies/measured/study.py pairs | compare | recognise | ablate --inputs FOLDER --out FOLDER
+    python studies/measured/study.py pairs | compare | recognise --inputs FOLDER --out FOLDER
     python studies/measured/study.py page --out FOLDER
 
 FOLDER of the inputs: one folder a measured set (`sets.yaml`). `--out` gets the tables measured-*.csv, the pictures and
-report.html. `recognise` and `ablate` train networks into the folder `--models`.
+report.html. `recognise` trains networks into the folder `--models`.
 """
 
 import argparse
@@ -130,19 +130,6 @@ def recognise(arguments: list[str]) -> None:
     _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, block["seed"]))
 
 
-def ablate(arguments: list[str]) -> None:
-    """Train networks without one randomisation each and test them on the tuning half: measured-ablation.csv."""
-    inputs, block = _inputs("ablate", ablate.__doc__, arguments, trains=True), load_yaml(HERE / "ablation.yaml")
-    from ablation import ABLATION, ablation_rows
-
-    from lowalt.recordings.twin_network import settings
-
-    network = settings(inputs.options.recognition) | {key: block[key] for key in ("echoes", "receivers", "seeds")}
-    network["training"] = network["training"] | {"steps": block["steps"], "validate_every": block["steps"]}
-    shared = inputs.recordings, inputs.library, network, block["changes"], inputs.options.models
-    _write(inputs.options.out, "ablation", ABLATION, ablation_rows(block["radar"], *shared))
-
-
 def write_page(arguments: list[str]) -> None:
     """Draw the pairs of pictures that there are, then write the page of all tables, report.html."""
     options = argparse.ArgumentParser("study.py page", description=write_page.__doc__)
@@ -161,7 +148,7 @@ def write_page(arguments: list[str]) -> None:
         temporary.write_text(page(folder))
 
 
-COMMANDS = {"pairs": pairs, "compare": compare, "recognise": recognise, "ablate": ablate, "page": write_page}
+COMMANDS = {"pairs": pairs, "compare": compare, "recognise": recognise, "page": write_page}
 
 
 def main(arguments: list[str]) -> None:

@@ -4,7 +4,6 @@ import hashlib
 import runpy
 from pathlib import Path
 
-import ablation
 import accuracy
 import class_figures
 import fetch
@@ -198,34 +197,6 @@ def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
     assert found["cw", "test", "balanced"][3:5] == [65.0, 85.0]
 
 
-def test_an_ablation_changes_what_it_names_and_pairs_its_differences(library):
-    plainer = ablation.changed(library, "cw_24ghz", {"receiver": {"snr_db": 30.0}, "drop": ["beam", "size"]})
-    for scene in plainer.scenes["cw_24ghz"]["Vehicle"]:
-        assert scene["receiver"]["snr_db"] == 30.0 and "beam" not in scene and "size" not in scene
-        assert scene["texture_db"] == library.scenes["cw_24ghz"]["Vehicle"][0]["texture_db"]
-    assert plainer.scenes["uav_3ghz"] == library.scenes["uav_3ghz"]
-    with pytest.raises(InputError, match=r"receiver has no \['snr'\]"):
-        ablation.changed(library, "cw_24ghz", {"receiver": {"snr": 1.0}})
-    with pytest.raises(InputError, match="expected some of receiver and drop"):
-        ablation.changed(library, "cw_24ghz", {"droop": []})
-    row = lambda seed, file, label, right: ["cw", seed, "set", "tuning", file, label, 10, 0, 0, 0, 0, right]  # noqa: E731
-    rows = [row(s, f, "Bird", r) for f, s, r in (("a", 0, 50.0), ("a", 1, 70.0), ("b", 0, 90.0), ("b", 1, 90.0))]
-    rows += [row("mean", "a", "Bird", 0.0), row(0, "c", "UAV", 40.0), row(1, "c", "UAV", 40.0)]
-    # A file of the same name in another set is another file.
-    elsewhere = [[*line[:2], "other", *line[3:]] for line in rows[:2]]
-    assert ablation.shares([*rows, *elsewhere])["Bird"].tolist() == [[50.0, 70.0], [90.0, 90.0], [50.0, 70.0]]
-    full = ablation.shares(rows)
-    np.testing.assert_array_equal(full["Bird"], [[50.0, 70.0], [90.0, 90.0]])
-    less = {label: values - 10.0 for label, values in full.items()}
-    bird, uav, both = ablation.summarised("cw", "less", less, full, {"Bird": 20, "UAV": 10}, 1)
-    assert bird[2:7] == ["Bird", 2, 2, 20, 65.0] and uav[2:7] == ["UAV", 2, 1, 10, 30.0]
-    assert both[2:7] == ["balanced", 2, 3, 30, 47.5]
-    for line in (bird, uav, both):
-        # Every file and seed lost ten points, so the paired difference has no spread.
-        assert line[9:] == pytest.approx([-10.0, -10.0, -10.0])
-    assert bird[7] < 65.0 < bird[8]
-
-
 def libraries():
     """The scenes that networks learn from, and those as they were recorded."""
     return Library.read("config/measured/twins.yaml"), Library.read(HERE / "recorded.yaml")
@@ -287,13 +258,7 @@ def test_the_page_shows_what_the_tables_and_pictures_hold(tmp_path):
     page, picture = (tmp_path / "report.html").read_text(), (tmp_path / "measured-bird.png").read_bytes()
     assert "Held against measurement" in page and "2.31" in page and page.count("data:image/png") == 2
     assert page.index("<td>bad.csv") < page.index("<td>good.csv") and "spectra of bad.csv" in page
-    assert "What each randomisation adds" not in page
-    cells = {"change": "antenna beam", "difference_percent": "-8.7539"}
-    row = [cells.get(column, "7") for column in ablation.ABLATION]
-    write_csv(tmp_path / "measured-ablation.csv", ablation.ABLATION, [row])
     study(arguments)
-    page = (tmp_path / "report.html").read_text()
-    assert "What each randomisation adds" in page and "antenna beam" in page and "-8.7539" in page
     assert (tmp_path / "measured-bird.png").read_bytes() == picture
     for name in ("pair-bird.npz", "spectra-birds-bad.csv.png", "measured-bird.png"):
         (tmp_path / name).unlink()
