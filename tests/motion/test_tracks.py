@@ -139,7 +139,7 @@ def test_rotors_with_rates_of_their_own_go_on_from_look_to_look(dataset):
         np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
 
 
-def test_along_a_log_a_larger_car_s_wheels_turn_more_slowly_and_a_full_circle_is_one_turn(dataset, tmp_path):
+def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circle_is_one_turn(dataset, tmp_path):
     def circle(time_s):
         angle = 2 * np.pi * time_s / 10
         return np.stack([250 + 20 * np.cos(angle), 144 + 20 * np.sin(angle), 0 * time_s], axis=-1)
