@@ -298,7 +298,7 @@ def test_every_step_has_the_rate_of_its_share_and_a_gradient_no_longer_than_the_
     assert {factor for _, factor in rates[0]} == {1.0, 0.25} and lengths == pytest.approx([0.01] * 4, rel=1e-3)
 
 
-def test_the_weights_kept_are_the_averages_that_were_validated_last_of_equal_ones(views, trained, tmp_path):
+def test_the_final_weights_are_the_averages_that_were_validated_last_of_equal_ones(views, trained, tmp_path):
     found, validation = runs.load(trained / "model.pt").model, sources(views)["validation"]
     machine, every = inference.Machine(torch.device("cpu"), "fp32"), np.arange(len(validation.facts))
     answers = inference.probabilities(found, validation, every, machine, 8)
