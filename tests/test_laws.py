@@ -181,9 +181,9 @@ def test_an_interval_is_as_wide_as_scipy_s_bootstrap_of_motion_models(seed, mode
 @given(seed=st.integers(0, 1000), order=st.permutations(range(3)), fusion=st.sampled_from(["attention", "mean"]))
 def test_the_network_answers_the_same_for_stations_in_another_order(seed, order, fusion):
     torch = pytest.importorskip("torch")
-    from test_recognition import images, recogniser
+    from test_recognition import images, small_recogniser
 
-    model = _kept(recogniser, fusion)
+    model = _kept(small_recogniser, fusion)
     index = images(2, 6, seed)
     turned = index.unflatten(1, (3, 2))[:, list(order)].flatten(1, 2)
     with torch.inference_mode():
