@@ -90,6 +90,11 @@ def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
     share record["moving_share"] of the points by area. Equal record, files and seed give equal points.
     Raises: InputError naming the file or the part and the reason.
     """
+    return cloud_and_pools(record, inputs_dir, seed)[0]
+
+
+def cloud_and_pools(record: dict, inputs_dir: str | Path, seed: int) -> tuple[Cloud, dict[str, Pool], dict[str, Pool]]:
+    """Return the cloud as `mesh_cloud`, and every part's dense samples by name, as in the mesh and as in the cloud."""
     where, rng = record["subtype"], stream(seed, "cloud", record["subtype"])
     record = record | {"parts": ordered_parts(record["parts"])}
     kinds = {name: part["kind"] for name, part in record["parts"].items()}
@@ -112,4 +117,4 @@ def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
                for (name, pool), count in zip(scaled.items(), counts, strict=True)]  # fmt: skip
     sums = {name: sha256(Path(inputs_dir) / name) for name in record_files(record)}
     facts |= {"closed_share": closed, "files_sha256": sums, "checksum": checksum(sums), "seed": seed}
-    return cloud_of_parts(parts, samples, record | facts | ({"warnings": doubts} if doubts else {}))
+    return cloud_of_parts(parts, samples, record | facts | ({"warnings": doubts} if doubts else {})), raw, scaled

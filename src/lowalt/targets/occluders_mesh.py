@@ -1,19 +1,17 @@
 """The surfaces of a user's mesh, part by part, as its cloud has them: cut, turned, scaled and simplified.
 
-The cloud's own steps are repeated with its own stream; where they take a part's samples, they take its triangles.
+The cloud's own steps cut the mesh; where they take a part's samples, here they take its triangles.
 """
 
 from pathlib import Path
 
 import numpy as np
 
-from lowalt.numerics.streams import stream
 from lowalt.targets import vehicle
-from lowalt.targets.mesh import mesh_cloud, pools
+from lowalt.targets.mesh import cloud_and_pools
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut_parts, inside
 from lowalt.targets.mesh_record import body_axes, ordered_parts
-from lowalt.targets.mesh_size import sized
 from lowalt.targets.occluders import GRAIN, longest_edge, quartered
 from lowalt.targets.sampling import face_normals
 from lowalt.targets.surfaces import Surface, merged
@@ -91,9 +89,7 @@ def mesh_surfaces(record: dict, inputs: Path, seed: int) -> tuple[list[Surface],
     Raises: InputError naming the file or the part and the reason.
     """
     record = record | {"parts": ordered_parts(record["parts"])}
-    cloud = mesh_cloud(record, inputs, seed)
-    raw, _ = pools(record, inputs, stream(seed, "cloud", record["subtype"]))
-    final, _ = sized(record, raw, {name: part["kind"] for name, part in record["parts"].items()})
+    cloud, raw, final = cloud_and_pools(record, inputs, seed)
     triangles, surfaces, offsets = _triangles(record, inputs), [], []
     for number, name in enumerate(cloud.names):
         # How a part's samples were scaled and moved, recovered from the samples themselves.
