@@ -106,7 +106,7 @@ def cloud_and_pools(record: dict, inputs_dir: str | Path, seed: int) -> tuple[Cl
         refuse_implausible(raw, kinds, parents, like(record), where, count)
     scaled, facts = sized(record, raw, kinds)
     for warning in caught:
-        warnings.warn(warning.message, warning.category, stacklevel=2)
+        warnings.warn(warning.message, warning.category, stacklevel=3)
     doubts = list(dict.fromkeys(str(warning.message) for warning in caught if warning.category is InputWarning))
     names = list(scaled)
     parts = [Part(name, kinds[name], (), tuple(pool.hinge), tuple(pool.axis), weight=pool.area,
