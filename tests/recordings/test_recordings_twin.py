@@ -137,6 +137,18 @@ def test_the_twins_echo_is_a_direct_sum_over_the_points(quadrotor):
     np.testing.assert_allclose(found, wanted, atol=1.1e-4 * abs(wanted).max())
 
 
+def test_a_walker_s_gait_begins_where_its_row_says(records):
+    cloud, times = clouds_of(records, ["Walking Pedestrian 1"], 1)["Walking Pedestrian 1"], np.arange(16) / 5000.0
+    course = straight(times, np.array([0.5, 4.0, 1.0]), 1.0, 0.7)
+    row = still_row(cloud, 0.0, np.random.default_rng(1))
+    later, moved, first = (
+        echo(TWIN, cloud, row | {"start_s": start_s}, course._replace(clock_s=times + clock_s), times, 0.0, 0.0, None)
+        for start_s, clock_s in ((0.4, 0.0), (0.0, 0.4), (0.0, 0.0))
+    )
+    np.testing.assert_allclose(later, moved, atol=1e-9 * abs(moved).max())
+    assert abs(later - first).max() > 0.1 * abs(first).max()
+
+
 def test_strengths_and_textures_touch_what_they_name(quadrotor):
     stronger = strengthened(quadrotor, {"rotor": 10.0})
     ratio = stronger.rcs_m2 / quadrotor.rcs_m2
@@ -171,6 +183,19 @@ def test_the_receiver_adds_as_much_as_set():
     assert abs(added.mean()) == pytest.approx(10.0, rel=1e-2)
     assert np.mean(abs(added - added.mean()) ** 2) == pytest.approx(0.1, rel=0.02)
     assert np.isrealobj(received(echoes, 5000.0, Receiver.from_settings(settings), True, rng))
+
+
+def test_wander_has_its_rms_in_decibels_and_flicker_its_corner():
+    rng, steady = np.random.default_rng(0), np.exp(2j * np.pi * 700 / 5000 * np.arange(200_000))
+    wandering = received(steady, 5000.0, Receiver.from_settings({**QUIET, "wander_db": 3.0}), False, rng)
+    assert np.std(20 * np.log10(abs(wandering))) == pytest.approx(3.0, rel=0.02)
+    # Flicker has half of its density at the corner, and a hundredth at ten times that.
+    settings = Receiver.from_settings({**QUIET, "snr_db": 0.0, "flicker_db": 30.0, "flicker_hz": 50.0})
+    noise = received(steady, 5000.0, settings, False, rng, target=False).reshape(100, 2000)
+    density = np.mean(abs(np.fft.fft(noise, axis=1)) ** 2, axis=0) / 2000
+    low, corner, high = (density[np.arange(2000) * 2.5 // width == place].mean()
+                         for width, place in ((5.0, 0), (5.0, 10), (50.0, 10)))  # fmt: skip
+    assert (corner / low, high / low) == pytest.approx((0.5, 0.0106), rel=0.15)
 
 
 def test_intervals_without_a_target_are_left_out():

@@ -57,6 +57,11 @@ def test_a_stage_loads_an_effect_s_module_only_in_its_scene():
         "lowalt.scene.lateness", "lowalt.motion", "lowalt.scene.effects.transmitter.slow_time"]  # fmt: skip
     for other in (late | {"spectra": {}}, late | {"effects": {}}, late | {"effects": {"slow_time": {"jitter_s": 0.0}}}):
         assert options.tile_modules(other) == []
+    cells = late | {"spectra": {"times": "known", "hrrp": {"window": 1}}}
+    assert options.tile_modules(cells)[:3] == options.tile_modules(late)
+    assert options.tile_modules(cells)[3:] == ["lowalt.tiles.cubes", "lowalt.scene.effects.transmitter.slow_time"]
+    for kind, modules in (("cube", ["lowalt.scene.effects.receiver.adc"]), ("image", [])):
+        assert options.shard_modules({"effects": {"adc": {}}, "shards": {"kind": kind}}) == modules
     assert options.noise_modules({"effects": {"canceller": None}}) == [
         "lowalt.scene.set_noise", "lowalt.scene.effects.detection.canceller"]  # fmt: skip
     assert options.noise_modules({"effects": {"adc": None}}) == []

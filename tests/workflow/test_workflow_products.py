@@ -201,6 +201,7 @@ def test_a_run_on_another_s_data_reads_there_and_refuses_other_settings(tmp_path
     assert products.samples(job)["views"][0].startswith("results/default/views/24/")
     folders = {Path(name).parts[1] for name in products.benchmarks(job) if "/train/" in name or "/evaluate/" in name}
     assert folders == {"mine"} and run.data == "default"
+    assert products.prepared(job) == []
     made.write_text(yaml.safe_dump(base | {"seed": 5}))
     with pytest.raises(InputError, match=r"other settings of \['seed'\]"):
         run_of(overlay)
