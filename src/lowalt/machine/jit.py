@@ -22,6 +22,7 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.targetconfig import ConfigStack
 
+
 def _text_of(value) -> str:
     """Return a constant as text that is the same in every process."""
     if isinstance(value, (set, frozenset)):
