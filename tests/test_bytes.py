@@ -72,7 +72,7 @@ shards: {kind: signal}
 
 
 def test_signals_of_a_small_data_set_are_those_of_another_processor(tmp_path):
-    """Clouds, motion tables, shards, their tables and the index, on the processor that can do least; images are slow."""
+    """Clouds, motion tables, shards, their tables and the index, on the processor that can do least."""
     (tmp_path / "small.yaml").write_text(SMALL)
     config = "--config", "config/default.yaml", "config/tiny.yaml", str(tmp_path / "small.yaml")
     build.main([*config, "--out", str(tmp_path / "here")])
