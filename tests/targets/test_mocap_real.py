@@ -30,7 +30,6 @@ def test_every_real_recording_that_walks_or_runs_becomes_a_cloud_where_its_known
                 cloud_of(FOLDER, **record)
         cloud = cloud_of(FOLDER, **record, **trim)
         assert 0.7 < cloud.record["track_speed_mps"] < 4.5
-        assert cloud.record["stance_foot_speed_mps"] < 1.0
         track = cloud.track
         ahead = track[:, NODES.index("ltoes"), 1] - track[:, NODES.index("ltibia"), 1]
         assert ahead.mean() > 0 and track[:, NODES.index("lhipjoint"), 0].mean() < 0  # faces front, left is left
