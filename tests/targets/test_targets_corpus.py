@@ -19,7 +19,7 @@ from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 
 ROOT = Path(__file__).parents[2]
-QUICK = ("up -y front -x", "names that grow", "units by part", "instances in GLB", "Box car", "Box bird")
+QUICK = ("up -y front -x", "names that grow", "units by part", "groups", "instances in GLB", "Box car", "Box bird")
 
 
 def overlay(folder, names):

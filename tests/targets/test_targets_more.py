@@ -111,7 +111,9 @@ def test_strips_and_animations_show_every_class(clouds):
     assert len(strip.axes) == 2 * len({cloud.category for cloud in clouds.values()})
     assert view_of(clouds["Cessna 172S"])[2] == "from behind" and view_of(clouds["MD 520N"])[2] == "from above"
     frames = Image.open(io.BytesIO(target_animation(clouds["Agusta A109A"], count=1)))
-    assert frames.n_frames == 6
+    first = np.asarray(frames.convert("L"), int)
+    frames.seek(1)
+    assert frames.n_frames == 6 and abs(np.asarray(frames.convert("L"), int) - first)[60:].max() > 100
 
 
 def test_every_cell_and_figure_without_a_source_is_called_an_estimate():
