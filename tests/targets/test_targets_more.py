@@ -21,9 +21,9 @@ from lowalt.report.figures.target_picture import target_animation
 from lowalt.targets import cyclist, quadruped
 from lowalt.targets.cloud import write
 from lowalt.targets.gallery import bones
-from lowalt.targets.limbs import circle, joint
 from lowalt.targets.make import make
 from lowalt.targets.records import estimates, load_records, records_of
+from lowalt.targets.skeleton import circle, joint
 from moving_clouds import row
 
 ROOT = Path(__file__).parents[2]
