@@ -111,22 +111,6 @@ def echo_signals(
     ])  # fmt: skip
 
 
-def method_text(result: EchoResult) -> str:
-    """Return in words how a signal was computed and which bounds allowed it."""
-    method = result.method
-    kind = "float32 after the phase" if method.single else "float64"
-    aim = "exact mode" if method.error is None else f"plan for {method.error:.1e} of the sum of amplitudes"
-    return "\n".join([
-        f"target radius {method.size_m:.3g} m, at most {method.spread:.3g} of the range",
-        f"{aim}: {kind}, ranges by {'polynomials' if method.near else 'roots'}, orders of cosine {method.orders[0]}, "
-        f"sine {method.orders[1]}, cell kernel {method.orders[2]}",
-        f"symbols: {method.cheap} by that plan, {method.exact} by the exact one, "
-        f"{method.general} by the pointwise kernel",
-        f"symbols computed again so that complex64 is rounded correctly: {method.again[0]}",
-        f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
-    ])  # fmt: skip
-
-
 def echo_matrix(
     network: Network,
     station: Station,

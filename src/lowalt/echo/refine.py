@@ -42,7 +42,7 @@ class Method(NamedTuple):
     not roots; cheap, exact, general: symbols by the cheap plan, by the exact plan and by the pointwise kernel; spread:
     largest target radius over range; size_m: largest radius (m); pointwise_bound: error bound of the pointwise kernel
     relative to its sums of amplitudes and of risks; again: symbols computed again so that complex64 is rounded
-    correctly, how many of them in double-double throughout, and how many that leaves open.
+    correctly, and how many of them that leaves open.
     """
 
     error: float | None
@@ -55,7 +55,7 @@ class Method(NamedTuple):
     spread: float
     size_m: float
     pointwise_bound: tuple[float, float]
-    again: tuple[int, int, int] = (0, 0, 0)
+    again: tuple[int, int] = (0, 0)
 
 
 def compute(

@@ -111,10 +111,6 @@ def fill_offsets(scene, lay, radar, q, n, r, first, size, placing, offsets):
                 (cosine * x + sine * y) * scale, (cosine * y - sine * x) * scale,
                 (translation[at, p, two] - z0) * scale,
             )  # fmt: skip
-            still = abs(a) + abs(b) + abs(c) + abs(d) + abs(e) + abs(f) + abs(g) + abs(h) + abs(k)
-            if still == 0.0:
-                vector_loops.place_still(pose, placing, high - low, offsets, low - first)
-            else:
-                vector_loops.place_part(lay.x, lay.y, lay.z, low, high - low, pose, placing, offsets, low - first)
+            vector_loops.place_part(lay.x, lay.y, lay.z, low, high - low, pose, placing, offsets, low - first)
     for i in range(end - first, size):
         offsets.eps[i], offsets.y[i], offsets.z[i] = 0.0, 0.0, 0.0

@@ -67,19 +67,6 @@ def place_part(px, py, pz, low, size, pose, placing, offsets, at):
 
 
 @INNER_VECTOR
-def place_still(pose, placing, size, offsets, at):
-    """Do as `place_part` for a part whose matrix is zero, as a node's is: all its points stand at its offset."""
-    hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
-    eps, ey, ez = offsets
-    a, b, c = pose.x, pose.y, pose.z
-    e = a * (hx + a) + b * (hy + b) + c * (hz + c)
-    y, z = b * y_scale + y_shift, c * z_scale + z_shift
-    at = np.uint64(at)
-    for i in range(np.uint64(-(-size // MULTIPLE) * MULTIPLE)):
-        eps[at + i], ey[at + i], ez[at + i] = e, y, z
-
-
-@INNER_VECTOR
 def place_nodes(translation, n, q, low, size, cosine, sine, scale, placing, offsets):
     """Do as `place_part` for `size` points from `low` that are parts of their own, relative to the point q."""
     hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing

@@ -13,7 +13,6 @@ from lowalt.echo.fast.layout import Layout
 from lowalt.echo.fast.workspace import Found
 from lowalt.echo.pointwise import results as pointwise
 from lowalt.echo.radar import Radar
-from lowalt.echo.rounding import double
 from lowalt.echo.rounding.sums import ROWS, cell_value
 from lowalt.echo.scene import EchoScene
 from lowalt.machine.jit import INLINED, LEAN
@@ -64,25 +63,18 @@ def to_odd(high, low, bits):
 
 @LEAN
 def compute_again(scene, lay, radar, symbols, found, work, bits):
-    """Replace the values of `symbols` (K,) in their strongest cells by closer ones.
+    """Replace the values of `symbols` (K,) in their strongest cells by sums in double-double.
 
-    First: sums in double of phases in double-double. Where their bound leaves the nearest complex64 open, everything
-    is computed in double-double. work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols
-    that needed the second, and the number for which its error still leaves the nearest complex64 open.
+    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols whose nearest complex64 the
+    error of these sums still leaves open.
     """
-    twice, still = 0, 0
-    share = double.share(len(lay.root))
+    still = 0
     for n in symbols:
-        x, y = double.cell_value(scene, lay, radar, n, found.cells[n], work)
-        if same_single(x, share * found.totals[n]) and same_single(y, share * found.totals[n]):
-            found.values[n] = complex(x, y)
-            continue
-        twice += 1
         real, imag = cell_value(scene, lay, radar, n, found.cells[n], work)
         error = ERROR * found.totals[n]
         still += not (same_double(real, error, bits) and same_double(imag, error, bits))
         found.values[n] = complex(to_odd(real[0], real[1], bits), to_odd(imag[0], imag[1], bits))
-    return twice, still
+    return still
 
 
 @INLINED
@@ -97,17 +89,16 @@ def same_double(x, error, bits):
 def correct(
     scene: EchoScene, lay: Layout, radar: Radar, refs: np.ndarray,
     aims: tuple[float, float], found: Found, pointwise_bound: tuple[float, float],
-) -> tuple[int, int, int]:  # fmt: skip
+) -> tuple[int, int]:  # fmt: skip
     """Make every value of `found` round to the complex64 nearest to the true value, in the truly strongest cell.
 
-    Returns how many symbols were computed again, how many of them in double-double throughout, and how many that leaves
-    open. Cells whose strengths
-    differ by less than its error count as equal: the lowest index wins.
+    Returns how many symbols were computed again, and how many that leaves open. Cells whose strengths differ by less
+    than its error count as equal: the lowest index wins.
     """
     open_ones = np.empty(len(refs), np.int64)
     count, unproved = doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)
     if not count:
-        return 0, 0, 0
+        return 0, 0
     open_ones = open_ones[:count]
     work, bits = np.empty((ROWS, len(lay.root) + 4)), np.empty(1, np.int64)
     for n in open_ones[found.gaps[open_ones] <= 0.0] if unproved else ():
@@ -118,7 +109,7 @@ def correct(
             least = max(strengths) - 4 * Fraction(ERROR * found.totals[n]) * Fraction(abs(found.values[n]))
             cells = [cell for cell, strength in zip(cells, strengths, strict=True) if strength >= least]
         found.cells[n] = min(cells)
-    return len(open_ones), *compute_again(scene, lay, radar, open_ones, found, work, bits)
+    return len(open_ones), compute_again(scene, lay, radar, open_ones, found, work, bits)
 
 
 def _contenders(scene, radar, refs, aims, found: Found, n: int, pointwise_bound) -> list[int]:
