@@ -69,10 +69,10 @@ def echo_signal(
     """
     _check_tolerance(tolerance, sample)
     scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)
-    found, left, method, lay = refine.compute(scene, radio, refs, aims, tolerance)
+    found, left, method, seen = refine.compute(scene, radio, refs, aims, tolerance)
     if paths is not None:
         left = np.arange(len(refs))
-        method = method._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
+        method = method._replace(single=False, cheap=0, exact=0, general=len(refs))
     if len(left):
         risks = np.zeros(len(refs))
         check_fault(results.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
@@ -80,8 +80,7 @@ def echo_signal(
         found.bounds[left] = found.totals[left] * share + risks[left] * direction
         found.gaps[left] = np.maximum(found.gaps[left] - 2 * found.bounds[left], 0.0)
     if tolerance is None and paths is None:
-        again = nearest.correct(scene, lay, radio, refs, aims, found, method.pointwise_bound)
-        method = method._replace(again=again)
+        method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
     largest = float(abs(found.values).max())
     bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
     if tolerance is not None and not bound <= tolerance:
