@@ -4,7 +4,7 @@ A double-double is the unevaluated sum of two doubles (about 32 digits). Turns p
 100 km and 4.9 GHz the phase is 2e7 rad, and one double would leave only eight digits of the turn.
 """
 
-from decimal import localcontext
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
