@@ -1,7 +1,9 @@
 """Fixtures that several test files share, and in which order files of tests run."""
 
 import gc
+import json
 import math
+import pickle
 
 import pytest
 
@@ -17,7 +19,7 @@ LONG = (
     "test_house", "test_dataset", "test_workflow_locks", "test_classes", "test_effects_occlusion",
     "test_recognition_sharing", "test_recognition_memory",
     "test_report_plots", "test_effects_every", "test_attacks", "test_recordings_unseen", "test_benchmarks_long_run",
-    "test_skips", "test_workflow_board", "test_jit_turns", "test_targets_more",
+    "test_skips", "test_workflow_board", "test_targets_more",
 )  # fmt: skip
 
 
@@ -46,6 +48,27 @@ def pytest_collection_finish():
     """From here on look for garbage among what tests make alone."""
     gc.freeze()
     gc.enable()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def checked_once():
+    """Let a process check each built-in record once: hundreds of tests read all forty, which takes 0.3 s."""
+    from lowalt.targets import records
+
+    check, known = records.merge, {}
+
+    def merge(row, record, where):
+        """The merged record, kept as bytes, so that no test changes another's."""
+        if record.get("source") != "builtin":
+            return check(row, record, where)
+        key = json.dumps([row, record, where])
+        if key not in known:
+            known[key] = pickle.dumps(check(row, record, where))
+        return pickle.loads(known[key])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(records, "merge", merge)
+        yield
 
 
 @pytest.fixture

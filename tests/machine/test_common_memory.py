@@ -5,10 +5,6 @@ import platform
 import subprocess
 import sys
 
-import numpy as np
-
-from lowalt.machine.memory import LINE, aligned
-
 PROBE = """
 import resource, sys
 import numpy as np
@@ -51,10 +47,3 @@ def test_arrays_fetch_no_pages_once_freed_memory_is_kept():
 def test_thresholds_that_the_user_has_set_stay():
     before, after = pages("keep", MALLOC_TRIM_THRESHOLD_="131072")
     assert after > 0.5 * before
-
-
-def test_work_space_begins_with_a_line_of_the_cache():
-    for shape in ((1,), (4, 256), (3, 7, 5)):
-        held = [aligned(*shape) for _ in range(5)]
-        assert all(one.ctypes.data % LINE == 0 for one in held)
-        assert all(one.shape == shape and one.flags.c_contiguous and one.dtype == np.float64 for one in held)

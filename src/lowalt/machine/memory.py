@@ -6,7 +6,6 @@ up to half of the time of a sample with effects. Both functions work with glibc;
 
 import contextlib
 import ctypes
-import math
 from functools import cache
 
 import numpy as np
@@ -37,30 +36,3 @@ def keep_freed_arrays() -> None:
     Source: mallopt(3), M_MMAP_THRESHOLD and M_TRIM_THRESHOLD, the dynamic adjustment.
     """
     np.empty(LARGEST, np.uint8)
-
-
-LINE = 64
-"""Bytes of a line of the cache."""
-
-
-def aligned(*shape: int) -> np.ndarray:
-    """Return a new float64 array of this shape that begins with a line of the cache, for work space of compiled loops.
-
-    NumPy's arrays begin 16 bytes behind such a line, so that every second vector instruction would read two lines.
-    """
-    count = math.prod(shape)
-    room = np.empty(count + LINE // 8)
-    first = -room.__array_interface__["data"][0] % LINE // 8
-    return room[first : first + count].reshape(shape)
-
-
-def aligned_complex(*shape: int) -> np.ndarray:
-    """Return a new complex128 array of this shape that begins with a line of the cache."""
-    return aligned(*shape[:-1], 2 * shape[-1]).view(np.complex128)
-
-
-def aligned_copy(values: np.ndarray) -> np.ndarray:
-    """Return float64 values of any shape in a new array that begins with a line of the cache."""
-    result = aligned(*values.shape)
-    result[...] = values
-    return result
