@@ -22,7 +22,6 @@ measure.estimate: --stages, --costs, --schema, --base, --overlays, --out
 motion.__main__: --settings, --clouds, --group, --first, --count, --out
 noise.__main__: --settings, --motion, --echoes, --out
 recordings.__main__ import: --out, --record, --radar
-recordings.__main__ keep: --out, --models
 report.__main__: --settings, --manifest, --stages, --figures, --out
 report.figures.cost_plots: plot, --table, --figure
 shards.__main__ index: --settings, --shards, --out

@@ -77,15 +77,20 @@ def looks_of(dataset: Dataset, subtype: str, track: int) -> list[dict]:
     return [dataset.row(Place(group, subtype, track * LOOKS + look, 3.0)) for look in range(LOOKS)]
 
 
+def goes_on(cloud, rows: list[dict]):
+    """Assert that all points end a look where they begin the next: place, heading, phases of parts and gait at once."""
+    for row, after in itertools.pairwise(rows):
+        ends, starts = positions(cloud, row, np.array([1.0])), positions(cloud, after, np.array([0.0]))
+        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("subtype", SUBTYPES)
 @pytest.mark.parametrize("which", ["dataset", "logged"])
 def test_nothing_jumps_between_looks(which, subtype, request):
     tracks = request.getfixturevalue(which)
-    cloud, rows = tracks.clouds[subtype], looks_of(tracks, subtype, 2)
+    rows = looks_of(tracks, subtype, 2)
+    goes_on(tracks.clouds[subtype], rows)
     for row, after in itertools.pairwise(rows):
-        # All points: place, heading, and phases of rotors, wings, wheels and gait at once.
-        ends, starts = positions(cloud, row, np.array([1.0])), positions(cloud, after, np.array([0.0]))
-        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
         for axis in "xyz":
             bent = row[f"v{axis}_mps"] + row[f"a{axis}_mps2"] + row[f"j{axis}_mps3"] / 2
             assert bent == pytest.approx(after[f"v{axis}_mps"], abs=1e-9)
@@ -133,10 +138,7 @@ def test_rotors_with_rates_of_their_own_go_on_from_look_to_look(dataset):
     cloud, masts = dataset.clouds["DJI Mini 2"], np.array(masts_m(dataset.config["network"]), float)
     own = replace(cloud, record=cloud.record | {"rate_factors": {cloud.names[cloud.parts_of("rotor")[1]]: 1.37}})
     settings, published = motion_block(dataset.config), TABLE["DJI Mini 2"]
-    rows = model_rows(1, own, published, masts, region_polygon(masts, None), settings, 0)
-    for row, after in itertools.pairwise(rows):
-        ends, starts = positions(own, row, np.array([1.0])), positions(own, after, np.array([0.0]))
-        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
+    goes_on(own, model_rows(1, own, published, masts, region_polygon(masts, None), settings, 0))
 
 
 def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circle_is_one_turn(dataset, tmp_path):

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from lowalt.files.errors import InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
+from lowalt.targets.surfaces import volume
 from meshes import TABLE, box, car_record, made, plain, quad_record
 
 
@@ -55,13 +56,9 @@ def test_axes_of_the_file_do_not_matter_if_the_record_names_them(up, front, tmp_
     assert (high[:, 0] > 0.01).all() and (high[:, 1] > 0.07).all()  # the mast stands ahead on the right
 
 
-STATING = (".dae", ".glb")  # formats that state their unit; trimesh writes metres
-
-
 @pytest.mark.parametrize(
     ("suffix", "unit", "metres"),
-    [(suffix, "m", 1.0) for suffix in SUFFIXES]
-    + [(s, u, f) for s in SUFFIXES if s not in STATING for u, f in (("in", 0.0254), ("mm", 0.001))],
+    [(suffix, "m", 1.0) for suffix in SUFFIXES] + [(suffix, "in", 0.0254) for suffix in (".stl", ".obj", ".ply")],
 )
 def test_every_format_and_unit_gives_the_same_size(suffix, unit, metres, tmp_path):
     shape = box(np.array([0.1, 0.2, 0.05]) / metres)
@@ -70,6 +67,7 @@ def test_every_format_and_unit_gives_the_same_size(suffix, unit, metres, tmp_pat
     found = read_mesh(path, unit)
     assert len(found.faces) == 12 and found.closed.tolist() == [True]
     assert np.ptp(found.vertices, axis=0) == pytest.approx([0.1, 0.2, 0.05], rel=1e-6)
+    assert volume(found) == pytest.approx(0.001, rel=1e-6)
 
 
 def test_a_record_s_unit_overrides_the_file_s_with_a_warning(tmp_path):

@@ -19,16 +19,7 @@ from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 
 ROOT = Path(__file__).parents[2]
-QUICK = (
-    "in mm",
-    "up -y front -x",
-    "names that grow",
-    "units by part",
-    "objects",
-    "instances in GLB",
-    "Box car",
-    "Box bird",
-)
+QUICK = ("up -y front -x", "names that grow", "units by part", "groups", "instances in GLB", "Box car", "Box bird")
 
 
 def overlay(folder, names):
