@@ -23,7 +23,9 @@ def test_sections_are_the_sources_and_their_keys_those_of_the_code():
     models = SCHEMA["models"]
     assert {model["like"] for model in models.values()} == set(MODULES)
     assert {name for name, model in models.items() if model["like"] == "UAV"} == set(uav.LAYOUTS)
-    assert {key for model in models.values() for key in model.get("keys", [])} < set(record_schema.keys("builtin"))
+    assert {key for model in models.values() for key in model.get("keys", [])} < set(
+        SCHEMA["sources"]["builtin"]["properties"]
+    )
     kinds = {kind for name in models for kind in record_schema.figures(name).values()}
     assert kinds == {"length", "ratio", "offset", "count", "whole"}
     definitions = SCHEMA["$defs"]

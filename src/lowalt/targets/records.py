@@ -17,18 +17,25 @@ from lowalt.targets import record_schema
 from lowalt.targets.make import SOURCES, source_module
 from lowalt.targets.record_schema import check_file_name, record_files
 
-COMMON_KEYS = record_schema.keys(record_schema.COMMON)
+COMMON_KEYS = tuple(record_schema.schema()["sources"][record_schema.COMMON]["properties"])
 """Keys every record may have; `source` it must have. Each source adds its own."""
 
 _WORDS = ("category", "name", "unseen_protocol")
 _WHOLE = ("idx", "n_rotors_or_wings", "points_in_published_cloud_approx")
-_NUMBERS = (
-    "size_m", "freq_lo_hz", "freq_hi_hz", "vx_abs_max", "vy_abs_max", "vz_abs_max", "len_m", "wid_m", "hgt_m",
-    "wheel_diam_m", "speed_lo", "speed_hi",
-)  # fmt: skip
-COLUMNS = (*_WORDS, *_WHOLE, *_NUMBERS)
 AIR_SPEEDS, GROUND_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max"), ("speed_lo", "speed_hi")
 """Columns of speeds of targets in the air and on the ground; they may be 0: a craft hovers, a car stands."""
+_NUMBERS = (
+    "size_m",
+    "freq_lo_hz",
+    "freq_hi_hz",
+    *AIR_SPEEDS,
+    "len_m",
+    "wid_m",
+    "hgt_m",
+    "wheel_diam_m",
+    *GROUND_SPEEDS,
+)
+COLUMNS = (*_WORDS, *_WHOLE, *_NUMBERS)
 
 
 def load_table(path: str | Path) -> dict[str, dict]:
