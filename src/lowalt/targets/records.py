@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, classes_of, like
 from lowalt.files.csv_tables import read_csv
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
 from lowalt.targets.make import SOURCES, source_module
@@ -57,10 +57,8 @@ def load_table(path: str | Path) -> dict[str, dict]:
         if row["unseen_protocol"] not in ("seen", "unseen"):
             raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
         table[name] = {column: _cell(where, column, text) for column, text in row.items()}
-    try:
+    with reading(path, "table of targets"):
         classes_of(table)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     return table
 
 
