@@ -1,10 +1,14 @@
 """Users' meshes: places, axes, units and formats, parts that turn, and which components a region takes."""
 
+import os
+import subprocess
+import sys
 import warnings
 
 import numpy as np
 import pytest
 import trimesh
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,7 +16,7 @@ from lowalt.files.errors import InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
 from lowalt.targets.surfaces import volume
-from meshes import TABLE, box, car_record, made, plain, quad_record
+from meshes import ROOT, TABLE, box, car_record, made, plain, quad_record, saved, write_quad
 
 
 def test_places_senses_and_sizes_are_those_of_the_record(quad):
@@ -179,3 +183,54 @@ def test_regions_take_whole_components_only_where_asked(tmp_path):
         taken = cloud.points[cloud.part == 1]
         assert bool((taken[:, 0] - taken[:, 0].max() < -0.4).any()) is tall  # the tall post is cut, not whole inside
         assert np.array_equal(cloud.axes[1], [0, 0, 1])
+
+
+@pytest.mark.parametrize("suffix", [".glb", "o", "g"])
+def test_parts_are_chosen_by_the_names_of_instances_objects_and_groups(suffix, tmp_path):
+    hubs = {name: part["meshes"][0]["move"] for name, part in quad_record()["parts"].items() if part["kind"] == "rotor"}
+    hull, prop = box((0.2, 0.12, 0.06)), box((0.2, 0.02, 0.004))
+    name = "craft.obj" if suffix in "og" else f"craft{suffix}"
+    if suffix in "og":
+        props = {hub: prop.copy().apply_translation(at) for hub, at in hubs.items()}
+        saved(tmp_path / name, {"hull": hull, **props}, suffix)
+    else:
+        scene = trimesh.Scene()
+        scene.add_geometry(hull, node_name="hull", geom_name="hull shape")
+        for hub, place in hubs.items():
+            matrix = trimesh.transformations.translation_matrix(place)
+            scene.add_geometry(prop, node_name=hub, geom_name="prop", transform=matrix)
+        scene.export(tmp_path / name)
+    record = quad_record()
+    for word, part in record["parts"].items():
+        part["meshes"] = [{"file": name, "geometry": ["hull" if word == "body" else word]}]
+    hull.export(tmp_path / "body.stl")
+    prop.apply_scale(1000).export(tmp_path / "prop.stl")
+    separate = quad_record()
+    for part in separate["parts"].values():
+        part["meshes"][0] |= {"unit": "mm"} if part["kind"] == "rotor" else {}
+    one, other = (made("DJI Mini 2", tmp_path, **own) for own in (record, separate))
+    np.testing.assert_allclose(one.hinges, other.hinges, atol=5e-4)
+    np.testing.assert_allclose(np.ptp(one.points, axis=0), np.ptp(other.points, axis=0), rtol=1e-3)
+
+
+@pytest.mark.slow
+def test_the_workflow_s_rule_makes_the_cloud_of_meshes_with_odd_names(tmp_path):
+    inputs, copy, record = tmp_path / "inputs", tmp_path / "checkout", quad_record()
+    for part in record["parts"].values():
+        part["meshes"][0]["file"] = "odd folder/my craft (1), " + part["meshes"][0]["file"]
+    (inputs / "odd folder").mkdir(parents=True)
+    for path in write_quad(tmp_path).glob("*.stl"):
+        path.rename(inputs / f"odd folder/my craft (1), {path.name}")
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump({"DJI Mini 2": {"source": "mesh", **record}}))
+    targets = {"own": {"odd": str(tmp_path / "own.yaml")}, "select": ["DJI Mini 2"]}
+    (tmp_path / "overlay.yaml").write_text(yaml.safe_dump({"run": "odd", "targets": targets}))
+    copy.mkdir()
+    for name in ("Snakefile", "workflow", "config", "src", "profiles", "envs", "pyproject.toml", "README.md"):
+        (copy / name).symlink_to(ROOT / name)
+    environment = {**os.environ, "LOWALT_INPUTS": str(inputs), "PYTHONPATH": str(ROOT / "src")}
+    command = ["snakemake", "--cores", "2", "--configfile", str(tmp_path / "overlay.yaml"), "--", "clouds"]
+    done = subprocess.run([sys.executable, "-m", *command], cwd=copy, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0 and "from files: DJI Mini 2" in done.stderr, done.stderr[-3000:]
+    seed = yaml.safe_load((ROOT / "config/default.yaml").read_text())["seed"]
+    cloud = clouds.read(copy / "results/odd/clouds/dji-mini-2.npz")
+    np.testing.assert_array_equal(cloud.points, made("DJI Mini 2", inputs, seed, **record).points)
