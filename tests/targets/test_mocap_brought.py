@@ -13,8 +13,6 @@ from lowalt.targets.skeleton import NODES, PARENTS
 from real_inputs import FOLDER, needs_inputs
 from walkers import BVH, cloud_of, walk, write_files
 
-UNIT_M = 0.0254 / 0.45
-
 
 @pytest.fixture
 def files(tmp_path):
@@ -71,25 +69,9 @@ def test_real_walks_and_runs_pass_at_their_rate_and_not_at_twice_it(clip, tmp_pa
 
 
 def test_a_long_recording_of_which_a_few_frames_are_used_says_which(files):
-    (files / "m.amc").write_text(walk(3000, growth=1e-4))
-    with pytest.warns(InputWarning, match=r"of 3000 frames \d+ to \d+ are used.*first_frame and last_frame"):
+    (files / "m.amc").write_text(walk(1500, period=62, growth=1e-4))
+    with pytest.warns(InputWarning, match=r"of 1500 frames \d+ to \d+ are used.*first_frame and last_frame"):
         cloud_of(files)
-
-
-@needs_inputs
-def test_legs_of_a_bvh_are_those_of_the_amc_it_was_made_of():
-    folder = FOLDER / "cmu/131"
-    joints, rate = read_bvh(folder / "131_01.bvh")
-    nodes = to_nodes(joints, "131_01.bvh") * UNIT_M
-    skeleton = read_skeleton(folder / "131.asf")
-    track = nodes_m(posed(skeleton, read_motion(folder / "131_01.amc", skeleton)[0], 120))
-    assert rate == pytest.approx(120, rel=1e-5)
-    for name in ("root", "lhipjoint", "lfemur", "rtibia", "lfoot", "rtoes"):
-        node = NODES.index(name)
-        # File axes x left, y up, z front; ours x right, y front, z up.
-        np.testing.assert_allclose(nodes[:, node][:, [0, 2, 1]] * [-1, 1, 1], track[:, node], atol=2e-5)
-    cloud = cloud_of(folder, skeleton=None, rate_hz=None, motion="131_01.bvh", max_mismatch_m=0.4)
-    assert np.ptp(cloud.points[:, 2]) == pytest.approx(1.75, rel=0.1)
 
 
 def joints_of(track: np.ndarray, names: dict[str, str]) -> np.ndarray:
@@ -202,3 +184,5 @@ def test_every_real_recording_that_walks_or_runs_becomes_a_cloud_where_its_known
         ahead = track[:, NODES.index("ltoes"), 1] - track[:, NODES.index("ltibia"), 1]
         assert ahead.mean() > 0 and track[:, NODES.index("lhipjoint"), 0].mean() < 0  # faces front, left is left
         assert track[:, NODES.index("head"), 2].mean() > 0.5
+    bvh = cloud_of(FOLDER, skeleton=None, rate_hz=None, motion="cmu/131/131_01.bvh", max_mismatch_m=0.4)
+    assert np.ptp(bvh.points[:, 2]) == pytest.approx(1.75, rel=0.1)

@@ -48,16 +48,6 @@ def test_the_page_of_keys_describes_every_key_and_every_figure():
         records_page(bare)
 
 
-def test_pictures_and_files_that_the_page_names_are_there():
-    import re
-
-    page = (ROOT / "design/targets.md").read_text()
-    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page)
-    assert len(pictures) >= 2 and all((ROOT / "design" / name).is_file() for name in pictures)
-    for name in re.findall(r"`((?:config|src)/[^`*{]+\.(?:yaml|csv|py))`", page):
-        assert (ROOT / name).is_file(), name
-
-
 @pytest.mark.parametrize(
     ("file", "name", "change", "message"),
     [
