@@ -18,10 +18,9 @@ echo.__main__: --settings, --motion, --clouds, --station, --out
 scene.__main__: --settings, --motion, --clouds, --station, --out, --power
 measure.accuracy_cost: --settings, --predictions, --speeds, --data-jobs, --index, --presets, --out
 measure.echo_cost: --settings, --clouds, --out
-measure.estimate: --stages, --costs, --schema, --base, --overlays, --out
 motion.__main__: --settings, --clouds, --group, --first, --count, --out
 noise.__main__: --settings, --motion, --echoes, --out
-recordings.__main__ import: --out, --record, --radar
+recordings.__main__ import: --record, --radar, --out
 report.__main__: --settings, --manifest, --stages, --figures, --out
 report.figures.cost_plots: plot, --table, --figure
 shards.__main__ index: --settings, --shards, --out
