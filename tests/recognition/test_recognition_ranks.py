@@ -183,21 +183,6 @@ def test_two_nodes_of_one_process_train_to_the_bytes_of_one_node_of_two(views, t
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
 
 
-@pytest.mark.slow
-def test_nodes_that_train_unlike_things_are_told_instead_of_mixing_their_gradients(views, tmp_path):
-    table = tmp_path / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nA:VRP,A,VRP,attention,,seen\n")
-    lines = []
-    for precision in ("fp32", "bf16"):
-        settings = json.dumps(with_training(steps=2, validate_every=2, precision=precision))
-        line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "A:VRP"]
-        lines.append([*line, "--stations", "A", "B", "C", "--schemes", str(table), "--out", str(tmp_path / "out")])
-    found = launched(lines, 1)
-    assert all(status for status, _ in found)
-    assert any("stands at step 0, another rank differs in that" in text for _, text in found), found
-    assert not (tmp_path / "out/model.pt").exists()
-
-
 @pytest.fixture
 def ranks(monkeypatch):
     """Stands for so many ranks with the same images: a sum over them is that many times each one's."""
