@@ -244,14 +244,6 @@ def test_the_spread_between_seeds_is_that_of_both_models_pooled(tmp_path):
     assert float(average["spread_points"]) == pytest.approx(2.5)
 
 
-def test_a_model_compared_with_itself_differs_nowhere(tmp_path):
-    right = stream(1, "right").random(80) < 0.7
-    own = predicted(tmp_path / "own.csv", right)
-    same = predicted(tmp_path / "same.csv", right, "twin")
-    for row in transfer.comparison([own], [same], "twin", 1):
-        assert row[3:6] == ["0.0000"] * 3
-
-
 def test_strangers_are_refused_by_name(tmp_path):
     own = predicted(tmp_path / "own.csv", np.ones(80, dtype=bool))
     fewer = predicted(tmp_path / "fewer.csv", np.ones(60, dtype=bool), "small")
