@@ -1,9 +1,7 @@
 """Fixtures that several test files share, and in which order files of tests run."""
 
 import gc
-import json
 import math
-import pickle
 
 import pytest
 
@@ -51,23 +49,13 @@ def pytest_collection_finish():
 
 
 @pytest.fixture(scope="session", autouse=True)
-def checked_once():
-    """Let a process check each built-in record once: hundreds of tests read all forty, which takes 0.3 s."""
+def records_checked_once():
+    """Let the process check each built-in record once."""
+    from checked_records import checked_once
     from lowalt.targets import records
 
-    check, known = records.merge, {}
-
-    def merge(row, record, where):
-        """The merged record, kept as bytes, so that no test changes another's."""
-        if record.get("source") != "builtin":
-            return check(row, record, where)
-        key = json.dumps([row, record, where])
-        if key not in known:
-            known[key] = pickle.dumps(check(row, record, where))
-        return pickle.loads(known[key])
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(records, "merge", merge)
+        patch.setattr(records, "merge", checked_once())
         yield
 
 

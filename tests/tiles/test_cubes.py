@@ -28,7 +28,6 @@ from lowalt.tiles.cubes import Cubes
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.tile_files import Tiles
-from lowalt.workflow.refusals import refuse_cells
 from small_configuration import configuration
 
 SHOWN = {"hrrp": {"window": 2, "hop": 1, "cells": 9}, "range_doppler": {"cells": 9, "points": 512}}
@@ -214,20 +213,6 @@ def test_images_of_cells_ask_for_a_band_with_enough_cells_and_speeds_for_all_sym
     with pytest.raises(InputError, match="points is 256, expected at least the 400"):
         Spectra(range_doppler=range_doppler.Settings(9, 256)).check(400, 3, 512)
     assert spectrum("range_doppler") is range_doppler
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"shards": {"kind": "signal"}}, "shards.kind 'signal'"),
-        ({"effects": {"slow_time": {"regrid": "nudft"}}}, "slow_time.regrid: 'nudft'"),
-    ],
-)
-def test_cells_are_refused_where_no_stage_makes_them(dataset, change, words):
-    refuse_cells(dataset.config)
-    with pytest.raises(InputError, match=words):
-        refuse_cells(dataset.config | change)
-    refuse_cells(without(dataset.config) | change)
 
 
 def test_symbols_that_were_not_received_are_zeros(dataset):

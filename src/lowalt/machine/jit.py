@@ -3,14 +3,13 @@
 numba's own cache looks at the file of a function only. It does not look at the functions that it calls in other
 files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
 kernel's bytecode and options, of all kernels and constants that it uses, of those that these use, and so on. Code that
-is not compiled has no part in it. Whether products are fused and sums reordered is said for every kernel, and numba's own
-parts, such as the product of complex numbers, are compiled for each set of options by themselves: else the first
+is not compiled has no part in it. Whether products are fused and sums reordered is said for every kernel, and numba's
+own parts, such as the product of complex numbers, are compiled for each set of options by themselves: else the first
 kernel of a process to call a function would decide how that function rounds in all others.
 """
 
 import hashlib
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -114,7 +113,7 @@ cpu_target.target_context.cached_internal_func = _PartsByOptions()
 class _DigestCache(FunctionCache):
     """Numba's cache on disk, with the digest of everything compiled in its keys."""
 
-    options: dict[str, Any] = {}
+    options: dict[str, Any] | None = None
     """How the function is compiled."""
 
     def _index_key(self, sig, codegen):

@@ -27,7 +27,7 @@ from lowalt.numerics.portable import log, sine_cosine_turns
 Size = int | tuple[int, ...] | None
 _HALF = np.uint64(0xFFFFFFFF)
 COMPILED = 4096
-"""From this many normal numbers on compiled code makes them, and fewer once it is loaded: the same bits in less time."""
+"""So many normal numbers are worth loading compiled code, which gives the same bits in less time."""
 
 
 def _count(size: Size) -> int:
