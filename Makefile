@@ -141,7 +141,7 @@ reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	$(BIN)/python docs/filled_tables.py docs/results.md presets=results/reference/default-
 	for run in default tiny; do test ! -e results/$$run/shards || \
 		$(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
-	$(BIN)/python -m lowalt.measure.estimate --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
+	$(BIN)/python docs/scale_table.py --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 	$(BIN)/python docs/tiles_picture.py results/default/shards/index.json design/pictures/tiles.png
 

@@ -36,6 +36,7 @@ rule all:
         f"results/{RUN.name}/report.html",
         f"results/{RUN.name}/accuracy.csv",
         f"{DATA}/shards/README.md",
+        f"{DATA}/clouds.png",
         [f"results/{RUN.name}/transfer.csv"] if config["recognition"]["transfer"] else [],
     localrule: True
 

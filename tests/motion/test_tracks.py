@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -162,29 +163,27 @@ def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circl
 def test_a_track_is_in_one_fold_whole(dataset):
     plan = dataset.plan
     assert len(dataset) == len(SUBTYPES) * 4 * LOOKS * 2
-    places = {fold: [one.place(n) for n in range(len(one))]
-              for fold in FOLDS for one in [Dataset(dataset.config, dataset.clouds, folds=[fold])]}  # fmt: skip
-    tracks = {fold: {(place.subtype, place.model // LOOKS) for place in found} for fold, found in places.items()}
-    assert {fold: len(found) for fold, found in tracks.items()} == {"train": 8, "val": 4, "test": 4}
-    assert {fold: len(found) for fold, found in places.items()} == {
-        fold: len(found) * LOOKS * 2 for fold, found in tracks.items()
-    }
+    folds = {}
+    for fold in FOLDS:
+        part = Dataset(dataset.config, dataset.clouds, folds=[fold])
+        for place in map(part.place, range(len(part))):
+            folds.setdefault((place.group, place.subtype, place.model // LOOKS), []).append(fold)
+    assert all(held == held[:1] * LOOKS * 2 for held in folds.values())
+    assert Counter(held[0] for held in folds.values()) == {"train": 8, "val": 4, "test": 4}
     # Shards are dealt by the motion tables; the plan names a shard for each fold that has a sample.
     for chunk in plan.chunks:
-        first, count = plan.span(chunk)
-        names = plan.chunk(chunk).members
-        group = chunk.partition("-")[0]
+        (first, count), names, group = plan.span(chunk), plan.chunk(chunk).members, chunk.partition("-")[0]
         rows = [dataset.row(Place(group, name, model, 3.0)) for model in range(first, first + count) for name in names]
         assert plan.folds(chunk) == list(FOLDS)
-        for fold in FOLDS:
-            chosen = {(rows[number]["subtype"], rows[number]["model"]) for number, _ in
-                      select(rows, [3.0, math.inf], plan.split, plan.seed, fold)}  # fmt: skip
-            assert chosen == {(place.subtype, place.model) for place in places[fold] if place.group == group}
+        chosen = [(fold, rows[number]) for fold in FOLDS
+                  for number, _ in select(rows, [3.0, math.inf], plan.split, plan.seed, fold)]  # fmt: skip
+        assert len(chosen) == 2 * len(rows)
+        assert all(folds[group, row["subtype"], row["model"] // LOOKS][0] == fold for fold, row in chosen)
     # One track of each subtype is in one fold, however many looks it has.
     few = Dataset(configuration(models=1), dataset.clouds)
     for chunk in few.plan.chunks:
         names = few.plan.chunk(chunk).members
-        dealt = {fold for fold, found in tracks.items() if found & {(name, 0) for name in names}}
+        dealt = {held[0] for (_, name, track), held in folds.items() if track == 0 and name in names}
         assert {*few.plan.folds(chunk)} == dealt
 
 

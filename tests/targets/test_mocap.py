@@ -1,14 +1,14 @@
-"""Recordings: forward kinematics against an independent BVH, and faults named by file and frame."""
+"""Recordings: nodes against an independent conversion to BVH, and faults named by file and frame."""
 
 import math
 import re
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from lowalt.files.errors import InputError
 from lowalt.targets.mocap_files import read_motion, read_skeleton
+from lowalt.targets.mocap_joints import read_bvh, to_nodes
 from lowalt.targets.mocap_motion import FROM_FILE, nodes_m, posed
 from lowalt.targets.skeleton import NODES
 from real_inputs import FOLDER, needs_inputs
@@ -20,37 +20,13 @@ def files(tmp_path):
     return write_files(tmp_path)
 
 
-def bvh_joints(path) -> dict[str, np.ndarray]:
-    """Positions (F, 3) of every joint of a BVH file in file units, straight from the format's definition."""
-    head, _, data = path.read_text().partition("MOTION")
-    words, rows = head.split(), np.array(data.split()[5:], float).reshape(int(data.split()[1]), -1).T
-    columns, stack, places, turns = iter(rows), [], {"": 0.0}, {"": np.eye(3)}
-    for at, word in enumerate(words):
-        if word in ("ROOT", "JOINT", "End"):
-            stack.append(words[at + 1] if word != "End" else stack[-1] + "/end")
-        elif word == "OFFSET":
-            name, above = stack[-1], stack[-2] if len(stack) > 1 else ""
-            places[name] = places[above] + turns[above] @ np.array(words[at + 1 : at + 4], float)
-            turns[name] = turns[above]
-        elif word == "CHANNELS":  # joints stand in the file parents first, and so do their channels
-            for channel in words[at + 2 : at + 2 + int(words[at + 1])]:
-                axis, value = np.eye(3)["XYZ".index(channel[0])], next(columns)[:, None]
-                if channel.endswith("position"):
-                    places[stack[-1]] = places[stack[-1]] + axis * value
-                else:
-                    turn = Rotation.from_rotvec(axis * np.radians(value)).as_matrix()
-                    turns[stack[-1]] = turns[stack[-1]] @ turn
-        elif word == "}":
-            stack.pop()
-    return places
-
-
 @needs_inputs
-def test_forward_kinematics_agrees_with_an_independent_conversion():
+def test_a_motion_s_nodes_are_the_joints_of_an_independent_conversion_to_bvh():
     folder = FOLDER / "cmu" / "131"
     skeleton = read_skeleton(folder / "131.asf")
     channels = read_motion(folder / "131_01.amc", skeleton)[0]
-    joints = bvh_joints(folder / "131_01.bvh")
+    joints, rate = read_bvh(folder / "131_01.bvh")
+    assert rate == pytest.approx(120, rel=1e-5)
     unit = 0.0254 / 0.45
     same = {
         "root": "Hips", "lhipjoint": "LeftHip", "lfemur": "LeftKnee", "ltibia": "LeftAnkle", "lfoot": "LeftToe",
@@ -66,6 +42,8 @@ def test_forward_kinematics_agrees_with_an_independent_conversion():
     assert positions.shape == (994, 31, 3)
     for node, joint in same.items():
         assert np.abs(positions[:, NODES.index(node)] - joints[joint] * unit).max() < 5e-5, node
+    legs = [NODES.index(side + name) for side in "lr" for name in ("hipjoint", "femur", "tibia", "foot", "toes")]
+    assert np.abs((to_nodes(joints, "131_01.bvh") * unit - positions)[:, legs]).max() < 5e-5
     # The conversion leaves the bone `thorax` out: without its length what hangs on it agrees too.
     skeleton.bones[NODES.index("thorax")] = 0
     positions = nodes_m(posed(skeleton, channels, 120)) @ FROM_FILE

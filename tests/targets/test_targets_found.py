@@ -13,7 +13,7 @@ from lowalt.__main__ import main
 from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.inspection import inspect_mesh
-from meshes import box
+from meshes import box, saved
 
 HUBS = np.array([(0.13, 0.11), (0.13, -0.11), (-0.13, 0.11), (-0.13, -0.11)])
 
@@ -23,17 +23,6 @@ def disc(at, radius: float = 0.1, height: float = 0.006) -> trimesh.Trimesh:
     shape = trimesh.creation.cylinder(radius=radius, height=height, sections=24)
     shape.apply_translation(at)
     return shape
-
-
-def saved(path: Path, shapes: dict[str, trimesh.Trimesh]) -> Path:
-    """Write named shapes as objects of an OBJ file."""
-    lines, first = [], 1
-    for name, shape in shapes.items():
-        lines += [f"o {name}", *(f"v {x} {y} {z}" for x, y, z in shape.vertices)]
-        lines += ["f " + " ".join(str(first + corner) for corner in face) for face in shape.faces]
-        first += len(shape.vertices)
-    path.write_text("\n".join(lines) + "\n")
-    return path
 
 
 def draft(path: Path, *words: str) -> tuple[int, Path]:

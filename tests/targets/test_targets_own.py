@@ -11,7 +11,7 @@ from PIL import Image
 from lowalt.__main__ import main
 from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import read
-from lowalt.targets.guesses import clusters, guessed_axes, guessed_unit
+from lowalt.targets.guesses import guessed_axes, guessed_unit
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.make import make
 from lowalt.targets.records import load_table, merge, read_records
@@ -41,15 +41,6 @@ def test_a_quadrotor_s_four_propellers_are_found_and_drafted(blades, unit, metre
     np.testing.assert_allclose(found, places, atol=1e-9)
     assert abs(cloud.axes[1:, 2]) == pytest.approx(1, abs=1e-3)
     assert Image.open(made.with_suffix(".png")).size[0] > 1000
-
-
-def test_blades_that_touch_are_one_rotor_and_separate_ones_are_not(tmp_path):
-    quadrotor(True).export(tmp_path / "craft.stl")
-    found = inspect_mesh(tmp_path / "craft.stl", "UAV")
-    rotors = [part for part in found.components if part.guess == "rotor"]
-    assert len(rotors) == 8
-    assert sorted(len(group) for group in clusters(rotors, 2)) == [2, 2, 2, 2]
-    assert len(clusters(rotors, 2, touching=False)) == 8
 
 
 def test_an_alike_plate_at_another_height_is_no_rotor(tmp_path):
