@@ -1,19 +1,15 @@
 """The schema of records: it knows the keys that the code knows, describes each, and the page of keys shows them."""
 
-from pathlib import Path
-
 import pytest
 from key_pages import records_page
 
 from lowalt.files.errors import InputError
 from lowalt.targets import bird, record_schema, uav
 from lowalt.targets.builtin import MODULES
+from lowalt.targets.make import SOURCES
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import ALL_AXES, SIZES
-from lowalt.targets.records import SOURCES, load_table
 
-ROOT = Path(__file__).parents[2]
-TABLE = load_table(ROOT / "config/targets.csv")
 SCHEMA = record_schema.schema()
 
 
