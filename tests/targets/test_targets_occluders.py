@@ -18,20 +18,6 @@ def areas(corners):
     return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
 
 
-def test_a_quartered_triangle_is_four_like_it_of_half_its_size_and_together_it():
-    corners = np.random.default_rng(1).normal(size=(5, 3, 3))
-    four = occluders.quartered(corners).reshape(4, 5, 3, 3)
-    edges = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2)
-    assert (occluders.longest_edge(corners) == pytest.approx(edges.max(1))) and (edges.max(1) > edges[:, 0]).any()
-    for piece in four:
-        np.testing.assert_allclose(occluders.longest_edge(piece), occluders.longest_edge(corners) / 2)
-        np.testing.assert_allclose(areas(piece), areas(corners) / 4)
-    # Three keep a corner, the fourth lies in the middle.
-    for place in range(3):
-        assert (four[place, :, place] == corners[:, place]).all()
-    np.testing.assert_allclose(four[3].mean(1), corners.mean(1), atol=1e-15)
-
-
 def test_a_cut_takes_the_area_inside_it_to_a_triangle_s_size():
     square = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
     left = occluders.cut_away(square, (box((0.5, 0.5, 1.0), (0.5, 0.5, 0.0), exponent=200.0),))
