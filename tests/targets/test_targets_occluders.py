@@ -18,6 +18,18 @@ def areas(corners):
     return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
 
 
+def test_a_quartered_triangle_is_four_like_it_of_half_its_size_and_together_it():
+    corners = np.random.default_rng(1).normal(size=(5, 3, 3))
+    pieces = occluders.quartered(corners).reshape(4, 5, 3, 3)
+    longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
+    for place, piece in enumerate(pieces):
+        np.testing.assert_allclose(occluders.longest_edge(piece), longest / 2)
+        np.testing.assert_allclose(areas(piece), areas(corners) / 4)
+        # Three keep a corner, the fourth lies in the middle.
+        kept = piece[:, place] == corners[:, place] if place < 3 else abs((piece - corners).mean(axis=1)) < 1e-15
+        assert kept.all()
+
+
 def test_a_cut_takes_the_area_inside_it_to_a_triangle_s_size():
     square = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
     left = occluders.cut_away(square, (box((0.5, 0.5, 1.0), (0.5, 0.5, 0.0), exponent=200.0),))
