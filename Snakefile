@@ -30,10 +30,6 @@ onstart:
         space.before(workflow, RUN.plan, config)
 
 
-onerror:
-    space.after()
-
-
 rule all:
     default_target: True
     input:
