@@ -23,14 +23,10 @@ SOURCE = (
     "targets); the spread of a flock: estimate"
 )
 DEFAULTS = {"subtypes": [], "count": [1, 3], "spread_m": 4.0, "speed_mps": 1.0}
+IDLE = [{"count": [0, 0]}]
 
 TRIES = 200
 """Draws of a place that keeps clear of the other targets, before the spread counts as too small."""
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the target is always alone."""
-    return settings["count"] == [0, 0]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -29,11 +29,7 @@ DEFAULTS = {
     "kind": "mean", "order": 1,
     "wind_mps": 4.5, "depth_db": 50.0, "carrier_hz": 4.9e9, "symbol_interval_s": 2.5e-3,
 }  # fmt: skip
-
-
-def idle(settings: dict) -> bool:
-    """Return True for kind none, or a difference of order 0."""
-    return settings["kind"] == "none" or (settings["kind"] == "pulse" and settings["order"] == 0)
+IDLE = [{"kind": "none"}, {"kind": "pulse", "order": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -24,6 +24,7 @@ SOURCE = (
     + flight.SOURCE
 )
 DEFAULTS = {"wind_mps": 7.7}
+IDLE = [{"wind_mps": 0}]
 
 SPEED_GAIN, PLACE_GAIN = 0.18, 0.0171
 """Thrust against speed times the attitude's lag, and against displacement times its square; stable at any drag."""
@@ -36,11 +37,6 @@ ROUGHNESS_FT = 2.0
 SLOWEST_MPS = 0.1
 """Least airspeed, below which turbulence would stand still around the target."""
 GRAVITY_MPS2 = flight.GRAVITY_MPS2
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the air stands still."""
-    return settings["wind_mps"] == 0
 
 
 def turbulence(height_m: float, wind_mps: float) -> tuple[np.ndarray, np.ndarray]:
