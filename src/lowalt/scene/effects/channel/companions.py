@@ -1,9 +1,10 @@
 """Other targets in the beam: a flock, a bird next to a drone, a car under it. The label stays the primary target's.
 
-Companions stand around the target at the first symbol and move on. Each is a target of its own: points, moving parts,
-cross sections, motion effects and paths as the scene gives them. Their complex echoes add to the target's before the
-strongest range cell is chosen, which may be a companion's. Beams point at the primary target, and set SNRs refer to
-its echo alone. Records of samples name the companions' subtypes.
+Companions stand around the target at the first symbol, with a standard deviation of `spread_m` on each axis, and move
+on; in a flock their speeds differ from the target's by a standard deviation of `speed_mps`. Each is a target of its
+own: points, moving parts, cross sections, motion effects and paths as the scene gives them. Their complex echoes add to
+the target's before the strongest range cell is chosen, which may be a companion's. Beams point at the primary target,
+and set SNRs refer to its echo alone. Records of samples name the companions' subtypes.
 """
 
 import math

@@ -3,7 +3,8 @@
 Turbulence is a field frozen into the mean wind; the target meets it at its airspeed. Drag carries the target along
 with the air. Its control asks for a thrust against speed and displacement, and the attitude follows with a lag: a
 multirotor tilts by atan(a / g) towards the acceleration a of its thrust alone, a bird banks. Drag tilts nothing.
-Turbulence, velocity, place and thrust are one linear process, discretised exactly.
+Turbulence, velocity, place and thrust are one linear process, discretised exactly. `wind_mps` is the mean wind 20 ft
+(6 m) above ground.
 """
 
 from functools import lru_cache

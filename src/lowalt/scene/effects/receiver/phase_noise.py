@@ -37,6 +37,7 @@ DEFAULTS = {
     "reference": [[1.0, -46.0], [10.0, -76.0], [100.0, -96.0]],
 }  # fmt: skip
 IDLE = [{"points": []}]
+"""points, reference: offset (Hz) and L(f) (dBc/Hz) of the oscillator and of what its loop follows up to loop_hz."""
 
 SPLIT = 16
 """Symbol rates at which slow ends and fast begins."""
