@@ -11,9 +11,7 @@ from dataset import build, publish
 from test_tutorials import FENCE, FOLDER, NEEDS, ROOT, SHARDS, linked_tree
 
 PAGES = sorted(path.stem for path in FOLDER.glob("*.md"))
-SHORT = "trajectory"
-"""The tutorial whose notebook runs in the quick suite; `test_tutorials` runs the blocks of the others there."""
-LONG = sorted(set(PAGES) - {SHORT, "effect"})
+LONG = sorted(set(PAGES) - {"effect"})
 
 
 @pytest.fixture
@@ -73,16 +71,17 @@ def test_links_of_a_notebook_lead_to_files_of_the_repository(made, page):
     assert not [link for link in links if not (ROOT / "notebooks" / link).resolve().exists()]
 
 
-def test_the_short_notebook_runs(made, checkout):
-    whole = book(made, SHORT)
-    whole.cells.append(made.nbformat.v4.new_code_cell("print(tile.shape, tile.dtype)"))
-    assert run(whole, checkout).endswith("(768, 768) uint8\n")
-
-
-def test_a_failing_line_of_a_notebook_is_not_passed_over(made, tmp_path):
+def test_cells_run_in_order_in_the_checkout_and_a_failing_line_is_not_passed_over(made, checkout):
+    """`test_tutorials` runs the blocks of all pages in the quick suite."""
     errors = pytest.importorskip("nbclient").exceptions
+    text = (
+        "```python\nprint(open('Snakefile').read(8), end='')\n```\n```sh\nfalse\ntrue\n```\n```python\nprint(1)\n```\n"
+    )
+    short = made.notebook(text)
     with pytest.raises(errors.CellExecutionError):
-        run(made.notebook("```sh\nfalse\ntrue\n```\n"), tmp_path)
+        run(short, checkout)
+    said = [output.get("text", "") for cell in short.cells for output in cell.get("outputs", [])]
+    assert "".join(said) == "# lowalt"
 
 
 @pytest.mark.slow

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 TARGETS = (
-    "aircraft", "assemble", "bird", "builtin", "cyclist", "gait", "gait_run", "gait_walk", "limbs", "quadruped",
-    "sampling", "surfaces", "uav", "uav_pieces", "vehicle",
+    "aircraft", "assemble", "bird", "builtin", "cyclist", "gait", "gait_run", "gait_walk", "quadruped",
+    "sampling", "skeleton", "surfaces", "uav", "uav_pieces", "vehicle",
 )  # fmt: skip
 ROOT = Path(__file__).parent.parent / "src/lowalt"
 FILES = sorted(

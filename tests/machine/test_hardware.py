@@ -16,7 +16,13 @@ from lowalt.machine import hardware
         ("/bin/nvidia-smi", 0, "\n", "no GPU"),
     ],
 )
-def test_a_machine_is_named_by_processor_cores_memory_and_first_gpu(tool, status, said, wanted, monkeypatch):
+@pytest.mark.parametrize("hidden", [None, "", "-1"])
+def test_a_machine_is_named_by_processor_cores_memory_and_first_gpu(tool, status, said, wanted, hidden, monkeypatch):
+    if hidden is None:
+        monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    else:
+        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", hidden)
+        wanted = "no GPU"
     monkeypatch.setattr(hardware.shutil, "which", lambda name: tool)
     asked = SimpleNamespace(returncode=status, stdout=said)
     monkeypatch.setattr(hardware.subprocess, "run", lambda line, **options: asked)

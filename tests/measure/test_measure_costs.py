@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from craft import NETWORK, craft
-from lowalt.config.layers import load
 from lowalt.config.network import Network
 from lowalt.echo import echo_signal
-from lowalt.measure import echo_cost, estimate
-from lowalt.recognition.schemes import named
+from lowalt.measure import echo_cost
 
 PUBLISHED = {"vx_abs_max": 5, "vy_abs_max": 5, "vz_abs_max": 2, "freq_lo_hz": 60, "freq_hi_hz": 100}
 MOTION = {
@@ -104,41 +102,3 @@ def test_a_row_is_the_mean_time_and_the_largest_error_of_all_clouds(monkeypatch)
     block = {"motion": {}, "seed": 1, "distance_m": 30.0, "points": [9]}
     (row,) = echo_cost.measure(None, [SimpleNamespace(subtype="x")] * 2, {"x": {}}, block)
     assert (row["seconds"], row["relative_error"], row["points"]) == (2.0, 0.5, 9) and asked == [(30.0, 9)] * 2
-
-
-def test_an_estimate_adds_stages_rounds_hours_and_gigabytes_and_counts_a_recipe_s_one_signal():
-    config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
-    models, samples = estimate.samples_of(config)
-    assert samples == 6 * models
-    stages = [{"rule": rule, "wall_s": "1234.567", "samples": "1000", "sample_bytes": "260123", "hardware": "here"}
-              for rule in estimate.DATA_RULES]  # fmt: skip
-    signal = 8 * 400 * 3
-    for kind, size in (("image", 260123), ("signal", signal), ("recipe", signal / 6)):
-        row = estimate.estimate(stages, [], config | {"shards": {"kind": kind}}, "x")
-        assert row["core_hours"] == round(6 * 1.234567 * samples / 3600, 2)
-        assert row["shards_gb"] == round(size * samples / 1e9, 1)
-        assert row["noisy_gb"] == round(signal * samples / 1e9, 1) and row["training_core_hours"] == ""
-
-
-def test_a_network_counts_by_its_row_of_most_images_and_settings_by_the_scheme_s_own():
-    config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
-    block = config["recognition"]
-    block |= {"schemes": ["A:VRP+TRP+VT", "ABC:VRP+TRP+VT"], "seeds": [1, 2], "protocols": ["unseen"]}
-    kept = {"backbone": block["network"]["backbone"], "pixels": str(block["size"]), "hardware": "best"}
-    costs = [
-        kept | {"network_bytes": str(9 * block["size"] ** 2), "train_ms": "1.5"},
-        kept | {"network_bytes": str(3 * block["size"] ** 2), "train_ms": "7", "hardware": "few"},
-        kept | {"network_bytes": str(9 * block["size"] ** 2), "train_ms": "8", "hardware": "later"},
-        kept | {"network_bytes": str(12 * block["size"] ** 2), "train_ms": "", "hardware": "untimed"},
-        {"backbone": "svm", "pixels": "", "network_bytes": "1", "train_ms": "", "hardware": "none"},
-    ]
-    number, hours, hardware = estimate.training_hours(costs, config)
-    visits = 2 * block["training"]["steps"] * block["training"]["batch"]
-    assert (number, hardware) == (4, "best")
-    assert hours == pytest.approx(visits * 1.5e-3 / 3600 * (9 + 3) / 9)
-    assert named(block["table"], "A:VRP+TRP+VT", "ABC").size == 0
-    assert estimate.training_hours([], config) == (4, None, "")
-    # A network that was timed on fewer images than another tells nothing of what more of them take.
-    wider = costs[0] | {"backbone": "another"}
-    assert estimate.training_hours([costs[1], wider], config) == (4, None, "")
-    assert estimate.training_hours([costs[0], wider], config) == (4, hours, "best")

@@ -1,26 +1,19 @@
 """Motion: laws of rigid rotation, exact phases, and the places of parts and of recordings' nodes."""
 
 import math
+from dataclasses import replace
 
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
 from lowalt.motion import poses, positions
 from lowalt.motion.rotations import attitude, rodrigues, turns
 from lowalt.targets.cloud import Cloud
-from moving_clouds import rigid_cloud, row
-
-
-@settings(deadline=None)
-@given(st.lists(st.floats(-10, 10), min_size=3, max_size=3))
-def test_attitude_is_a_rotation(angles):
-    matrix = attitude(*angles)
-    np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-14)
-    assert np.linalg.det(matrix) == pytest.approx(1, abs=1e-13)
+from moving_clouds import recorded_cloud, rigid_cloud, row
 
 
 def test_attitude_turns_about_z_then_x_then_y_as_published():
@@ -78,16 +71,23 @@ def test_blade_tip_moves_at_two_pi_rate_times_radius():
     assert speed == pytest.approx(2 * math.pi * 50 * radius, rel=1e-6)
 
 
+def turning_cloud(kind: str, points: list, hinges: list, axes: list, **more) -> Cloud:
+    """A body of one point and parts of one kind, a point each; `more`: names or parents, and facts of the record."""
+    count, nothing = len(points) + 1, [np.nan] * 3
+    fields = {key: more.pop(key) for key in ("names", "parents") if key in more}
+    cloud = rigid_cloud(kind, "UAV", more)
+    return replace(
+        cloud, points=np.array([[0.0, 0, 0], *points]), part=np.arange(count), kinds=("body", *[kind] * len(points)),
+        hinges=np.array([nothing, *hinges], float), axes=np.array([nothing, *axes], float),
+        normals=np.full((count, 3), np.nan), rcs_m2=np.ones(count),
+        **{"names": tuple(map(str, range(count))), "parents": np.full(count, -1)} | fields,
+    )  # fmt: skip
+
+
 def two_rotors(factors: dict) -> Cloud:
     """A body and two rotors of one point each, with rate factors by part."""
-    nothing = np.full(3, np.nan)
-    record = {"subtype": "test", "category": "UAV", "source": "test", "checksum": "", "rate_factors": factors}
-    return Cloud(
-        points=np.array([[0.0, 0, 0], [0.5, 0, 0], [-0.5, 0, 0]]), part=np.arange(3), kinds=("body", "rotor", "rotor"),
-        names=("body", "main", "tail"), parents=np.full(3, -1), axes=np.array([nothing, [0, 0, 1.0], [1.0, 0, 0]]),
-        hinges=np.array([nothing, [0.3, 0, 0], [-0.5, 0.1, 0]]), normals=np.full((3, 3), np.nan), rcs_m2=np.ones(3),
-        record=record,
-    )  # fmt: skip
+    return turning_cloud("rotor", [[0.5, 0, 0], [-0.5, 0, 0]], [[0.3, 0, 0], [-0.5, 0.1, 0]], [[0, 0, 1], [1, 0, 0]],
+                         names=("body", "main", "tail"), rate_factors=factors)  # fmt: skip
 
 
 def test_each_rotor_turns_at_its_own_factor_of_the_rate():
@@ -103,40 +103,23 @@ def test_each_rotor_turns_at_its_own_factor_of_the_rate():
     angle = np.unwrap(np.arctan2(own.rotation[:, 2, 2, 1], own.rotation[:, 2, 2, 2]))
     assert np.ptp(angle) == pytest.approx(2 * np.pi * 6.4 * 5.4 * times[-1])
     assert np.ptp(poses(two_rotors({"main": 0}), line, times).rotation[:, 1], axis=0).max() == 0
-
-
-def test_a_factor_of_one_leaves_every_bit():
-    times = np.arange(50) * 2.5e-3
-    line = row(rate_hz=93.7, phase_0_rad=0.3, phase_1_rad=1.1)
-    plain, ones = (poses(two_rotors(factors), line, times) for factors in ({}, {"main": 1, "tail": 1.0}))
-    assert plain.rotation.tobytes() == ones.rotation.tobytes()
-    assert plain.translation.tobytes() == ones.translation.tobytes()
+    ones = poses(two_rotors({"main": 1, "tail": 1.0}), line, times)
+    assert all(one.tobytes() == other.tobytes() for one, other in zip(plain, ones, strict=True))
 
 
 def test_a_wheel_point_on_the_ground_stands_still():
     diameter, speed = 0.56, 13.0
-    wheel = rigid_cloud("wheel", "Vehicle", {"wheel_diameter_m": diameter})
     hinge = np.array([0.8, 1.4, 0.0])
-    cloud = Cloud(
-        points=np.array([[0.0, 0, 0], hinge - [0, 0, diameter / 2], hinge, hinge]), part=wheel.part, kinds=wheel.kinds,
-        names=wheel.names, parents=wheel.parents, hinges=np.array([[np.nan] * 3, hinge]),
-        axes=np.array([[np.nan] * 3, [-1.0, 0, 0]]), normals=wheel.normals, rcs_m2=wheel.rcs_m2, record=wheel.record,
-    )  # fmt: skip
+    cloud = turning_cloud("wheel", [hinge - [0, 0, diameter / 2]], [hinge], [[-1, 0, 0]])
     rate = speed / (math.pi * diameter)
     found = positions(cloud, row(rate_hz=rate, phase_0_rad=0.0, vy_mps=speed), np.array([-1e-6, 1e-6]))
     assert np.linalg.norm(found[1, 1] - found[0, 1]) / 2e-6 < 1e-4 * speed
 
 
 def test_an_outer_wing_rides_on_the_inner_one():
-    nothing = [np.nan] * 3
     flap = {"mean_deg": 15, "amplitude_deg": 40, "fold_amplitude_deg": 30, "fold_lag_deg": 90}
-    cloud = Cloud(
-        points=np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]]), part=np.arange(3), kinds=("body", "wing", "wing"),
-        names=("body", "inner", "outer"), parents=np.array([-1, -1, 1]),
-        hinges=np.array([nothing, [0.0, 0, 0], [1.0, 0, 0]]), axes=np.array([nothing, [0, -1.0, 0], [0, -1.0, 0]]),
-        normals=np.full((3, 3), np.nan), rcs_m2=np.ones(3),
-        record={"subtype": "test", "category": "Bird", "source": "test", "checksum": "", "flap": flap},
-    )  # fmt: skip
+    cloud = turning_cloud("wing", [[1, 0, 0], [2, 0, 0]], [[0, 0, 0], [1, 0, 0]], [[0, -1, 0]] * 2,
+                          parents=np.array([-1, -1, 1]), flap=flap)  # fmt: skip
     times = np.linspace(0, 0.25, 7)
     found = positions(cloud, row(rate_hz=4.0, phase_0_rad=0.3), times)
     beat = 0.3 + 2 * np.pi * 4 * times
@@ -149,14 +132,8 @@ def test_an_outer_wing_rides_on_the_inner_one():
 
 
 def test_a_recording_is_cyclic_and_linear_between_frames():
-    rng = np.random.default_rng(1)
-    track = rng.normal(size=(12, 31, 3))
-    nothing = np.full((31, 3), np.nan)
-    cloud = Cloud(
-        points=track[0], part=np.arange(31), kinds=("node",) * 31, names=tuple(map(str, range(31))),
-        parents=np.full(31, -1), hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(31), track=track,
-        record={"subtype": "t", "category": "Pedestrian", "source": "", "checksum": "", "track_rate_hz": 120.0},
-    )  # fmt: skip
+    cloud = recorded_cloud()
+    track = cloud.track
     motion = row(start_s=11 / 120, playback=1.0)
     found = positions(cloud, motion, np.array([0.0, 0.25 / 120, 1 / 120, 12 / 120]))
     np.testing.assert_allclose(found[0], track[11], atol=1e-12)

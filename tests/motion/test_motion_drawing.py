@@ -13,10 +13,9 @@ from lowalt.motion.drawing import draw, region_polygon
 from lowalt.motion.rotations import attitude
 from lowalt.motion.table import NUMBERS
 from lowalt.numerics.streams import stream
-from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
-from moving_clouds import rigid_cloud, row
+from moving_clouds import recorded_cloud, rigid_cloud, row
 
 KINDS = "uav", "bird", "vehicle", "pedestrian"
 MASTS = np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0127018922193]])
@@ -94,30 +93,18 @@ def test_every_ground_target_moves_to_its_front_and_its_wheels_roll(name):
         np.testing.assert_allclose(along, speed * rad_per_m * now[:, 2], atol=1e-5 * speed)
 
 
-def test_two_stations_need_a_polygon():
-    with pytest.raises(InputError, match="polygon_m"):
-        region_polygon(MASTS[:2], None)
-
-
 def test_the_hull_of_many_stations_is_the_region_and_bad_polygons_are_refused():
     square = np.array([[0, 0], [0, 10], [10, 0], [10, 10], [4, 5]], dtype=float)
     assert sorted(map(tuple, region_polygon(square, None))) == sorted(map(tuple, square[:4]))
-    with pytest.raises(InputError, match="not convex"):
-        region_polygon(square, square.tolist())
-    with pytest.raises(InputError, match="flat"):
-        region_polygon(square, [[0, 0], [1, 1], [2, 2]])
+    for masts, polygon, words in ((MASTS[:2], None, "polygon_m"), (square, square.tolist(), "not convex"),
+                                  (square, [[0, 0], [1, 1], [2, 2]], "flat")):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            region_polygon(masts, polygon)
 
 
 @pytest.mark.parametrize(("cadence", "tied"), [("free", False), ("tied", True)])
 def test_cadence_follows_speed_only_where_tied(cadence, tied):
-    track = np.random.default_rng(3).normal(size=(12, 31, 3))
-    nothing = np.full((31, 3), np.nan)
-    record = {"subtype": "t", "category": "Pedestrian", "source": "", "checksum": "", "origin_height_m": 0.9}
-    cloud = Cloud(
-        points=track[0], part=np.arange(31), kinds=("node",) * 31, names=tuple(map(str, range(31))),
-        parents=np.full(31, -1), hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(31), track=track,
-        record={**record, "track_rate_hz": 120.0, "track_speed_mps": 1.25},
-    )  # fmt: skip
+    cloud = recorded_cloud(origin_height_m=0.9, track_speed_mps=1.25)
     settings, ranges = {**MOTION, "cadence": cadence}, {"speed_lo": 0.2, "speed_hi": 1.5}
     drawn = draw(stream(1, "m"), cloud, ranges, MASTS, region_polygon(MASTS, None), settings)
     speed = math.hypot(drawn["vx_mps"], drawn["vy_mps"])

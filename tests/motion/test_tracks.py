@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -77,15 +78,20 @@ def looks_of(dataset: Dataset, subtype: str, track: int) -> list[dict]:
     return [dataset.row(Place(group, subtype, track * LOOKS + look, 3.0)) for look in range(LOOKS)]
 
 
+def goes_on(cloud, rows: list[dict]):
+    """Assert that all points end a look where they begin the next: place, heading, phases of parts and gait at once."""
+    for row, after in itertools.pairwise(rows):
+        ends, starts = positions(cloud, row, np.array([1.0])), positions(cloud, after, np.array([0.0]))
+        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("subtype", SUBTYPES)
 @pytest.mark.parametrize("which", ["dataset", "logged"])
 def test_nothing_jumps_between_looks(which, subtype, request):
     tracks = request.getfixturevalue(which)
-    cloud, rows = tracks.clouds[subtype], looks_of(tracks, subtype, 2)
+    rows = looks_of(tracks, subtype, 2)
+    goes_on(tracks.clouds[subtype], rows)
     for row, after in itertools.pairwise(rows):
-        # All points: place, heading, and phases of rotors, wings, wheels and gait at once.
-        ends, starts = positions(cloud, row, np.array([1.0])), positions(cloud, after, np.array([0.0]))
-        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
         for axis in "xyz":
             bent = row[f"v{axis}_mps"] + row[f"a{axis}_mps2"] + row[f"j{axis}_mps3"] / 2
             assert bent == pytest.approx(after[f"v{axis}_mps"], abs=1e-9)
@@ -133,10 +139,7 @@ def test_rotors_with_rates_of_their_own_go_on_from_look_to_look(dataset):
     cloud, masts = dataset.clouds["DJI Mini 2"], np.array(masts_m(dataset.config["network"]), float)
     own = replace(cloud, record=cloud.record | {"rate_factors": {cloud.names[cloud.parts_of("rotor")[1]]: 1.37}})
     settings, published = motion_block(dataset.config), TABLE["DJI Mini 2"]
-    rows = model_rows(1, own, published, masts, region_polygon(masts, None), settings, 0)
-    for row, after in itertools.pairwise(rows):
-        ends, starts = positions(own, row, np.array([1.0])), positions(own, after, np.array([0.0]))
-        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
+    goes_on(own, model_rows(1, own, published, masts, region_polygon(masts, None), settings, 0))
 
 
 def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circle_is_one_turn(dataset, tmp_path):
@@ -160,29 +163,27 @@ def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circl
 def test_a_track_is_in_one_fold_whole(dataset):
     plan = dataset.plan
     assert len(dataset) == len(SUBTYPES) * 4 * LOOKS * 2
-    places = {fold: [one.place(n) for n in range(len(one))]
-              for fold in FOLDS for one in [Dataset(dataset.config, dataset.clouds, folds=[fold])]}  # fmt: skip
-    tracks = {fold: {(place.subtype, place.model // LOOKS) for place in found} for fold, found in places.items()}
-    assert {fold: len(found) for fold, found in tracks.items()} == {"train": 8, "val": 4, "test": 4}
-    assert {fold: len(found) for fold, found in places.items()} == {
-        fold: len(found) * LOOKS * 2 for fold, found in tracks.items()
-    }
+    folds = {}
+    for fold in FOLDS:
+        part = Dataset(dataset.config, dataset.clouds, folds=[fold])
+        for place in map(part.place, range(len(part))):
+            folds.setdefault((place.group, place.subtype, place.model // LOOKS), []).append(fold)
+    assert all(held == held[:1] * LOOKS * 2 for held in folds.values())
+    assert Counter(held[0] for held in folds.values()) == {"train": 8, "val": 4, "test": 4}
     # Shards are dealt by the motion tables; the plan names a shard for each fold that has a sample.
     for chunk in plan.chunks:
-        first, count = plan.span(chunk)
-        names = plan.chunk(chunk).members
-        group = chunk.partition("-")[0]
+        (first, count), names, group = plan.span(chunk), plan.chunk(chunk).members, chunk.partition("-")[0]
         rows = [dataset.row(Place(group, name, model, 3.0)) for model in range(first, first + count) for name in names]
         assert plan.folds(chunk) == list(FOLDS)
-        for fold in FOLDS:
-            chosen = {(rows[number]["subtype"], rows[number]["model"]) for number, _ in
-                      select(rows, [3.0, math.inf], plan.split, plan.seed, fold)}  # fmt: skip
-            assert chosen == {(place.subtype, place.model) for place in places[fold] if place.group == group}
+        chosen = [(fold, rows[number]) for fold in FOLDS
+                  for number, _ in select(rows, [3.0, math.inf], plan.split, plan.seed, fold)]  # fmt: skip
+        assert len(chosen) == 2 * len(rows)
+        assert all(folds[group, row["subtype"], row["model"] // LOOKS][0] == fold for fold, row in chosen)
     # One track of each subtype is in one fold, however many looks it has.
     few = Dataset(configuration(models=1), dataset.clouds)
     for chunk in few.plan.chunks:
         names = few.plan.chunk(chunk).members
-        dealt = {fold for fold, found in tracks.items() if found & {(name, 0) for name in names}}
+        dealt = {held[0] for (_, name, track), held in folds.items() if track == 0 and name in names}
         assert {*few.plan.folds(chunk)} == dealt
 
 

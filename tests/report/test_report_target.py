@@ -112,8 +112,3 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
             np.testing.assert_allclose(tip - start, 0.8 * half * along)
             assert (abs(np.array([start, tip]) - middle[[across, up]]) < half).all()
     assert figure.get_suptitle().startswith("DJI Mini 2 (UAV, test): 20 points, 2 parts, ")
-
-
-def test_decibels_end_at_the_floor_and_silence_is_the_floor():
-    np.testing.assert_allclose(target_picture._decibel(np.array([1.0, 10.0, 0.001])), [-20, 0, -40])
-    np.testing.assert_array_equal(target_picture._decibel(np.zeros(2)), [-40, -40])

@@ -32,6 +32,17 @@ def box(size, at=(0, 0, 0)) -> trimesh.Trimesh:
     return shape
 
 
+def saved(path: Path, shapes: dict[str, trimesh.Trimesh], keyword: str = "o") -> Path:
+    """Write named shapes as objects (o) or groups (g) of an OBJ file, and return its path."""
+    lines, first = [], 1
+    for name, shape in shapes.items():
+        lines += [f"{keyword} {name}", *(f"v {x} {y} {z}" for x, y, z in shape.vertices)]
+        lines += ["f " + " ".join(str(first + corner) for corner in face) for face in shape.faces]
+        first += len(shape.vertices)
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
 def write_quad(folder: Path) -> Path:
     """Write a body with arms along its file's x (front), and a propeller with its hub at the origin."""
     box((0.2, 0.12, 0.06)).export(folder / "body.stl")

@@ -1,19 +1,15 @@
 """The built-in pedestrians: what the published model says, rigid bones, a seamless cycle, people who differ."""
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
-from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import cloud as clouds
 from lowalt.targets import gait, gait_walk
-from lowalt.targets.make import make
 from lowalt.targets.records import load_table, merge, read_records
 from lowalt.targets.skeleton import FEET, NODES, PARENTS, rotation, stature_m
 
@@ -30,11 +26,6 @@ def built(name: str, **changes) -> clouds.Cloud:
 @pytest.fixture(scope="module")
 def people() -> dict[str, clouds.Cloud]:
     return {name: built(name) for name in RECORDS}
-
-
-def test_every_published_pedestrian_has_a_record():
-    assert set(RECORDS) == set(HEIGHTS)
-    assert sum(record["gait"] == "walk" for record in RECORDS.values()) == 8
 
 
 def test_cycle_length_and_duration_are_the_published_ones():
@@ -58,8 +49,7 @@ def test_leg_passes_through_the_published_control_points(rv, phase, degrees):
             assert np.degrees(found[0]) == pytest.approx(wanted)
 
 
-@given(rv=st.sampled_from([0.5, 1.3]))
-@settings(max_examples=2)
+@pytest.mark.parametrize("rv", [0.5, 1.3])
 def test_the_three_speed_ranges_join_without_a_step(rv):
     phase = np.linspace(0, 1, 101)
     below, above = rv - 1e-9, rv + 1e-9
@@ -71,19 +61,15 @@ def test_the_three_speed_ranges_join_without_a_step(rv):
 
 
 def test_stature_and_length_of_every_bone_hold_in_every_frame(people):
+    assert set(people) == set(HEIGHTS)
     for name, cloud in people.items():
         bones = gait.bones_m(HEIGHTS[name])
         assert stature_m(bones) == pytest.approx(HEIGHTS[name], rel=1e-12)
         parents = list(PARENTS[1:])
         lengths = np.linalg.norm(cloud.track[:, 1:] - cloud.track[:, parents], axis=2)
         assert np.abs(lengths - np.linalg.norm(bones[1:], axis=1)).max() < 1e-13
-
-
-def test_walkers_reach_their_published_height_within_two_percent(people):
-    for name, cloud in people.items():
         if name.startswith("Walking"):
-            extent = np.ptp(cloud.track[..., 2], axis=1)
-            assert np.abs(extent / HEIGHTS[name] - 1).max() < 0.02
+            assert np.abs(np.ptp(cloud.track[..., 2], axis=1) / HEIGHTS[name] - 1).max() < 0.02
 
 
 def test_cycle_closes_in_position_and_velocity(people):
@@ -94,16 +80,6 @@ def test_cycle_closes_in_position_and_velocity(people):
         change = np.linalg.norm(turns, axis=2).max(axis=1)
         assert steps[-1].max() < 1.2 * steps[:-1].max()
         assert change[-2:].max() <= 1.2 * change[:-2].max()
-
-
-def test_clouds_are_the_default_s_to_the_byte(tmp_path):
-    """Each bone, angle and time of the built-in walks and runs is that of the kept run."""
-    kept = dict(line.split()[::-1] for line in (ROOT / "results/reference/default.sha256").read_text().splitlines())
-    seed = load_yaml(ROOT / "config/default.yaml")["seed"]
-    for name in RECORDS:
-        clouds.write(tmp_path / "cloud.npz", make(merge(TABLE[name], RECORDS[name], name), None, seed))
-        found = hashlib.sha256((tmp_path / "cloud.npz").read_bytes()).hexdigest()
-        assert found == kept[f"clouds/{slug(name)}.npz"], name
 
 
 def test_left_side_is_the_right_side_half_a_cycle_later():
@@ -120,20 +96,14 @@ def test_walkers_foot_stands_while_the_body_passes(people):
         assert cloud.record["stance_foot_speed_mps"] < 0.65 < 0.25 * fastest
 
 
-def test_people_differ_in_height_speed_cadence_and_stride(people):
-    facts = [
-        (c.record["stature_m"], c.record["track_speed_mps"], c.record["cadence_steps_per_min"]) for c in people.values()
-    ]
-    assert len(set(facts)) == len(facts)
+def test_the_record_s_facts_are_those_of_the_cycle(people):
     for name, cloud in people.items():
         record = cloud.record
         assert record["stride_m"] / record["cycle_s"] == pytest.approx(record["speed_mps"])
         assert record["track_rate_hz"] == pytest.approx(len(cloud.track) / record["cycle_s"])
         assert record["origin_height_m"] == pytest.approx(-cloud.track[..., 2].min())
-        if name.startswith("Walking"):
-            assert 85 < record["cadence_steps_per_min"] < 125
-        else:
-            assert record["cadence_steps_per_min"] == pytest.approx(169.6)
+        usual = (85, 125) if name.startswith("Walking") else (169.5, 169.7)
+        assert usual[0] < record["cadence_steps_per_min"] < usual[1]
 
 
 def test_runner_flies_and_walker_never_does():

@@ -9,7 +9,7 @@ import pytest
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.motion import poses, read_table, write_table
+from lowalt.motion import read_table, write_table
 from lowalt.motion.drawing import draw, region_polygon
 from lowalt.motion.poses import positions
 from lowalt.numerics.streams import stream
@@ -67,9 +67,10 @@ def test_only_size_rate_and_height_of_the_ground_change(targets, name):
 def test_every_point_of_a_scaled_target_lies_as_many_times_as_far_from_its_origin(targets, name):
     row, times_s = drawn(targets, name, 7), np.arange(6) * 2.5e-3
     cloud = targets[name][0]
-    origin = np.array([row["x_m"], row["y_m"], row["z_m"]]) + times_s[:, None, None] * np.array(
-        [row["vx_mps"], row["vy_mps"], row["vz_mps"]]
+    start, velocity = (
+        np.array([row[f"{kind}{axis}{unit}"] for axis in "xyz"]) for kind, unit in (("", "_m"), ("v", "_mps"))
     )
+    origin = start + times_s[:, None, None] * velocity
     small = positions(cloud, row, times_s) - origin
     large = positions(cloud_of({name: cloud}, {**row, "scale": 3.0}), row, times_s) - origin
     np.testing.assert_allclose(large, 3 * small, atol=1e-9)
@@ -101,11 +102,3 @@ def test_table_and_record_carry_the_size_and_other_tables_have_no_such_column(ta
     (tmp_path / "bad.csv").write_text("\n".join([text[0], text[1].rpartition(",")[0] + ",-1.0"]) + "\n")
     with pytest.raises(InputError, match=r"bad.csv, line 2, column scale: -1.0, expected a positive number"):
         read_table(tmp_path / "bad.csv")
-
-
-def test_poses_of_a_row_do_not_depend_on_its_scale_column(targets):
-    """Sizes are the cloud's alone: who passes another cloud with the row gets that cloud's points."""
-    cloud, row = targets["Crow"][0], drawn(targets, "Crow", 4, SIZES)
-    bare = {key: value for key, value in row.items() if key != "scale"}
-    for one, other in zip(poses(cloud, row, np.zeros(1)), poses(cloud, bare, np.zeros(1)), strict=True):
-        np.testing.assert_array_equal(one, other)

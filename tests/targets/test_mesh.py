@@ -1,17 +1,26 @@
-"""Users' meshes: places, axes, units and formats, parts that turn, and which components a region takes."""
+"""Users' meshes, made and real: places, axes, units and formats, parts that turn, regions."""
 
+import os
+import subprocess
+import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.files.errors import InputWarning
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
-from meshes import TABLE, box, car_record, made, plain, quad_record
+from lowalt.targets.record_schema import record_files
+from lowalt.targets.records import read_records
+from lowalt.targets.surfaces import volume
+from meshes import ROOT, TABLE, box, car_record, made, plain, quad_record, saved, write_quad
+from real_inputs import FOLDER, needs_inputs
 
 
 def test_places_senses_and_sizes_are_those_of_the_record(quad):
@@ -55,13 +64,9 @@ def test_axes_of_the_file_do_not_matter_if_the_record_names_them(up, front, tmp_
     assert (high[:, 0] > 0.01).all() and (high[:, 1] > 0.07).all()  # the mast stands ahead on the right
 
 
-STATING = (".dae", ".glb")  # formats that state their unit; trimesh writes metres
-
-
 @pytest.mark.parametrize(
     ("suffix", "unit", "metres"),
-    [(suffix, "m", 1.0) for suffix in SUFFIXES]
-    + [(s, u, f) for s in SUFFIXES if s not in STATING for u, f in (("in", 0.0254), ("mm", 0.001))],
+    [(suffix, "m", 1.0) for suffix in SUFFIXES] + [(suffix, "in", 0.0254) for suffix in (".stl", ".obj", ".ply")],
 )
 def test_every_format_and_unit_gives_the_same_size(suffix, unit, metres, tmp_path):
     shape = box(np.array([0.1, 0.2, 0.05]) / metres)
@@ -70,6 +75,7 @@ def test_every_format_and_unit_gives_the_same_size(suffix, unit, metres, tmp_pat
     found = read_mesh(path, unit)
     assert len(found.faces) == 12 and found.closed.tolist() == [True]
     assert np.ptp(found.vertices, axis=0) == pytest.approx([0.1, 0.2, 0.05], rel=1e-6)
+    assert volume(found) == pytest.approx(0.001, rel=1e-6)
 
 
 def test_a_record_s_unit_overrides_the_file_s_with_a_warning(tmp_path):
@@ -181,3 +187,114 @@ def test_regions_take_whole_components_only_where_asked(tmp_path):
         taken = cloud.points[cloud.part == 1]
         assert bool((taken[:, 0] - taken[:, 0].max() < -0.4).any()) is tall  # the tall post is cut, not whole inside
         assert np.array_equal(cloud.axes[1], [0, 0, 1])
+
+
+@pytest.mark.parametrize("suffix", [".glb", "o", "g"])
+def test_parts_are_chosen_by_the_names_of_instances_objects_and_groups(suffix, tmp_path):
+    hubs = {name: part["meshes"][0]["move"] for name, part in quad_record()["parts"].items() if part["kind"] == "rotor"}
+    hull, prop = box((0.2, 0.12, 0.06)), box((0.2, 0.02, 0.004))
+    name = "craft.obj" if suffix in "og" else f"craft{suffix}"
+    if suffix in "og":
+        props = {hub: prop.copy().apply_translation(at) for hub, at in hubs.items()}
+        saved(tmp_path / name, {"hull": hull, **props}, suffix)
+    else:
+        scene = trimesh.Scene()
+        scene.add_geometry(hull, node_name="hull", geom_name="hull shape")
+        for hub, place in hubs.items():
+            matrix = trimesh.transformations.translation_matrix(place)
+            scene.add_geometry(prop, node_name=hub, geom_name="prop", transform=matrix)
+        scene.export(tmp_path / name)
+    record = quad_record()
+    for word, part in record["parts"].items():
+        part["meshes"] = [{"file": name, "geometry": ["hull" if word == "body" else word]}]
+    hull.export(tmp_path / "body.stl")
+    prop.apply_scale(1000).export(tmp_path / "prop.stl")
+    separate = quad_record()
+    for part in separate["parts"].values():
+        part["meshes"][0] |= {"unit": "mm"} if part["kind"] == "rotor" else {}
+    one, other = (made("DJI Mini 2", tmp_path, **own) for own in (record, separate))
+    np.testing.assert_allclose(one.hinges, other.hinges, atol=5e-4)
+    np.testing.assert_allclose(np.ptp(one.points, axis=0), np.ptp(other.points, axis=0), rtol=1e-3)
+
+
+@pytest.mark.slow
+def test_the_workflow_s_rule_makes_the_cloud_of_meshes_with_odd_names(tmp_path):
+    inputs, copy, record = tmp_path / "inputs", tmp_path / "checkout", quad_record()
+    for part in record["parts"].values():
+        part["meshes"][0]["file"] = "odd folder/my craft (1), " + part["meshes"][0]["file"]
+    (inputs / "odd folder").mkdir(parents=True)
+    for path in write_quad(tmp_path).glob("*.stl"):
+        path.rename(inputs / f"odd folder/my craft (1), {path.name}")
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump({"DJI Mini 2": {"source": "mesh", **record}}))
+    targets = {"own": {"odd": str(tmp_path / "own.yaml")}, "select": ["DJI Mini 2"]}
+    (tmp_path / "overlay.yaml").write_text(yaml.safe_dump({"run": "odd", "targets": targets}))
+    copy.mkdir()
+    for name in ("Snakefile", "workflow", "config", "src", "profiles", "envs", "pyproject.toml", "README.md"):
+        (copy / name).symlink_to(ROOT / name)
+    environment = {**os.environ, "LOWALT_INPUTS": str(inputs), "PYTHONPATH": str(ROOT / "src")}
+    command = ["snakemake", "--cores", "2", "--configfile", str(tmp_path / "overlay.yaml"), "--", "clouds"]
+    done = subprocess.run([sys.executable, "-m", *command], cwd=copy, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0 and "from files: DJI Mini 2" in done.stderr, done.stderr[-3000:]
+    seed = yaml.safe_load((ROOT / "config/default.yaml").read_text())["seed"]
+    cloud = clouds.read(copy / "results/odd/clouds/dji-mini-2.npz")
+    np.testing.assert_array_equal(cloud.points, made("DJI Mini 2", inputs, seed, **record).points)
+
+
+REAL = read_records(ROOT / "config/targets/real.yaml")
+UNITS = {"hatchback.obj": "in", "prius_hybrid.obj": "cm", "prius_body.obj": "cm", "prius_wheel.obj": "cm",
+         "cowbird_fly.obj": "cm"}  # fmt: skip
+
+
+@needs_inputs
+@pytest.mark.parametrize("subtype", [name for name, record in REAL.items() if record["source"] == "mesh"])
+def test_real_records_give_clouds_of_the_published_size(subtype):
+    published = TABLE[subtype]
+    cloud = made(subtype, FOLDER, **REAL[subtype])
+    assert len(cloud.points) == published["points_in_published_cloud_approx"]
+    assert np.isfinite(cloud.normals).all()
+    moving = [kind for kind in cloud.kinds if kind != "body"]
+    assert np.bincount(cloud.part).min() >= 8
+    extent = np.ptp(cloud.points, axis=0)
+    if cloud.category == "Vehicle":
+        wanted = [published["wid_m"], published["len_m"], published["hgt_m"]]
+        assert np.abs(extent / wanted - 1).max() < 0.02
+        assert moving == ["wheel"] * 4
+        assert cloud.record["wheel_diameter_m"] == published["wheel_diam_m"]
+        # The wheels stand on the ground, two of them left and two ahead, and roll to the front.
+        assert np.allclose(cloud.hinges[1:, 2] + cloud.record["origin_height_m"], published["wheel_diam_m"] / 2)
+        assert sorted(np.sign(cloud.hinges[1:, 0])) == sorted(np.sign(cloud.hinges[1:, 1])) == [-1, -1, 1, 1]
+        assert np.allclose(cloud.axes[1:], [-1, 0, 0], atol=0.02)
+        # A car is lower over its bonnet than over its boot or hatch.
+        ahead, behind = (
+            cloud.points[np.abs(cloud.points[:, 1] - y * extent[1]) < 0.1 * extent[1], 2] for y in (0.4, -0.4)
+        )
+        assert ahead.max() < behind.max()
+    elif cloud.category == "Bird":
+        assert extent[1] == pytest.approx(published["size_m"], rel=0.02)
+        assert cloud.parents.tolist() == [-1, -1, 1, -1, 3]
+    else:
+        hubs = cloud.hinges[1:, :2]
+        assert np.linalg.norm(hubs[:, None] - hubs, axis=2).max() == pytest.approx(published["size_m"], rel=1e-9)
+        assert moving == ["rotor"] * 4
+        # Blades lie about their hub, in one plane, and neighbours turn in opposite senses.
+        order = np.argsort(np.arctan2(hubs[:, 1], hubs[:, 0]))
+        assert np.sign(cloud.axes[1:, 2])[order].tolist() in ([1, -1, 1, -1], [-1, 1, -1, 1])
+        for part in range(1, 5):
+            away = (cloud.points - cloud.hinges[part])[cloud.part == part]
+            assert np.linalg.norm(away[:, :2].mean(axis=0)) < 0.25 * np.linalg.norm(away, axis=1).max()
+
+
+@needs_inputs
+def test_every_real_mesh_is_used_and_alone_becomes_a_valid_cloud():
+    files = {str(path.relative_to(FOLDER)) for path in (FOLDER / "meshes").rglob("*.*")}
+    assert len(files) >= 18 and files <= {file for record in REAL.values() for file in record_files(record)}
+    for name in files:
+        cloud = made("DJI Mini 2", FOLDER, **plain(name, unit=UNITS.get(Path(name).name, "m")))
+        assert len(cloud.points) == 171 and np.ptp(cloud.points, axis=0).max() < 5.0
+
+
+@needs_inputs
+def test_inches_given_as_metres_are_caught_by_the_published_size():
+    record = REAL["BYD Song L EV 2024"] | {"unit": "m"}
+    with pytest.raises(InputError, match=r"parts.front left wheel.region .* 65\.2, 61\.3\] m; is the unit 'm'"):
+        made("BYD Song L EV 2024", FOLDER, **record)

@@ -1,24 +1,18 @@
-"""Users' meshes that cannot be read or used: each is refused by file, key and reason."""
+"""Users' meshes that cannot be read or used: each is refused by file, key and reason; order means nothing."""
 
 import json
-import struct
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
+from lowalt.targets.make import make
 from lowalt.targets.mesh_files import read_mesh
-from meshes import made, plain, quad_record
-
-
-def written(folder: Path, name: str, text: str | bytes) -> str:
-    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return name
-
+from lowalt.targets.records import merge
+from meshes import TABLE, box, car_record, made, plain, quad_record
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -43,35 +37,10 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 )
 def test_bad_files_are_refused_by_name_and_reason(name, text, reason, tmp_path):
     if text is not None:
-        written(tmp_path, name, text)
+        (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError, match=reason) as error:
         made("DJI Mini 2", tmp_path, **plain(name))
     assert name in str(error.value)
-
-
-def test_a_glb_compressed_by_draco_is_refused_with_the_way_out(tmp_path):
-    name = "KHR_draco_mesh_compression"
-    points = {"attributes": {"POSITION": 0}, "extensions": {name: {"bufferView": 0, "attributes": {"POSITION": 0}}}}
-    scene = {
-        "asset": {"version": "2.0"}, "extensionsUsed": [name], "extensionsRequired": [name],
-        "meshes": [{"primitives": [points]}], "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}],
-        "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 8}], "buffers": [{"byteLength": 8}],
-    }  # fmt: skip
-    text = json.dumps(scene).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", 8, b"BIN\0") + bytes(8)
-    (tmp_path / "small.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
-    with pytest.raises(InputError, match=r"small.glb: is compressed by Draco.*export it without compression"):
-        read_mesh(tmp_path / "small.glb", "m")
-
-
-def test_nan_in_binary_stl_is_refused(tmp_path):
-    shape = trimesh.creation.icosphere(2)
-    shape.vertices[7] = np.nan
-    (tmp_path / "nan.stl").write_bytes(shape.export(file_type="stl"))
-    with pytest.raises(InputError, match=r"nan.stl: a triangle has a NaN"):
-        read_mesh(tmp_path / "nan.stl", "m")
 
 
 def test_a_machine_without_pymeshlab_is_told_what_to_install(quad, monkeypatch):
@@ -112,17 +81,13 @@ def test_bad_records_are_refused_by_key_and_value(path, value, names, quad):
     assert str(error.value).startswith(f"{place}: ")
 
 
-def test_regions_that_hold_nothing_or_everything_are_refused(quad):
-    for low, high, names in (
-        ([5, 5, 5], [6, 6, 6], "holds nothing"),
-        ([-5, -5, -5], [6, 6, 6], "leave nothing of body"),
-    ):
-        parts = {
-            "body": {"kind": "body", "meshes": [{"file": "body.stl"}]},
-            "r": {"kind": "rotor", "region": {"box": [low, high]}, "hinge": [0, 0, 0], "axis": [0, 0, 1]},
-        }
-        with pytest.raises(InputError, match=names):
-            made("DJI Mini 2", quad, **plain("", parts=parts))
+@pytest.mark.parametrize(("low", "words"), [(5, "holds nothing"), (-5, "leave nothing of body")])
+def test_regions_that_hold_nothing_or_everything_are_refused(low, words, quad):
+    record = plain("body.stl")
+    region = {"box": [[low] * 3, [6] * 3]}
+    record["parts"]["r"] = {"kind": "rotor", "region": region, "hinge": [0, 0, 0], "axis": [0, 0, 1]}
+    with pytest.raises(InputError, match=words):
+        made("DJI Mini 2", quad, **record)
 
 
 @pytest.mark.slow
@@ -148,3 +113,104 @@ print(len(cloud.points), int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/
     run = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
     points, peak_mib = map(int, run.stdout.split())
     assert points == 169 and peak_mib < 1500
+
+
+@pytest.mark.parametrize("names", [("front right", "body"), ("arm 1", "zebra"), ("back left wheel", "Aaa"), ("1", "0")])
+def test_the_order_and_the_names_of_parts_mean_nothing(names, quad):
+    """Settings reach a job with sorted keys, so a record must give the same cloud however its parts are sorted."""
+    first, body = names
+    record = quad_record()
+    given_parts = {first: record["parts"].pop("front right"), body: record["parts"].pop("body"), **record.pop("parts")}
+    if body != "body":
+        given_parts[body] = given_parts[body] | {"kind": "body"}
+    merged = merge(TABLE["DJI Mini 2"], {"source": "mesh", **record, "parts": given_parts}, "own")
+    found = [
+        make(json.loads(json.dumps(settings, sort_keys=keys)), quad, 1)
+        for settings, keys in ((merged, False), (merged, True), (merged | {"parts": given_parts}, False))
+    ]
+    assert found[0].kinds == ("body", "rotor", "rotor", "rotor", "rotor")
+    assert found[0].names == (body, *sorted(set(given_parts) - {body}))
+    for other in found[1:]:
+        assert other.names == found[0].names
+        np.testing.assert_array_equal(other.points, found[0].points)
+
+
+def test_a_child_may_sort_before_its_parent(bird):
+    folder, record = bird
+    renamed = {"right inner": "right wing", "right outer": "right outer wing"}
+    parts = {renamed.get(name, name): dict(part) for name, part in reversed(record["parts"].items())}
+    parts["right outer wing"]["parent"] = "right wing"
+    cloud = make(json.loads(json.dumps(merge(TABLE["Crow"], {"source": "mesh", **record, "parts": parts}, "own"),
+                                       sort_keys=True)), folder, 1)  # fmt: skip
+    assert cloud.names == ("body", "left inner", "left outer", "right wing", "right outer wing")
+    assert cloud.parents.tolist() == [-1, -1, 1, -1, 3]
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("right inner", {"parent": "right outer"}, "parent is 'right .*', which hangs on 'right .*' itself"),
+        ("right inner", {"kind": "body"}, "2 of kind body"),
+        ("body", {"kind": "wing"}, "0 of kind body"),
+        ("right outer", {"region": {"box": [[0.03, None, -0.01], [None, None, 0.01]]}},
+         "parts 'right inner' and 'right outer' take the same surface"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("order", [1, -1])
+def test_parts_that_contradict_one_another_are_refused_whatever_their_order(name, change, words, order, bird):
+    folder, record = bird
+    parts = dict(list(record["parts"].items())[::order])
+    with pytest.raises(InputError, match=words):
+        made("Crow", folder, **record | {"parts": parts | {name: parts[name] | change}})
+
+
+def wheeled(tmp_path, axis=0, centre=0.33, count=4, turns=None) -> dict:
+    """Write a car with separate wheels whose thin direction is `axis`, and return its record; turns: the last axle."""
+    box((1.8, 4.5, 1.0), (0, 0, 0.9)).export(tmp_path / "car.obj")
+    turn = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0] if axis == 0 else [1, 0, 0])
+    shape = trimesh.creation.cylinder(radius=0.33, height=0.2, sections=64)
+    shape.apply_transform(turn)
+    shape.export(tmp_path / "wheel.obj")
+    record = car_record()
+    places = (("fl", -0.8, 1.4), ("fr", 0.8, 1.4), ("rl", -0.8, -1.4), ("rr", 0.8, -1.4))[:count]
+    body = record["parts"]["body"]
+    record["parts"] = {
+        name: {"kind": "wheel", "meshes": [{"file": "wheel.obj", "move": [x, y, centre]}]} for name, x, y in places
+    } | {"body": body}
+    if turns:
+        record["parts"]["rr"]["axis"] = turns
+    return record
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"centre": 1.3}, "fl: its centre lies 0.9 m above the lowest point of a body 1 m high.*is `up` reversed"),
+        ({"axis": 1}, "fl: it measures 0.66 m along its axis and 0.2 x 0.66 m across"),
+        ({"turns": [0, 1, 0]}, r"rr: its axis is .*1.0, -?0.0. .right, front, up., expected right or left"),
+    ],
+)
+def test_wheels_that_cannot_roll_are_refused_with_their_measures(changes, words, tmp_path):
+    with pytest.raises(InputError, match=words):
+        made("Audi A6L 2019", tmp_path, **wheeled(tmp_path, **changes))
+
+
+def test_a_car_on_two_wheels_is_made_with_a_warning_that_its_cloud_keeps(tmp_path):
+    with pytest.warns(InputWarning, match="2 wheels, expected at least 3"):
+        cloud = made("Audi A6L 2019", tmp_path, **wheeled(tmp_path, count=2))
+    assert cloud.record["warnings"] == ["Audi A6L 2019: 2 wheels, expected at least 3"]
+    assert "warnings" not in made("Audi A6L 2019", tmp_path, **wheeled(tmp_path)).record
+
+
+def test_hinges_far_from_their_part_and_a_rotor_of_a_millimetre_are_refused(quad, bird):
+    record = quad_record()
+    record["parts"]["front left"]["hinge"] = [5.0, 0.1, 0.04]
+    with pytest.raises(InputError, match=r"front left: its hinge lies 4.9 m from the middle of its surface"):
+        made("DJI Mini 2", quad, **record)
+    folder, record = bird
+    record["parts"]["right inner"]["hinge"] = [0.2, 0, 0]
+    with pytest.raises(InputError, match=r"right inner: its hinge lies 0.2 m and its surface 0.05 m right"):
+        made("Crow", folder, **record)
+    box((0.012, 0.002, 0.001)).export(quad / "prop.stl")
+    with pytest.raises(InputError, match=r"rotor front left has a diameter of 0.0095 m at the final size"):
+        made("DJI Mini 2", quad, **quad_record())

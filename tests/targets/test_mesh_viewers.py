@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import read_mesh, stated_unit_m
@@ -101,15 +100,12 @@ def test_quantised_places_are_fractions_of_their_type(tmp_path):
     assert piece.names == ("here", "shape")
     turned = 2 * TETRAHEDRON[:, [1, 0, 2]] * [-1, 1, 1]  # a quarter turn about z
     np.testing.assert_allclose(piece.vertices, turned, atol=1e-9)
-
-
-def test_a_buffer_in_the_text_of_the_file_is_read_and_a_turn_of_zeros_is_none(tmp_path):
-    places, corners = TETRAHEDRON.astype("<f4"), FACES.ravel().astype("<u2")
-    text = base64.b64encode(places.tobytes() + corners.tobytes()).decode()
-    buffer = {"byteLength": places.nbytes + corners.nbytes, "uri": f"data:application/octet-stream;base64,{text}"}
+    # The same numbers in the text of the file, and a turn of zeros, which is none.
+    text = base64.b64encode(places.tobytes() + bytes(-places.nbytes % 4) + FACES.astype("<u2").tobytes()).decode()
+    buffer = {"byteLength": 48, "uri": f"data:application/octet-stream;base64,{text}"}
     head = {"buffers": [buffer], "nodes": [{"mesh": 0, "rotation": [0, 0, 0, 0]}]}
-    (piece,) = pieces(glb(tmp_path / "a.glb", head, POSITION=places, indices=corners))
-    np.testing.assert_allclose(piece.vertices, places)
+    (piece,) = pieces(glb(tmp_path / "b.glb", head, POSITION=places, indices=FACES.ravel().astype("<u2")))
+    np.testing.assert_allclose(piece.vertices, TETRAHEDRON, atol=1e-9)
 
 
 def test_a_skin_s_joints_place_it_and_its_own_node_does_not(tmp_path):
@@ -131,6 +127,7 @@ def test_strips_and_fans_are_surfaces_and_lines_are_not(mode, order, area, tmp_p
     ("head", "words"),
     [
         ({"extensionsRequired": ["EXT_meshopt_compression"]}, "compressed by meshopt, .* without compression"),
+        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed by Draco, .* without compression"),
         ({"nodes": [{"mesh": 0, "children": [0]}], "scenes": [{"nodes": [0]}]}, "hangs on two nodes"),
         ({"buffers": [{"uri": "../../etc/passwd", "byteLength": 9}]}, "its data lies in another file"),
         ({"nodes": [{"mesh": -1}]}, "-1 is no whole number"),
@@ -157,10 +154,3 @@ def test_a_collada_file_states_its_unit_outside_comments_and_has_no_entities_or_
     path.write_text(dae(*prism()).replace("instance_geometry", "instance_controller"))
     with pytest.raises(InputError, match=r"a\.dae: has a skin or morph .*apply it"):
         pieces(path)
-
-
-def test_a_surface_that_trimesh_writes_is_read_back_from_every_format(tmp_path):
-    shape = trimesh.creation.icosphere(2)
-    for kind in ("obj", "ply", "glb", "dae", "stl"):
-        shape.export(tmp_path / f"a.{kind}")
-        assert measures(tmp_path / f"a.{kind}")[1:] == pytest.approx((shape.area, shape.volume), rel=1e-5)

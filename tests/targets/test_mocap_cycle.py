@@ -47,15 +47,6 @@ def test_turning_a_recording_about_the_vertical_changes_nothing(turn, first, tmp
     assert np.abs(cloud_of(folder, first_frame=first).track - straight.track).max() < 1e-9
 
 
-@pytest.mark.parametrize(("frames", "rate_hz", "fade"), [(9, 120, 1), (60, 120, 10), (140, 120, 18), (40, 8, 1)])
-def test_the_fade_takes_a_quarter_of_a_step_and_at_most_a_sixth_of_the_recording(frames, rate_hz, fade):
-    # A figure that glides without moving its limbs closes everywhere, so the longest cycle is the answer.
-    root = np.stack([0.01 * np.arange(frames), np.zeros(frames), np.ones(frames)], axis=1)
-    turned = np.broadcast_to(np.eye(3), (frames, len(NODES), 3, 3))
-    found = find_cycle(Motion(root, turned, np.ones((31, 3)), rate_hz))
-    assert found == (0, frames - fade, fade, pytest.approx(0, abs=1e-7))
-
-
 @given(frames=st.integers(8, 140), period=st.floats(60, 130), seed=st.integers(0, 99))
 @settings(max_examples=25, deadline=None)
 def test_any_recording_goes_round_without_a_jump(frames, period, seed):
@@ -93,7 +84,7 @@ def test_a_cycle_that_closes_badly_is_refused_with_its_mismatch(files):
 @pytest.mark.slow
 def test_a_long_recording_is_searched_in_little_memory():
     rng = np.random.default_rng(1)
-    frames = 6000
+    frames = 3000
     time = np.arange(frames)
     turned = np.broadcast_to(np.eye(3), (frames, len(NODES), 3, 3))
     root = np.stack([0 * time, 0.012 * time, 0.03 * np.sin(time / 9)], axis=1)
@@ -102,5 +93,5 @@ def test_a_long_recording_is_searched_in_little_memory():
     find_cycle(motion)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    # One matrix of all pairs would take 8 * 6000^2 bytes, 288 MB, and the search held several.
-    assert peak < 200e6
+    # One matrix of all pairs would take 8 * 3000^2 bytes, 72 MB, and the search held several.
+    assert peak < 60e6

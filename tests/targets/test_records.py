@@ -1,4 +1,4 @@
-"""Records: what is merged, what overrides what, and every fault refused by file, subtype, key and value."""
+"""Records: what is merged and overrides what, rows of one's own, and faults refused by file, subtype, key and value."""
 
 import copy
 from pathlib import Path
@@ -6,13 +6,26 @@ from pathlib import Path
 import pytest
 import yaml
 
+from lowalt.config import layers
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
-from lowalt.targets.records import load_records, load_table, merge, missing_inputs, read_records, source_files
+from lowalt.targets.records import (
+    load_records,
+    load_table,
+    merge,
+    missing_inputs,
+    read_records,
+    records_of,
+    source_files,
+    with_row,
+)
+from lowalt.workflow.run import Run
 
-CONFIG = Path(__file__).parents[2] / "config"
-TABLE = CONFIG / "targets.csv"
-FILES = [CONFIG / "targets" / f"{name}.yaml" for name in ("uav", "bird", "vehicle", "pedestrian")]
+ROOT = Path(__file__).parents[2]
+TABLE = ROOT / "config/targets.csv"
+FILES = [ROOT / f"config/targets/{name}.yaml" for name in ("uav", "bird", "vehicle", "pedestrian")]
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+BUS = yaml.safe_load((ROOT / "config/targets/more.yaml").read_text())["City bus"]
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +50,7 @@ def test_all_forty_in_the_tables_order_with_their_published_values():
     assert mini["figures"]["propeller_diameter"]["si"] == 0.109
     assert records["EH 216 S"]["group"] == "unseen"
     assert missing_inputs(records, None) == [] and source_files(mini, None) == []
+    assert len({slug(name) for name in records}) == 40
 
 
 def test_a_later_file_replaces_whole_records(tmp_path, written):
@@ -73,38 +87,25 @@ def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, m
 
 
 @pytest.mark.parametrize(
-    ("figure", "message"),
-    [
-        (
-            [46, "furlong", "reference"],
-            r"figures\.length: unit is 'furlong', expected one of \['mm', 'cm', 'm', 'in'\]",
-        ),
-        ([46, 1, "reference"], r"figures\.length: unit is '1'"),
-        ([-46, "cm", "reference"], r"figures\.length: value is -46, expected a positive number"),
-        ([float("nan"), "cm", "reference"], r"figures\.length\.0: value 'nan', expected type number"),
-        (
-            [46, "cm", "hearsay"],
-            r"figures\.length: source is 'hearsay', expected 'estimate' or one of \['authors'",
-        ),
-        (46, r"figures\.length: value 46, expected type array \(\[value, unit, source\]\)"),
-    ],
-)
-def test_wrong_figures_are_refused(tmp_path, written, figure, message):
-    record = copy.deepcopy(written["Crow"])
-    record["figures"]["length"] = figure
-    with pytest.raises(InputError, match=message):
-        load(tmp_path, {"Crow": record})
-
-
-@pytest.mark.parametrize(
     ("name", "figure", "value", "message"),
     [
         (
-            "DJI Mini 4 Pro",
-            "spacing_ratio",
-            [1.6, 1, "estimate"],
-            r"propeller_diameter is 0\.157 m, expected less than",
+            "Crow",
+            "length",
+            [46, "furlong", "reference"],
+            r"length: unit is 'furlong', expected one of \['mm', 'cm', 'm'",
         ),
+        ("Crow", "length", [46, 1, "reference"], r"figures\.length: unit is '1'"),
+        ("Crow", "length", [-46, "cm", "reference"], r"length: value is -46, expected a positive number"),
+        ("Crow", "length", [float("nan"), "cm", "reference"], r"length\.0: value 'nan', expected type number"),
+        (
+            "Crow",
+            "length",
+            [46, "cm", "hearsay"],
+            r"length: source is 'hearsay', expected 'estimate' or one of \['auth",
+        ),
+        ("Crow", "length", 46, r"length: value 46, expected type array \(\[value, unit, source\]\)"),
+        ("DJI Mini 4 Pro", "spacing_ratio", [1.6, 1, "estimate"], r"diameter is 0\.157 m, expected less than"),
         ("DJI Avata", "motor_diagonal", [30, "cm", "maker"], r"motor diagonal is 0\.3 m in a craft of 0\.2048 m"),
         ("EH 216 S", "propeller_diameter", [6, "m", "estimate"], r"propeller_diameter is 6 m, expected less than"),
         ("Wild goose", "neck", [0.7, 1, "estimate"], r"add up to 1\.06 of the length"),
@@ -116,29 +117,31 @@ def test_wrong_figures_are_refused(tmp_path, written, figure, message):
         ("Audi A6L 2019", "hood_height", [0.9, 1, "estimate"], r"expected rising and below 1"),
     ],
 )
-def test_impossible_shapes_are_refused(tmp_path, written, name, figure, value, message):
+def test_wrong_figures_and_impossible_shapes_are_refused(tmp_path, written, name, figure, value, message):
     record = copy.deepcopy(written[name])
     record["figures"][figure] = value
     with pytest.raises(InputError, match=rf"mine\.yaml: {name}: .*{message}"):
         load(tmp_path, {name: record})
 
 
-def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written):
-    quad = written["Type-A Firefighting UAV"]
-    with pytest.raises(InputError, match="model is tanker, expected n_rotors_or_wings 4 in its row, not 6"):
-        load(tmp_path, {"DJI Matrice 600 Pro": quad})
-    with pytest.raises(InputError, match=r"\['coaxial'\] are not for model folding, expected \[\] at most"):
-        load(tmp_path, {"DJI Mini 2": written["DJI Mini 2"] | {"coaxial": True}})
-    lifted = {"size_is": "span over ducts", "figures": {**quad["figures"]}}
-    del lifted["figures"]["motor_diagonal"]
-    with pytest.raises(InputError, match=r"size_is is 'span over ducts', expected one of .* with model tanker"):
-        load(tmp_path, {"Type-A Firefighting UAV": quad | lifted})
-
-
-def test_too_few_points_for_the_parts_are_refused(tmp_path, written):
-    for name, points in (("DJI Mini 2", 8), ("Owl", 4)):
-        with pytest.raises(InputError, match=f"{name}: {points} points for 5 parts leave none for the body"):
-            load(tmp_path, {name: written[name] | {"points": points}})
+@pytest.mark.parametrize(
+    ("name", "changes", "message"),
+    [
+        ("DJI Matrice 600 Pro", {}, "model is tanker, expected n_rotors_or_wings 4 in its row, not 6"),
+        ("DJI Mini 2", {"coaxial": True}, r"\['coaxial'\] are not for model folding, expected \[\] at most"),
+        ("DJI Mini 2", {"points": 8}, "8 points for 5 parts leave none for the body"),
+        ("Owl", {"points": 4}, "4 points for 5 parts leave none for the body"),
+        (
+            "Type-A Firefighting UAV",
+            {"size_is": "span over ducts"},
+            "size_is is 'span over ducts', .* with model tanker",
+        ),
+    ],
+)
+def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written, name, changes, message):
+    record = written[name if changes else "Type-A Firefighting UAV"]
+    with pytest.raises(InputError, match=rf"{name}: .*{message}"):
+        load(tmp_path, {name: record | changes})
 
 
 def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
@@ -196,7 +199,99 @@ def test_a_file_outside_the_folder_or_of_a_name_that_the_workflow_cannot_pass_on
             merge(row, {"source": "mocap", **files}, "here")
 
 
-def test_slugs_are_file_names_and_unique():
-    names = list(load_table(TABLE))
-    assert slug("Ramphastidae (toucan)") == "ramphastidae-toucan" and slug("EH 216 S") == "eh-216-s"
-    assert len({slug(name) for name in names}) == len(names)
+def run_of(tmp_path, overlay, inputs=None, base="default"):
+    path = tmp_path / "overlay.yaml"
+    path.write_text(yaml.safe_dump(overlay))
+    files = [ROOT / "config/default.yaml", ROOT / f"config/{base}.yaml", path]
+    return Run.of(layers.load(dict.fromkeys(files), SCHEMA), SCHEMA, inputs)
+
+
+def records(tmp_path, content, name="mine"):
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return str(path)
+
+
+def test_one_record_with_its_row_adds_one_target(tmp_path):
+    own = records(tmp_path, {"My bus": BUS})
+    run = run_of(tmp_path, {"targets": {"own": {"bus": own}}})
+    assert [group for group, names in run.plan.groups.items() if "My bus" in names] == ["seen"]
+    assert len(run.records) == 41 and run.records["My bus"]["published"]["len_m"] == 11.95
+    assert run.classes == ("UAV", "Bird", "Vehicle", "Pedestrian") and run.sources == "targets: 41 built-in"
+    bus = records(tmp_path, {"My bus": {**BUS, "like": "Vehicle", "row": BUS["row"] | {"category": "Bus"}}}, "class")
+    assert run_of(tmp_path, {"targets": {"own": {"bus": bus}}}).classes[-1] == "Bus"
+    # A null in a later layer takes the file out again.
+    (tmp_path / "one.yaml").write_text(yaml.safe_dump({"targets": {"own": {"bus": own}}}))
+    (tmp_path / "two.yaml").write_text(yaml.safe_dump({"targets": {"own": {"bus": None}}}))
+    config = layers.load([ROOT / "config/default.yaml", tmp_path / "one.yaml", tmp_path / "two.yaml"], SCHEMA)
+    assert len(records_of(config["targets"])) == 40
+
+
+def test_a_single_record_replaces_that_of_its_subtype_alone_and_cells_of_its_row(tmp_path):
+    crow = yaml.safe_load((ROOT / "config/targets/bird.yaml").read_text())["Crow"]
+    own = records(tmp_path, {"Crow": {**crow, "points": 77, "row": {"freq_hi_hz": 6}}})
+    found = run_of(tmp_path, {"targets": {"own": {"crow": own}}}).records
+    plain = run_of(tmp_path, {}).records
+    assert {name for name in plain if found[name] != plain[name]} == {"Crow"} and list(found) == list(plain)
+    assert found["Crow"]["points"] == 77
+    assert found["Crow"]["published"] == plain["Crow"]["published"] | {"freq_hi_hz": 6.0}
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"colour": "red"}, "expected cells of the columns"),
+        ([1], "expected cells of the columns"),
+        ({"len_m": -1}, r"here: row: len_m is '-1', expected a positive number"),
+        ({"speed_lo": -1}, r"here: row: speed_lo is '-1', expected a number of at least 0"),
+        ({"category": "Vehicle", "unseen_protocol": "both"}, "seen or unseen"),
+        ({"len_m": 4}, "expected a category"),
+    ],
+)
+def test_wrong_rows_are_refused_and_a_target_may_stand_still(row, message):
+    with pytest.raises(InputError, match=message):
+        with_row(None, "Tram", row, "here")
+    still = dict.fromkeys(("vx_abs_max", "vy_abs_max", "vz_abs_max", "speed_lo", "speed_hi"), 0)
+    assert with_row(None, "Tram", {"category": "UAV", **still}, "here").items() >= still.items()
+
+
+def test_one_file_is_enough_for_real_inputs_and_none_is_refused(tmp_path):
+    inputs = tmp_path / "inputs"
+    real = yaml.safe_load((ROOT / "config/targets/real.yaml").read_text())
+    names = [part["file"] for item in real["DJI Mini 2"]["parts"].values() for part in item["meshes"]]
+    with pytest.raises(InputError, match="expected a folder with the files of at least one of"):
+        run_of(tmp_path, {}, str(inputs), "real")
+    for name in names:
+        (inputs / name).parent.mkdir(parents=True, exist_ok=True)
+        (inputs / name).write_text("")
+    run = run_of(tmp_path, {}, str(inputs), "real")
+    assert run.sources == "targets: 39 built-in; from files: DJI Mini 2"
+    plain = run_of(tmp_path, {}).records
+    assert {name for name in plain if run.records[name] != plain[name]} == {"DJI Mini 2"}
+    # One of its files missing, and with it the whole record.
+    (inputs / names[0]).unlink()
+    with pytest.raises(InputError, match="at least one of"):
+        run_of(tmp_path, {}, str(inputs), "real")
+    with pytest.raises(InputError, match="missing inputs"):
+        run_of(tmp_path, {"targets": {"where_missing": "refuse"}}, str(inputs), "real")
+
+
+def test_the_command_makes_a_record_with_its_row(tmp_path, monkeypatch):
+    from lowalt.__main__ import main
+    from lowalt.commands import target
+    from lowalt.targets.cloud import read
+
+    monkeypatch.setattr(target, "_picture", lambda cloud, out: str(out))
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "bus.npz"
+    own = records(tmp_path, {"My bus": BUS})
+    assert main(["target", "make", own, "--out", str(out)]) == 0
+    assert read(out).record["published"]["len_m"] == 11.95
+    bare = records(tmp_path, {"My bus": {key: value for key, value in BUS.items() if key != "row"}}, "bare")
+    assert main(["target", "make", bare, "--out", str(out)]) != 0
+
+
+def test_heights_of_unknown_names_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"motion.height_m: \['Brid'\]"):
+        run_of(tmp_path, {"motion": {"height_m": {"Brid": [1, 2]}}})
+    assert run_of(tmp_path, {"motion": {"height_m": {"Crow": [1, 2]}}})

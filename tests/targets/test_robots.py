@@ -100,12 +100,9 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     assert main(["target", "new", *words]) == 0
     parts = yaml.safe_load((tmp_path / "a").read_text())["top"]["parts"]
     assert parts["lift"]["sense"] == "cw"  # anticlockwise about an axis that points down
-
-
-def test_an_old_sdf_s_axes_are_in_the_model_s_frame(tmp_path):
-    (tmp_path / "a.sdf").write_text(SDF.replace('version="1.9"', 'version="1.4"'))
-    found, _ = joints(tmp_path / "a.sdf", tmp_path)
-    np.testing.assert_allclose(found["pusher"].axis, [0, 0, 1], atol=1e-9)
+    (tmp_path / "old.sdf").write_text(SDF.replace('version="1.9"', 'version="1.4"'))
+    found, _ = joints(tmp_path / "old.sdf", tmp_path)
+    np.testing.assert_allclose(found["pusher"].axis, [0, 0, 1], atol=1e-9)  # along the model's axes
 
 
 def test_an_mjcf_s_classes_angles_and_hinges_are_followed(tmp_path):
@@ -137,8 +134,10 @@ def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, caps
     np.testing.assert_allclose(np.ptp(cloud.points, axis=0), [0.46, 0.8, 0.35], rtol=0.02)
     path = tmp_path / "two.urdf"
     path.write_text((tmp_path / "rover.urdf").read_text().replace("continuous", "fixed", 2))
+    before = sorted(tmp_path.rglob("*"))
     assert main(["target", "new", str(path), "--inputs", str(tmp_path), "--subtype", "AITO M9 2024"]) == 2
-    assert "2 wheels turn, AITO M9 2024 has 4" in capsys.readouterr().err
+    assert "2 wheels turn, AITO M9 2024 has 4: leave --subtype out" in capsys.readouterr().err
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize(
@@ -152,24 +151,6 @@ def test_a_description_whose_names_tell_no_category_is_refused_until_it_is_given
     error = capsys.readouterr().err
     assert seen in error and "--category Vehicle" in error and error.count("\n") == 1
     assert main([*command, "--category", "UAV"]) == 0
-
-
-def test_a_published_target_with_another_number_of_rotors_is_refused_and_nothing_is_left(tmp_path, capsys):
-    inputs = folder(tmp_path)
-    (inputs / "craft/craft.urdf").write_text(urdf())
-    before = sorted(inputs.rglob("*"))
-    command = [
-        "target",
-        "new",
-        str(inputs / "craft/craft.urdf"),
-        "--inputs",
-        str(inputs),
-        "--out",
-        str(inputs / "a.yaml"),
-    ]
-    assert main([*command, "--subtype", "DJI Matrice 600 Pro"]) == 2
-    assert "4 rotors turn, DJI Matrice 600 Pro has 6: leave --subtype out" in capsys.readouterr().err
-    assert sorted(inputs.rglob("*")) == before
 
 
 def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_path, capsys, monkeypatch):
@@ -195,6 +176,7 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
         (urdf(blade="package://craft/meshes/gone.stl"), "'package://craft/meshes/gone.stl' is not there"),
         (urdf(blade="../../outside.stl"), "lies outside the folder of inputs"),
         (urdf(blade="/etc/passwd"), "lies outside the folder of inputs"),
+        (urdf(blade="meshes/link.stl"), "lies outside the folder of inputs"),
         (urdf(blade="file:///etc/passwd"), "lies outside the folder of inputs"),
         (urdf(blade="https://example.org/a.stl"), "is no file of the folder of inputs"),
         (urdf(base='<box size="a b c"/>'), "not a readable description"),
@@ -211,20 +193,10 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
 def test_a_description_that_is_wrong_or_reaches_outside_is_refused_by_name(text, words, tmp_path):
     (tmp_path / "outside.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
     inputs = folder(tmp_path / "inputs")
+    (inputs / "craft/meshes/link.stl").symlink_to(tmp_path / "outside.stl")
     (inputs / "craft/self.urdf").write_text(text)
     with pytest.raises(InputError, match=rf"self\.urdf: .*({words})"):
         read_robot(inputs / "craft/self.urdf", inputs)
-
-
-def test_a_link_to_a_file_outside_and_a_template_are_refused(tmp_path):
-    (tmp_path / "outside.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
-    inputs = folder(tmp_path / "inputs")
-    (inputs / "craft/meshes/link.stl").symlink_to(tmp_path / "outside.stl")
-    (inputs / "craft/a.urdf").write_text(urdf(blade="meshes/link.stl"))
-    with pytest.raises(InputError, match="outside the folder of inputs"):
-        read_robot(inputs / "craft/a.urdf", inputs)
     (inputs / "b.urdf.xacro").write_text("")
-    with pytest.raises(
-        InputError, match=r"is a template, expected what it expands to: xacro b.urdf.xacro > robot.urdf"
-    ):
+    with pytest.raises(InputError, match=r"is a template, expected what it .* xacro b.urdf.xacro > robot.urdf"):
         read_robot(inputs / "b.urdf.xacro", inputs)

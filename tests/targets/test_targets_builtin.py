@@ -1,25 +1,30 @@
 """The built-in models: published sizes, exact counts, closed surfaces, and parts that turn the right way."""
 
 import hashlib
-import itertools
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from builtin_records import BIRDS, CARS, NAMES, RECORDS, TABLE, UAVS, WRITTEN
 from lowalt.files.atomic import slug
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import bird
-from lowalt.targets.assemble import turn
+from lowalt.targets.assemble import allot, turn
 from lowalt.targets.builtin import MODULES, builtin_cloud
-from lowalt.targets.cloud import check, write
+from lowalt.targets.cloud import check, read, write
+from lowalt.targets.gallery import main as gallery
+from lowalt.targets.make import make
+from lowalt.targets.records import merge, read_records
 from lowalt.targets.surfaces import inside
 
-REFERENCE = Path(__file__).parents[2] / "results/reference/default.sha256"
+ROOT = Path(__file__).parents[2]
 SEED = load_yaml("config/default.yaml")["seed"]
 
 
@@ -35,22 +40,27 @@ def rotated(cloud, part, angle):
     return Rotation.from_rotvec(angle * cloud.axes[part]).apply(points) + cloud.hinges[part]
 
 
-def test_every_published_craft_bird_and_car_has_a_record():
-    assert list(WRITTEN) == NAMES and len(NAMES) == 30
+def variant(name, **changes):
+    """The cloud of a record with some keys changed as a user's file would."""
+    return builtin_cloud(merge(TABLE[name], WRITTEN[name] | changes, name), 1)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_counts_are_the_published_ones_and_the_cloud_keeps_the_contract(clouds, name):
-    cloud = check(clouds[name], name)
+def test_counts_are_the_published_ones_and_moving_parts_get_their_share_in_whole_blades(clouds, name):
+    cloud, record = check(clouds[name], name), RECORDS[name]
+    counts = np.bincount(cloud.part)
     assert len(cloud.points) == TABLE[name]["points_in_published_cloud_approx"]
-    assert (
-        cloud.record["checksum"]
-        == hashlib.sha256(json.dumps(RECORDS[name], sort_keys=True, separators=(",", ":")).encode()).hexdigest()
-    )
-    assert set(np.unique(cloud.part)) == set(range(len(cloud.kinds)))
-    assert (cloud.rcs_m2 == 1).all()
-    for part, count in enumerate(np.bincount(cloud.part)):
-        assert cloud.record["points_by_part"][cloud.names[part]] == count
+    assert cloud.record["points_by_part"] == dict(zip(cloud.names, counts, strict=True))
+    parts, _ = MODULES[record["category"]].parts(record)
+    blades = sum(part.copies for part in parts if part.kind != "body")
+    assert abs(counts[1:].sum() - record["moving_share"] * record["points"]) <= blades / 2 + 4
+    assert all(count % part.copies == 0 and count >= part.copies for part, count in zip(parts, counts, strict=True))
+
+
+def test_any_count_that_leaves_the_body_a_point_is_met():
+    parts, _ = MODULES["UAV"].parts(RECORDS["DJI Mini 2"])
+    assert allot(parts, 9, 0.4, "mini") == [1, 2, 2, 2, 2]
+    assert [len(variant("Wild goose", points=points).points) for points in (20, 1000)] == [20, 1000]
 
 
 @pytest.mark.parametrize("name", UAVS)
@@ -93,6 +103,10 @@ def test_cars_have_their_published_sizes_and_stand_on_the_ground(clouds, name):
     assert base == pytest.approx(figure["wheel_base"]["si"], rel=1e-12)
     assert np.ptp(cloud.hinges[wheels, 0]) == pytest.approx(figure["track"]["si"], rel=0.02)
     for wheel in wheels:
+        end, side, _ = cloud.names[wheel].split()
+        assert ((cloud.hinges[wheel, 1] > 0) == (end == "front")) and (
+            (cloud.hinges[wheel, 0] > 0) == (side == "right")
+        )
         points = cloud.points[cloud.part == wheel]
         assert points[:, 2].min() == pytest.approx(-cloud.record["origin_height_m"], abs=1e-5)
         away = np.linalg.norm((points - cloud.hinges[wheel])[:, 1:], axis=1)
@@ -172,8 +186,7 @@ def test_a_positive_angle_raises_both_wing_tips(clouds, name):
         reach = abs(cloud.points[cloud.part == inner][:, 0]).max()
         assert reach == pytest.approx(abs(cloud.hinges[outer, 0]), rel=1e-3)
         assert abs(cloud.hinges[inner, 0]) < abs(cloud.hinges[outer, 0])
-    left, right = (cloud.points[cloud.part == p][:, 0] for p in (wings[3], wings[1]))
-    assert left.max() < 0 < right.min()
+        assert cloud.names[inner].startswith("right" if cloud.points[cloud.part == outer][:, 0].min() > 0 else "left")
     assert cloud.record["flap"] == bird.FLAP | WRITTEN[name]["flap"]
 
 
@@ -189,48 +202,68 @@ def test_a_positive_angle_rolls_the_car_forward(clouds, name):
         assert moved[1] - contact[1] + radius * angle == pytest.approx(0, abs=1e-12)
 
 
-def test_names_and_hinges_are_where_they_belong(clouds):
-    for name in CARS:
-        cloud = clouds[name]
-        for wheel in cloud.parts_of("wheel"):
-            end, side, _ = cloud.names[wheel].split()
-            assert (cloud.hinges[wheel, 1] > 0) == (end == "front")
-            assert (cloud.hinges[wheel, 0] > 0) == (side == "right")
-    for name in BIRDS:
-        cloud = clouds[name]
-        assert all((cloud.hinges[p, 0] > 0) == cloud.names[p].startswith("right") for p in cloud.parts_of("wing"))
-
-
-def test_equal_seeds_give_equal_bytes_and_other_seeds_other_points(tmp_path, clouds):
-    for name in ("DJI Avata", "Owl", "NIO ET5T 2023"):
-        write(tmp_path / "first.npz", clouds[name])
-        write(tmp_path / "again.npz", builtin_cloud(RECORDS[name], SEED))
-        assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "again.npz").read_bytes()
-        assert not np.array_equal(builtin_cloud(RECORDS[name], 2).points, clouds[name].points)
-
-
-def test_clouds_are_the_default_s_to_the_byte(tmp_path, clouds):
-    """Each length, angle and count of a built-in model, and each draw, is that of the kept run."""
-    kept = dict(line.split()[::-1] for line in REFERENCE.read_text().splitlines())
-    for name, cloud in clouds.items():
+def test_clouds_are_the_default_s_to_the_byte_and_another_seed_gives_others(tmp_path, clouds):
+    """Each length, angle, count, time and draw of a built-in model or gait is that of the kept run."""
+    kept = dict(line.split()[::-1] for line in (ROOT / "results/reference/default.sha256").read_text().splitlines())
+    people = read_records(ROOT / "config/targets/pedestrian.yaml")
+    walkers = {name: make(merge(TABLE[name], record, name), None, SEED) for name, record in people.items()}
+    for name, cloud in {**clouds, **walkers}.items():
         write(tmp_path / "cloud.npz", cloud)
         found = hashlib.sha256((tmp_path / "cloud.npz").read_bytes()).hexdigest()
         assert found == kept[f"clouds/{slug(name)}.npz"], name
+    assert not np.array_equal(builtin_cloud(RECORDS["Owl"], 2).points, clouds["Owl"].points)
 
 
-def test_subtypes_differ_physically():
-    def signature(name):
-        figures = {figure: entry["si"] for figure, entry in RECORDS[name]["figures"].items()}
-        table = {key: TABLE[name][key] for key in ("size_m", "n_rotors_or_wings", "len_m", "wid_m", "hgt_m")}
-        return RECORDS[name]["model"], *sorted((figures | table).items())
-
-    for first, second in itertools.combinations(NAMES, 2):
-        if TABLE[first]["category"] == TABLE[second]["category"]:
-            differing = set(signature(first)) ^ set(signature(second))
-            assert len(differing) >= 8, (first, second)
+def test_the_eh216_may_fly_sixteen_rotors_in_coaxial_pairs():
+    cloud = variant("EH 216 S", coaxial=True)
+    rotors = cloud.parts_of("rotor")
+    assert len(rotors) == 16 and len(cloud.points) == 396
+    for upper, lower in zip(rotors[::2], rotors[1::2], strict=True):
+        assert cloud.hinges[upper] - cloud.hinges[lower] == pytest.approx([0, 0, 1.29], abs=1e-12)
+        assert cloud.axes[upper] @ cloud.axes[lower] == -1
 
 
-def test_every_figure_has_a_source_or_the_mark_estimate():
-    for record in RECORDS.values():
-        sources = {entry["source"] for entry in record["figures"].values()} - {"estimate"}
-        assert all(len(record["sources"][source]) > 12 for source in sources)
+@pytest.mark.parametrize(
+    ("name", "turn"), [("EH 216 S", 0.25), ("Type-A Firefighting UAV", 0), ("Type-B Firefighting UAV", 1 / 6)]
+)
+def test_a_rotor_of_two_layers_turns_as_one_with_its_lower_blades_ahead(name, turn):
+    cloud, figures = variant(name, points=3000), RECORDS[name]["figures"]
+    for rotor in cloud.parts_of("rotor"):
+        points = cloud.points[cloud.part == rotor] - cloud.hinges[rotor]
+        gap = figures["layer_gap"]["si"]
+        upper, lower = (points[abs(points[:, 2] + depth) < gap / 2] for depth in (0, gap))
+        assert len(upper) + len(lower) == len(points) and abs(len(upper) - len(lower)) < 0.2 * len(points)
+        # The sums of (x + i y)^n over n equal blades have n times the angle of a blade.
+        count = figures["blade_count"]["value"]
+        told = [np.angle(((layer[:, 0] + 1j * layer[:, 1]) ** count).sum()) for layer in (upper, lower)]
+        off = (told[1] - told[0]) / count / (2 * np.pi) - turn
+        assert abs(off * count - round(off * count)) < 0.05 * count
+
+
+def test_rolling_diameter_wing_beat_and_cross_section_may_be_set():
+    car = variant("Xiaomi SU7 2024", wheel_size="rolling")
+    assert car.record["wheel_diameter_m"] == 0.703
+    lowest = [car.points[car.part == wheel][:, 2].min() for wheel in car.parts_of("wheel")]
+    assert lowest == pytest.approx([-0.7] * 4, abs=1e-5)
+    crow = variant("Crow", flap={"mean_deg": 5.0}, rcs_m2_per_point=0.01)
+    assert crow.record["flap"] == bird.FLAP | {"mean_deg": 5.0} and (crow.rcs_m2 == 0.01).all()
+
+
+def test_the_command_line_makes_the_same_cloud_and_refuses_an_unknown_source(tmp_path, clouds):
+    settings, out = tmp_path / "settings.json", tmp_path / "seagull.npz"
+    command = [sys.executable, "-m", "lowalt.targets", "--settings", f"@{settings}", "--out", str(out)]
+    settings.write_text(json.dumps({"seed": SEED, "record": RECORDS["Seagull"]}))
+    subprocess.run(command, check=True, capture_output=True)
+    np.testing.assert_array_equal(read(out).points, clouds["Seagull"].points)
+    settings.write_text(json.dumps({"seed": 1, "record": RECORDS["Seagull"] | {"source": "clay"}}))
+    refused = subprocess.run(command, capture_output=True, text=True)
+    assert refused.returncode == 2 and "record.source is 'clay'" in refused.stderr
+
+
+def test_the_gallery_draws_every_cloud(tmp_path, clouds):
+    files = [tmp_path / f"{slug(name)}.npz" for name in ("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024")]
+    for name, file in zip(("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024"), files, strict=True):
+        write(file, clouds[name])
+    gallery(["--clouds", *map(str, files), "--out", str(tmp_path / "gallery.png")])
+    picture = np.asarray(Image.open(tmp_path / "gallery.png").convert("RGB"))
+    assert picture.shape[1] > 1000 and len({tuple(pixel) for pixel in picture[::7, ::7].reshape(-1, 3)}) > 20

@@ -1,6 +1,5 @@
 """Own targets: a mesh is inspected, a record is drafted from it, and the draft becomes the right cloud at once."""
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +10,10 @@ from PIL import Image
 
 from lowalt.__main__ import main
 from lowalt.files.errors import InputWarning
-from lowalt.report.figures.target_picture import target_animation
 from lowalt.targets.cloud import read
-from lowalt.targets.guesses import clusters, guessed_axes, guessed_unit
+from lowalt.targets.guesses import guessed_axes, guessed_unit
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.make import make
-from lowalt.targets.mesh_files import read_mesh
-from lowalt.targets.mesh_scene import selected
 from lowalt.targets.records import load_table, merge, read_records
 from meshes import box, quadrotor
 
@@ -47,36 +43,11 @@ def test_a_quadrotor_s_four_propellers_are_found_and_drafted(blades, unit, metre
     assert Image.open(made.with_suffix(".png")).size[0] > 1000
 
 
-def test_blades_that_touch_are_one_rotor_and_separate_ones_are_not(tmp_path):
-    quadrotor(True).export(tmp_path / "craft.stl")
-    found = inspect_mesh(tmp_path / "craft.stl", "UAV")
-    rotors = [part for part in found.components if part.guess == "rotor"]
-    assert len(rotors) == 8
-    assert sorted(len(group) for group in clusters(rotors, 2)) == [2, 2, 2, 2]
-    assert len(clusters(rotors, 2, touching=False)) == 8
-
-
 def test_an_alike_plate_at_another_height_is_no_rotor(tmp_path):
     whole = trimesh.util.concatenate([quadrotor(False), box((0.12, 0.012, 0.004), (0, 0, -0.06))])
     whole.export(tmp_path / "craft.stl")
     rotors = [part for part in inspect_mesh(tmp_path / "craft.stl", "UAV").components if part.guess == "rotor"]
     assert sorted(round(float(part.centre[2]), 3) for part in rotors) == [0.05] * 4
-
-
-def test_a_car_s_wheels_are_found_by_their_shape_among_other_pieces(tmp_path):
-    shapes = [box((1.8, 4.5, 1.0), (0, 0, 0.9)), box((0.6, 0.6, 0.6), (0, 0, 1.8)), box((0.2, 0.1, 0.1), (1.1, 1, 1))]
-    for x, y in ((-0.8, 1.4), (0.8, 1.4), (-0.8, -1.4), (0.8, -1.4)):
-        wheel = trimesh.creation.cylinder(radius=0.33, height=0.2, sections=48)
-        wheel.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
-        wheel.apply_translation((x, y, 0.33))
-        shapes.append(wheel)
-    trimesh.util.concatenate(shapes).export(tmp_path / "car.ply")
-    found = inspect_mesh(tmp_path / "car.ply", "Vehicle")
-    assert (found.unit, found.unit_from, found.up, found.front) == ("m", "guessed from the size", "z", "y")
-    wheels = [part for part in found.components if part.guess]
-    assert {part.guess for part in wheels} == {"wheel"} and len(wheels) == 4
-    assert sorted(tuple(np.sign(part.centre[:2])) for part in wheels) == [(-1, -1), (-1, 1), (1, -1), (1, 1)]
-    assert described(found).count("may be a wheel") == 4 and "category Vehicle" in described(found)
 
 
 @pytest.mark.parametrize(
@@ -143,26 +114,6 @@ def test_axes_are_guessed_from_the_extents():
     assert guessed_axes(np.array([0.3, 0.05, 0.2]), "Bird") == ("y", "z")
 
 
-def test_groups_of_an_obj_and_instances_of_a_scene_have_names(tmp_path):
-    text, base = "", 0
-    for name, shape in (("hull", box((1, 1, 1))), ("left wheel", box((0.2, 0.1, 0.1), (3, 0, 0)))):
-        rows = [f"v {x} {y} {z}" for x, y, z in shape.vertices]
-        text += f"g {name}\n" + "\n".join(rows) + "\n"
-        text += "\n".join("f " + " ".join(str(i + 1 + base) for i in face) for face in shape.faces) + "\n"
-        base += len(rows)
-    (tmp_path / "car.obj").write_text(text)
-    found = read_mesh(tmp_path / "car.obj", "m", ["left wheel"])
-    assert np.ptp(found.vertices, axis=0) == pytest.approx([0.2, 0.1, 0.1])
-    scene = trimesh.Scene()
-    scene.add_geometry(box((0.2, 0.1, 0.1)), node_name="prop 0", geom_name="prop")
-    place = trimesh.transformations.translation_matrix((-1, 0, 0))
-    scene.graph.update(frame_to="prop 1", matrix=place, geometry="prop")
-    scene.export(tmp_path / "craft.glb")
-    both, one = selected(tmp_path / "craft.glb", ["prop"]), selected(tmp_path / "craft.glb", ["prop 1"])
-    assert len(both) == 2 and len(one) == 1
-    assert one[0].vertices.mean(axis=0) == pytest.approx([-1, 0, 0])
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -183,15 +134,3 @@ def test_wrong_commands_end_in_one_line_and_leave_nothing(arguments, words, tmp_
     error = capsys.readouterr().err
     assert words in error and error.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before
-
-
-def test_the_motion_is_shown_as_frames():
-    rows = load_table(ROOT / "config/targets.csv")
-    record = merge(rows["DJI Inspire 2"], read_records(ROOT / "config/targets/uav.yaml")["DJI Inspire 2"], "built in")
-    picture = Image.open(io.BytesIO(target_animation(make(record, None, 1), ROOT / "config/default.yaml", count=4)))
-    frames = []
-    for number in range(picture.n_frames):
-        picture.seek(number)
-        frames.append(np.asarray(picture.convert("L"), int))
-    assert len(frames) == 4
-    assert abs(frames[1] - frames[0])[60:].max() > 100  # after a quarter of a turn the blades stand elsewhere

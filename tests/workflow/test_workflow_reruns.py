@@ -138,43 +138,12 @@ CHANGES = {
 }
 
 QUICK = (
-    "seed", "scene", "more motion models", "an SNR added", "a subtype added", "a station more", "kind of shards",
-    "protocol", "a second training seed", "a target's record", "a mesh", "the table of schemes", "text of the report",
-    "code of tiles", "nothing",
+    "seed", "more motion models", "an SNR added", "a station more", "protocol", "a target's record", "a mesh",
+    "text of the report", "code of tiles", "nothing",
 )  # fmt: skip
 """Changes that are planned in every run of the tests. What the others rest on stands in the rule files, see the tests
 of the settings and of the code of each rule."""
 SLOW = [name for name in CHANGES if name not in QUICK]
-DRIVER = """
-import contextlib, io, json, os, sys
-from pathlib import Path
-from snakemake.cli import main
-
-for name, (overlay, edit) in json.loads(Path("changes.json").read_text()).items():
-    Path("change.yaml").write_text(overlay)
-    if edit:
-        path, old, new = Path(edit[0]), edit[1], edit[2]
-        before, times = path.read_text(), path.stat()
-        path.write_text(before.replace(old, new, 1) if old else before + new)
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-        try:
-            main(["--cores", "1", "--dry-run", "--configfile", "overlay.yaml", "change.yaml"])
-        except SystemExit as end:
-            print("exit", end.code)
-    if edit:
-        path.write_text(before)
-        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
-    Path("said").mkdir(exist_ok=True)
-    Path("said", name + ".txt").write_text(said.getvalue())
-"""
-
-
-def snakemake(folder, *arguments):
-    environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
-    status, text = run(folder, ["--cores", "1", "--configfile", "overlay.yaml", *arguments], environment)
-    assert status == 0, text[-4000:]
-    return text
 
 
 def jobs(text):
@@ -208,23 +177,15 @@ def dry_runs(tmp_path_factory, request):
     records = yaml.safe_load((ROOT / "config/default.yaml").read_text())["targets"]["records"]
     overlay = OVERLAY | {"targets": OVERLAY["targets"] | {"records": [*records, "mesh.yaml"]}}
     (folder / "overlay.yaml").write_text(yaml.safe_dump(overlay))
-    text = snakemake(folder, "--dry-run")
-    assert set(jobs(text)) == WHOLE
-    for line in re.findall(r"^    (?:output|benchmark|log): (.*)$", text, re.MULTILINE):
-        for name in line.split(", "):
-            path = folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if path.name == "figures":  # the report's folder of plots
-                path.mkdir()
-            else:
-                path.write_text(name)
-    snakemake(folder, "--touch", "--forceall")
     plan = {name: (yaml.safe_dump(change.overlay), change.edit) for name, change in CHANGES.items() if name in asked}
     (folder / "changes.json").write_text(json.dumps(plan))
-    environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
-    status, text = run(folder, [], environment, DRIVER)
+    support = ROOT / "tests/support"
+    environment = os.environ | {"PYTHONPATH": f"{folder / 'src'}:{support}", "LOWALT_INPUTS": str(folder / "inputs")}
+    status, text = run(folder, [], environment, "import rerun_driver; rerun_driver.run()")
     assert status == 0, text[-4000:]
-    return {name: (folder / "said" / f"{name}.txt").read_text() for name in plan}
+    said = json.loads((folder / "said.json").read_text())
+    assert set(jobs(said["whole"])) == WHOLE
+    return said
 
 
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])

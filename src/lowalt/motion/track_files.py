@@ -23,22 +23,17 @@ SLOWEST_MPS = 0.5
 
 
 def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStarts | None:
-    """Return the path of the log that the block `motion` names under `track`, None where it names none.
+    """Return the path at the starts of looks of the flight log that the block `motion` names under `track`, None where
+    it names none.
 
-    corners (K, 2), masts_m (S, 2): as of `Cell`. Raises: InputError as `read_path`.
+    corners (K, 2), masts_m (S, 2): as of `Cell`. Velocities at the log's rows are differences of its places (second
+    order), and cubics join the rows. The heading is the course.
+    Raises: InputError naming the file, and the line, column or place that is wrong.
     """
     if "track" not in motion:
         return None
+    path, looks, look_s = motion["track"], motion["looks"], motion["look_s"]
     cell = Cell(corners, masts_m, motion["region"]["mast_clearance_m"])
-    return read_path(motion["track"], motion["looks"], motion["look_s"], cell)
-
-
-def read_path(path: str | Path, looks: int, look_s: float, cell: Cell) -> LookStarts:
-    """Return the path of a flight log at the starts of `looks` looks of `look_s` seconds.
-
-    Velocities at the log's rows are differences of its places (second order), and cubics join the rows. The heading is
-    the course. Raises: InputError naming the file, and the line, column or place that is wrong.
-    """
     times_s, places = _numbers(path, cell)
     long_s = times_s[-1] - times_s[0]
     if long_s < looks * look_s * (1 - 1e-9):

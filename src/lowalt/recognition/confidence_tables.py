@@ -1,4 +1,4 @@
-"""Rows of the tables on thresholds and confidence of a scheme: false alarms, calibration and reliability."""
+"""Rows of the tables on thresholds and confidence of a scheme: false alarms and calibration."""
 
 from collections.abc import Iterable
 
@@ -14,7 +14,6 @@ from lowalt.recognition.statistics import (
     alarm_rates,
     calibration,
     measurable,
-    reliability,
     threshold,
 )
 
@@ -62,11 +61,3 @@ def calibration_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [calibration_error, brier, cross_entropy] on the test part."""
     of_runs = [list(calibration(run.test.probabilities, run.test.label).values()) for run in runs]
     yield [f"{value:.6f}" for value in np.mean(of_runs, axis=0)]
-
-
-def reliability_rows(runs: list[Evaluated]) -> Iterable[list]:
-    """Yield rows [from, to, confidence_percent, accuracy_percent, samples] over bands of confidence."""
-    probabilities = np.concatenate([run.test.probabilities for run in runs])
-    labels = np.concatenate([run.test.label for run in runs])
-    for low, high, confidence, share, count in reliability(probabilities, labels):
-        yield [f"{low:.4f}", f"{high:.4f}", percent(confidence), percent(share), count]

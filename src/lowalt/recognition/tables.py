@@ -14,7 +14,6 @@ Files written, each with the columns `protocol, scheme` first:
                      alarms of the other classes on test with 95 % intervals; each model at its own threshold, means
                      over the seeds; "not measurable" where fewer than ten validation samples would lie below it
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
-    reliability.csv  band of confidence: mean confidence, accuracy and samples in it; all seeds together
     comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the interval resamples:
                      training seeds (where there are several), subtypes (unseen protocol), motion models
     orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds here (the interval
@@ -30,7 +29,7 @@ from lowalt.config.classes import word
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition.confidence_tables import alarm_rows, calibration_rows, percent, reliability_rows
+from lowalt.recognition.confidence_tables import alarm_rows, calibration_rows, percent
 from lowalt.recognition.evaluated import Evaluated, difference, whole_subtypes
 from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
@@ -167,7 +166,6 @@ def write(runs: list[Evaluated], order: list[str], published: dict, folder: str 
         "aspects": (bands, lambda group: band_rows(group, lambda test: test.aspect_deg, 30)),
         "alarms": (alarm, lambda group: alarm_rows(group, seed)),
         "calibration": (["calibration_error", "brier", "cross_entropy"], calibration_rows),
-        "reliability": (["from", "to", "confidence_percent", "accuracy_percent", "samples"], reliability_rows),
     }
     for name, (columns, rows) in tables.items():
         _write(Path(folder) / f"{name}.csv", columns, [[*key, *row] for key in keys for row in rows(groups[key])])

@@ -18,8 +18,9 @@ up +z. Every point belongs to one part; every part except the body moves.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ from lowalt.config import classes
 from lowalt.files.archives import write_arrays
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import replacing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
@@ -81,10 +82,16 @@ class Cloud:
         return [index for index, name in enumerate(self.kinds) if name == kind]
 
 
-def _need(good: bool, message: str) -> None:
-    """Raise InputError with the message unless `good`."""
-    if not good:
-        raise InputError(message)
+def check(cloud: Cloud, where: str) -> Cloud:
+    """Return the cloud if it keeps the contract.
+
+    Raises: InputError naming `where`, the array and what was expected.
+    """
+    with reading(where, "cloud"):
+        for good, fault in chain(_arrays(cloud), _parts(cloud), _facts(cloud)):
+            if not good:
+                raise InputError(fault)
+    return cloud
 
 
 def _near(places: np.ndarray) -> bool:
@@ -92,78 +99,58 @@ def _near(places: np.ndarray) -> bool:
     return bool((abs(places) <= LARGEST_M).all())
 
 
-def check(cloud: Cloud, where: str) -> Cloud:
-    """Return the cloud if it keeps the contract.
-
-    Raises: InputError naming `where`, the array and what was expected.
-    """
-    try:
-        _check_points(cloud)
-        _check_parts(cloud)
-        _check_record(cloud)
-        if "node" in cloud.kinds:
-            _check_nodes(cloud)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    return cloud
-
-
-def _check_points(cloud: Cloud) -> None:
-    """Raise InputError where an array has the wrong shape or a point's numbers are out of range."""
+def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
+    """Whether each array has its shape and its numbers are in range, and what is wrong otherwise."""
     count, parts = len(cloud.points), len(cloud.kinds)
-    _need(count > 0, "points is empty, expected at least one point")
+    yield count > 0, "points is empty, expected at least one point"
     shapes = {"points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
               "parents": (parts,), "hinges": (parts, 3), "axes": (parts, 3)}  # fmt: skip
     for name, shape in shapes.items():
-        array = getattr(cloud, name)
-        _need(np.shape(array) == shape, f"{name} has shape {np.shape(array)}, expected {shape}")
-        numbers = "iu" if name in ("part", "parents") else "iuf"
-        _need(array.dtype.kind in numbers, f"{name} has values of type {array.dtype}, expected numbers")
-    _need(_near(cloud.points), f"points has a coordinate that is no number within {LARGEST_M:g} m")
-    good_rcs = bool(((cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)).all())
-    _need(good_rcs, f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2")
+        array, numbers = getattr(cloud, name), "iu" if name in ("part", "parents") else "iuf"
+        yield np.shape(array) == shape, f"{name} has shape {np.shape(array)}, expected {shape}"
+        yield array.dtype.kind in numbers, f"{name} has values of type {array.dtype}, expected numbers"
+    yield _near(cloud.points), f"points has a coordinate that is no number within {LARGEST_M:g} m"
+    good_rcs = (cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)
+    yield good_rcs.all(), f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2"
     lengths = np.linalg.norm(cloud.normals, axis=1)
-    good_normals = bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all())
-    _need(good_normals, "normals has a vector of length other than 1 or NaN")
+    good_normals = np.isnan(lengths) | (abs(lengths - 1) < 1e-9)
+    yield good_normals.all(), "normals has a vector of length other than 1 or NaN"
 
 
-def _check_parts(cloud: Cloud) -> None:
-    """Raise InputError where a part's name, kind, parent, hinge or axis is wrong."""
+def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
+    """Whether each part's name, kind, parent, hinge and axis are right, and what is wrong otherwise."""
     count = len(cloud.kinds)
     unique = len(set(cloud.names)) == count == len(cloud.names)
-    _need(unique, f"names {cloud.names}, expected {count} unique names")
-    _need(set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}")
-    _need(cloud.part.min() >= 0 and cloud.part.max() < count, f"part names a part outside 0..{count - 1}")
+    yield unique, f"names {cloud.names}, expected {count} unique names"
+    yield set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}"
+    yield cloud.part.min() >= 0 and cloud.part.max() < count, f"part names a part outside 0..{count - 1}"
     for index, (kind, name, parent) in enumerate(zip(cloud.kinds, cloud.names, cloud.parents, strict=True)):
-        _need(-1 <= parent < index, f"parents[{index}] is {parent}, expected an earlier part or -1")
+        yield -1 <= parent < index, f"parents[{index}] is {parent}, expected an earlier part or -1"
         if kind in ("rotor", "wing", "wheel"):
             length = np.linalg.norm(cloud.axes[index])
-            _need(abs(length - 1) < 1e-12, f"axes[{index}] ({name}) has length {length}, expected 1")
-            _need(_near(cloud.hinges[index]), f"hinges[{index}] ({name}) is no place within {LARGEST_M:g} m")
+            yield abs(length - 1) < 1e-12, f"axes[{index}] ({name}) has length {length}, expected 1"
+            yield _near(cloud.hinges[index]), f"hinges[{index}] ({name}) is no place within {LARGEST_M:g} m"
 
 
-def _check_record(cloud: Cloud) -> None:
-    """Raise InputError where the record lacks a fact, names an unknown class or has rates of parts that do not turn."""
+def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
+    """Whether the record has what all need, and a recording's track fits its nodes, and what is wrong otherwise."""
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
-    _need(not missing, f"record lacks {sorted(missing)}")
+    yield not missing, f"record lacks {sorted(missing)}"
     classes.like(cloud.record)
     factors = cloud.record.get("rate_factors", {})
-    _need(isinstance(factors, dict), f"rate_factors: {factors!r}, expected numbers by the parts' names")
+    yield isinstance(factors, dict), f"rate_factors: {factors!r}, expected numbers by the parts' names"
     turning = [name for name, kind in zip(cloud.names, cloud.kinds, strict=True) if kind in ("rotor", "wheel")]
     strange = sorted(set(factors) - set(turning))
-    _need(not strange, f"rate_factors: {strange} are no parts that turn, expected some of {turning}")
+    yield not strange, f"rate_factors: {strange} are no parts that turn, expected some of {turning}"
     good = all(isinstance(value, (int, float)) and 0 <= value <= LARGEST_RATE_FACTOR for value in factors.values())
-    _need(good, f"rate_factors: {factors}, expected numbers from 0 to {LARGEST_RATE_FACTOR}")
-
-
-def _check_nodes(cloud: Cloud) -> None:
-    """Raise InputError where the track of a recording does not fit its nodes."""
-    count, shape = len(cloud.points), cloud.track.shape
-    fits = len(shape) == 3 and shape[1:] == (count, 3) and shape[0] >= 2
-    _need(fits, f"track has shape {shape}, expected (frames >= 2, {count}, 3)")
-    _need(_near(cloud.track), f"track has a coordinate that is no number within {LARGEST_M:g} m")
-    _need(cloud.record.get("track_rate_hz", 0) > 0, "record.track_rate_hz is missing, expected a positive rate")
-    _need(list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node")
+    yield good, f"rate_factors: {factors}, expected numbers from 0 to {LARGEST_RATE_FACTOR}"
+    if "node" in cloud.kinds:
+        count, shape = len(cloud.points), cloud.track.shape
+        fits = len(shape) == 3 and shape[1:] == (count, 3) and shape[0] >= 2
+        yield fits, f"track has shape {shape}, expected (frames >= 2, {count}, 3)"
+        yield _near(cloud.track), f"track has a coordinate that is no number within {LARGEST_M:g} m"
+        yield cloud.record.get("track_rate_hz", 0) > 0, "record.track_rate_hz is missing, expected a positive rate"
+        yield list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node"
 
 
 def extent(cloud: Cloud) -> float:

@@ -7,7 +7,7 @@ rim.
 
 import numpy as np
 
-from lowalt.targets.limbs import both_sides, circle, joint
+from lowalt.targets.skeleton import both_sides, circle, joint
 
 WHEEL_M = 0.678
 """Diameter of a road wheel: ISO 5775 size 28-622, 622 mm and twice 28 mm."""

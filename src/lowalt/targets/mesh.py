@@ -23,8 +23,7 @@ from lowalt.targets.cloud import Cloud
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut_parts, hinged, pool_of, refuse_shared
 from lowalt.targets.mesh_record import body_axes, check_record, ordered_parts
-from lowalt.targets.mesh_size import sized
-from lowalt.targets.plausible import refuse_implausible
+from lowalt.targets.mesh_size import refuse_implausible, sized
 from lowalt.targets.record_schema import record_files
 from lowalt.targets.sampling import thin
 

@@ -101,12 +101,6 @@ def taken(pool: Pool, mesh: Mesh, region: dict) -> np.ndarray:
     return ~partly[pool.component]
 
 
-def cut(pool: Pool, mesh: Mesh, region: dict) -> tuple[Pool, Pool]:
-    """Return the part of a body's pool that the region takes (see `taken`), and the rest."""
-    mask = taken(pool, mesh, region)
-    return pool.picked(mask), pool.picked(~mask)
-
-
 def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) -> None:
     """Refuse regions (by part) that take the same surface: which part got it would depend on the order of parts.
 
@@ -151,7 +145,8 @@ def cut_parts(
     made = {size: wheel(*size) for size in dict.fromkeys(sizes.values())}
     for name, part in moving:
         if "region" in part:
-            pools[name], body = cut(body, mesh, part["region"])
+            mask = taken(body, mesh, part["region"])
+            pools[name], body = body.picked(mask), body.picked(~mask)
         elif "wheel" in part:
             pools[name] = _made_wheel(sizes[name], np.array(part["hinge"], float), made[sizes[name]], frame)
         else:
@@ -164,7 +159,7 @@ def cut_parts(
                 f"reaches from {low} to {high} m; is the unit {record['unit']!r} right?"
             )
     for region in record["drop"]:
-        body = cut(body, mesh, region)[1]
+        body = body.picked(~taken(body, mesh, region))
     if not len(body.points):
         raise InputError(f"{where}: regions and drop leave nothing of {body_name}, expected a body")
     return {body_name: body, **pools}, mesh

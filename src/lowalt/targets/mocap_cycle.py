@@ -78,13 +78,14 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     positions[..., :2] -= positions[:, :1, :2]
     velocity = np.gradient(positions, axis=0) * fade
     state = np.concatenate([positions, velocity], axis=1).reshape(frames, -1)
-    place = motion.root_m[:, :2]
+    place, square = motion.root_m[:, :2], portable.dot(state, state)
     # Only pairs (start, end) of a few starts at a time: all pairs of a long recording would take gigabytes.
     blocks = [np.arange(first, min(first + BLOCK, frames)) for first in range(0, frames, BLOCK)]
     fastest = max(_speeds(place, starts, shortest, fade).max() for starts in blocks)
     least, candidates = np.inf, []
     for starts in blocks:
-        distance = _mismatches(state, starts)
+        distance = square[starts, None] + square - 2 * product(state[starts], state.T)
+        distance = np.sqrt(np.maximum(distance, 0) / len(NODES))
         distance[_speeds(place, starts, shortest, fade) < max(fastest / 2, 0.0)] = np.inf
         least = min(least, float(distance.min()))
         row, end = np.nonzero(distance <= 1.5 * least)
@@ -108,13 +109,6 @@ def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> 
     length = ends - starts[:, None]
     way = portable.norm(place[None] - place[starts, None])
     return np.where((length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0)
-
-
-def _mismatches(state: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Return the root mean square distance (S, F) over the nodes between the states at each start and at each end."""
-    square = portable.dot(state, state)
-    both = product(state[starts], state.T)
-    return np.sqrt(np.maximum(square[starts, None] + square - 2 * both, 0) / len(NODES))
 
 
 def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.ndarray]:

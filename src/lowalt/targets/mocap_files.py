@@ -5,6 +5,7 @@ Source: Acclaim's ASF/AMC format as the CMU Graphics Lab Motion Capture Database
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,31 +34,34 @@ class Skeleton:
     unit_m: float
 
 
-def _sections(text: str) -> dict[str, list[list[str]]]:
-    """Return the file's sections by keyword, each a list of lines split into words."""
+def _lines(path: Path) -> Iterator[list[str]]:
+    """The words of each line of a file, without comments; lines without a word are left out."""
+    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
+        if words := line.split("#", 1)[0].split():
+            yield words
+
+
+def _sections(path: Path) -> dict[str, list[list[str]]]:
+    """The file's sections by keyword, each a list of lines split into words."""
     sections: dict[str, list[list[str]]] = {}
-    current: list[list[str]] = []
-    for line in text.splitlines():
-        words = line.split("#", 1)[0].split()
-        if not words:
-            continue
+    section: list[list[str]] = []
+    for words in _lines(path):
         if words[0].startswith(":"):
-            current = sections.setdefault(words[0].lower(), [])
+            section = sections.setdefault(words[0].lower(), [])
             words = words[1:]
-        if words:
-            current.append(words)
+        section += [words] if words else []
     return sections
 
 
-def _blocks(lines: list[list[str]]) -> list[dict[str, list[str]]]:
-    """Return the begin/end blocks as mappings of first words to the words after them."""
+def _blocks(lines: list[list[str]]) -> dict[str, dict[str, list[str]]]:
+    """The begin/end blocks by their names, as mappings of first words to the words after them."""
     blocks: list[dict[str, list[str]]] = []
     for words in lines:
         if words[0] == "begin":
             blocks.append({})
         elif words[0] != "end" and blocks:
             blocks[-1].setdefault(words[0].lower(), words[1:])
-    return blocks
+    return {block["name"][0]: block for block in blocks}
 
 
 def read_skeleton(path: str | Path) -> Skeleton:
@@ -67,7 +71,7 @@ def read_skeleton(path: str | Path) -> Skeleton:
     nodes, or angles are not in degrees.
     """
     path = existing(path, "skeleton file")
-    sections = _sections(path.read_text(encoding="utf-8-sig", errors="replace"))
+    sections = _sections(path)
     for name in (":units", ":root", ":bonedata", ":hierarchy"):
         if name not in sections:
             raise InputError(f"{path}: no section {name}, expected an ASF skeleton")
@@ -84,7 +88,7 @@ def read_skeleton(path: str | Path) -> Skeleton:
     try:
         unit_m = INCH_M / float(units["length"][0])
         fixed = [float(word) for word in root["position"][:3] + root["orientation"][:3]]
-        named = {block["name"][0]: block for block in _blocks(sections[":bonedata"])}
+        named = _blocks(sections[":bonedata"])
         for name in LIMBS:
             block, index = named[name], NODES.index(name)
             direction = np.array([float(word) for word in block["direction"]])
@@ -118,10 +122,9 @@ def _frames(
     """
     frames: dict[int, dict[str, list[float]]] = {}
     frame, radians = None, False
-    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
-        words = line.split("#", 1)[0].split()
-        if not words or words[0].startswith(":"):
-            radians |= frame is None and words[:1] != [] and words[0].upper() == ":RADIANS"
+    for words in _lines(path):
+        if words[0].startswith(":"):
+            radians |= frame is None and words[0].upper() == ":RADIANS"
         elif len(words) == 1 and words[0].isdecimal():
             number = int(words[0])
             if last is not None and number > last:

@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
-from lowalt.targets.limbs import both_sides, joint
+from lowalt.targets.skeleton import both_sides, joint
 
 STANCE = 0.42
 """Share of a stride in which a foot is on the ground."""

@@ -21,11 +21,6 @@ def schema() -> dict:
     return load_yaml(PATH)
 
 
-def keys(section: str) -> tuple[str, ...]:
-    """Return the names of the keys of a source, or of COMMON."""
-    return tuple(schema()["sources"][section]["properties"])
-
-
 def check(section: str, record: dict, where: str) -> None:
     """Refuse keys of a record that are unknown to a section, missing, or of another value than it says.
 

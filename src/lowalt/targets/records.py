@@ -11,24 +11,31 @@ from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, classes_of, like
 from lowalt.files.csv_tables import read_csv
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, reading
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
 from lowalt.targets.make import SOURCES, source_module
 from lowalt.targets.record_schema import check_file_name, record_files
 
-COMMON_KEYS = record_schema.keys(record_schema.COMMON)
+COMMON_KEYS = tuple(record_schema.schema()["sources"][record_schema.COMMON]["properties"])
 """Keys every record may have; `source` it must have. Each source adds its own."""
 
 _WORDS = ("category", "name", "unseen_protocol")
 _WHOLE = ("idx", "n_rotors_or_wings", "points_in_published_cloud_approx")
-_NUMBERS = (
-    "size_m", "freq_lo_hz", "freq_hi_hz", "vx_abs_max", "vy_abs_max", "vz_abs_max", "len_m", "wid_m", "hgt_m",
-    "wheel_diam_m", "speed_lo", "speed_hi",
-)  # fmt: skip
-COLUMNS = (*_WORDS, *_WHOLE, *_NUMBERS)
 AIR_SPEEDS, GROUND_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max"), ("speed_lo", "speed_hi")
 """Columns of speeds of targets in the air and on the ground; they may be 0: a craft hovers, a car stands."""
+_NUMBERS = (
+    "size_m",
+    "freq_lo_hz",
+    "freq_hi_hz",
+    *AIR_SPEEDS,
+    "len_m",
+    "wid_m",
+    "hgt_m",
+    "wheel_diam_m",
+    *GROUND_SPEEDS,
+)
+COLUMNS = (*_WORDS, *_WHOLE, *_NUMBERS)
 
 
 def load_table(path: str | Path) -> dict[str, dict]:
@@ -50,10 +57,8 @@ def load_table(path: str | Path) -> dict[str, dict]:
         if row["unseen_protocol"] not in ("seen", "unseen"):
             raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
         table[name] = {column: _cell(where, column, text) for column, text in row.items()}
-    try:
+    with reading(path, "table of targets"):
         classes_of(table)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     return table
 
 

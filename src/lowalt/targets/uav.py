@@ -84,8 +84,7 @@ def raised(record: dict, f: dict) -> list[Part]:
         x = side * reach_x
         shells.append(tube([(x, -1.08 * reach_y, boom), (x, 1.08 * reach_y, boom)], arm))
         shells.append(tube([(0.2 * side * f["body_width"], 0, 0.1 * f["body_height"]), (x, 0, boom)], [1.3 * arm, arm]))
-        for end in (-1, 1):
-            y = end * reach_y
+        for y in (-reach_y, reach_y):
             shells.append(tube([(x, y, boom), (1.04 * x, y, boom - f["leg_height"])], [0.7 * arm, 0.4 * arm], 8))
     d = f["camera_diameter"]
     shells += camera(f, 0.38 * f["body_length"], -0.5 * f["body_height"] - 0.6 * d)
@@ -110,8 +109,7 @@ def radial(record: dict, f: dict) -> list[Part]:
         far = np.sqrt(x * x + y * y)
         sine, cosine = -x / far, y / far
         spin = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-        reach = 0.36 * f["body_length"]
-        pack = box((0.4 * cell, cell, 0.5 * cell), (0, reach, 0.5 * f["body_height"]))
+        pack = box((0.4 * cell, cell, 0.5 * cell), (0, 0.36 * f["body_length"], 0.5 * f["body_height"]))
         shells.append(pack.mapped(spin))
     bottom = -0.5 * f["body_height"] - f["leg_height"]
     shells += skids(0.85 * f["body_width"], 1.2 * f["body_length"], -0.3 * f["body_height"], bottom, 0.6 * arm)
@@ -130,8 +128,7 @@ def cabin(record: dict, f: dict) -> list[Part]:
     # The arms carry their motors half-way between the two layers of blades.
     top = level + f["layer_gap"] / 2
     shells += [cylinder(f["motor_diameter"] / 2, (x, y, top - f["layer_gap"]), (x, y, top)) for x, y in places]
-    for x, y in places:
-        shells.append(tube([(0.12 * x, 0.2 * y, level), (x, y, level)], [1.5 * arm, arm]))
+    shells += [tube([(0.12 * x, 0.2 * y, level), (x, y, level)], [1.5 * arm, arm]) for x, y in places]
     bottom = -0.5 * height - f["leg_height"]
     shells += skids(0.9 * half, 0.75 * length, -0.45 * height, bottom, 0.7 * arm)
     return [Part("body", "body", tuple(shells)), *rotors(places, top, f, bool(record.get("coaxial")))]
@@ -145,8 +142,7 @@ def tanker(record: dict, f: dict) -> list[Part]:
     frame = ((0.5, 0.3, 0.35), (0.35, 0.5, 0.5), (-0.35, 0.5, 0.5), (-0.5, 0.3, 0.35))
     shells = [hull([(y * length, w * width, -h * height, h * height) for y, w, h in frame], 5.0)]
     shells += motors(places, top, f)
-    for x, y in places:
-        shells.append(tube([(0.12 * x, 0.12 * y, 0.2 * height), (x, y, 0.5 * height)], [1.1 * arm, arm]))
+    shells += [tube([(0.12 * x, 0.12 * y, 0.2 * height), (x, y, 0.5 * height)], [1.1 * arm, arm]) for x, y in places]
     d, span = f["tank_diameter"], f["tank_length"]
     z = -0.5 * height - 0.5 * d
     tank = ((0.5, 0.3), (0.44, 0.8), (0.35, 1), (-0.35, 1), (-0.44, 0.8), (-0.5, 0.3))
