@@ -19,11 +19,7 @@ from lowalt.scene.waveform import Look
 
 SOURCE = "T. Schenk, RF Imperfections in High-rate Wireless Systems, Springer 2008, ch. 2"
 DEFAULTS = {"share": 0.5}
-
-
-def idle(settings: dict) -> bool:
-    """Return True where nothing leaks."""
-    return settings["share"] == 0
+IDLE = [{"share": 0}]
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:

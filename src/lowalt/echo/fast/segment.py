@@ -8,7 +8,7 @@ import numpy as np
 from lowalt.echo.fast import vector_loops
 from lowalt.echo.fast.polynomials import TOP, degree_for, economised, tail
 from lowalt.echo.fast.range_bounds import OMEGA_CENTRE, OMEGA_HALF, PSI_CENTRE, PSI_HALF
-from lowalt.echo.fast.strip import Geometry, PartPose, Placing
+from lowalt.echo.fast.strip import Geometry, Placing
 from lowalt.echo.pointwise.reference_range import RANGE, REST, TURN, X, Y, Z
 from lowalt.machine.jit import INLINED
 
@@ -101,12 +101,12 @@ def fill_offsets(sample, n, r, first, size, placing, offsets):
             d, e, f = rotation[at, p, none, one], rotation[at, p, one, one], rotation[at, p, two, one]
             g, h, k = rotation[at, p, none, two], rotation[at, p, one, two], rotation[at, p, two, two]
             x, y = translation[at, p, none] - x0, translation[at, p, one] - y0
-            pose = PartPose(
-                (cosine * a + sine * b) * scale, (cosine * d + sine * e) * scale, (cosine * g + sine * h) * scale,
-                (cosine * b - sine * a) * scale, (cosine * e - sine * d) * scale, (cosine * h - sine * g) * scale,
-                c * scale, f * scale, k * scale,
-                (cosine * x + sine * y) * scale, (cosine * y - sine * x) * scale,
-                (translation[at, p, two] - z0) * scale,
+            pose = (
+                ((cosine * a + sine * b) * scale, (cosine * d + sine * e) * scale, (cosine * g + sine * h) * scale),
+                ((cosine * b - sine * a) * scale, (cosine * e - sine * d) * scale, (cosine * h - sine * g) * scale),
+                (c * scale, f * scale, k * scale),
+                ((cosine * x + sine * y) * scale, (cosine * y - sine * x) * scale,
+                 (translation[at, p, two] - z0) * scale),
             )  # fmt: skip
             vector_loops.place_part(sample.lay.coordinates, low, high - low, pose, placing, offsets, low - first)
     for i in range(end - first, size):

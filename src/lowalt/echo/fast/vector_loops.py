@@ -49,12 +49,12 @@ def horner(x, c, row, degree, out, size):
 def place_part(coordinates, low, size, pose, placing, offsets, at):
     """Fill the offsets from `at` with `size` points of a part from `low`, and with up to MULTIPLE - 1 beyond.
 
-    coordinates: those of all points in their parts' frames (m). The loop takes whole vectors: single steps would cost
-    more.
+    coordinates: those of all points in their parts' frames (m); pose: rows of the part's matrix and its offset from the
+    reference, in the array's axes (normal, horizontal, up), over r_ref. The loop takes whole vectors: single steps
+    would cost more.
     """
     px, py, pz = coordinates
-    xx, xy, xz, yx, yy, yz = pose.xx, pose.xy, pose.xz, pose.yx, pose.yy, pose.yz
-    zx, zy, zz, x0, y0, z0 = pose.zx, pose.zy, pose.zz, pose.x, pose.y, pose.z
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz), (x0, y0, z0) = pose
     hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
     eps, ey, ez = offsets
     at, low = np.uint64(at), np.uint64(low)
