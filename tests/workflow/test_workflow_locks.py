@@ -121,27 +121,30 @@ import sys, time
 from pathlib import Path
 from lowalt.workflow.locks import Owner, guarded, numbers, take, take_over
 
-folder, start = Path(sys.argv[1]), float(sys.argv[2])
-time.sleep(start - time.time())
+folder = Path(sys.argv[1])
+print("ready", flush=True)
+while not (folder / "go").exists():
+    time.sleep(0.001)
 with guarded(folder):
     take_over(folder / "locks", lambda line: None)
-    if not numbers(folder / "locks"):
+    free = not numbers(folder / "locks")
+    if free:
         time.sleep(0.02)
         held = take(folder / "locks", Owner(), {"input": [], "output": ["out.txt"]})
-        print("won")
+print("won" if free else "lost", flush=True)
 sys.stdin.read()
 """
 
 
 def test_of_many_that_find_a_dead_owner_at_the_same_moment_one_wins(tmp_path):
     leave(tmp_path / "locks")
-    start = str(time.time() + 1.5)
-    command = [sys.executable, "-c", RACE, str(tmp_path), start]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    racers = [subprocess.Popen(command, **pipes) for _ in range(6)]
-    time.sleep(2.2)
-    said = [racer.communicate("")[0] for racer in racers]
-    assert sorted(said) == [""] * 5 + ["won\n"]
+    racers = [subprocess.Popen([sys.executable, "-c", RACE, str(tmp_path)], **pipes) for _ in range(6)]
+    assert [racer.stdout.readline() for racer in racers] == ["ready\n"] * 6
+    (tmp_path / "go").touch()
+    assert sorted(racer.stdout.readline() for racer in racers) == ["lost\n"] * 5 + ["won\n"]
+    for racer in racers:
+        racer.communicate("")
 
 
 def test_a_process_that_dies_inside_the_guard_lets_go(tmp_path):
