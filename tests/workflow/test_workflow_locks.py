@@ -21,7 +21,7 @@ from lowalt.workflow.locks import TOKEN, Owner, guarded, holders, numbers, refus
 ROOT = Path(__file__).parents[2]
 KEYS = {"input": ["in.txt"], "output": ["out.txt"]}
 # The process id of a process that has ended, and whose number the system has not given to another.
-GONE = Owner(pid=2**22 + 1, token="gone")
+GONE = Owner(pid=2**22 + 1)
 
 SNAKEFILE = """
 from lowalt.workflow import mends
@@ -93,7 +93,7 @@ def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_
     program = "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True); time.sleep(60)"
     heeding, stubborn, another = jobs = [
         subprocess.Popen([sys.executable, "-c", program.format(answer)], env=os.environ | {TOKEN: token}, stdout=-1)
-        for answer, token in (("SIG_DFL", "gone"), ("SIG_IGN", "gone"), ("SIG_IGN", "another"))
+        for answer, token in (("SIG_DFL", GONE.token), ("SIG_IGN", GONE.token), ("SIG_IGN", "another"))
     ]
     for job in jobs:
         job.stdout.readline()
