@@ -76,7 +76,7 @@ class Dataset:
 
     >>> from lowalt.config.layers import overlaid
     >>> config = overlaid(["config/tiny.yaml"])
-    >>> config["targets"]["select"] = ["Crow"]
+    >>> config["targets"].update(select=["Crow"])
     >>> samples = Dataset(config)
     >>> image, signal, record = samples[0]
     >>> len(samples), image.shape, signal.shape, record["snr_db"]
