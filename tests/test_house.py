@@ -159,9 +159,9 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 CEILINGS = {
     "commands": (11, 1030), "config": (8, 1030), "echo": (28, 2870), "files": (12, 715), "machine": (9, 590),
-    "measure": (7, 710), "motion": (10, 1020), "noise": (4, 170), "numerics": (14, 1070), "recognition": (46, 4680),
+    "measure": (7, 710), "motion": (10, 1010), "noise": (4, 170), "numerics": (14, 1070), "recognition": (46, 4680),
     "recordings": (17, 1800), "report": (34, 1900), "scene": (72, 6020), "shards": (22, 2660), "spectra": (16, 910),
-    "targets": (50, 6400), "tiles": (17, 1550), "workflow": (16, 1850),
+    "targets": (44, 6350), "tiles": (17, 1550), "workflow": (16, 1850),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 
