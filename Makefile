@@ -53,9 +53,11 @@ $(TESTING): $(SETUP)
 	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
-# Machine code of the data stages: compiled once, while packages come, and not by many tests at the same time.
+# Machine code of the data stages: compiled once, while packages come, and not by many tests at the same time. A sample
+# needs nearly all of it.
+SAMPLE = $(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1
 $(KERNELS): $(BASE)
-	$(BIN)/python -m lowalt.workflow.kernels 2>.venv/kernels.log || { cat .venv/kernels.log >&2; exit 1; }
+	$(SAMPLE) || { cat .venv/kernels.log >&2; exit 1; }
 	touch $@
 
 # Bytecode of the tests and of what they import: written once, not by both processes of the tests at the same time. Where a
@@ -68,10 +70,10 @@ $(DOCS): $(BASE)
 	$(call install,$(call of_extra,docs))
 	touch $@
 
-# Where the packages of training are not there yet, they come while the data are made; so does the machine code, for
-# which jobs wait that need it. Bytecode of torch takes ten seconds: written once here, not by two trainings at a time.
+# Where the packages of training are not there yet, they come while the data are made; so does the machine code. Bytecode
+# of torch takes ten seconds: written once here, not by two trainings at a time.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
-	@test -e $(SETUP) || { $(BIN)/python -m lowalt.workflow.kernels 2>.venv/kernels.log & \
+	@test -e $(SETUP) || { $(SAMPLE) & \
 		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile && \
 		{ $(BIN)/python -c 'import lowalt.recognition.runs, lowalt.report.__main__' 2>.venv/bytecode.log & } }
 	$(SNAKEMAKE)
@@ -140,7 +142,7 @@ reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	$(BIN)/python docs/filled_tables.py docs/results.md presets=results/reference/default-
 	for run in default tiny; do test ! -e results/$$run/shards || \
 		$(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
-	$(BIN)/python -m lowalt.measure.estimate --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
+	$(BIN)/python docs/scale_table.py --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 	$(BIN)/python docs/tiles_picture.py results/default/shards/index.json design/pictures/tiles.png
 

@@ -30,16 +30,13 @@ onstart:
         space.before(workflow, RUN.plan, config)
 
 
-onerror:
-    space.after()
-
-
 rule all:
     default_target: True
     input:
         f"results/{RUN.name}/report.html",
         f"results/{RUN.name}/accuracy.csv",
         f"{DATA}/shards/README.md",
+        f"{DATA}/clouds.png",
         [f"results/{RUN.name}/transfer.csv"] if config["recognition"]["transfer"] else [],
     localrule: True
 

@@ -50,8 +50,6 @@ def part(words: list[str]) -> str | None:
     """Return the part that a process's command line belongs to: a stage, Snakemake, or None for neither."""
     if "-m" in words:
         module, *rest = words[words.index("-m") + 1 :]
-        if module == "lowalt.workflow.kernels" and not rest:
-            return None  # it only waits for the processes that compile
         if module.startswith("lowalt."):
             verb = f" {rest[0]}" if rest and rest[0].isalpha() else ""
             return module.removeprefix("lowalt.") + verb

@@ -37,13 +37,14 @@ def copy_of_tree(root: Path, folder: Path) -> Path:
 
 
 def test_file(root: Path, name: str) -> Path:
-    """Return the test file of a name in the table, such as echo or scene/receiver, in whichever folder of tests it is.
+    """Return the test file of a name in the table, such as echo or scene/receiver, in whichever folder it is.
 
     Raises: ValueError where there is none.
     """
-    for path in root.glob(f"tests/**/{Path(name).parent}/test_{Path(name).name}.py"):
-        return path.relative_to(root)
-    raise ValueError(f"no test file {name!r} in {root / 'tests'}")
+    for folder in ("tests", "studies"):
+        for path in root.glob(f"{folder}/**/{Path(name).parent}/test_{Path(name).name}.py"):
+            return path.relative_to(root)
+    raise ValueError(f"no test file {name!r} in tests or studies of {root}")
 
 
 def planted(tree: Path, fault: dict[str, str]) -> str:

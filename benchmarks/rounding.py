@@ -1,4 +1,4 @@
-"""The cost of correct rounding of the echo, and how many values need a second and a third computation.
+"""The cost of correct rounding of the echo, and how many values need a second computation.
 
     python benchmarks/rounding.py --out results/benchmarks/rounding.csv
 
@@ -24,8 +24,7 @@ from lowalt.numerics.streams import stream
 from lowalt.shards.dataset import Dataset, Place
 
 COLUMNS = (
-    "points", "signals", "symbols", "again", "again_twice", "left_open", "signal_ms", "rounding_ms", "percent",
-    "hardware",
+    "points", "signals", "symbols", "again", "left_open", "signal_ms", "rounding_ms", "percent", "hardware",
 )  # fmt: skip
 
 
@@ -48,14 +47,14 @@ def inputs(dataset: Dataset, models: int, points: int | None) -> list[tuple[Targ
 
 def measured(dataset: Dataset, models: int, points: int | None, calls: int) -> dict:
     """Return a row of COLUMNS."""
-    correct, again, spent = nearest.correct, np.zeros(3, int), np.zeros(2)
+    correct, again, spent = nearest.correct, np.zeros(2, int), np.zeros(2)
     network, given = dataset.maker.network, inputs(dataset, models, points)
     try:
         for seen, aim in given:
             for station in network.stations:
                 least = [np.inf, np.inf]
                 for _ in range(calls):
-                    for place, how in enumerate((correct, lambda *_: (0, 0, 0))):
+                    for place, how in enumerate((correct, lambda *_: (0, 0))):
                         nearest.correct = how
                         start = time.perf_counter()
                         result = echo_signal(network, station, seen, None, aim)
@@ -68,7 +67,7 @@ def measured(dataset: Dataset, models: int, points: int | None, calls: int) -> d
     with_ms, without_ms = (1e3 * value / signals for value in spent)
     return {
         "points": "as they are" if points is None else points, "signals": signals,
-        "symbols": signals * network.symbols, "again": again[0], "again_twice": again[1], "left_open": again[2],
+        "symbols": signals * network.symbols, "again": again[0], "left_open": again[1],
         "signal_ms": f"{with_ms:.4f}", "rounding_ms": f"{with_ms - without_ms:.4f}",
         "percent": f"{100 * (with_ms - without_ms) / without_ms:.1f}", "hardware": describe(),
     }  # fmt: skip

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from twin_scenes import Library
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
@@ -25,7 +26,6 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings.faults import RATE_SHARE
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.formats import READERS
-from lowalt.recordings.library import Library
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record, read_record, record
 from lowalt.recordings.twin import Twin

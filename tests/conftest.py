@@ -17,7 +17,7 @@ LONG = (
     "test_house", "test_dataset", "test_workflow_locks", "test_classes", "test_effects_occlusion",
     "test_recognition_sharing", "test_recognition_memory",
     "test_report_plots", "test_effects_every", "test_attacks", "test_recordings_unseen", "test_benchmarks_long_run",
-    "test_skips", "test_workflow_board", "test_jit_turns", "test_targets_more",
+    "test_skips", "test_workflow_board", "test_targets_more",
 )  # fmt: skip
 
 
@@ -46,6 +46,17 @@ def pytest_collection_finish():
     """From here on look for garbage among what tests make alone."""
     gc.freeze()
     gc.enable()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def records_checked_once():
+    """Let the process check each built-in record once."""
+    from checked_records import checked_once
+    from lowalt.targets import records
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(records, "merge", checked_once())
+        yield
 
 
 @pytest.fixture

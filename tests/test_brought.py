@@ -24,24 +24,8 @@ from small_configuration import configuration
 from trainings import SCHEME, SETTINGS, write_views
 
 DAMAGE = (
-    None,
-    True,
-    -1,
-    0,
-    0.5,
-    10**30,
-    20_000,
-    math.nan,
-    "",
-    "x\ny",
-    "../x",
-    [],
-    {},
-    [[]],
-    [-1],
-    {"x": 1},
-    ["a", "a"],
-)
+    None, True, -1, 0, 0.5, 10**30, 20_000, math.nan, "", "x\ny", "../x", [], {}, [[]], [-1], {"x": 1}, ["a", "a"],
+)  # fmt: skip
 RUNS = "def run(size):\n    open('made', 'w').close()\n"
 
 
@@ -62,9 +46,9 @@ def leaves(value, path=()):
 
 
 def damaged(block):
-    """Copies of a block, each with one value damaged, dropped or joined by an unknown key; each value in a few ways."""
+    """Copies of a block, each with one value damaged, dropped or joined by an unknown key; each value in two ways."""
     for turn, path in enumerate(leaves(block)):
-        for new in (*DAMAGE, "drop", "add")[turn % 5 :: 5]:
+        for new in (*DAMAGE, "drop", "add")[turn % 10 :: 10]:
             found = copy.deepcopy(block)
             inner = found
             for key in path[:-1]:

@@ -19,11 +19,7 @@ from lowalt.scene.waveform import Look
 
 SOURCE = "T. Schenk, RF Imperfections in High-rate Wireless Systems, Springer 2008, ch. 2"
 DEFAULTS = {"share": 0.5}
-
-
-def idle(settings: dict) -> bool:
-    """Return True where nothing leaks."""
-    return settings["share"] == 0
+IDLE = [{"share": 0}]
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
@@ -96,18 +92,20 @@ SPECTRUM_ENTRY = """      power:
         required: [window, hop]
         properties: {window: {type: integer, minimum: 2}, hop: {type: integer, minimum: 1}}
 """
-SPECTRUM_TRIAL = """
-import json, sys
+TRIAL = """
+import json
 import numpy as np
-import torch
+from lowalt.__main__ import main
 from lowalt.config.layers import load
-from lowalt.config.network import Network
 from lowalt.recognition.augment import augment
 from lowalt.recognition.schemes import columns_in, scheme
-from lowalt.spectra import Spectra, spectrum
+from lowalt.scene import explanation
+from lowalt.scene.effects import PLACES
+from lowalt.spectra import spectrum
 from lowalt.tiles.render import Renderer, split
 
-for overlays in ([], sys.argv[1:]):
+print(json.dumps([*PLACES]))
+for overlays in ([], ["more.yaml"]):
     config = load(["config/default.yaml", *overlays], "workflow/schemas/config.schema.yaml")
     tiles = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
     rng = np.random.default_rng(1)
@@ -128,24 +126,11 @@ for overlays in ([], sys.argv[1:]):
         whole = spectrum("power").definition(signals[0], tiles.spectra["power"], "power", 1.0, 1.0)
         facts["mean"] = float(abs(values.mean() / whole.mean() - 1))
     print(json.dumps(facts))
+main(["spectra", "more.yaml"])
+# All other effects would be tried in turn.
+explanation.PLACES = {"dc_offset": PLACES["dc_offset"]}
+main(["explain", "scene.yaml", "--sample", "Crow:0", "--sources"])
 """
-
-
-@pytest.fixture
-def tree(tmp_path):
-    """A copy of the tree, and a function that runs Python there and returns what it prints."""
-    for name in ("src", "config", "workflow"):
-        shutil.copytree(ROOT / name, tmp_path / name)
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "src")}
-
-    def python(*arguments):
-        run = subprocess.run(
-            [sys.executable, *arguments], cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
-        assert run.returncode == 0, run.stderr
-        return run.stdout
-
-    return tmp_path, python
 
 
 def enter(folder: Path, before: str, entry: str) -> None:
@@ -156,32 +141,39 @@ def enter(folder: Path, before: str, entry: str) -> None:
     schema.write_text(text.replace(before, entry + before))
 
 
-def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_and_priced(tree):
-    folder, python = tree
+@pytest.fixture(scope="module")
+def lines(tmp_path_factory):
+    """What TRIAL prints in a copy of the tree with one more effect and one more spectrum."""
+    folder = tmp_path_factory.mktemp("tree")
+    for name in ("src", "config", "workflow"):
+        shutil.copytree(ROOT / name, folder / name)
     (folder / "src/lowalt/scene/effects/receiver/dc_offset.py").write_text(EFFECT)
     enter(folder, "      adc:\n", ENTRY)
     (folder / "scene.yaml").write_text("run: leaky\neffects: {dc_offset: {share: 0.25}}\n")
-    found = python("-m", "lowalt", "explain", "scene.yaml", "--sample", "Crow:0", "--sources")
-    # Run: the signal is another. Priced: its milliseconds. Documented: its source.
-    line, source = [line for line in found.splitlines() if line.startswith("dc_offset")]
-    assert float(re.fullmatch(r"dc_offset +named +(\S+)%( +\S+%)+ +-?\d+\.\d", line)[1]) > 1
-    assert "ch. 2" in source
-    program = "from lowalt.scene.effects import PLACES\nprint(*PLACES)"
-    names = python("-c", program).split()
-    # Its place in the chain is the last of the receiver's, before detection begins.
-    assert names.index("adc") + 1 == names.index("dc_offset") == names.index("canceller") - 1
-
-
-def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented_and_priced(tree):
-    folder, python = tree
     (folder / "src/lowalt/spectra/kinds/power.py").write_text(SPECTRUM)
     enter(folder, "      vrp: &fourier\n", SPECTRUM_ENTRY)
     (folder / "more.yaml").write_text("run: more\nspectra: {power: {window: 16, hop: 2}, trp: null}\n")
-    listed = python("-m", "lowalt", "spectra", "more.yaml").splitlines()
+    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
+    run = subprocess.run([sys.executable, "-c", TRIAL], cwd=folder, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return run.stdout.splitlines()
+
+
+def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_and_priced(lines):
+    # Run: the signal is another. Priced: its milliseconds. Documented: its source.
+    line, source = [line for line in lines if line.startswith("dc_offset")]
+    assert float(re.fullmatch(r"dc_offset +named +(\S+)%( +\S+%)+ +-?\d+\.\d", line)[1]) > 1
+    assert "ch. 2" in source
+    # Its place in the chain is the last of the receiver's, before detection begins.
+    names = json.loads(lines[0])
+    assert names.index("adc") + 1 == names.index("dc_offset") == names.index("canceller") - 1
+
+
+def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented_and_priced(lines):
     pattern = r"power \(mean power\): 16 rows, 192 windows, zero at index 128, \d+\.\d\d ms an image \| window 16"
-    (line,) = [number for number, line in enumerate(listed) if re.match(pattern, line)]
-    assert listed[line + 1] == "  any textbook, ch. 3"
-    before, found = map(json.loads, python("-c", SPECTRUM_TRIAL, "more.yaml").splitlines())
+    (line,) = [number for number, line in enumerate(lines) if re.match(pattern, line)]
+    assert lines[line + 1] == "  any textbook, ch. 3"
+    before, found = map(json.loads, lines[1:3])
     # The configuration decides: without an entry there, the new file changes nothing.
     assert before == {"spectra": ["vrp", "trp", "vt"], "shape": [768, 768]}
     assert found["spectra"] == ["vrp", "vt", "power"] and found["shape"] == [768, 768]

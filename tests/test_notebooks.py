@@ -2,18 +2,13 @@
 
 import importlib
 import re
-import shutil
 import sys
 
 import pytest
 
-from dataset import build, publish
-from test_tutorials import FENCE, FOLDER, NEEDS, ROOT, SHARDS, linked_tree
+from test_tutorials import FENCE, FOLDER, ROOT
 
 PAGES = sorted(path.stem for path in FOLDER.glob("*.md"))
-SHORT = "trajectory"
-"""The tutorial whose notebook runs in the quick suite; `test_tutorials` runs the blocks of the others there."""
-LONG = sorted(set(PAGES) - {SHORT, "effect"})
 
 
 @pytest.fixture
@@ -73,36 +68,20 @@ def test_links_of_a_notebook_lead_to_files_of_the_repository(made, page):
     assert not [link for link in links if not (ROOT / "notebooks" / link).resolve().exists()]
 
 
-def test_the_short_notebook_runs(made, checkout):
-    whole = book(made, SHORT)
-    whole.cells.append(made.nbformat.v4.new_code_cell("print(tile.shape, tile.dtype)"))
-    assert run(whole, checkout).endswith("(768, 768) uint8\n")
-
-
-def test_a_failing_line_of_a_notebook_is_not_passed_over(made, tmp_path):
+def test_cells_run_in_order_in_the_checkout_and_a_failing_line_is_not_passed_over(made, checkout):
+    """`test_tutorials` runs the blocks of all pages in the quick suite."""
     errors = pytest.importorskip("nbclient").exceptions
+    text = (
+        "```python\nprint(open('Snakefile').read(8), end='')\n```\n```sh\nfalse\ntrue\n```\n```python\nprint(1)\n```\n"
+    )
+    short = made.notebook(text)
     with pytest.raises(errors.CellExecutionError):
-        run(made.notebook("```sh\nfalse\ntrue\n```\n"), tmp_path)
+        run(short, checkout)
+    said = [output.get("text", "") for cell in short.cells for output in cell.get("outputs", [])]
+    assert "".join(said) == "# lowalt"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", LONG)
-def test_a_long_notebook_runs(made, page, checkout, tmp_path_factory):
-    if page in SHARDS:
-        pytest.importorskip(NEEDS[page])
-        shards = publish(build(tmp_path_factory.mktemp("made") / "shards", "image"), checkout / "made")
-        (checkout / "results/default").mkdir(parents=True)
-        shutil.copytree(shards, checkout / "results/default/shards")
-    run(book(made, page), checkout)
-
-
-@pytest.mark.slow
-def test_the_notebook_of_an_effect_runs_once_its_entry_is_in_the_schema(made, checkout):
-    (checkout / "workflow").unlink()
-    shutil.copytree(ROOT / "workflow", checkout / "workflow")
-    (checkout / "src").unlink()
-    linked_tree(checkout / "src", "lowalt/scene/effects/receiver")
-    entry = next(code for _, title, code in FENCE.findall((FOLDER / "effect.md").read_text()) if title == "entry")
-    schema = checkout / "workflow/schemas/config.schema.yaml"
-    schema.write_text(schema.read_text().replace("      squint:", f"{entry}      squint:", 1))
-    assert "dc_offset" in run(book(made, "effect"), checkout)
+def test_the_notebook_of_a_first_data_set_runs_whole(made, checkout):
+    """With the run that `test_tutorials` leaves out."""
+    run(book(made, "first_data_set"), checkout)

@@ -18,7 +18,9 @@ from typing import NamedTuple
 import numpy as np
 import recorded_sets
 import rejection
+import twin_networks
 from study import logits
+from twin_scenes import MARGIN, Library, samples, stretch
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
@@ -30,15 +32,12 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition import runs, zoo
 from lowalt.recognition.samples import fingerprint, joined
 from lowalt.recognition.schemes import TABLE, named
-from lowalt.recordings import twin_network
 from lowalt.recordings.channel import coherent_intervals
 from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.library import Library
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
-from lowalt.recordings.scenes import MARGIN, samples, stretch
 from lowalt.recordings.twin import Twin
-from lowalt.recordings.windows import at_symbol_rate
+from lowalt.recordings.windows import Windows, at_symbol_rate, facts, rendered
 from lowalt.tiles.image_settings import Images
 
 FOLDER = Path("config/measured")
@@ -64,14 +63,14 @@ class Radar:
 
     def rendered(self, intervals: np.ndarray, twin: Twin) -> np.ndarray:
         """Return the images (n, 3, size, size) uint8 of intervals (n, symbols)."""
-        return twin_network.rendered(intervals, twin, self.images, self.size)
+        return rendered(intervals, twin, self.images, self.size)
 
     def logits(self, intervals: np.ndarray, twin: Twin) -> np.ndarray:
         """Return the logits (n, classes) of intervals (n, symbols) at a recording's own carrier."""
         shown = self.rendered(intervals, twin)
         count = len(shown)
-        facts = twin_network.facts(np.zeros(count, int), ["window"] * count, np.arange(count), np.zeros(count), "")
-        return logits(self.model, twin_network.Windows(shown, facts))
+        known = facts(np.zeros(count, int), ["window"] * count, np.arange(count), np.zeros(count), "")
+        return logits(self.model, Windows(shown, known))
 
 
 class Part(NamedTuple):
@@ -134,7 +133,7 @@ def empty(radar: Radar, library: Library, kind: str, count: int, fold: str) -> n
     return np.array(found)
 
 
-class Kept(twin_network.Windows):
+class Kept(Windows):
     """Windows in memory whose images and facts name a training."""
 
     def sha256(self) -> str:
@@ -144,13 +143,13 @@ class Kept(twin_network.Windows):
 
 def with_empty(radar: Radar, library: Library, block: dict, fold: str) -> Kept:
     """Return the twin's windows of a fold, "train" or "validation", and as many of an extra class as of another."""
-    known = twin_network.simulated(library, radar.name, block, fold)
+    known = twin_networks.simulated(library, radar.name, block, fold)
     count = len(known.facts) // (2 * len(CATEGORIES))
     parts, told = [known.images], [known.facts]
     for kind in EMPTY:
         parts.append(radar.rendered(empty(radar, library, kind, count, fold), radar.twin))
         numbers = np.arange(count)
-        told.append(twin_network.facts(np.full(count, len(CATEGORIES)), [kind] * count, numbers, np.zeros(count), fold))
+        told.append(facts(np.full(count, len(CATEGORIES)), [kind] * count, numbers, np.zeros(count), fold))
     return Kept(np.concatenate(parts), joined(told))
 
 
@@ -198,8 +197,8 @@ def foreign_parts(radar: Radar, folder: Path) -> list[Part]:
 
 def rows_of(radar: Radar, library: Library, inputs: Path, folder: Path, models: Path) -> list[list]:
     """Return the table's rows of one network of the zoo, and of one with an extra class."""
-    block = twin_network.settings(FOLDER / "recognition.yaml")
-    own = twin_network.simulated(library, radar.name, block, "validation")
+    block = twin_networks.settings(FOLDER / "recognition.yaml")
+    own = twin_networks.simulated(library, radar.name, block, "validation")
     hollow = {kind: empty(radar, library, kind, ASKED, "test") for kind in EMPTY}
     rows = []
     for asked, scores in ((radar, SCORES), (with_extra(radar, library, block, models), EXTRA)):

@@ -10,37 +10,6 @@ from forks import ended
 from lowalt.config.command import pick, refusal, run, settings
 from lowalt.files.atomic import existing, replacing, sha256
 from lowalt.files.errors import InputError
-from needed_options import assert_needed_options_are_named
-
-NEEDED = """
-config.layers: --settings, --out
-echo.__main__: --settings, --motion, --clouds, --station, --out
-scene.__main__: --settings, --motion, --clouds, --station, --out, --power
-measure.accuracy_cost: --settings, --predictions, --speeds, --data-jobs, --index, --presets, --out
-measure.echo_cost: --settings, --clouds, --out
-measure.estimate: --stages, --costs, --schema, --base, --overlays, --out
-motion.__main__: --settings, --clouds, --group, --first, --count, --out
-noise.__main__: --settings, --motion, --echoes, --out
-recordings.__main__ import: --out, --record, --radar
-recordings.__main__ keep: --out, --models
-report.__main__: --settings, --manifest, --stages, --figures, --out
-report.figures.cost_plots: plot, --table, --figure
-shards.__main__ index: --settings, --shards, --out
-shards.__main__ write: --settings, --motion, --fold, --out
-shards.build: --config, --out
-shards.card: --index, --config
-shards.manifest write: --run, --manifest
-shards.sigmf: --index, --out
-targets.__main__: --settings, --out
-targets.download: --out
-targets.gallery: --clouds, --out
-targets.occluders: --settings, --out
-tiles.__main__: --settings, --signals, --out
-"""
-
-
-def test_a_command_without_its_options_names_all_that_it_needs(capsys):
-    assert_needed_options_are_named(NEEDED, capsys)
 
 
 def test_settings_come_as_json_or_as_a_file(tmp_path):

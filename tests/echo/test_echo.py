@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 import reference
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_matrix, echo_signal
-from lowalt.echo.scene import target
 
 
 def network(**changes) -> Network:
@@ -158,59 +157,3 @@ def test_the_command_s_memory_grows_by_its_output_alone():
     # 200 more models: 400 complex64 values of each. Their positions alone would take sixty times as much.
     more, output = peak(220) - peak(20), 200 * 400 * 8
     assert output <= more < 1.5 * output
-
-
-def test_settings_that_are_missing_are_named(tmp_path):
-    from lowalt.echo.__main__ import main
-    from lowalt.files.errors import InputError
-
-    with pytest.raises(InputError, match=r"missing \['network', 'tolerance'\]"):
-        main(["--settings", "{}", "--motion", "x", "--clouds", "y", "--station", "A", "--out", str(tmp_path / "o.npy")])
-
-
-BAD = {
-    "positions": (np.full((2, 3, 3), np.nan), "positions.0, 0, 0. is nan"),
-    "infinite": (np.full((2, 3, 3), np.inf), "positions.0, 0, 0. is inf"),
-    "empty": (np.zeros((2, 0, 3)), r"positions has shape \(2, 0, 3\), expected \(N, L, 3\)"),
-    "flat": (np.zeros((2, 3)), r"positions has shape \(2, 3\)"),
-    "here": (np.full((2, 3, 3), [0.0, 0.0, 25.0]), "point 0 at symbol 0 .*r = 0"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_positions_are_named(case):
-    from lowalt.files.errors import InputError
-
-    value, message = BAD[case]
-    net = network()
-    with pytest.raises(InputError, match="crow, model 3: .*" + message):
-        echo_signal(net, net.stations[0], value, 1.0, (9.0, 9.0, 9.0), sample="crow, model 3")
-
-
-def test_other_bad_arguments_are_named():
-    from lowalt.files.errors import InputError
-
-    net = network()
-    good = np.full((2, 3, 3), 40.0)
-    cases = [
-        (dict(rcs_m2=-1.0), "rcs_m2.0. is -1"),
-        (dict(rcs_m2=np.ones(2)), r"rcs_m2 has shape \(2,\), expected \(3,\)"),
-        (dict(aim_m=(0.0, 0.0, 25.0)), "no direction to aim at"),
-        (dict(aim_m=(np.nan, 0.0, 25.0)), "aim_m.0. is nan"),
-        (dict(paths=[]), "paths is empty"),
-        (dict(paths=[Path(np.nan)]), "paths.0..delay_s has a NaN"),
-        (dict(paths=[Path(0, np.ones((2, 5)))]), r"paths.0..gain has shape \(2, 5\)"),
-    ]
-    for change, message in cases:
-        arguments = dict(rcs_m2=1.0, aim_m=(9.0, 9.0, 9.0)) | change
-        with pytest.raises(InputError, match=message):
-            echo_signal(net, net.stations[0], good, **arguments)
-    with pytest.raises(InputError, match="frequency_hz is -1"):
-        echo_signal(net, Station("A", (0.0, 0.0, 25.0), 0.0, -1.0), good, 1.0, (9.0, 9.0, 9.0))
-
-
-def test_read_only_arrays_are_copied_so_that_no_kernel_is_compiled_for_them():
-    motion = cloud_in_motion(np.random.default_rng(1), 3, 1, (90.0, 40.0, 10.0))
-    for array in motion:
-        array.setflags(write=False)
-    assert all(array.flags.writeable for array in target(motion, 1.0))

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_echo import cloud_in_motion, network, relative
+from test_echo import network, relative
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_signal
 from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cell_polynomials
 from lowalt.echo.fast.polynomials import CELL_REACH
 from lowalt.echo.fast.strongest_cell import far_limit, far_moments
-from lowalt.files.errors import InputError
 
 
 def kernel(x, count):
@@ -69,19 +68,6 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
     assert deep > 0.3 or limit <= 1.6 * truth.max() + 1e-3 * total
 
 
-def test_ranges_by_roots_and_by_polynomials_agree(always_approximate):
-    net = network(symbols=60)
-    motion = cloud_in_motion(np.random.default_rng(2), 60, 300, (400.0, 30.0, 60.0), 0.3)
-    arguments = (net, net.stations[0], motion, 1.0, motion.translation[0, 0])
-    exact, loose = echo_signal(*arguments), echo_signal(*arguments, 1e-5)
-    assert not exact.method.near and loose.method.near and loose.method.cheap > 50
-    assert 1e-15 < relative(loose.signal, exact.signal) <= loose.bound <= 1e-5
-    close = cloud_in_motion(np.random.default_rng(2), 60, 300, (20.0, 3.0, 30.0), 0.8)
-    arguments = (net, net.stations[0], close, 1.0, close.translation[0, 0])
-    exact, loose = echo_signal(*arguments), echo_signal(*arguments, 1e-7)
-    assert not loose.method.near and relative(loose.signal, exact.signal) <= loose.bound <= 1e-7
-
-
 def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
     net = network(symbols=30)
     rng = np.random.default_rng(3)
@@ -99,14 +85,6 @@ def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
     places = nodes[:, part] + np.einsum("nlij,lj->nli", turned[:, part], points)
     truth = echo_signal(net, net.stations[0], places, 1.0, nodes[0, 0], paths=[Path()])
     assert relative(moved.signal, truth.signal) < 1e-11 and relative(moved.signal, plain.signal) > 1e-3
-
-
-def test_rotations_of_a_wrong_shape_are_named_by_the_shape_they_were_given_in():
-    """One number repeated is checked by its first entry alone, which has another shape."""
-    net = network(symbols=5)
-    motion = Rigid(np.broadcast_to(0.0, (5, 4, 2, 2)), np.ones((5, 4, 3)), np.ones((1, 3)), np.zeros(1, int))
-    with pytest.raises(InputError, match=r"motion.rotation has shape \(5, 4, 2, 2\), expected \(N, P, 3, 3\)"):
-        echo_signal(net, net.stations[0], motion, 1.0, np.ones(3))
 
 
 def test_a_point_half_way_between_two_cells_is_counted_as_a_tie_and_one_off_it_is_not():

@@ -44,10 +44,6 @@ def test_signals_are_those_of_the_positions(folder):
         aim = [row(model)[name] for name in ("x_m", "y_m", "z_m")]
         truth = echo_signal(network, network.station("B"), track, 1.0, aim).signal
         assert abs(found[model] - truth).max() < 1e-6 * abs(truth).max()
-    first = (folder / "B.npy").read_bytes()
-    main(command(folder, **{"--explain": str(folder / "why.txt")}))
-    assert (folder / "why.txt").read_text().count("error proved below") == 2
-    assert (folder / "B.npy").read_bytes() == first
 
 
 def test_stations_heard_together_are_those_heard_alone(folder):
@@ -70,11 +66,6 @@ def test_a_target_checked_once_serves_every_station():
         alone = echo_signal(network, station, motion, 1.0, aim).signal
         assert (echo_signal(network, station, seen, None, aim).signal == alone).all()
         assert (signal == alone).all()
-    with pytest.raises(InputError, match=r"model 0: rcs_m2 is 1\.0, expected None: a Target holds its cross sections"):
-        echo_signal(network, network.stations[0], seen, 1.0, aim, sample="model 0")
-    with pytest.raises(InputError, match=r"model 0: motion.translation\[3, 0, 1\] is nan"):
-        motion.translation[3, 0, 1] = np.nan
-        target(motion, 1.0, "model 0")
 
 
 def test_a_job_whose_kernels_are_compiled_loads_no_compiler(folder):
@@ -86,6 +77,8 @@ def test_a_job_whose_kernels_are_compiled_loads_no_compiler(folder):
 
 
 def test_faults_are_named_and_leave_nothing_behind(folder):
+    with pytest.raises(InputError, match=r"missing \['network', 'tolerance'\]"):
+        main(command(folder, **{"--settings": "{}"}))
     with pytest.raises(InputError, match="station 'D': not in the network"):
         main(command(folder, **{"--station": "D"}))
     with pytest.raises(InputError, match="tolerance is 2"):

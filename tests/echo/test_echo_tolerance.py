@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_echo import cloud_in_motion, network, positions, relative
 
-from lowalt.echo import Path, echo_matrix, echo_signal, method_text
+from lowalt.echo import Path, echo_matrix, echo_signal
 from lowalt.echo.fast import polynomials
 from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
 from lowalt.echo.pointwise.reference_range import reference as reference_ranges
@@ -44,7 +44,7 @@ def test_a_looser_tolerance_takes_shorter_polynomials(always_approximate):
         assert result.method.cheap + result.method.exact + result.method.general == 400
     assert orders == sorted(orders) and orders[0] < orders[-1] - 8
     loose = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], 1e-2)
-    assert loose.method.single and "float32" in method_text(loose)
+    assert loose.method.single
 
 
 def test_points_in_parts_and_plain_positions_agree():
@@ -70,22 +70,20 @@ def test_incoherent_clouds_are_certified_against_all_cells():
 @pytest.mark.parametrize("error", [1e-3, 1e-8, 1e-14])
 def test_fitted_cosines_keep_their_bound(band, error):
     degree = polynomials.degree_for(band, error)
-    weights, rates = np.array([0.25, 0.45, 0.3]), np.array([1.0, 0.6, 0.1])
+    cosines = polynomials.CosineSum(np.array([0.25, 0.45, 0.3]), np.array([1.0, 0.6, 0.1]))
     out, s = np.zeros(polynomials.TOP + 1), np.linspace(-1, 1, 401)
-    polynomials.economised(weights, rates, 0.3, 1.7, band, degree, polynomials.folding(), np.empty((3, 3)), out)
-    truth = np.cos(np.outer(1.7 + band * s, rates) + 0.3) @ weights
+    polynomials.economised(cosines, 1.7, band, degree, polynomials.folding(), np.empty((3, 3)), out)
+    truth = np.cos(np.outer(1.7 + band * s, cosines.rates)) @ cosines.weights
     assert abs(np.polynomial.polynomial.polyval(s, out) - truth).max() <= polynomials.tail(band, degree) + 2e-15
     assert polynomials.tail(band, degree) <= error
 
 
-@pytest.mark.parametrize("kind", ["inverse", "excess", "cosine", "sine"])
+@pytest.mark.parametrize("kind", ["cosine", "sine"])
 @pytest.mark.parametrize("degree", [3, 5, 7, 10])
 def test_fixed_functions_keep_their_bound(kind, degree):
-    reach = 0.25 if kind in ("cosine", "sine") else 0.1
-    coefficients, bound = polynomials.smooth(kind, reach, degree)
-    x = np.linspace(1e-6 if kind in ("cosine", "sine") else -reach, reach, 200)
+    coefficients, bound = polynomials.smooth(kind, degree)
+    x = np.linspace(1e-6, 0.25, 200)
     exact = {
-        "inverse": lambda v: 1 / mpmath.sqrt(1 + v), "excess": lambda v: (mpmath.sqrt(1 + v) - 1) / v,
         "cosine": lambda v: mpmath.cos(2 * mpmath.pi * mpmath.sqrt(v)),
         "sine": lambda v: mpmath.sin(2 * mpmath.pi * mpmath.sqrt(v)) / mpmath.sqrt(v),
     }[kind]  # fmt: skip
@@ -95,9 +93,9 @@ def test_fixed_functions_keep_their_bound(kind, degree):
     assert abs(found - truth).max() <= bound + 1e-14 and bound < 2e-3
 
 
-@pytest.mark.parametrize("kind", ["inverse", "excess", "cosine", "sine"])
+@pytest.mark.parametrize("kind", ["cosine", "sine"])
 def test_a_higher_degree_never_has_a_larger_bound_and_the_highest_leaves_rounding_alone(kind):
-    bounds = [polynomials.smooth(kind, 0.25, degree)[1] for degree in range(0, 96, 5)]
+    bounds = [polynomials.smooth(kind, degree)[1] for degree in range(0, 96, 5)]
     assert bounds == sorted(bounds, reverse=True) and bounds[-1] == 2e-16
 
 

@@ -1,7 +1,5 @@
 """One thread for BLAS: within the block alone, however blocks stand in each other, and the bits of scenes with it."""
 
-import threading
-
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -31,24 +29,6 @@ def test_a_block_has_one_thread_also_where_it_stands_in_another_or_fails(two):
             assert counts() == {1}
             raise ZeroDivisionError
         assert counts() == {1}
-
-
-def test_blocks_of_several_threads_of_a_program_end_in_any_order(two):
-    inside, may_end = threading.Event(), threading.Event()
-
-    def other():
-        with one_blas_thread():
-            inside.set()
-            may_end.wait(10)
-
-    thread = threading.Thread(target=other)
-    with one_blas_thread():
-        thread.start()
-        assert inside.wait(10)
-    assert counts() == {1}
-    may_end.set()
-    thread.join()
-    assert counts() == {2}
 
 
 PROBE = """

@@ -3,7 +3,6 @@
 import sys
 from pathlib import Path
 
-import mpmath
 import numpy as np
 import pytest
 
@@ -63,18 +62,6 @@ def test_every_method_has_the_strongest_of_the_cells_in_fifty_digits(count):
     assert single.dtype == np.complex64 and 1e-7 < abs(single / truth - 1).max() < 0.1
     pytest.importorskip("finufft")
     np.testing.assert_allclose(echo_baselines.finufft(network, STATION, *given, 1e-12), truth, rtol=1e-8)
-
-
-@pytest.mark.parametrize("length", [1, 2, 7, 64, 100])
-def test_a_run_of_powers_is_their_sum(length):
-    step = mpmath.expjpi(mpmath.mpf(1) / 7)
-    assert abs(fifty_digits._run(step, length) - sum(step**k for k in range(length))) < 1e-13
-
-
-def test_ratios_of_sines_have_their_limit_at_multiples_of_pi():
-    x = np.array([0.0, 1e-14, 1e-6, 0.3, -2.0])
-    wanted = [7, 7, 7, *(np.sin(7 * x[3:]) / np.sin(x[3:]))]
-    np.testing.assert_allclose(echo_baselines._ratio(x, 7), wanted, rtol=1e-9)
 
 
 def test_light_is_as_fast_in_fifty_digits():

@@ -2,18 +2,14 @@
 
 import copy
 from dataclasses import replace
-from types import SimpleNamespace
 
-import mpmath
 import numpy as np
 import pytest
 
 from craft import NETWORK, craft
-from lowalt.config.layers import load
 from lowalt.config.network import Network
 from lowalt.echo import echo_signal
-from lowalt.measure import echo_cost, estimate
-from lowalt.recognition.schemes import named
+from lowalt.measure import echo_cost
 
 PUBLISHED = {"vx_abs_max": 5, "vy_abs_max": 5, "vz_abs_max": 2, "freq_lo_hz": 60, "freq_hi_hz": 100}
 MOTION = {
@@ -76,12 +72,6 @@ def test_the_truth_is_the_value_of_the_strongest_cell_at_two_symbols_and_the_dee
     assert set(judged[0]) != set(judged[1])
 
 
-def test_an_error_is_the_largest_at_a_judged_symbol_over_the_largest_signal():
-    signal = np.array([1.0, 4j, -8.0, 2.0])
-    assert echo_cost.error(signal, {0: mpmath.mpc(1.5), 1: mpmath.mpc(9j), 3: mpmath.mpc(-2)}) == 5 / 8
-    assert echo_cost.error(signal, {0: mpmath.mpc(1)}) == 0
-
-
 def test_the_table_has_every_method_and_its_error():
     pytest.importorskip("finufft")
     block = {"motion": MOTION, "seed": 1, "distance_m": 150.0, "points": [6, 40], "tolerances": [1e-3, 1e-15],
@@ -94,51 +84,3 @@ def test_the_table_has_every_method_and_its_error():
     assert [(row["method"], row["tolerance"], row["points"]) for row in rows] == wanted
     single, double, transform, exact, loose = (row["relative_error"] for row in rows[5:])
     assert 1e-6 < single < 1e-1 and double < 1e-10 and transform < 1e-8 and exact < 1e-13 and loose < 1e-3
-
-
-def test_a_row_is_the_mean_time_and_the_largest_error_of_all_clouds(monkeypatch):
-    found = iter([{("a", ""): (1.0, 0.5)}, {("a", ""): (3.0, 0.25)}])
-    asked = []
-    monkeypatch.setattr(echo_cost, "sample", lambda *given: asked.append(given[-2:]))
-    monkeypatch.setattr(echo_cost, "measured", lambda *given: next(found))
-    block = {"motion": {}, "seed": 1, "distance_m": 30.0, "points": [9]}
-    (row,) = echo_cost.measure(None, [SimpleNamespace(subtype="x")] * 2, {"x": {}}, block)
-    assert (row["seconds"], row["relative_error"], row["points"]) == (2.0, 0.5, 9) and asked == [(30.0, 9)] * 2
-
-
-def test_an_estimate_adds_stages_rounds_hours_and_gigabytes_and_counts_a_recipe_s_one_signal():
-    config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
-    models, samples = estimate.samples_of(config)
-    assert samples == 6 * models
-    stages = [{"rule": rule, "wall_s": "1234.567", "samples": "1000", "sample_bytes": "260123", "hardware": "here"}
-              for rule in estimate.DATA_RULES]  # fmt: skip
-    signal = 8 * 400 * 3
-    for kind, size in (("image", 260123), ("signal", signal), ("recipe", signal / 6)):
-        row = estimate.estimate(stages, [], config | {"shards": {"kind": kind}}, "x")
-        assert row["core_hours"] == round(6 * 1.234567 * samples / 3600, 2)
-        assert row["shards_gb"] == round(size * samples / 1e9, 1)
-        assert row["noisy_gb"] == round(signal * samples / 1e9, 1) and row["training_core_hours"] == ""
-
-
-def test_a_network_counts_by_its_row_of_most_images_and_settings_by_the_scheme_s_own():
-    config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
-    block = config["recognition"]
-    block |= {"schemes": ["A:VRP+TRP+VT", "ABC:VRP+TRP+VT"], "seeds": [1, 2], "protocols": ["unseen"]}
-    kept = {"backbone": block["network"]["backbone"], "pixels": str(block["size"]), "hardware": "best"}
-    costs = [
-        kept | {"network_bytes": str(9 * block["size"] ** 2), "train_ms": "1.5"},
-        kept | {"network_bytes": str(3 * block["size"] ** 2), "train_ms": "7", "hardware": "few"},
-        kept | {"network_bytes": str(9 * block["size"] ** 2), "train_ms": "8", "hardware": "later"},
-        kept | {"network_bytes": str(12 * block["size"] ** 2), "train_ms": "", "hardware": "untimed"},
-        {"backbone": "svm", "pixels": "", "network_bytes": "1", "train_ms": "", "hardware": "none"},
-    ]
-    number, hours, hardware = estimate.training_hours(costs, config)
-    visits = 2 * block["training"]["steps"] * block["training"]["batch"]
-    assert (number, hardware) == (4, "best")
-    assert hours == pytest.approx(visits * 1.5e-3 / 3600 * (9 + 3) / 9)
-    assert named(block["table"], "A:VRP+TRP+VT", "ABC").size == 0
-    assert estimate.training_hours([], config) == (4, None, "")
-    # A network that was timed on fewer images than another tells nothing of what more of them take.
-    wider = costs[0] | {"backbone": "another"}
-    assert estimate.training_hours([costs[1], wider], config) == (4, None, "")
-    assert estimate.training_hours([costs[0], wider], config) == (4, hours, "best")

@@ -131,16 +131,6 @@ def test_the_compiled_normals_are_those_of_the_draws(count):
     assert np.array_equal(found, expected.reshape(-1, 2).T)
 
 
-@pytest.mark.parametrize("count", [3, 300])
-def test_normals_apart_are_the_draws_at_even_and_at_odd_places(count):
-    real, imaginary = np.zeros((5, count + 4)), np.zeros((5, count + 3))
-    normals.apart(Draws(np.random.PCG64(1)).words(10 * count), real, imaginary)
-    expected = Draws(np.random.PCG64(1)).standard_normal((5, count, 2))
-    np.testing.assert_array_equal(real[:, 4:], expected[..., 0])
-    np.testing.assert_array_equal(imaginary[:, 3:], expected[..., 1])
-    assert not real[:, :4].any() and not imaginary[:, :3].any()
-
-
 def test_an_echo_file_that_was_cut_is_named(tmp_path):
     path = tmp_path / "A.npy"
     np.save(path, np.ones((2, 40), complex))

@@ -10,7 +10,6 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable, streams
 from lowalt.numerics.draws import Draws
 from lowalt.numerics.matrices import nearest_rotations, thinnest
-from lowalt.numerics.raw_words import FEWEST, words
 
 RNG = np.random.default_rng(5)
 WIDE = RNG.uniform(-1e5, 1e5, 300)
@@ -88,19 +87,6 @@ def test_draws_are_those_of_the_numpy_of_today_where_it_promises_none(seed):
         assert (mine.integers(3_000_000_000, size=50) == numpys.integers(3_000_000_000, size=50)).all()
         assert (mine.permutation(11) == numpys.permutation(11)).all()
         assert (mine.permutation(np.arange(7) * 2) == numpys.permutation(np.arange(7) * 2)).all()
-
-
-@pytest.mark.parametrize("count", [1, FEWEST, 9001, 102_400])
-@pytest.mark.parametrize("kept", [False, True])
-def test_compiled_words_are_those_of_the_generator_and_leave_it_where_it_would_stand(count, kept):
-    compiled, plain = (np.random.PCG64(11) for _ in range(2))
-    for bits in (compiled, plain):
-        # A 32-bit draw leaves half a word behind.
-        np.random.Generator(bits).integers(0, 99, int(kept), dtype=np.int32)
-    assert np.array_equal(words(compiled, count), plain.random_raw(count))
-    assert compiled.state == plain.state
-    assert compiled.state["has_uint32"] == kept
-    assert np.array_equal(words(compiled, 5), plain.random_raw(5))
 
 
 @pytest.mark.parametrize("last", [bytes(4), bytes(8), b"\x00\x00\x00\x01", b"\xff" * 4])

@@ -35,17 +35,11 @@ number = 3
 """
 
 
-def small_recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", **changes):
+def small_recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", own_backbone="", **changes):
     torch.manual_seed(0)
-    row = {
-        "scheme": "x",
-        "stations": stations,
-        "spectra": spectra,
-        "fusion": fusion,
-        "backbone": "",
-        "protocols": "seen",
-    }
-    return recogniser.Recogniser(schemes.scheme(row, "test", "ABC"), {**BLOCK, **changes}, SIZE, PALETTES, 4).eval()
+    places = tuple("ABC".index(name) for name in stations), tuple(schemes.SPECTRA.index(n) for n in spectra.split("+"))
+    scheme = schemes.Scheme("x", *places, fusion, own_backbone)
+    return recogniser.Recogniser(scheme, {**BLOCK, **changes}, SIZE, PALETTES, 4).eval()
 
 
 def images(samples, views, seed=0):
@@ -144,14 +138,6 @@ def test_parameter_counts_follow_from_the_shapes():
     assert recogniser.parameters(hidden) == base + (width + 1) * 16 + (16 + 1) * 4
 
 
-def test_encoders_normalise_first_and_last():
-    model = small_recogniser()
-    for encoder in (model.fusion.intra, model.fusion.inter):
-        assert encoder.layers[0].norm_first
-        assert isinstance(encoder.norm, nn.LayerNorm)
-        assert not encoder.enable_nested_tensor
-
-
 @pytest.mark.parametrize(
     "name", ["test_resnet", "test_vit", "test_convnext", "test_efficientnet", "mobilenetv3_small_050"]
 )
@@ -162,17 +148,7 @@ def test_any_kind_of_backbone_trains_a_step(name):
 
 
 def test_a_row_of_the_table_chooses_its_own_backbone():
-    row = {
-        "scheme": "x",
-        "stations": "A",
-        "spectra": "VT",
-        "fusion": "mean",
-        "backbone": "test_vit",
-        "protocols": "seen",
-    }
-    model = recogniser.Recogniser(
-        schemes.scheme(row, "test", "ABC"), {**BLOCK, "backbone": "test_resnet"}, SIZE, PALETTES, 4
-    )
+    model = small_recogniser("A", "VT", "mean", "test_vit", backbone="test_resnet")
     assert type(model.backbone).__name__ == "VisionTransformer"
 
 
@@ -225,27 +201,18 @@ def test_the_module_gives_its_features_and_learns(file):
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
+    ("name", "weights", "message"),
     [
-        ("none.py:small", "no file none.py"),
-        ("{file}:other", "no function 'other'"),
-        ("{file}:number", "no function 'number'"),
-        ("{file}:broken", "ValueError: no network today"),
-        ("{file}:empty", r"gives \(2, 3, 24, 24\) for two images"),
+        ("none.py:small", "none", "no file none.py"),
+        ("{file}:other", "none", "no function 'other'"),
+        ("{file}:number", "none", "no function 'number'"),
+        ("{file}:broken", "none", "ValueError: no network today"),
+        ("{file}:empty", "none", r"gives \(2, 3, 24, 24\) for two images"),
+        ("{file}:small", "hub", "expected 'none'"),
+        ("bad.py:small", "none", r"bad\.py:small.*SyntaxError"),
     ],
 )
-def test_a_wrong_name_is_refused(file, name, message):
+def test_a_module_that_cannot_be_made_is_refused_by_name(file, name, weights, message):
+    file.with_name("bad.py").write_text("def small(size:\n")
     with pytest.raises(InputError, match=message):
-        recogniser.backbone(name.format(file=file), "none", 24)
-
-
-def test_weights_of_a_library_do_not_fit_a_module_of_one_s_own(file):
-    with pytest.raises(InputError, match="expected 'none'"):
-        recogniser.backbone(f"{file}:small", "hub", 24)
-
-
-def test_a_file_with_a_fault_is_named(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.py").write_text("def small(size:\n")
-    with pytest.raises(InputError, match=r"bad\.py:small.*SyntaxError"):
-        recogniser.backbone(f"{tmp_path}/bad.py:small", "none", 24)
+        recogniser.backbone(name.format(file=file), weights, 24)

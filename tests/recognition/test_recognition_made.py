@@ -14,7 +14,6 @@ from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, samples, schemes
 from lowalt.recognition.__main__ import main
-from lowalt.recognition.ahead import Augmented
 from lowalt.recognition.made import DatasetSamples, opened, stations_of
 from lowalt.recognition.views import ShardSamples
 from lowalt.scene import chain
@@ -61,15 +60,6 @@ def test_order_facts_and_pixels_are_those_of_the_shards(pair):
     copy.keep(some[1:])
     assert (copy.views(np.array([0, 2])) == stored.views(some[[1, 3]])).all()
     assert copy.facts.key.tolist() == stored.facts.key[some[1:]].tolist()
-
-
-def test_the_network_gets_the_same_tensors(pair):
-    augmentation = {"mirror": 0.5, "shift_doppler": 0.0, "shift_time": 0.1, "contrast": 0.3, "mask_doppler": 0.0,
-                    "mask_time": 0.0, "drop_view": 0.0}  # fmt: skip
-    readers = [Augmented(source, COLUMNS, augmentation, (5, "a"), 0, 1) for source in pair]
-    for step, numbers in ((0, np.array([4, 9, 2])), (7, np.array([50, 1]))):
-        (images, labels), (same_images, same_labels) = (reader[step, numbers] for reader in readers)
-        assert torch.equal(images, same_images) and torch.equal(labels, same_labels)
 
 
 def test_clean_echoes_are_computed_once_a_motion_model(run, pair, monkeypatch):

@@ -126,76 +126,23 @@ def test_a_rank_beside_the_first_writes_and_says_nothing(views, trained, tmp_pat
     assert not list(tmp_path.iterdir()) and not capsys.readouterr().err
 
 
-def launched(lines, processes):
-    """Run one training under a launcher for each command line, with so many processes each.
-
-    Returns the exit status and the text of each launcher.
-    """
-    nodes = len(lines)
-    port = str(20000 + os.getpid() % 20000 + nodes)
+@pytest.mark.slow
+def test_two_nodes_of_one_process_train_to_the_bytes_of_the_workflow_s_launcher_of_two(views, tmp_path):
+    """The launcher: the words that the rule `train` puts before the module (`recognition.processes: 2`)."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
-    launchers = []
-    for node, arguments in enumerate(lines):
-        command = [sys.executable, "-m", "torch.distributed.run", "--nnodes", str(nodes), "--node-rank", str(node)]
-        command += ["--nproc-per-node", str(processes), "--master-addr", "127.0.0.1", "--master-port", port]
-        command += ["-m", "lowalt.recognition", *arguments]
+    nodes = ["torch.distributed.run", "--nnodes", "2", "--nproc-per-node", "1", "--master-addr", "127.0.0.1"]
+    nodes += ["--master-port", str(20002 + os.getpid() % 20000), "--node-rank"]
+    for name, launchers in (("one", [Launch.of({"processes": 2}).words]), ("two", [[*nodes, "0"], [*nodes, "1"]])):
+        line = ["-m", "lowalt.recognition"] if name == "two" else ["lowalt.recognition"]
+        line += training_line(tmp_path, views, name, 8)
+        commands = [[sys.executable, "-m", *words, *line] for words in launchers]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-        launchers.append(subprocess.Popen(command, env=environment, **pipes))
-    texts = [launcher.communicate(timeout=300)[0] for launcher in launchers]
-    return [(launcher.returncode, text) for launcher, text in zip(launchers, texts, strict=True)]
-
-
-def trained(lines, processes):
-    """The same, where all must end well."""
-    for status, text in launched(lines, processes):
-        assert status == 0, text[-3000:]
-
-
-@pytest.mark.slow
-def test_the_workflow_s_launcher_trains_to_the_bytes_of_plain_torchrun(views, tmp_path):
-    """The words that the rule `train` puts between `python -m` and the module (`recognition.processes: 2`)."""
-    settings = json.dumps(with_training(steps=4, validate_every=2))
-    line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "A:VRP"]
-    table = tmp_path / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nA:VRP,A,VRP,attention,,seen\n")
-    line += ["--stations", "A", "B", "C", "--schemes", str(table), "--out"]
-    trained([[*line, str(tmp_path / "plain")]], 2)
-    words = Launch.of({"processes": 2}).words
-    command = [sys.executable, "-m", *words, "lowalt.recognition", *line, str(tmp_path / "rule")]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
-    assert run.returncode == 0, run.stderr[-3000:]
-    assert json.loads((tmp_path / "rule/run.json").read_text())["ranks"] == 2
-    assert (tmp_path / "rule/model.pt").read_bytes() == (tmp_path / "plain/model.pt").read_bytes()
-
-
-@pytest.mark.slow
-def test_two_nodes_of_one_process_train_to_the_bytes_of_one_node_of_two(views, tmp_path):
-    table = tmp_path / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
-    settings = json.dumps(with_training(steps=12, validate_every=6))
-    for name, nodes, processes in (("one", 1, 2), ("two", 2, 1)):
-        line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "AB:VRP+VT"]
-        line += ["--stations", "A", "B", "C", "--schemes", str(table), "--out", str(tmp_path / name)]
-        trained(nodes * [line], processes)
+        for process in [subprocess.Popen(command, env=environment, **pipes) for command in commands]:
+            said, _ = process.communicate(timeout=300)
+            assert process.returncode == 0, said[-3000:]
         assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == 2
     for name in ("model.pt", "history.csv"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
-
-
-@pytest.mark.slow
-def test_nodes_that_train_unlike_things_are_told_instead_of_mixing_their_gradients(views, tmp_path):
-    table = tmp_path / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nA:VRP,A,VRP,attention,,seen\n")
-    lines = []
-    for precision in ("fp32", "bf16"):
-        settings = json.dumps(with_training(steps=2, validate_every=2, precision=precision))
-        line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "A:VRP"]
-        lines.append([*line, "--stations", "A", "B", "C", "--schemes", str(table), "--out", str(tmp_path / "out")])
-    found = launched(lines, 1)
-    assert all(status for status, _ in found)
-    assert any("stands at step 0, another rank differs in that" in text for _, text in found), found
-    assert not (tmp_path / "out/model.pt").exists()
 
 
 @pytest.fixture

@@ -15,7 +15,6 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, recipe, runs, samples, schemes, training
 from lowalt.recognition.__main__ import main
-from lowalt.recognition.recogniser import built
 from trainings import SCHEME, TRAINING, Killed, equal, kill_at, sources, train, with_training
 
 
@@ -46,28 +45,19 @@ def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp
 def test_checkpoints_come_by_the_clock_and_the_time_spent_waiting_for_data_is_told(
     views, tmp_path, monkeypatch, capsys
 ):
-    """On a clock that stands still but for a second of reading and three of computing a step."""
+    """On a clock that stands still except for four seconds of reading a batch."""
     clock = SimpleNamespace(now=0.0, monotonic=lambda: clock.now, process_time=lambda: clock.now)
     monkeypatch.setattr(training, "time", clock)
     monkeypatch.setattr(runs, "time", clock)
 
     class Slow(samples.ViewSamples):
         def changed(self, *given):
-            clock.now += 1
+            clock.now += 4
             return super().changed(*given)
-
-    def compute(model, inputs):
-        clock.now += 3 if model.training else 0
-
-    def build(*given):
-        model = built(*given)
-        model.register_forward_pre_hook(compute)
-        return model
 
     def run(**changes):
         found = sources(views) | {"train": Slow([views], SCHEME.columns, {("seen", "train")})}
-        settings = with_training(steps=6, validate_every=6, **changes)
-        runs.train(found, SCHEME, "seen", settings, tmp_path, build=build)
+        runs.train(found, SCHEME, "seen", with_training(steps=6, validate_every=6, **changes), tmp_path)
 
     step = kill_at(monkeypatch, 5)
     with pytest.raises(Killed):
@@ -76,9 +66,9 @@ def test_checkpoints_come_by_the_clock_and_the_time_spent_waiting_for_data_is_to
     monkeypatch.setattr(runs.Trainer, "_step", step)
     run(checkpoint_s=1e9)
     told = capsys.readouterr().err
-    assert "resumed at step 3" in told and "2 samples/s, 25.0 % of the time waiting for data" in told
+    assert "resumed at step 3" in told and "2 samples/s, 100.0 % of the time waiting for data" in told
     record = json.loads((tmp_path / "run.json").read_text())
-    assert (record["waiting_share"], record["samples_per_s"], record["train_s"]) == (0.25, 2.0, 12.0)
+    assert (record["waiting_share"], record["samples_per_s"], record["train_s"]) == (1.0, 2.0, 12.0)
 
 
 def killed_at(moments, views, folder, settings):

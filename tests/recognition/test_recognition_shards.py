@@ -150,6 +150,29 @@ def test_scores_come_from_the_shards_labels_not_from_the_file(dataset, model, tm
     lying = [{**row, "label": "0"} for row in rows]
     assert score.score(written(lying), dataset / "index.json", "seen") == found
     assert score.score(written(short[::-1]), dataset / "index.json", "seen") == found
+    tested = next(row for row in rows if row["key"] == ours.key[0])
+    others = [row for row in short if row["key"] != tested["key"]]
+    sure = {"key": tested["key"], "p_uav": 1, "p_bird": 0, "p_vehicle": 0, "p_pedestrian": 0}
+    for wrong, words in (
+        ([], f"1 test samples have no prediction, the first is '{tested['key']}'"), ([sure, sure], "stands twice"),
+        ([sure | {"p_bird": 0.2}], "with sum 1"), ([sure | {"p_uav": 1.1, "p_bird": -0.1}], "with sum 1"),
+        ([sure | {"p_bird": "x"}], "line 2"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            score.score(written([*wrong, *others]), dataset / "index.json", "seen")
+    with pytest.raises(InputError, match="lacks the columns"):
+        score.score(written([{"key": row["key"]} for row in rows]), dataset / "index.json", "seen")
+
+
+def test_scores_count_every_snr_alike():
+    """Three samples of two classes: one right, one wrong at 3 dB, one right without noise."""
+    unused = dict.fromkeys(("key", "model", "group", "fold", "range_m", "aspect_rad"), np.zeros(3))
+    names, snrs = np.array(["Crow", "Owl", "Owl"]), np.array([3.0, 3.0, np.inf])
+    facts = samples.Facts(label=np.array([0, 1, 1]), snr_db=snrs, subtype=names, **unused)
+    found = score.scores(facts, np.array([[0.9, 0.1], [0.6, 0.4], [0.2, 0.8]]))
+    assert found["accuracy_percent"] == 75 and found["by_snr_percent"] == {"3": 50.0, "inf": 100.0}
+    assert found["by_subtype_percent"] == {"Crow": 100.0, "Owl": 50.0} and found["confusion"] == [[1, 0], [1, 1]]
+    assert found["brier"] == pytest.approx((0.02 + 0.72 + 0.08) / 3)
 
 
 def test_unknown_shards_and_sizes_are_refused(dataset, tmp_path):
@@ -179,13 +202,6 @@ def test_views_from_the_tiles_stage_are_those_from_decoded_images_byte_for_byte(
         settings = json.dumps({"size": size, "snr_db": SNRS})
         main(["views", "--settings", settings, *given, *same, str(tmp_path / "reduced.npz")])
         assert (tmp_path / "reduced.npz").read_bytes() == (tmp_path / "decoded.npz").read_bytes()
-
-
-def test_reduced_images_leave_the_tiles_as_they_are_and_none_are_made_unasked(dataset, tmp_path):
-    reduce_tiles(dataset, tmp_path / "with", "seen", (24,))
-    reduce_tiles(dataset, tmp_path / "without", "seen", ())
-    assert (tmp_path / "with/tiles.npz").read_bytes() == (tmp_path / "without/tiles.npz").read_bytes()
-    assert [path.name for path in (tmp_path / "without").iterdir()] == ["tiles.npz"]
 
 
 def test_reduced_images_of_another_size_chunk_or_snr_are_refused_by_name(dataset, tmp_path):

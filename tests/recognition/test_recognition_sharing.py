@@ -1,4 +1,4 @@
-"""Models that others can use: safetensors with the run's identity, ONNX, cards, 8-bit entries of the zoo, the hub."""
+"""Models that others can use: safetensors with the run's identity, ONNX, cards, 8-bit entries of the zoo."""
 
 import json
 import shutil
@@ -14,7 +14,7 @@ from safetensors import safe_open
 
 from lowalt.__main__ import main
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, eight_bits, model_file, one_sample, runs, upload, zoo
+from lowalt.recognition import checkpoint, eight_bits, model_file, one_sample, runs, zoo
 from lowalt.recognition.export import export
 from made_predictions import facts
 from pictures import IMAGES, NETWORK, SPECTRA
@@ -185,13 +185,13 @@ def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name
 
 @pytest.mark.parametrize("name", ["uav_3ghz", "bird_drone_10ghz", "cw_24ghz"])
 def test_the_shipped_entries_of_radars_are_those_of_the_twins_there_are(name, monkeypatch):
-    from lowalt.recordings.library import Library
+    from lowalt.recordings.twin import radars
 
     monkeypatch.chdir(ROOT)
     path = zoo.ZOO / f"{name}.safetensors"
     assert path.stat().st_size < zoo.LARGEST_BYTES and model_file.read(path).measured["percent"] > 80
     radar = zoo.opened(name)[1]["radar"]
-    assert radar == asdict(Library.read("config/measured/twins.yaml").twins[name])
+    assert radar == asdict(radars()[name])
     card = path.with_suffix(".md").read_text()
     assert f"a radar of {radar['carrier_hz'] / 1e9:g} GHz" in card and f"lowalt predict {name} recording.yaml" in card
 
@@ -211,56 +211,6 @@ def test_signals_become_images_as_the_model_file_says_unless_overlays_are_given(
     for gamma, answer in zip((1.0, 0.25), found, strict=True):
         assert answer == one_sample.predict(model, signals, {**made, "images": {**made["images"], "gamma": gamma}})
     assert found[0] != found[1]
-
-
-class Hub:
-    """Stands in for the hub and notes what is asked of it, with the bytes of the files."""
-
-    def __init__(self):
-        self.calls = []
-
-    def create_repo(self, *names, **options):
-        self.calls.append((names, options))
-
-    def upload_folder(self, **options):
-        folder = Path(options["folder_path"])
-        self.calls.append((options, {path.name: path.read_bytes() for path in folder.iterdir()}))
-
-
-def test_an_upload_sends_the_file_and_its_card_as_the_repositorys_page(finished, tmp_path, monkeypatch):
-    path, client = tmp_path / "mine.safetensors", Hub()
-    export(runs.load(finished), path)
-    upload.upload(path, "somebody/echoes", client)
-    (names, made), (options, sent) = client.calls
-    assert names == ("somebody/echoes",) and made["repo_type"] == "model" and made["private"]
-    assert options["repo_type"] == "model" and set(options["allow_patterns"]) == set(sent)
-    card = path.with_suffix(".md")
-    assert sent == {"model.safetensors": path.read_bytes(), "README.md": card.read_bytes()}
-    line = ["--model", str(path), "--repository", "somebody/echoes"]
-    monkeypatch.delenv("HF_TOKEN", raising=False)
-    with pytest.raises(InputError, match="HF_TOKEN"):
-        upload.main(line)
-    with pytest.raises(InputError, match="USER/NAME"):
-        upload.upload(path, "echoes", client)
-    card.unlink()
-    with pytest.raises(InputError, match="model card"):
-        upload.upload(path, "somebody/echoes", client)
-    path.write_bytes(path.read_bytes()[:-8])
-    with pytest.raises(InputError, match="not a model file"):
-        upload.upload(path, "somebody/echoes", client)
-    assert len(client.calls) == 2
-
-
-def test_the_hubs_own_client_is_asked_with_the_token_and_nothing_is_sent(finished, tmp_path, monkeypatch, capsys):
-    hub = pytest.importorskip("huggingface_hub")
-    export(runs.load(finished), tmp_path / "mine.safetensors")
-    seen = []
-    monkeypatch.setenv("HF_TOKEN", "hf_token_of_nobody")
-    monkeypatch.setattr(hub.HfApi, "create_repo", lambda self, *names, **options: seen.append((self.token, names)))
-    monkeypatch.setattr(hub.HfApi, "upload_folder", lambda self, **options: seen.append(options["repo_id"]))
-    upload.main(["--model", str(tmp_path / "mine.safetensors"), "--repository", "somebody/echoes"])
-    assert seen == [("hf_token_of_nobody", ("somebody/echoes",)), "somebody/echoes"]
-    assert "hf_token" not in capsys.readouterr().out
 
 
 @pytest.mark.slow

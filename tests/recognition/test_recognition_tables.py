@@ -2,18 +2,20 @@
 models of other runs compared sample by sample."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import orderings, predictions, samples, schemes, tables, transfer
+from lowalt.recognition import orderings, predictions, samples, schemes, statistics, tables, transfer
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
 from lowalt.report.pivots import macro_f1 as in_words
-from made_predictions import read_rows, run_files
+from made_predictions import facts, read_rows, run_files
 
 SNRS = (3.0, np.inf)
 PUBLISHED = orderings.read_published("config/published_accuracy.csv")
@@ -56,10 +58,6 @@ def test_tables_say_what_the_predictions_say(tmp_path):
     (ordering,) = read_rows(tmp_path / "out/orderings.csv")
     assert (ordering["ordering"], ordering["over"]) == ("not ranked", "A:VRP+TRP+VT")
     assert float(ordering["paper_points"]) == pytest.approx(99.88 - 98.94)
-    bands = [row for row in read_rows(tmp_path / "out/reliability.csv") if row["scheme"] == "ABC:VRP+TRP+VT"]
-    assert sum(int(row["samples"]) for row in bands) == test.sum()
-    right = sum(int(row["samples"]) * float(row["accuracy_percent"]) for row in bands) / test.sum()
-    assert right == pytest.approx(100 * (guess == found.label)[test].mean(), abs=1e-3)
     alarms = read_rows(tmp_path / "out/alarms.csv")
     assert [float(row["asked_percent"]) for row in alarms[:3]] == [90, 95, 99]
 
@@ -88,17 +86,10 @@ def test_several_seeds_are_averaged(tmp_path):
     assert float(average["accuracy_percent"]) == pytest.approx(np.mean(seeds), abs=1e-3)
     assert average["seeds"] == "3"
     assert float(average["spread_points"]) == pytest.approx(np.std(seeds, ddof=1), abs=1e-3)
-    (calibrated,) = read_rows(tmp_path / "calibration.csv")
-    each = []
-    for seed in (0, 1, 2):
-        tables.write([Evaluated(paths[seed])], names, {}, tmp_path / str(seed), 1)
-        each += read_rows(tmp_path / str(seed) / "calibration.csv")
-    assert float(calibrated["brier"]) == pytest.approx(np.mean([float(row["brier"]) for row in each]), abs=1e-5)
-    assert len({row["brier"] for row in each}) > 1
 
 
 def test_bands_begin_at_multiples_of_their_width_and_leave_out_samples_without_a_value(tmp_path):
-    """Ranges in bands of 50 m, aspects in bands of 30 degrees; the means are over both seeds."""
+    """The means are over both seeds."""
     paths = [run_files(tmp_path, "seen", "A:VT", 0.7, seed=seed)[0] for seed in (0, 1)]
     runs = [Evaluated(path) for path in paths]
     test = runs[0].test
@@ -107,12 +98,6 @@ def test_bands_begin_at_multiples_of_their_width_and_leave_out_samples_without_a
     rows = list(tables.band_rows(runs, lambda found: values, 50))
     for row, (start, chosen) in zip(rows, ((0, values < 50), (50, values >= 50)), strict=True):
         assert row == [f"{start}", f"{start + 50}", f"{100 * right[chosen].mean():.4f}", chosen.sum()]
-    tables.write(runs, ["A:VT"], {}, tmp_path, 1)
-    for name, column, width in (("ranges", test.range_m, 50), ("aspects", test.aspect_deg, 30)):
-        found = read_rows(tmp_path / f"{name}.csv")
-        firsts = sorted(set((column // width * width).astype(int).tolist()))
-        assert [(row["from"], row["to"]) for row in found] == [(f"{one}", f"{one + width}") for one in firsts]
-        assert sum(int(row["samples"]) for row in found) == len(test)
 
 
 def test_tables_do_without_published_accuracies(tmp_path):
@@ -198,13 +183,13 @@ def predicted(path, right, trained_on="", scheme="A:VT", seed=0):
     """Predictions for 40 motion models, at 3 dB and without noise, of which the `right` ones are called rightly."""
     count = len(right)
     label = np.arange(count // 2).repeat(2) % 4
-    facts = samples.Facts(
+    known = samples.Facts(
         key=np.array([f"k{number:03d}" for number in range(count)]), subtype=np.char.add("s", label.astype(str)),
         model=np.arange(count // 2).repeat(2), snr_db=np.tile(SNRS, count // 2), group=np.full(count, "seen"),
         fold=np.full(count, "test"), label=label, range_m=np.ones((count, 3)), aspect_rad=np.ones((count, 3)),
     )  # fmt: skip
     guess = np.where(right, label, (label + 1) % 4)
-    predictions.write(path, predictions.from_facts(facts, (0,), np.eye(4)[guess]))
+    predictions.write(path, predictions.from_facts(known, (0,), np.eye(4)[guess]))
     about = {"protocol": "seen", "scheme": scheme, "seed": seed, "hardware": "none", "trained_on": trained_on}
     path.with_suffix(".json").write_text(json.dumps(about))
     return Evaluated(path)
@@ -246,14 +231,6 @@ def test_the_spread_between_seeds_is_that_of_both_models_pooled(tmp_path):
     assert float(average["spread_points"]) == pytest.approx(2.5)
 
 
-def test_a_model_compared_with_itself_differs_nowhere(tmp_path):
-    right = stream(1, "right").random(80) < 0.7
-    own = predicted(tmp_path / "own.csv", right)
-    same = predicted(tmp_path / "same.csv", right, "twin")
-    for row in transfer.comparison([own], [same], "twin", 1):
-        assert row[3:6] == ["0.0000"] * 3
-
-
 def test_strangers_are_refused_by_name(tmp_path):
     own = predicted(tmp_path / "own.csv", np.ones(80, dtype=bool))
     fewer = predicted(tmp_path / "fewer.csv", np.ones(60, dtype=bool), "small")
@@ -270,3 +247,60 @@ def test_a_split_that_would_leak_is_refused():
     transfer.check_folds(own, {"run": "there", "seed": 2, "split": {"by": "sample", "train": 7, "val": 2, "test": 1}})
     with pytest.raises(InputError, match="'there' has the same seed 1"):
         transfer.check_folds(own, {**own, "run": "there", "split": {**own["split"], "by": "sample"}})
+
+
+def test_thresholds_come_from_validation_samples_and_not_from_those_they_are_judged_by(tmp_path):
+    found = facts(models=200)
+    score = stream(1, "scores").uniform(0, 1, len(found))
+    # Scores of test samples are half of those of validation samples.
+    score[found.fold == "test"] /= 2
+    rest = np.repeat(((1 - score) / 3)[:, None], 3, 1)
+    path, *_ = run_files(tmp_path, "seen", "A:VT", 0.9)
+    predictions.write(path, predictions.from_facts(found, (0,), np.column_stack([score, rest])))
+    tables.write([Evaluated(path)], ["A:VT"], {}, tmp_path, 1)
+    uav = found.label == 0
+    levels = {
+        fold: statistics.threshold(score[found.fold == fold], found.label[found.fold == fold], 0.8)
+        for fold in ("val", "test")
+    }
+    assert levels["val"] > 1.5 * levels["test"]
+    for row in read_rows(tmp_path / "alarms.csv"):
+        if row["threshold"] == "not measurable":
+            continue
+        asked = float(row["asked_percent"]) / 100
+        mine = found.fold == "val"
+        level = statistics.threshold(score[mine], found.label[mine], asked)
+        assert float(row["threshold"]) == level
+        reached = (score[uav & (found.fold == "test")] >= level).mean()
+        assert float(row["detected_percent"]) == pytest.approx(100 * reached, abs=1e-3)
+    rows = read_rows(tmp_path / "alarms.csv")
+    # 120 UAVs validate: a tenth of them are twelve samples, a twentieth are six.
+    assert [row["threshold"] == "not measurable" for row in rows] == [False, True, True]
+
+
+def test_a_comparison_averages_all_seeds_and_not_the_first(tmp_path):
+    one, other = (
+        [Evaluated(run_files(tmp_path, "seen", name, share, seed=seed)[0]) for seed, share in enumerate(shares)]
+        for name, shares in (("ABC:VRP+TRP+VT", (0.9, 0.6, 0.3)), ("A:VRP+TRP+VT", (0.5, 0.5, 0.5)))
+    )
+    ((resampled, seeds, difference, low, high),) = tables.comparison_rows(one, other, 1)
+    each = [100 * (a.test.correct.mean() - b.test.correct.mean()) for a, b in zip(one, other, strict=True)]
+    assert (resampled, seeds) == ("seeds, motion models", 3)
+    assert float(difference) == pytest.approx(np.mean(each), abs=1e-3)
+    assert abs(each[0] - np.mean(each)) > 20
+    # Seeds that lie 60 points apart make an interval of many points.
+    assert float(high) - float(low) > 30
+
+
+def test_every_table_that_the_report_s_page_or_recognition_s_document_names_is_kept_or_made_by_a_rule():
+    kept = {
+        path.name for folder in ("results/reference", "results/benchmarks", "config") for path in Path(folder).iterdir()
+    }
+    rules = "".join(path.read_text() for path in [*Path("workflow").rglob("*.smk"), *Path("src/lowalt").rglob("*.py")])
+    made = set(re.findall(r"[\w-]+\.csv", rules))
+    # Tables that the stage writes by their stems.
+    made |= {f"{name}.csv" for name in re.findall(r'"(\w+)": \(', Path("src/lowalt/recognition/tables.py").read_text())}
+    pages = [Path("results/README.md"), Path("design/recognition.md"), *Path("src/lowalt/report").rglob("*.html")]
+    named = {(page.name, name) for page in pages for name in re.findall(r"(?<![\w}*-])[\w-]+\.csv\b", page.read_text())}
+    assert len(named) > 5
+    assert not {(page, name) for page, name in named if name not in kept | made}

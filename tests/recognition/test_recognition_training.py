@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from timm.utils import ModelEmaV3
 from torch import nn
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
@@ -22,7 +21,6 @@ from lowalt.recognition.ahead import Augmented
 from lowalt.recognition.matrix_products import MatrixProduct
 from lowalt.recognition.objective import objective
 from lowalt.recognition.order import batches, epoch_order
-from lowalt.recognition.statistics import cross_entropy
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
 
 PATHS = os.pathsep.join(str(Path(__file__).parents[2] / folder) for folder in ("src", "tests/support"))
@@ -47,12 +45,7 @@ def test_equal_seeds_repeat_bit_for_bit_and_others_do_not(views, tmp_path, preci
     two = train(views, tmp_path / "two", settings)
     assert equal(one[0], two[0]) and one[1] == two[1]
     assert not equal(one[0], train(views, tmp_path / "three", {**settings, "seed": 4})[0])
-
-
-def test_workers_that_read_ahead_change_no_bit(views, tmp_path):
-    one = train(views, tmp_path / "here", with_training(steps=9, validate_every=3))
-    two = train(views, tmp_path / "ahead", with_training(steps=9, validate_every=3, workers=2))
-    assert equal(one[0], two[0]) and one[1] == two[1]
+    assert torch.are_deterministic_algorithms_enabled() and torch.get_num_threads() == 1
 
 
 @pytest.mark.parametrize("precision", ["fp32", "bf16"])
@@ -124,28 +117,6 @@ def test_early_stopping_counts_validations_without_gain_and_no_patience_asked_fo
     assert len(history.splitlines()) == 1 + 4
 
 
-@pytest.mark.parametrize("change", [{"steps": 0}, {"rate": -1.0}, {"precision": "fp16"}, {"warmup": 2}, {"epochs": 3},
-                                    {"batch": True}, {"ema": math.nan}, {"threads": 1.0}])  # fmt: skip
-def test_wrong_training_settings_are_refused_by_name(change):
-    with pytest.raises(InputError, match=rf"recognition\.training: .*{next(iter(change))}.*, expected"):
-        recipe.check({**TRAINING, **change})
-
-
-@pytest.mark.parametrize("change", [{"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1}])
-def test_wrong_augmentation_is_refused_by_name(views, tmp_path, change):
-    settings = {**SETTINGS, "augmentation": {**SETTINGS["augmentation"], **change}}
-    with pytest.raises(InputError, match=rf"recognition\.augmentation: .*{next(iter(change))}.*, expected"):
-        train(views, tmp_path, settings)
-
-
-def test_settings_that_may_be_left_out_change_nothing_then():
-    checked = recipe.check(TRAINING)
-    assert checked == {**TRAINING, "accumulate": 1, "activation_checkpointing": False}
-    assert recipe.check({**TRAINING, "batch": 3, "accumulate": 3})["accumulate"] == 3
-    with pytest.raises(InputError, match="accumulate is 4, expected at most batch, 3"):
-        recipe.check({**TRAINING, "batch": 3, "accumulate": 4})
-
-
 def test_batches_follow_each_epoch_s_order_and_validations_the_steps_and_the_end(views, tmp_path):
     read = []
 
@@ -165,26 +136,16 @@ def test_batches_follow_each_epoch_s_order_and_validations_the_steps_and_the_end
     assert [row.split(",")[:3] for row in rows] == [["3", "0", "39"], ["6", "1", "78"], ["8", "2", "104"]]
 
 
-@pytest.mark.parametrize("last", [True, False])
-def test_weights_lie_in_memory_as_the_settings_say_and_products_stand_for_convolutions_in_float32(
-    views, tmp_path, last
+@pytest.mark.parametrize(("last", "precision", "kind"), [(True, "fp32", MatrixProduct), (False, "bf16", nn.Conv2d)])
+def test_weights_lie_in_memory_as_asked_and_products_stand_for_convolutions_in_float32(
+    views, tmp_path, last, precision, kind
 ):
-    for precision, kind in (("fp32", MatrixProduct), ("bf16", nn.Conv2d)):
-        settings = with_training(channels_last=last)
-        settings["training"] = recipe.check(settings["training"])
-        machine = inference.Machine(torch.device("cpu"), precision)
-        run = loop.TrainingRun(("a",), "x", tmp_path)
-        model = loop.Trainer(nn.Conv2d(4, 8, 3), sources(views), SCHEME.columns, settings, run, machine).model
-        assert model.weight.is_contiguous(memory_format=torch.channels_last) == last
-        assert type(model) is kind and model.training
-
-
-def test_the_rate_rises_linearly_and_falls_as_a_cosine():
-    assert recipe.schedule(0.05, 0.1) == pytest.approx(0.5)
-    assert recipe.schedule(0.1, 0.1) == pytest.approx(1.0)
-    assert recipe.schedule(0.55, 0.1) == pytest.approx(0.5)
-    assert recipe.schedule(1.0, 0.1) == pytest.approx(0.0, abs=1e-12)
-    assert recipe.schedule(1.0, 1.0) == 1.0
+    settings = with_training(channels_last=last)
+    settings["training"] = recipe.check(settings["training"])
+    run, machine = loop.TrainingRun(("a",), "x", tmp_path), inference.Machine(torch.device("cpu"), precision)
+    model = loop.Trainer(nn.Conv2d(4, 8, 3), sources(views), SCHEME.columns, settings, run, machine).model
+    assert model.weight.is_contiguous(memory_format=torch.channels_last) == last
+    assert type(model) is kind and model.training
 
 
 def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
@@ -241,48 +202,6 @@ def test_a_compiled_network_trains_to_the_same_history(views, tmp_path):
     np.testing.assert_allclose(other, one, rtol=1e-3)
 
 
-@pytest.mark.parametrize("decay", [0.0, 0.6, 0.99, 1.0])
-def test_the_moving_average_weighs_the_weights_of_k_steps_ago_by_the_decay_to_the_k(decay):
-    weights = [3.0, -1.0, 4.0, 1.5, 9.0]
-    average = 77.0
-    for step, weight in enumerate(weights, start=1):
-        kept = recipe.averaging(decay, step)
-        average = kept * average + (1 - kept) * weight
-        ages = [decay**age for age in range(step)][::-1]
-        assert average == pytest.approx(np.average(weights[:step], weights=ages))
-
-
-def test_averages_of_a_network_are_those_of_timm_bit_for_bit():
-    torch.manual_seed(3)
-    model = nn.Sequential(nn.Linear(3, 4), nn.BatchNorm1d(4))
-    average, reference = recipe.MovingAverage(model), ModelEmaV3(model)
-    for step in range(1, 8):
-        model(torch.randn(5, 3)).sum().backward()
-        with torch.no_grad():
-            for value in model.parameters():
-                value -= 0.1 * torch.randn_like(value)
-        reference.decay = recipe.averaging(0.9, step)
-        average.update(reference.decay)
-        reference.update(model)
-        assert average.module[1].num_batches_tracked == step
-        assert equal(average.module.state_dict(), reference.module.state_dict())
-    # It goes on with the weights that a checkpoint brings.
-    average.module.load_state_dict({name: torch.full_like(value, 1) for name, value in model.state_dict().items()})
-    model.load_state_dict({name: torch.full_like(value, 3) for name, value in model.state_dict().items()})
-    average.update(0.5)
-    assert torch.equal(average.module[0].weight, torch.full((4, 3), 2.0))
-
-
-def test_seed_names_and_threads_fix_what_torch_draws():
-    drawn = []
-    for seed, keys in ((1, ("a",)), (1, ("a",)), (2, ("a",)), (1, ("b",))):
-        recipe.seeded(seed, keys, 1)
-        drawn.append(torch.rand(3).tolist())
-    assert drawn[0] == drawn[1] and drawn[2] != drawn[0] != drawn[3]
-    assert torch.get_num_threads() == 1 and torch.are_deterministic_algorithms_enabled()
-    assert not torch.utils.deterministic.fill_uninitialized_memory
-
-
 def test_every_step_has_the_rate_of_its_share_and_a_gradient_no_longer_than_the_clip(views, tmp_path, request):
     rates, lengths = [], []
 
@@ -298,24 +217,6 @@ def test_every_step_has_the_rate_of_its_share_and_a_gradient_no_longer_than_the_
     assert {factor for _, factor in rates[0]} == {1.0, 0.25} and lengths == pytest.approx([0.01] * 4, rel=1e-3)
 
 
-def test_the_final_weights_are_the_averages_that_were_validated_last_of_equal_ones(views, trained, tmp_path):
-    found, validation = runs.load(trained / "model.pt").model, sources(views)["validation"]
-    machine, every = inference.Machine(torch.device("cpu"), "fp32"), np.arange(len(validation.facts))
-    answers = inference.probabilities(found, validation, every, machine, 8)
-    with (trained / "history.csv").open(newline="") as file:
-        history = [(float(row["validation_accuracy"]), float(row["validation_loss"])) for row in csv.DictReader(file)]
-    # Max takes the first of equal ones.
-    accuracy, loss = max(history[::-1], key=lambda row: row[0])
-    assert accuracy == np.mean(answers.argmax(1) == validation.facts.label)
-    assert loss == pytest.approx(cross_entropy(answers, validation.facts.label), rel=1e-4)
-    # Steps too small for any accuracy: the weights are those of a training that validates at its end alone.
-    often, once = (
-        train(views, tmp_path / str(after), with_training(steps=4, rate=1e-9, validate_every=after))[0]
-        for after in (1, 4)
-    )
-    assert equal(often, once)
-
-
 def test_augmentation_differs_from_step_to_step_and_rank_to_rank_and_comes_again(views):
     source, numbers = sources(views)["train"], np.arange(16)
     block = SETTINGS["augmentation"] | {"mask_time": 0.5}
@@ -328,17 +229,17 @@ def test_augmentation_differs_from_step_to_step_and_rank_to_rank_and_comes_again
     assert (both[0][1] == both[1][1]).all() and (both[0][0] != both[1][0]).any()
 
 
-@pytest.mark.parametrize(("weight", "smoothing"), [(0.5, 0.2), (2.0, 0.0)])
+@pytest.mark.parametrize(("weight", "smoothing"), [(0.5, 0.2), (2.0, 0.0), (0.0, 0.3)])
 def test_the_loss_weighs_each_station_alone_against_all_together(weight, smoothing):
     rng = np.random.default_rng(3)
-    together, alone = (torch.from_numpy(rng.normal(size=(count, 4))) for count in (3, 6))
+    together, of_stations = (torch.from_numpy(rng.normal(size=(count, 4))) for count in (3, 6))
     labels = np.array([2, 0, 3])
 
     class Model(nn.Module):
         shape = 2, 1  # stations and spectra
 
-        def forward(self, images, **asked):
-            return together, alone
+        def forward(self, images, alone=False):
+            return (together, of_stations) if alone else together
 
     def entropy(logits, label):
         shares = np.exp(logits) / np.exp(logits).sum()
@@ -347,8 +248,60 @@ def test_the_loss_weighs_each_station_alone_against_all_together(weight, smoothi
 
     all_together = np.mean([entropy(row, label) for row, label in zip(together.numpy(), labels, strict=True)])
     # Samples one after the other, and the stations of each.
-    each = np.mean([entropy(row, labels[number // 2]) for number, row in enumerate(alone.numpy())])
+    each = np.mean([entropy(row, labels[number // 2]) for number, row in enumerate(of_stations.numpy())])
     block = {"alone": weight, "label_smoothing": smoothing}
     machine = inference.Machine(torch.device("cpu"), "fp32")
     found = objective(Model(), torch.zeros(3, 2, 8, 8), torch.from_numpy(labels), block, machine)
     assert float(found) == pytest.approx((all_together + weight * each) / (1 + weight), rel=1e-6)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.6, 0.998])
+def test_the_average_is_that_of_all_weights_so_far_by_powers_of_the_decay(views, tmp_path, monkeypatch, decay):
+    weights, averages, step = [], [], loop.Trainer._step
+
+    def stepped(trainer, *batch):
+        step(trainer, *batch)
+        for noted, model in ((weights, trainer.model), (averages, trainer.average.module)):
+            noted.append(model.classifier[0].weight.detach().double().clone())
+
+    monkeypatch.setattr(loop.Trainer, "_step", stepped)
+    train(views, tmp_path, with_training(steps=8, validate_every=8, ema=decay))
+    for count in (1, 2, 8):
+        ages = decay ** np.arange(count)[::-1]
+        expected = sum(age * value for age, value in zip(ages, weights, strict=False)) / ages.sum()
+        torch.testing.assert_close(averages[count - 1], expected, rtol=0, atol=2e-6)
+
+
+def test_the_kept_weights_are_the_last_of_the_best_validations(monkeypatch, views, tmp_path):
+    right, kept = iter([0.4, 0.8, 0.8, 0.6]), []
+
+    def told(model, source, numbers, *_, **named):
+        share = next(right)
+        kept.append({name: value.clone() for name, value in model.state_dict().items()})
+        labels = source.facts.label[numbers]
+        wrong = np.arange(len(labels)) >= share * len(labels)
+        return np.eye(4)[(labels + wrong) % 4]
+
+    monkeypatch.setattr(loop, "probabilities", told)
+    runs.train(sources(views), SCHEME, "seen", with_training(steps=12, validate_every=3), tmp_path)
+    weights = checkpoint.load(tmp_path / "model.pt")[1]["weights"]
+    assert all(torch.equal(value, kept[2][name]) for name, value in weights.items())
+    assert len({float(state["classifier.0.weight"].sum()) for state in kept}) == 4
+
+
+@pytest.mark.parametrize(("block", "change"), [
+    *(("training", change) for change in (
+        {"steps": 0}, {"rate": -1.0}, {"precision": "fp16"}, {"warmup": 2}, {"epochs": 3}, {"batch": True},
+        {"ema": math.nan}, {"threads": 1.0})),
+    *(("augmentation", change) for change in ({"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1})),
+])  # fmt: skip
+def test_wrong_settings_are_refused_by_name(views, tmp_path, block, change):
+    with pytest.raises(InputError, match=rf"recognition\.{block}: .*{next(iter(change))}.*, expected"):
+        train(views, tmp_path, {**SETTINGS, block: {**SETTINGS[block], **change}})
+
+
+def test_a_batch_has_at_least_a_sample_a_part_and_one_part_where_nothing_is_said():
+    assert recipe.check(TRAINING) == {**TRAINING, "accumulate": 1, "activation_checkpointing": False}
+    assert recipe.check({**TRAINING, "batch": 3, "accumulate": 3})["accumulate"] == 3
+    with pytest.raises(InputError, match="accumulate is 4, expected at most batch, 3"):
+        recipe.check({**TRAINING, "batch": 3, "accumulate": 4})

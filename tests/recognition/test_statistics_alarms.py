@@ -22,19 +22,6 @@ def test_threshold_is_the_largest_that_detects_enough(detection, uavs):
         assert (scores[labels == 0] >= higher[0]).mean() < detection
 
 
-@pytest.mark.parametrize("detection", [0.0, 0.07, 0.5, 0.9, 1.0])
-def test_a_weighted_threshold_is_that_of_scores_that_stand_as_often_as_their_weights(detection):
-    """0.07 times 100 is a little more than 7 in floating point: still seven samples are enough."""
-    assert statistics.threshold(np.arange(100.0), np.zeros(100, int), detection) == 100 - max(round(100 * detection), 1)
-    rng = stream(5, "weighted")
-    scores, weights = rng.permutation(40) / 40, rng.integers(0, 5, 40)
-    weights[0] += 100 - weights.sum()
-    repeated = np.repeat(scores, weights)
-    expected = statistics.threshold(repeated, np.zeros(100, int), detection)
-    if detection:
-        assert statistics._weighted_threshold(scores, weights.astype(float), detection) == expected
-
-
 def test_alarm_rates_are_shares_of_each_class():
     scores = np.array([0.9, 0.2, 0.8, 0.1, 0.7, 0.7, 0.0])
     labels = np.array([0, 0, 1, 1, 2, 2, 3])
@@ -82,17 +69,6 @@ def two_subtypes(first, second):
     score = np.repeat([first, second, 0.0], [20, 20, 1])
     names = np.array([f"m{number}" for number in range(41)])
     return statistics.AlarmPart(score, np.repeat([0, 1], [40, 1]), names, np.repeat([0, 1, 2], [20, 20, 1]))
-
-
-def test_alarm_intervals_come_of_400_draws_where_no_number_is_named():
-    """The generator shows how many random numbers were taken."""
-    parts = [[alarm_part(stream(seed, name), 8, name)] for seed, name in ((1, "v"), (2, "t"))]
-    after = []
-    for said in ((), (400,), (401,)):
-        generator = stream(3, "a")
-        statistics.alarm_intervals(*parts, 0.9, False, generator, 4, *said)
-        after.append(generator.random())
-    assert after[0] == after[1] != after[2]
 
 
 def test_alarm_intervals_draw_seeds_and_where_asked_subtypes_of_the_test_part():

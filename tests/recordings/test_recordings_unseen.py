@@ -15,7 +15,7 @@ from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings import read_record
 from lowalt.recordings.__main__ import main
-from lowalt.recordings.library import Library
+from lowalt.recordings.twin import radars
 from lowalt.recordings.windows import spectra, write
 from lowalt.shards import ShardSet, faults
 
@@ -52,51 +52,30 @@ def test_a_wav_and_five_lines_become_spectra_and_tiles(tmp_path, rate, stereo):
     assert set(spectra) == {"vrp", "trp", "vt"} and all(np.isfinite(spectra[name]).all() for name in spectra)
 
 
-@pytest.fixture(scope="module")
-def network(tmp_path_factory):
-    """A network of the 24 GHz radar, trained for two steps on its twin and kept as the zoo keeps its own."""
-    folder = tmp_path_factory.mktemp("network")
-    block = load_yaml("config/measured/recognition.yaml")
-    block |= {"size": 24, "echoes": {"train": 2, "validation": 1}, "receivers": 1, "seeds": [0]}
-    block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
-    (folder / "recognition.yaml").write_text(yaml.safe_dump(block))
-    twins = load_yaml("config/measured/twins.yaml")
-    twins["twins"] = {"cw_24ghz": twins["twins"]["cw_24ghz"]}
-    for block in (twins, *twins["twins"].values()):
-        for scene in (scene for scenes in block["scenes"].values() for scene in scenes):
-            scene["subtypes"] = scene["subtypes"][:1]
-    (folder / "twins.yaml").write_text(yaml.safe_dump(twins))
-    options = {"twins": folder / "twins.yaml", "recognition": folder / "recognition.yaml", "models": folder / "models",
-               "out": folder / "zoo"}  # fmt: skip
-    main(["keep", *(word for name, value in options.items() for word in (f"--{name}", str(value)))])
-    assert {path.name for path in (folder / "zoo").iterdir()} == {"cw_24ghz.md", "cw_24ghz.safetensors"}
-    return folder / "zoo/cw_24ghz.safetensors"
-
-
-def test_a_prediction_names_every_window_and_says_which_hold_a_target(network, tmp_path, capsys):
+def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path, capsys):
     path = drive(tmp_path, 44100, True)
-    assert lowalt(["predict", str(network), str(path), "--json"]) == 0
+    assert lowalt(["predict", "cw_24ghz", str(path), "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert [row["start_s"] for row in rows] == pytest.approx([0, 0.4, 0.8])
     for row in rows:
         shares = {name: row[name] for name in ("UAV", "Bird", "Vehicle", "Pedestrian")}
         assert row["target"] and sum(shares.values()) == pytest.approx(1)
         assert row["class"] == max(shares, key=shares.__getitem__)
-    assert lowalt(["predict", str(network), str(path)]) == 0
+    assert lowalt(["predict", "cw_24ghz", str(path)]) == 0
     assert "3 of 3 windows hold a target: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("model, file, changes, words", [
-    ("", "drive.yaml", {"carrier_hz": 3.4e9}, "carrier_hz is 3.4e+09, .*expected a network of .*uav_3ghz"),
-    ("", "drive.yaml", {"carrier_hz": 5.8e9}, "carrier_hz is 5.8e+09, .*the zoo has none"),
+    ("cw_24ghz", "drive.yaml", {"carrier_hz": 3.4e9}, "carrier_hz is 3.4e+09, .*expected a network of .*uav_3ghz"),
+    ("cw_24ghz", "drive.yaml", {"carrier_hz": 5.8e9}, "carrier_hz is 5.8e+09, .*the zoo has none"),
     ("uav_3ghz", "drive.yaml", {"carrier_hz": 3.4e9, "channel": "real"}, "expected in-phase and quadrature"),
-    ("", "signals.npy", {}, "knows recordings, expected the record of one"),
+    ("cw_24ghz", "signals.npy", {}, "knows recordings, expected the record of one"),
     ("default-seen", "drive.yaml", {}, "knows no recordings, expected a network of a radar"),
 ])  # fmt: skip
-def test_what_a_network_does_not_know_is_refused(network, tmp_path, capsys, model, file, changes, words):
+def test_what_a_network_does_not_know_is_refused(tmp_path, capsys, model, file, changes, words):
     drive(tmp_path, 22050, changes.get("channel") != "real", **changes)
     np.save(tmp_path / "signals.npy", np.ones((1, 1200), np.complex64))
-    assert lowalt(["predict", model or str(network), str(tmp_path / file)]) == 2
+    assert lowalt(["predict", model, str(tmp_path / file)]) == 2
     assert re.search(words.replace("+", r"\+"), capsys.readouterr().err)
 
 
@@ -118,7 +97,7 @@ def test_a_recording_becomes_signals_spectra_tiles_and_a_shard_of_its_own(tmp_pa
     (tmp_path / "drive.yaml").write_text(
         "file: drive.wav\ncarrier_hz: 24.0e+9\nchannel: real\nlabel: Vehicle\nsource: made here\nlicence: MIT\n"
     )
-    record, twin = read_record(tmp_path / "drive.yaml"), Library.read("config/measured/twins.yaml").twins["cw_24ghz"]
+    record, twin = read_record(tmp_path / "drive.yaml"), radars()["cw_24ghz"]
     images = load_yaml("config/default.yaml")["images"]
     count = write(record, twin, images, tmp_path / "out")
     signals = np.load(tmp_path / "out/signals.npy")

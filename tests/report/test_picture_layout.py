@@ -31,19 +31,6 @@ def places(figure: Figure) -> np.ndarray:
     return np.array([box.extents for box in (*boxes, *(part.bbox_relative for part in parts))])
 
 
-def test_places_are_round_and_those_of_the_engine():
-    """To half the last digit kept, and nothing moves when the figure is drawn."""
-    free, settled = drawing(), drawing()
-    free.set_dpi(110)
-    free.draw_without_rendering()
-    settle(settled, 110)
-    found = places(settled)
-    assert np.abs(found - places(free)).max() < 10.0**-DIGITS
-    np.testing.assert_array_equal(found, found.round(DIGITS))
-    settled.draw_without_rendering()
-    np.testing.assert_array_equal(places(settled), found)
-
-
 def test_an_answer_that_differs_in_its_last_bits_gives_the_same_places(monkeypatch):
     """As another process's solver would find it: every place a little elsewhere before it is rounded."""
     once = drawing()
@@ -66,13 +53,6 @@ def test_an_answer_that_differs_in_its_last_bits_gives_the_same_places(monkeypat
     np.testing.assert_array_equal(places(twice), places(once))
 
 
-def test_all_parts_still_count_for_a_tight_picture():
-    """A place set by hand would leave axes out of the box around everything, and cut their labels off."""
-    figure = drawing()
-    settle(figure, 100)
-    assert all(axes.get_in_layout() for axes in figure.axes)
-
-
 @pytest.mark.parametrize("dpi", [72, 110, 150])
 def test_laid_out_at_the_resolution_of_the_file(dpi):
     """The width of letters depends on it: what was laid out for one resolution is not right for another."""
@@ -81,6 +61,12 @@ def test_laid_out_at_the_resolution_of_the_file(dpi):
     free.draw_without_rendering()
     settle(settled, dpi)
     assert settled.dpi == dpi
+    found = places(settled)
+    np.testing.assert_array_equal(found, found.round(DIGITS))
+    # Nothing moves when the figure is drawn, and all parts count for a tight picture.
+    settled.draw_without_rendering()
+    np.testing.assert_array_equal(places(settled), found)
+    assert all(axes.get_in_layout() for axes in settled.axes)
     np.testing.assert_allclose(places(settled), places(free), rtol=0, atol=10.0**-DIGITS)
 
 

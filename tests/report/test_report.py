@@ -6,11 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.config.layers import load
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
-from lowalt.measure.estimate import estimate, training_hours
-from lowalt.measure.estimate import main as write_estimates
 from lowalt.recognition.predictions import Predictions
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
@@ -33,15 +30,6 @@ def test_a_spread_is_said_where_there_are_several_seeds_and_nowhere_else():
     assert spreads([alone]) == {}
 
 
-def test_a_table_without_a_column_is_refused(tmp_path):
-    path = tmp_path / "accuracy.csv"
-    path.write_text("protocol,scheme\n")
-    with pytest.raises(InputError, match=r"lacks the columns \['snr_db'\]"):
-        read_csv(path, "snr_db")
-    with pytest.raises(InputError, match="no file"):
-        read_csv(tmp_path / "none.csv")
-
-
 def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
     lines = [
         {"rule_name": "echo", "wildcards": {}, "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0},
@@ -62,54 +50,6 @@ def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
 def test_confusion_counts_add_up():
     row = {"protocol": "seen", "scheme": "A", "category": "UAV", "predicted": "Bird", "samples": "3"}
     assert confusion([row, row]) == {("seen", "A"): {("UAV", "Bird"): 6}}
-
-
-def test_an_estimate_scales_samples_and_bytes():
-    config = load(["config/default.yaml", "config/paper.yaml"], "workflow/schemas/config.schema.yaml")
-    stages = [
-        {"rule": rule, "wall_s": "100", "samples": "1000", "sample_bytes": "250000", "hardware": "x"}
-        for rule in ("motion", "echo", "noise", "tiles", "shard", "index")
-    ]
-    row = estimate(stages, [], config, "paper")
-    assert (row["trainings"], row["training_core_hours"]) == (17, "")
-    assert (row["motion_models"], row["samples"]) == (240_000, 1_440_000)
-    assert row["core_hours"] == pytest.approx(600 / 1000 * 1_440_000 / 3600)
-    assert row["shards_gb"] == pytest.approx(360.0)
-    assert row["noisy_gb"] == pytest.approx(1_440_000 * 9600 / 1e9, abs=0.05)
-    with pytest.raises(InputError, match="index"):
-        estimate(stages[:-1], [], config, "paper")
-
-
-def test_the_command_writes_a_row_of_every_overlay(tmp_path):
-    rules = ("motion", "echo", "noise", "tiles", "shard", "index")
-    (tmp_path / "stages.csv").write_text(
-        "rule,wall_s,samples,sample_bytes,hardware\n" + "".join(f"{rule},100,1000,250000,here\n" for rule in rules)
-    )
-    (tmp_path / "costs.csv").write_text("backbone,pixels,network_bytes,train_ms,hardware\n")
-    overlays = ["config/tiny.yaml", "config/paper.yaml"]
-    write_estimates([
-        "--stages", str(tmp_path / "stages.csv"), "--costs", str(tmp_path / "costs.csv"), "--out",
-        str(tmp_path / "scale.csv"), "--schema", "workflow/schemas/config.schema.yaml", "--base",
-        "config/default.yaml", "--overlays", *overlays,
-    ])  # fmt: skip
-    rows = read_csv(tmp_path / "scale.csv", "configuration", "samples", "measured_on")
-    assert [(row["configuration"], row["measured_on"]) for row in rows] == [("tiny", "here"), ("paper", "here")]
-    assert rows[1]["samples"] == "1440000"
-
-
-def test_training_scales_with_images_and_no_network_is_guessed_at():
-    config = load(["config/default.yaml", "config/workstation.yaml"], "workflow/schemas/config.schema.yaml")
-    timed = {"backbone": "swin_tiny_patch4_window7_224", "pixels": "224",
-             "network_bytes": str(9 * 224**2), "train_ms": "900", "hardware": "x"}  # fmt: skip
-    # Both protocols: three schemes of one image, three of three, one of nine; mean fusion in one protocol only.
-    images = 2 * (3 * 1 + 3 * 3 + 9) + 9
-    trainings, hours, hardware = training_hours([timed], config)
-    assert (trainings, hardware) == (15, "x")
-    assert hours == pytest.approx(images / 9 * 30000 * 64 * 0.9 / 3600)
-    assert training_hours(
-        [{**timed, "pixels": "64", "network_bytes": str(9 * 64**2)}, {**timed, "network_bytes": str(3 * 224**2)}],
-        config,
-    ) == (15, None, "")
 
 
 @pytest.fixture

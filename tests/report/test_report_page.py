@@ -47,12 +47,6 @@ def test_the_contents_name_every_part_of_the_page():
     assert page.links[1:] == [f"#{part.id}" for part in PARTS]
 
 
-def test_a_page_takes_the_plots_script_that_is_given_and_none_without_plots():
-    for html, held in (('<figure class="plot"></figure>', True), ("<p>no plot</p>", False)):
-        text = assembled("run", [{"id": "one", "title": "One", "html": html}], "const given = 7;")
-        assert ("const given = 7;" in text) == held and len(text) < 100_000
-
-
 def test_tables_sort_by_value_filter_and_download_and_the_theme_turns(tmp_path):
     script = """
     const column = (at) => [...document.querySelectorAll("tbody tr")].map((row) => row.cells[at].textContent).join("|");

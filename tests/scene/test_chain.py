@@ -1,7 +1,5 @@
 """The chain as a whole: the slow truth of motion and prefix inside symbols, and laws of what a scene names."""
 
-import importlib
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +8,9 @@ import pytest
 import reference_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import echo_signal
-from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
-from lowalt.scene.effects import PLACES, called, dotted
 from lowalt.scene.effects.channel import interference
 from lowalt.scene.effects.receiver.offsets import of_stations
 from lowalt.scene.observe import observe
@@ -165,30 +161,10 @@ def test_adding_an_effect_moves_no_other_draw():
     assert abs(noisy.cells - echo).max() > 0.1 * abs(echo).max()
 
 
-def test_the_catalogue_names_every_module_with_defaults_and_imports_none_that_is_not_called():
-    for name, place in PLACES.items():
-        module = importlib.import_module(dotted(name))
-        assert isinstance(module.DEFAULTS, dict) and module.SOURCE and f".{place}." in module.__name__
-    for name in list(sys.modules):
-        if name.startswith("lowalt.scene.effects.receiver."):
-            del sys.modules[name]
-    called({"adc": {}})
-    assert {name for name in sys.modules if name.startswith("lowalt.scene.effects.receiver.")} == {
-        "lowalt.scene.effects.receiver.adc"
-    }
-
-
 def test_sampling_and_carrier_come_of_one_oscillator():
     row, asked = target(np.random.default_rng(1))[1], scene({})
     drawn = [asked.drawn(row, A, name).random() for name in ("clock_offset", "carrier_offset", "timing_offset")]
     assert drawn[0] == drawn[1] != drawn[2] and drawn[0] != asked.drawn(row, B, "clock_offset").random()
-
-
-def test_unknown_effects_and_parameters_are_named():
-    with pytest.raises(InputError, match="unknown effect 'fog'"):
-        called({"fog": {}})
-    with pytest.raises(InputError, match=r"effects.adc: unknown parameter\(s\) \['bit'\]"):
-        called({"adc": {"bit": 8}})
 
 
 @pytest.mark.parametrize("noise", [{"receiver_noise": {}}, {"cell_noise": {"snr_db": 3.0}}])

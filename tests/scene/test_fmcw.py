@@ -5,10 +5,7 @@ import pytest
 
 import reference_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network
-from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.checks import UNKNOWN_OF
-from lowalt.scene.effects import called
 from lowalt.scene.observe import observe
 from scenes import scene, target
 
@@ -91,12 +88,3 @@ def test_white_phase_noise_fills_the_bandwidth_of_the_samples():
 def test_a_detector_begins_at_the_range_cell_that_the_beam_points_at():
     found = sample({"detector": {"range_error_m": 0.0, "training": 8}}, radio({**SWEEP, "samples": 64}), x_m=20.0)
     assert abs(found.received().cell - found.true_cell(found.view)).max() <= 1
-
-
-@pytest.mark.parametrize("kind", ["fmcw", "cw"])
-def test_effects_of_ofdm_are_refused_by_name(kind):
-    network = radio(SWEEP if kind == "fmcw" else {"kind": "cw"})
-    for name in UNKNOWN_OF[kind]:
-        (effect,) = called({name: {}})
-        with pytest.raises(InputError, match=rf"effects: \['{name}'\] .* kind '{kind}'"):
-            sample({effect.name: {}}, network)

@@ -81,7 +81,7 @@ def test_the_levels_of_a_sweep_follow_by_hand():
     assert table["noise, one range cell"] == pytest.approx(noise - 24.08, abs=0.06)
 
 
-@pytest.mark.parametrize("name", ["DJI Mavic 3 Pro", "Pigeon", "Audi A6L 2019", "Walking Pedestrian 1"])
+@pytest.mark.parametrize("name", ["DJI Mavic 3 Pro", "Walking Pedestrian 1"])
 def test_the_mean_power_of_an_echo_is_that_of_the_stated_cross_section(name):
     config, records = scene_levels.target_records(ROOT)
     level = scene_levels.target_level(config, records[name], 300)

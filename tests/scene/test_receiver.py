@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
-from lowalt.scene.checks import check
 from lowalt.scene.effects.receiver import (
     adc,
     carrier_offset,
@@ -224,33 +222,3 @@ def test_the_default_spectrum_is_that_of_the_3gpp_model():
         level = level - 10 * np.log10(1 + (f / hertz) ** power)
     found = 10 * np.log10(phase_noise.density(phase_noise.DEFAULTS | {"loop_hz": 0.0}, f))
     np.testing.assert_allclose(found, level, atol=0.8)
-
-
-BLOCK = {
-    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 256, "guard_subcarriers": 10,
-    "symbol_interval_s": 2.5e-3, "symbols": 400, "transmit_array": [4, 2], "receive_array": [4, 2], "power_w": 1.0,
-    "stations": {"A": {"position_m": [0.0, 0.0, 10.0], "normal_deg": 0.0}},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("effects", "said"),
-    [
-        ({"timing_offset": {"sigma_s": 1e-6}}, "prefix_slack_s"),
-        ({"clock_offset": {"fixed_ppm": 1.0}}, "prefix_slack_s"),
-        ({"clock_offset": {"sigma_ppm": 0.01}, "carrier_offset": {}}, "sigma_ppm"),
-        ({"carrier_offset": {}, "phase_noise": {}}, "shared"),
-        ({"phase_noise": {"points": [[10.0, 0.0], [1.0, 0.0]]}}, "points"),
-        ({"transmit_leakage": {}, "phase_noise": {"shared": False}}, "phase_noise"),
-        ({"link_offset": {}}, "link"),
-        ({"cell_noise": {}, "receiver_noise": {}}, "cell_noise"),
-        ({"cell_noise": {"snr_db": 3.0}}, "cell_noise"),
-        ({"receiver_noise": {}}, "receiver_noise"),
-        ({"canceller": {}}, "no clutter"),
-    ],
-)
-def test_settings_that_contradict_each_other_are_refused_by_name(effects, said):
-    levels = [3.0] if len(effects) == 1 and said in effects else [float("inf")]
-    with pytest.raises(InputError, match=said) as refused:
-        check({"network": BLOCK, "effects": effects, "noise": {"snr_db": levels}})
-    assert "expected" in str(refused.value)

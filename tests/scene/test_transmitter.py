@@ -1,15 +1,11 @@
 """What a station sends, and when: data, amplifier, combs of pilots, and symbols that are late or missing."""
 
-import math
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.scene import lateness, waveform
-from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.transmitter import comb_pilots, data_symbols, power_amplifier, slow_time
 from scenes import A, network
 
@@ -94,19 +90,3 @@ def test_lateness_is_drawn_again_from_the_name_of_a_sample():
     np.testing.assert_allclose(again[0], (own.times_s - radio.times_s) / 2.5e-3, rtol=1e-12)
     assert lateness.lateness({"times": "even"}, effects, radio, 5, row) is None
     assert lateness.lateness({"times": "known"}, {}, radio, 5, row) is None
-
-
-@pytest.mark.parametrize(
-    ("effect", "changes", "said"),
-    [
-        (comb_pilots, {"spacing": 3}, "divisor"),
-        (comb_pilots, {"offset": 4}, "offset"),
-        (slow_time, {"jitter_s": 2.5e-3}, "jitter_s"),
-        (slow_time, {"downlink": 1e-6, "tdd_period_s": 1.0}, "downlink"),
-        (slow_time, {"regrid": "zero"}, "gaps"),
-    ],
-)
-def test_settings_that_no_station_can_have_are_refused_by_name(effect, changes, said):
-    levels = (3.0,) if said == "gaps" else (math.inf,)
-    with pytest.raises(InputError, match=said):
-        effect.check(effect.DEFAULTS | changes, CheckedScene(network(), {}, levels))

@@ -19,7 +19,6 @@ from lowalt.shards.hub import features
 from lowalt.shards.stored_cubes import restored, rounded
 from lowalt.spectra.cube import TRUTH
 from lowalt.workflow import space
-from lowalt.workflow.refusals import refuse_cells
 
 
 def values(parts) -> np.ndarray:
@@ -138,12 +137,6 @@ def test_explain_says_the_size_first(tmp_path, capsys):
     assert main(["explain", str(overlay), "--no-table", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)["shards"]
     assert said["samples"] == 20 and said["bytes"] == 20 * said["sample_bytes"]
-
-
-def test_a_type_of_cells_is_refused_for_shards_of_another_kind():
-    refuse_cells(scene("int16"))
-    with pytest.raises(InputError, match=r"shards\.cells: 'int16' and shards\.kind 'signal', expected kind 'cube'"):
-        refuse_cells(scene("int16") | {"shards": {"kind": "signal", "cells": "int16"}})
 
 
 def test_cubes_with_companions_have_a_card_that_types_their_truth(tmp_path):

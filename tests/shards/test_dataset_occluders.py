@@ -1,10 +1,7 @@
 """Surfaces of a data set made on the spot: made where the scene hides points, and only there."""
 
 import numpy as np
-import pytest
 
-from lowalt.files.errors import InputError
-from lowalt.shards import dataset as datasets
 from lowalt.shards.dataset import Dataset
 from lowalt.targets import occluders
 from lowalt.targets.records import records_of
@@ -29,11 +26,3 @@ def test_a_scene_that_hides_points_is_made_with_the_surfaces_that_its_run_would_
     for number in range(0, len(made), 3):
         np.testing.assert_array_equal(made.signal(number), given.signal(number))
         assert not np.array_equal(made.signal(number), open_sky.signal(number))
-
-
-def test_no_surfaces_are_made_where_the_scene_hides_nothing_or_the_caller_has_the_targets(monkeypatch):
-    monkeypatch.setattr(datasets, "made_occluders", lambda *sources: pytest.fail("surfaces were made"))
-    plain = Dataset(config_of("DJI Mini 2", rotor_spread={}))
-    hidden = Dataset(config_of("DJI Mini 2", occlusion={}), plain.clouds)
-    with pytest.raises(InputError, match=r"effects\.occlusion: DJI Mini 2 has no surfaces"):
-        hidden.signal(0)

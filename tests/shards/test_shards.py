@@ -5,12 +5,10 @@ import io
 import json
 import math
 import pickle
-import tarfile
 
 import numpy as np
 import pytest
 import webdataset
-from PIL import Image
 
 from dataset import SEED, SNRS, SPLIT, TARGETS, build, motion_rows, write_settings
 from lowalt.config.network import Network
@@ -20,7 +18,6 @@ from lowalt.files.errors import InputError
 from lowalt.motion import write_table
 from lowalt.shards import ShardSet
 from lowalt.shards.__main__ import main
-from lowalt.shards.read import complex_signals
 from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import map_samples, table_path
 from lowalt.shards.write import ChunkSamples, write_shard
@@ -70,27 +67,6 @@ def test_every_sample_stands_once_in_the_fold_that_is_its_own(images):
     assert sorted(found) == sorted(expected)
 
 
-def test_shards_open_with_plain_webdataset_and_pillow(images):
-    data = webdataset.WebDataset(str(images / "unseen-test-00000.tar"), shardshuffle=False).decode("pil")
-    count = 0
-    for sample in data:
-        assert sample["png"].size == (768, 768)
-        tile, palette = decode(png_of(images, sample["__key__"]))
-        np.testing.assert_array_equal(np.asarray(sample["png"].convert("RGB")), palette[tile])
-        assert isinstance(sample["png"], Image.Image)
-        count += 1
-    assert count == 2
-
-
-def png_of(folder, key):
-    """The PNG of a sample by plain tarfile."""
-    for path in folder.glob("*.tar"):
-        with tarfile.open(path) as archive:
-            if f"{key}.png" in archive.getnames():
-                return archive.extractfile(f"{key}.png").read()
-    raise KeyError(key)
-
-
 def test_order_depends_on_names_alone(images, tmp_path):
     """With another SNR in the data set, the samples there were keep their order."""
     rows = motion_rows("seen")
@@ -104,12 +80,6 @@ def test_order_depends_on_names_alone(images, tmp_path):
     after = map_samples(tmp_path / "seen-train-00000.npz")["key"].tolist()
     assert [key for key in after if not key.endswith(b"snr008")] == before
     assert before != sorted(before)
-
-
-def test_signals_of_an_older_data_set_are_read(signals):
-    stored = ShardSet(signals / "index.json").signal(0)
-    assert (complex_signals(stored.view(np.float32).reshape(3, 400, 2)) == stored).all()
-    assert complex_signals(stored) is stored
 
 
 def test_index_has_counts_and_checksums(images):

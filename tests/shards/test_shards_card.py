@@ -14,7 +14,7 @@ from dataset import RENDER, SEED, SNRS, SPLIT, build, motion_rows
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, card
-from lowalt.shards.card import main, readme, write_samples
+from lowalt.shards.card import main, readme
 from lowalt.shards.croissant import metadata
 from lowalt.shards.index import build as index_of
 from lowalt.shards.write import ChunkSamples, write_shard
@@ -46,19 +46,6 @@ def test_card_has_counts_configuration_and_versions(published):
         assert word in text
 
 
-def test_sizes_of_shards_are_in_millions_of_bytes(monkeypatch):
-    """A millionth more would be rounded to another digit."""
-
-    class Shards(list):
-        @property
-        def shards(self):
-            return [{"group": "seen", "fold": "train", "samples": 3, "bytes": size} for size in self]
-
-    monkeypatch.setattr(card, "_census", lambda _: ({}, {}, {}))
-    text = card._counts(Shards([3_049_949_999, 4_950_500_000]))
-    assert text.endswith("2 shards of 3049.9 to 4950.5 MB, 8.000 GB in all, 4000225.0 kB a sample.\n")
-
-
 def test_samples_are_all_listed(published):
     shards = ShardSet(published / "index.json")
     rows = list(csv.DictReader((published / "samples.csv").open()))
@@ -73,22 +60,6 @@ def test_samples_are_all_listed(published):
             (math.inf, False) if row["snr_db"] == "inf" else (float(row["snr_db"]), True)
         )
         assert row["key"].encode() in (published / row["shard"]).read_bytes()
-
-
-def test_tables_are_held_one_at_a_time_by_the_card_too(published, monkeypatch):
-    shards = ShardSet(published / "index.json")
-    keys, held = [], []
-    for entry, table in shards.tables():
-        assert len(table) == entry["samples"]
-        keys += table["key"].tolist()
-        held.append(len(shards._tables))
-    assert held == [1] * len(shards.shards) and len(held) > 1 and not shards._tables
-    assert keys == shards.keys.tolist()
-    monkeypatch.setattr(ShardSet, "_column", lambda *_: pytest.fail("a column of all samples was read"))
-    readme(ShardSet(published / "index.json"), "run: x", "x", "MIT")
-    write_samples(ShardSet(published / "index.json"), published / "again.csv")
-    assert (published / "again.csv").read_bytes() == (published / "samples.csv").read_bytes()
-    (published / "again.csv").unlink()
 
 
 def test_checksums_of_the_description_are_right(published):

@@ -13,7 +13,6 @@ from dataset import SEED, SNRS, build
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.noise.noisy_signals import noisy_signals
-from lowalt.recognition.views import ShardSamples, cache_shard, facts_of
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
 from lowalt.shards.card import main as card
@@ -22,7 +21,6 @@ from lowalt.shards.sample_table import map_samples
 from lowalt.shards.sigmf import main as sigmf
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
-from lowalt.spectra import NAMES
 from pictures import NETWORK
 
 STATIONS = list(NETWORK["stations"])
@@ -77,22 +75,6 @@ def test_every_sample_is_the_one_of_the_signal_shards_under_the_same_number(reci
     assert (found.images(7, 64, ["B"]) == expected.images(7, 64, ["B"])).all()
     with pytest.raises(InputError, match="kind 'recipe', expected 'image'"):
         found.png(0)
-
-
-def test_training_sees_the_same_samples(recipes, noised, tmp_path):
-    folds = {("seen", "train"), ("unseen", "train")}
-    pair = [
-        ShardSamples(folder / "index.json", [len(NAMES) * station for station in range(3)], folds, 24, True)
-        for folder in (recipes, noised)
-    ]
-    for name in ("key", "label", "snr_db", "model", "range_m"):
-        assert (getattr(pair[0].facts, name) == getattr(pair[1].facts, name)).all()
-    some = np.array([3, 1, 2])
-    assert (pair[0].views(some) == pair[1].views(some)).all()
-    for folder in (recipes, noised):
-        cache_shard(folder / "index.json", "seen-val-00000.tar", 24, tmp_path / f"{folder.name}.npz")
-    assert (tmp_path / "shards.npz").read_bytes() == (tmp_path / "noised.npz").read_bytes()
-    assert len(facts_of(ShardSet(recipes / "index.json"), np.arange(4))) == 4
 
 
 def test_each_motion_model_is_stored_once(recipes, noised):

@@ -56,3 +56,20 @@ def test_stages_that_left_no_files_are_passed_over_where_they_are_named_alone(tm
     with pytest.raises(SystemExit, match="1"):
         manifest.main(["check", *options, "--without", "echo", "noise"])
     assert capsys.readouterr().out.splitlines() == [f"noise: {FILES[3]} differs"]
+
+
+def test_faults_are_told_in_the_order_of_the_stages_and_the_first_stage_by_its_name(tmp_path, options, capsys):
+    manifest.main(["check", *options])
+    assert "all 5 files are equal" in capsys.readouterr().out
+    (tmp_path / "run" / FILES[3]).write_text("other")
+    (tmp_path / "run" / FILES[4]).unlink()
+    (tmp_path / "run/motion/unseen-00000.csv").write_text("more")
+    with pytest.raises(SystemExit):
+        manifest.main(["check", *options])
+    said = capsys.readouterr()
+    assert said.out.splitlines() == [
+        "motion: motion/unseen-00000.csv is not in the manifest", f"noise: {FILES[3]} differs",
+        f"shards: {FILES[4]} is missing"]  # fmt: skip
+    assert said.err.strip() == "first stage that differs: motion"
+    with pytest.raises(InputError, match="folder of a run"):
+        manifest.text(tmp_path / "nowhere")

@@ -98,12 +98,6 @@ def test_keys_are_unique_and_without_dots():
     assert snr_label(3) == snr_label(3.0) == "snr003"
 
 
-def test_a_number_that_json_does_not_have_makes_no_record():
-    row = motion_rows("seen")[0] | {"rate_hz": math.inf}
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        record(row, 3, "val", SEED, Network.from_settings(NETWORK))
-
-
 @pytest.mark.parametrize("samples", [0, 1, 2, 3])
 def test_an_archive_ends_with_two_empty_blocks_at_a_whole_record(samples):
     """As plain tarfile fills it up, whatever it holds."""

@@ -1,6 +1,5 @@
 """Verification of a whole data set: damage of any kind to any of its files is found, and named by the file."""
 
-import hashlib
 import shutil
 import subprocess
 
@@ -10,7 +9,8 @@ import pytest
 from dataset import build, publish
 from lowalt.files.errors import InputError
 from lowalt.recognition.freeze import freeze
-from lowalt.shards import faults
+from lowalt.shards import ShardSet, faults
+from lowalt.shards.sample_table import map_samples
 from lowalt.shards.verify import frozen
 
 
@@ -86,18 +86,6 @@ def test_files_that_do_not_belong_are_named(copy):
     assert lines(copy) == ["notes/mine.txt: no part of the data set", "seen-train-00001.tar: no part of the data set"]
 
 
-def test_a_data_card_of_version_0_2_has_a_file_more(copy):
-    (copy / ".zenodo.json").write_text("{}")
-    sums = copy / "SHA256SUMS"
-    whole = sums.read_text()
-    sums.write_text(f"{hashlib.sha256(b'{}').hexdigest()}  .zenodo.json\n{whole}")
-    assert lines(copy) == []
-    (copy / ".zenodo.json").write_text("{ }")
-    assert lines(copy) == [".zenodo.json: damaged (SHA-256 differs from its line in SHA256SUMS)"]
-    sums.write_text(whole)
-    assert lines(copy) == [".zenodo.json: no part of the data set"]
-
-
 def test_a_checksum_line_more_or_less_or_for_another_file_is_found(copy):
     sums = copy / "SHA256SUMS"
     text = sums.read_text()
@@ -136,3 +124,46 @@ def test_clouds_and_motion_tables_of_the_run_are_held_to_the_checksums_that_froz
     (run / names[2]).unlink()
     assert lines(copy)[:-1] == [f"../{names[0]}: has changed since it was frozen in ../SHA256SUMS",
                                 f"../{names[2]}: missing"]  # fmt: skip
+
+
+def test_every_fault_of_a_shard_is_found_and_named(copy, published):
+    """Single bytes and cuts at random places: verify names the shard and the sample, reading never passes them."""
+    rng = np.random.default_rng(3)
+    paths = sorted(copy.glob("*.tar"))
+    for _ in range(40):
+        path = paths[rng.integers(len(paths))]
+        whole = (published / path.name).read_bytes()
+        samples = map_samples(published / path.with_suffix(".npz").name)
+        place = int(rng.integers(len(whole)))
+        hit = [r["key"].decode() for r in samples if r["offset"] <= place < r["offset"] + r["size"]]
+        if rng.random() < 0.5:
+            damaged = bytearray(whole)
+            damaged[place] ^= int(rng.integers(1, 256))
+            path.write_bytes(damaged)
+        else:
+            path.write_bytes(whole[:place])
+        lines = list(faults(copy / "index.json"))
+        assert lines and all(line.startswith(path.name) for line in lines)
+        assert all(any(key in line for line in lines) for key in hit)
+        shards = ShardSet(copy / "index.json")
+        if hit:
+            number = shards.keys.tolist().index(hit[0].encode())
+            with pytest.raises(InputError, match=path.name):
+                shards.signal(number)
+        path.write_bytes(whole)
+    assert list(faults(copy / "index.json")) == []
+
+
+def test_a_shard_cut_after_its_last_sample_is_named_by_its_length_and_its_end(copy):
+    """An archive ends with two empty blocks of 512 bytes; zeros of fewer are no end."""
+    path = copy / "seen-train-00000.tar"
+    whole, rows = path.read_bytes(), map_samples(path.with_suffix(".npz"))
+    end = int((rows["offset"] + rows["size"]).max())
+    for kept, told in (
+        (0, ["the end of the archive is damaged"]),
+        (1023, ["the end of the archive is damaged"]),
+        (1024, []),
+    ):
+        path.write_bytes(whole[: end + kept])
+        length = f"{end + kept} bytes, expected {len(whole)}"
+        assert list(faults(copy / "index.json")) == [f"{path.name}: {line}" for line in (length, *told)]

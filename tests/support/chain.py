@@ -3,8 +3,6 @@
 import json
 from dataclasses import replace
 
-from PIL import Image
-
 from craft import NETWORK, craft, row
 from lowalt.config.network import station_names
 from lowalt.motion import write_table
@@ -110,12 +108,11 @@ def recognised(folder, network, config, clouds, targets=TARGETS):
 
 def reported(folder, config, clouds, published=None):
     """The page of the run, as text."""
-    Image.new("L", (8, 8)).save(folder / "gallery.png")
     job = {"rule_name": "echo", "wildcards": {}, "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0}
     (folder / "echo.jsonl").write_text(json.dumps(job))
-    names = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "motion")
+    names = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances")
     manifest = {name: str(folder / f"{name}.csv") for name in names}
-    manifest |= {"index": str(folder / "index.json"), "gallery": str(folder / "gallery.png")}
+    manifest |= {"index": str(folder / "index.json")}
     manifest |= {"clouds": list(map(str, clouds)), "benchmarks": [str(folder / "echo.jsonl")]}
     (folder / "report.json").write_text(json.dumps(manifest))
     published = published or load_table("config/targets.csv")

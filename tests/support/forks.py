@@ -39,9 +39,9 @@ print(json.dumps(ended))
 """
 
 
-def ended(programs: Sequence[str]) -> list[tuple[int, str, str]]:
-    """Run each program; return its exit status and what it printed to both streams."""
-    call = [sys.executable, "-c", _HELPER, json.dumps([LIBRARIES, programs])]
+def ended(programs: Sequence[str], *libraries: str) -> list[tuple[int, str, str]]:
+    """Run each program; return its exit status and what it printed to both streams. libraries: imported beforehand."""
+    call = [sys.executable, "-c", _HELPER, json.dumps([[*LIBRARIES, *libraries], programs])]
     run = subprocess.run(call, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     return [tuple(found) for found in json.loads(run.stdout)]

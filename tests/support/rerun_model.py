@@ -52,9 +52,7 @@ def next_jobs(job):
     if rule == "motion":
         own = {work for work in ECHO | NOISE if list(work[1:3]) == names}
         own |= {work for work in SHARD if [work[1], work[3]] == names} | views_of(*names)
-        return (
-            own | FREEZE | (DISTANCES if names[1] == "00000" else set()) | (REPORT if names == [*CHUNKS[0]] else set())
-        )
+        return own | FREEZE | (DISTANCES if names[1] == "00000" else set())
     if rule == "echo":
         return {("noise", *names[:2])}
     if rule in ("noise", "tiles"):
@@ -64,7 +62,7 @@ def next_jobs(job):
         return {("views", "24", *names)} | INDEX
     after = {
         "index": CARD | REPORT, "views": TRAIN | EVALUATE, "freeze": TRAIN | EVALUATE,
-        "train": {("evaluate", *names)}, "evaluate": TABLES, "tables": REPORT, "gallery": REPORT, "distances": REPORT,
+        "train": {("evaluate", *names)}, "evaluate": TABLES, "tables": REPORT, "gallery": set(), "distances": REPORT,
         "configuration": CARD | REPORT, "report_manifest": REPORT, "card": set(), "report": set(),
     }  # fmt: skip
     return after[rule]

@@ -46,7 +46,7 @@ use rule * from lowalt as lowalt_*
 
 rule size:
     default_target: True
-    input: "results/test/motion/unseen-00001.csv"
+    input: "results/test/motion/unseen-00000.csv"
     output: "size.txt"
     shell: "wc -c < {{input}} > {{output}}"
 """

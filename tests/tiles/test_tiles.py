@@ -28,8 +28,14 @@ from lowalt.tiles import (
 )
 from lowalt.tiles.__main__ import main
 from lowalt.tiles.render import normalised
-from lowalt.tiles.scale import index, lookup
+from lowalt.tiles.scale import lookup
 from pictures import IMAGES, NETWORK, SCALES, SPECTRA, echoes, renderer
+
+
+def index(values, scale, signed):
+    """Index images by counting the thresholds that each value over the largest one reaches."""
+    steps = np.searchsorted(scale.thresholds(127 if signed else 255), np.abs(values) / np.abs(values).max(), "right")
+    return np.where(values < 0, 128 - steps, 128 + steps) if signed else steps
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from PIL import Image
 
 from lowalt.files.errors import InputError
 from lowalt.tiles import colour_map, decode, encode, paint
-from lowalt.tiles.filters import apply_paeth, undo
 from lowalt.tiles.huffman import MATCH_BITS, MATCH_EXTRA, MATCH_SYMBOL, zlib_compress
 from lowalt.tiles.huffman_code import code_lengths
 
@@ -83,32 +82,6 @@ def test_png_gives_the_pixels_back_to_us_and_to_pillow(height, width, seed, leve
         assert picture.mode == "P"
         np.testing.assert_array_equal(np.asarray(picture), image)
         np.testing.assert_array_equal(np.asarray(picture.convert("RGB")), paint(image, palette))
-
-
-@pytest.mark.parametrize("kind", range(5))
-def test_every_filter_is_undone_as_pillow_does(kind):
-    """Rows of random bytes under one filter: any bytes are a valid image."""
-    rows = np.random.default_rng(kind).integers(0, 256, (9, 12), np.uint8)
-    rows[:, 0] = kind
-    blank = encode(np.zeros((9, 11), np.uint8), colour_map("gray"))
-    start = blank.index(b"IDAT") - 4
-    body = b"IDAT" + zlib.compress(rows.tobytes())
-    chunk = (len(body) - 4).to_bytes(4, "big") + body + zlib.crc32(body).to_bytes(4, "big")
-    data = blank[:start] + chunk + blank[-12:]
-    with Image.open(io.BytesIO(data)) as picture:
-        expected = np.asarray(picture)
-    np.testing.assert_array_equal(decode(data)[0], expected)
-
-
-def test_paeth_there_and_back():
-    image = np.random.default_rng(1).integers(0, 256, (50, 33), np.uint8)
-    rows = np.empty((50, 34), np.uint8)
-    apply_paeth(image, rows)
-    back = np.empty_like(image)
-    assert undo(rows, back) == -1
-    np.testing.assert_array_equal(back, image)
-    rows[7, 0] = 5
-    assert undo(rows, back) == 7
 
 
 def test_pngs_of_others_are_read():

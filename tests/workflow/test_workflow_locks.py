@@ -1,6 +1,7 @@
 """Locks: a dead owner's is taken over, a living one's refused by name, and of many at once exactly one wins."""
 
 import errno
+import fcntl
 import json
 import os
 import signal
@@ -14,6 +15,7 @@ import pytest
 
 import snakemake_runs
 from lowalt.files.processes import started
+from lowalt.workflow import locks
 from lowalt.workflow.locks import TOKEN, Owner, guarded, holders, numbers, refusal, take, take_over
 
 ROOT = Path(__file__).parents[2]
@@ -86,22 +88,32 @@ def test_a_lock_that_cannot_be_written_whole_leaves_nothing(tmp_path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
-def test_jobs_that_outlived_their_run_are_ended(tmp_path):
-    command = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print(1, flush=True); time.sleep(60)"
-    jobs = [
-        subprocess.Popen([sys.executable, "-c", line], env=os.environ | {TOKEN: token}, stdout=subprocess.PIPE)
-        for line, token in [(command.replace("SIG_IGN", "SIG_DFL"), "gone"), (command, "another")]
+def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_a_signal(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks, "GRACE_S", 0.5)
+    program = "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True); time.sleep(60)"
+    heeding, stubborn, another = jobs = [
+        subprocess.Popen([sys.executable, "-c", program.format(answer)], env=os.environ | {TOKEN: token}, stdout=-1)
+        for answer, token in (("SIG_DFL", "gone"), ("SIG_IGN", "gone"), ("SIG_IGN", "another"))
     ]
     for job in jobs:
         job.stdout.readline()
-    assert GONE.left_behind() == [jobs[0].pid]
+    assert sorted(GONE.left_behind()) == sorted([heeding.pid, stubborn.pid])
     leave(tmp_path)
     said = []
     take_over(tmp_path, said.append)
-    assert str(jobs[0].pid) in said[0] and "ending its 1 processes" in said[0]
-    assert jobs[0].wait(5) == -signal.SIGTERM and jobs[1].poll() is None
-    jobs[1].kill()
-    jobs[1].wait()
+    assert str(heeding.pid) in said[0] and "ending its 2 processes" in said[0]
+    assert (heeding.wait(5), stubborn.wait(5), another.poll()) == (-signal.SIGTERM, -signal.SIGKILL, None)
+    another.kill()
+    another.wait()
+
+
+def test_a_system_without_locks_on_files_is_refused(tmp_path, monkeypatch):
+    def refuse(descriptor, how):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with pytest.raises(OSError, match=os.strerror(errno.ENOLCK)), guarded(tmp_path):
+        pytest.fail("the block runs without a lock")
 
 
 RACE = """

@@ -1,4 +1,4 @@
-"""Refusals: each contradiction is refused by its words, and the same configuration without it is taken."""
+"""Refusals: each contradiction of a configuration is refused by its key and words before any job, in one sentence."""
 
 import os
 import re
@@ -13,107 +13,122 @@ from lowalt.config.layers import load_yaml
 from lowalt.files.errors import InputError
 from lowalt.workflow import refusals
 
-
-def config(**recognition):
-    """What the refusals read of a configuration."""
-    block = {"cache": True, **recognition}
-    return {"motion": {}, "effects": {}, "shards": {"kind": "image"}, "recognition": block,
-            "network": {"symbols": 400, "stations": {"A": {}, "B": {}}}}  # fmt: skip
-
-
-def assert_refused(words, function, *given):
-    with pytest.raises(InputError, match=words):
-        function(*given)
+ALONE = {"stations": {"B": None, "C": None}}
+CORNERS = {"region": {"polygon_m": [[0, 0], [500, 0], [250, 433]]}}
+A = "A:VRP+TRP+VT"
+LINKS = {"stations": {"A-B": {"transmit": "A", "receive": "B"}}}
+GROUND = {"permittivity": 5.0, "conductivity_s_m": 0.1}
+AT_12_GHZ = {"carrier_hz": 12e9, "symbol_interval_s": 1e-3}
+CELLS = {"spectra": {"hrrp": {"window": 1, "hop": 1, "cells": 9}}}
 
 
-def test_sizes_of_motion_models_rise_and_stand_without_effects():
-    given = {"motion": {"sizes_m": {"UAV": [0.3, 0.3], "Bird": [0.1, 0.4]}}, "effects": {}}
-    refusals.refuse_sizes(given)
-    refusals.refuse_sizes({"motion": {}, "effects": {"adc": {}}})
-    assert_refused(
-        r"sizes_m: given together with effects \['adc'\]", refusals.refuse_sizes, {**given, "effects": {"adc": {}}}
-    )
-    given["motion"]["sizes_m"]["Bird"] = [0.4, 0.1]
-    assert_refused("Bird from 0.4 to 0.1 m", refusals.refuse_sizes, given)
-    assert_refused("expected some of the classes", refusals.refuse_sizes, {"motion": {"sizes_m": {"Boat": [1, 2]}}})
+def recognition(**block) -> dict:
+    """An overlay of the block `recognition`."""
+    return {"recognition": block}
 
 
-def test_samples_made_on_the_spot_have_no_cache():
-    refusals.refuse_input(config(input="dataset", cache=False))
-    refusals.refuse_input(config(input="shards"))
-    assert_refused("'dataset' together with recognition.cache true", refusals.refuse_input, config(input="dataset"))
+@pytest.mark.parametrize("overlay", [
+    {"network": ALONE, "motion": CORNERS, **recognition(schemes=[A])},
+    {"network": {"carrier_hz": "28e9"}, "spectra": {"vt": {"speed_min_mps": -1.0, "speed_max_mps": 1.0}}},
+    {"network": {"carrier_hz": 28e9}, "spectra": {"vt": None}, **recognition(schemes=["A:VRP"])},
+    # Only the width of the axis counts, and symbols at known uneven instants tell more speeds apart.
+    {"spectra": {"vt": {"speed_min_mps": 0.0, "speed_max_mps": 12.2}}},
+    {"spectra": {"vt": {"speed_max_mps": 20.0}, "times": "known"}},
+    {"motion": {"sizes_m": {"UAV": [0.3, 0.3], "Bird": [0.1, 0.4]}}},
+    {"motion": {"height_m": {"Crow": [1, 1], "UAV": [1, 2]}}},
+    recognition(input="dataset", cache=False),
+    {"effects": {"ground_reflection": {}}},
+    {"effects": {"ground_reflection": GROUND}, "network": AT_12_GHZ},
+    {"effects": {"cell_noise": {}}, "added": []}, {"added": [{"snr_db": [2]}]},
+    {"shards": {"kind": "cube", "cells": "int16"}}, {**CELLS, "shards": {"kind": "cube"}},
+])  # fmt: skip
+def test_what_suits_is_taken(overlay):
+    assert run_of(overlay).schemes
 
 
-def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_replace_them(monkeypatch):
-    sources = {"Crow": "mesh", "Walk": "mocap", "Mini": "builtin"}
-    asked = []
+@pytest.mark.parametrize(("overlay", "words"), [
+    ({"network": ALONE}, r"motion.region.polygon_m: None, the area between the stations, .* \[\[0.0, 0.0\]\]; exp"),
+    ({"motion": {"region": {"polygon_m": [[0, 0], [1, 1]]}}}, r"polygon_m: \[\[0, 0\], \[1, 1\]\]; expected corners"),
+    ({"motion": {"region": {"polygon_m": []}}}, r"polygon_m: \[\]; expected corners"),
+    ({"motion": {"sizes_m": {"UAV": [1, 2]}}, "effects": {"adc": {}}}, r"sizes_m: given together with effects \['adc'"),
+    ({"motion": {"sizes_m": {"Bird": [0.4, 0.1]}}}, "motion.sizes_m: Bird from 0.4 to 0.1 m"),
+    ({"motion": {"sizes_m": {"Boat": [1, 2]}}}, r"motion.sizes_m: \['Boat'\], expected some of the classes"),
+    ({"motion": {"height_m": {"Kite": [1, 2]}}}, r"height_m: \['Kite'\]"),
+    ({"motion": {"height_m": {"Crow": [2, 1]}}}, "height_m: Crow from 2 to 1 m"),
+    ({"network": ALONE, "motion": CORNERS}, "recognition.schemes: 'ABC:.* line 8: stations 'ABC', .* has .*'A:VT'"),
+    ({"spectra": {"vt": None}}, r"recognition.schemes: 'A:.* needs \['vt'\]; .* has \['A:VRP', 'A:TRP'\]"),
+    (recognition(schemes=["x"]), r"recognition.schemes: 'x': .* which has [^;]*$"),
+    (recognition(timed=["x"]), "recognition.timed: 'x'"),
+    (recognition(schemes=[A, "a-vrp-trp-vt"]), "expected every scheme once"),
+    (recognition(schemes=["ABC:mean fusion"], protocols=["seen"]), r"recognition.protocols: .* gives \['unseen'\]"),
+    (recognition(input="dataset"), "'dataset' together with recognition.cache true"),
+    (recognition(transfer=["default"]), "recognition.transfer: 'default' is this run"),
+    ({"network": {"carrier_hz": 28e9, "symbol_interval_s": 1e-3}},
+     r"speed_max_mps 6.1, .* to 2.68: .* 2.8e\+10 .* 0.001"),
+    ({"spectra": {"vt": {"speed_step_mps": 1e-6}}}, "spectra.vt: .* expected a step that makes at most 65536"),
+    ({"spectra": {"trp": {"window": 9}}}, "spectra.trp: window is 9"),
+    ({"network": {"symbols": 256}}, "spectrum vrp: .*256"),
+    ({"shards": {"kind": "signal", "cells": "int16"}}, "shards.cells: 'int16' and shards.kind 'signal', expected"),
+    ({**CELLS, "shards": {"kind": "signal"}}, r"spectra: \['hrrp'\] and shards.kind 'signal'"),
+    ({**CELLS, "effects": {"slow_time": {"regrid": "nudft"}}}, "slow_time.regrid: 'nudft'"),
+    ({"shards": {"kind": "recipe"}, "effects": {"cell_noise": {}}}, "'recipe' with the effect 'cell_noise'"),
+    ({"network": {"guard_subcarriers": -3}}, "expected effects.interference"),
+    ({"network": LINKS}, "links between two stations, expected effects.direct_path"),
+    # However weak the direct path is, also where there is none.
+    *(({"network": LINKS, "effects": {"direct_path": {"loss_db": loss_db}, name: {}}},
+       rf"\['{name}'\] are not modelled between two stations")
+      for loss_db in (0.0, None) for name in ("background_channel", "interference", "transmit_leakage")),
+    ({"effects": {"receiver_noise": {}}}, "a link budget or set SNRs, not both"),
+    ({"effects": {"ground_reflection": {"permittivity": 0.9}}}, "effects.ground_reflection"),
+    *(({"network": AT_12_GHZ, "effects": {"ground_reflection": {key: GROUND[key] for key in known}}},
+       "medium dry ground is known from 1 to 10 GHz, station A sends at 12 GHz")
+      for known in ((), ("permittivity",), ("conductivity_s_m",))),
+    ({"effects": {"companions": {"subtypes": ["Kite"]}}}, r"companions.subtypes: \['Kite'\], expected subtypes of the"),
+    ({"effects": {"cell_noise": {}}, "added": [{"snr_db": [2]}]}, "added: snr_db together with effects.cell_noise"),
+    ({"inputs": "none"}, "inputs: 'none' is not there"),
+    ({"inputs": "in{x}"}, r"inputs: 'in\{x\}', expected a path without braces"),
+    ({"report": {"accuracy": "a}.csv"}}, r"report.accuracy: 'a\}.csv', expected a path without braces"),
+    ({"targets": {"records": ["config/targets/none.yaml"]}}, "none.yaml"),
+    (recognition(network={"weights": "a.pth"}), "recognition.network.weights: 'a.pth' is not there"),
+    (recognition(network={"backbone": "a.py:f"}), "recognition.network.backbone: 'a.py' is not there"),
+    (recognition(table="a.csv"), "recognition.table: 'a.csv' is not there"),
+    ({"report": {"accuracy": "a.csv"}}, "report.accuracy: 'a.csv' is not there"),
+    ({"targets": {"select": ["crow"]}}, r"targets.select: \['crow'\], expected perhaps \['Crow'\]$"),
+    (recognition(processes=0), "recognition.processes: value 0"),
+    *((recognition(processes=processes, nodes=nodes), f"nodes: {nodes} with recognition.processes: {processes}, exp")
+      for processes, nodes in ((6, 4), (1, 2))),
+])  # fmt: skip
+def test_what_does_not_is_refused_with_its_key_and_what_was_expected(overlay, words):
+    with pytest.raises(InputError, match=words) as refused:
+        run_of(overlay, overlay.get("inputs"))
+    assert "\n" not in str(refused.value).removeprefix("configuration refused: ")
 
-    def records_of(targets):
-        asked.append(targets["where_missing"])
-        return {name: {"source": source} for name, source in sources.items()}
 
-    monkeypatch.setattr(refusals, "records_of", records_of)
-    there = {"Walk"}
-    monkeypatch.setattr(refusals, "missing_inputs", lambda records, inputs: sorted(set(records) - there))
-    refusals.refuse_no_files({"where_missing": "builtin"}, "folder")
-    there.clear()
-    assert_refused(r"inputs: folder, expected .* one of \['Crow', 'Walk'\]", refusals.refuse_no_files,
-            {"where_missing": "builtin"}, "folder")  # fmt: skip
-    assert asked == ["refuse"] * 2
-    for other in ({"where_missing": "refuse"}, {}):
-        refusals.refuse_no_files(other, "folder")
-    sources.update(Crow="builtin", Walk="builtin")
-    refusals.refuse_no_files({"where_missing": "builtin"}, "folder")
-
-
-def test_flight_heights_are_of_subtypes_and_classes_the_lower_first():
-    good = {"Crow": [1, 1], "UAV": [1, 2], "Glider": [3, 4]}
-    refusals.refuse_heights(good, {"Crow": {}}, ("Glider",))
-    for more, words in (({"Kite": [1, 2]}, r"height_m: \['Kite'\]"), ({"Crow": [2, 1]}, "Crow from 2 to 1 m")):
-        assert_refused(words, refusals.refuse_heights, good | more, {"Crow": {}}, ("Glider",))
+def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_replace_them(tmp_path):
+    targets = load_yaml("config/real.yaml")["targets"]
+    with pytest.raises(InputError, match=rf"inputs: {tmp_path}, expected a folder with the files of at least one of"):
+        run_of({"targets": targets}, str(tmp_path))
+    (name, record), *_ = load_yaml("config/targets/real.yaml").items()
+    for part in record["parts"].values():
+        for mesh in part["meshes"]:
+            (tmp_path / mesh["file"]).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / mesh["file"]).touch()
+    assert run_of({"targets": targets}, str(tmp_path)).records[name]["source"] == "mesh"
 
 
 def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, monkeypatch):
     own = load_yaml("config/default.yaml") | {"run": "own"}
     monkeypatch.chdir(tmp_path)
     refusals.refuse_data(own)
-    assert_refused("data: no results/made/config.yaml", refusals.refuse_data, own | {"data": "made"})
+    with pytest.raises(InputError, match=r"data: no results/made/config\.yaml, expected a finished run"):
+        refusals.refuse_data(own | {"data": "made"})
     (tmp_path / "results/made").mkdir(parents=True)
     kept = tmp_path / "results/made/config.yaml"
     kept.write_text(yaml.safe_dump(own | {"run": "made", "recognition": {}, "cost": 1}))
     refusals.refuse_data(own | {"data": "made"})
     kept.write_text(yaml.safe_dump(own | {"run": "made", "seed": own["seed"] + 1, "more": 1}))
-    assert_refused(r"other settings of \['more', 'seed'\]", refusals.refuse_data, own | {"data": "made"})
-
-
-def test_paths_with_braces_are_refused_by_their_key_and_other_odd_names_are_not():
-    config = {
-        "recognition": {"table": "my 'table'.csv"},
-        "report": dict.fromkeys(("published", "accuracy")),
-    }
-    refusals.refuse_braces(config, "in$(touch y)")
-    refusals.refuse_braces(config, None)
-    assert_refused(r"inputs: 'in\{x\}', expected a path without braces", refusals.refuse_braces, config, "in{x}")
-    config["report"]["accuracy"] = "a}.csv"
-    assert_refused(r"report\.accuracy: 'a\}\.csv'", refusals.refuse_braces, config, None)
-
-
-@pytest.mark.parametrize(
-    ("overlay", "words"),
-    [
-        ({"noise": {"snr_db": []}}, "noise.snr_db: value [], expected at least 1 item(s)"),
-        ({"targets": {"select": ["Dodo"]}}, "targets.select: ['Dodo']"),
-        ({"network": {"carrier_hz": 4.9}}, "network.carrier_hz: value 4.9"),
-        ({"network": {"symbols": 256}}, "256"),
-        ({"targets": {"records": ["config/targets/none.yaml"]}}, "none.yaml"),
-        ({"recogniton": {}}, "unknown key(s) ['recogniton']"),
-        ({"effects": {"receiver_noise": {}}}, "a link budget or set SNRs, not both"),
-        ({"effects": {"ground_reflection": {"permittivity": 0.9}}}, "effects.ground_reflection"),
-    ],
-)
-def test_a_wrong_configuration_makes_no_run(overlay, words):
-    with pytest.raises(InputError, match=re.escape(words)):
-        run_of(overlay)
+    with pytest.raises(InputError, match=r"other settings of \['more', 'seed'\]"):
+        refusals.refuse_data(own | {"data": "made"})
 
 
 @pytest.mark.workflow

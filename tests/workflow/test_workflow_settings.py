@@ -12,7 +12,6 @@ from lowalt.config.layers import plain
 from lowalt.files.yaml_files import load_yaml
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
-from lowalt.workflow.stage_settings import Settings
 from snakemake_texts import body
 
 ROOT = Path(__file__).parents[2]
@@ -23,20 +22,7 @@ SETTINGS_OF = {
 }  # fmt: skip
 
 
-class Job(SimpleNamespace):
-    """Wildcards of a job, read as attributes or asked for by name, as Snakemake gives them."""
-
-    def get(self, name, default=None):
-        return getattr(self, name, default)
-
-
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
-
-
-@pytest.fixture(autouse=True)
-def checkout(monkeypatch):
-    """Paths of the default configuration are relative to the checkout."""
-    monkeypatch.chdir(ROOT)
 
 
 @pytest.mark.parametrize(
@@ -79,55 +65,18 @@ def test_settings_of_different_jobs_differ_and_are_json():
     assert json.loads(settings.configuration(one)) == plain(load_yaml("config/default.yaml"))
 
 
-def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
-    """Texts are kept, so a key that leaves out what a job differs by would hand it another job's text."""
-    run, _, settings = parts({"added": [{"snr_db": [1.5]}], "tiles": {"reduced": [24]}})
-    scheme = next(one.slug for one in run.trained if one.name == "ABC:VRP+TRP+VT")
-    common = {"run": run.name, "scheme": scheme}
-    chunks = [name.split("-", 1) for name in ("seen-00000", "seen-00001", run.plan.chunks[-1])]
-    rest = [
-        ("A", "crow", "24", "seen", "0"), ("B", "owl", "48", "unseen", "0"), ("B", "crow", "24", "unseen", "1"),
-        ("A", "owl", "24", "unseen", "0"),
-    ]  # fmt: skip
-    names = ("station", "subtype", "size", "protocol", "train_seed")
-    jobs = [
-        Job(**common, group=group, part=part, **dict(zip(names, one, strict=True)))
-        for group, part in chunks
-        for one in rest
-    ]
-    stages = [
-        "cloud", "motion", "echo", "noise", "shard", "views", "training", "images", "index",
-    ]  # fmt: skip
-    for stage in stages:
-        told = [getattr(settings, stage)(job) for job in jobs]
-        assert told == [getattr(Settings(run), stage)(job) for job in jobs]
-        assert (len(set(told)) > 1) == (stage not in ("images", "index"))
-
-
 def test_tiles_of_range_cells_follow_the_seed_and_the_snrs():
     """Their noise is drawn from both; tiles of signals alone need neither."""
-    job, cells = (
-        Job(run="default", group="seen", part="00000"),
-        {"spectra": {"hrrp": {"window": 1, "hop": 1, "cells": 9}}},
-    )
+    job, cells = CHUNK, {"spectra": {"hrrp": {"window": 1, "hop": 1, "cells": 9}}}
     changes = [{}, {"seed": 2}, {"noise": {"snr_db": [3.0]}}]
     plain, of_cells = ([parts({**block, **change})[2].images(job) for change in changes] for block in ({}, cells))
     assert len(set(plain)) == 1 and len(set(of_cells)) == 3
 
 
 def test_the_report_s_files_are_a_manifest_that_the_report_takes():
-    shown = {
-        "cost": "config/schemes.csv",
-        "accuracy": "config/cost/accuracy.csv",
-        "published": "config/published_accuracy.csv",
-    }
-    for overlay, names in (
-        ({"report": {"cost": None}}, set()),
-        (
-            {"report": shown, "recognition": {"transfer": ["other"]}},
-            {"transfer", "accuracy_cost", "echo_cost"},
-        ),
-    ):
+    shown = {"cost": "config/schemes.csv", "accuracy": "config/cost/accuracy.csv"}
+    more = {"report": shown, "recognition": {"transfer": ["other"]}}
+    for overlay, names in (({}, set()), (more, {"transfer", "accuracy_cost", "echo_cost"})):
         _, products, _ = parts(overlay)
         files = ReportInputs(products.report(CHUNK)).files
         kept = {name for name in files if name.startswith("kept_")}

@@ -72,19 +72,6 @@ def test_a_run_is_refused_where_its_new_bytes_do_not_fit_and_started_when_told(t
         space.before(workflow, PLAN, CONFIG)
 
 
-def test_a_run_that_ends_on_a_full_disk_says_how_much_is_free(tmp_path, monkeypatch, caplog):
-    from snakemake.logging import logger
-
-    monkeypatch.setattr(logger, "propagate", True)
-    monkeypatch.setattr(space, "free_bytes", lambda folder: 500_000)
-    space.after(tmp_path)
-    assert f"the disk of {(tmp_path / 'results').resolve()} is full (0.5 MB free)" in caplog.text
-    caplog.clear()
-    monkeypatch.setattr(space, "free_bytes", lambda folder: 2**20)
-    space.after(tmp_path)
-    assert not caplog.text
-
-
 @pytest.fixture
 def small_disk(tmp_path):
     """A disk of 2 MB of its own, where this user may mount one."""

@@ -34,13 +34,6 @@ def test_the_state_of_a_run_is_seen_from_elsewhere_and_a_killed_one_is_called_so
     assert {found["pid"] for found in status.read(folder)} == {os.getpid(), dead["pid"]}
 
 
-def test_a_file_that_another_run_has_swept_away_meanwhile_is_no_fault(tmp_path, monkeypatch):
-    dead = {"pid": 2**22 + 1, "process": 1, "state": "running", "written": 0.0}
-    monkeypatch.setattr(status, "read", lambda folder: [dead])
-    status._sweep(tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_run_without_a_failed_job_is_told_apart_ended_failed_or_interrupted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     wrong = record("WorkflowError:\nno room", logging.ERROR, event="error", exception="WorkflowError")

@@ -22,22 +22,17 @@ def main(arguments: list[str]) -> None:
     options.add_argument(
         "--out", nargs="+", required=True, help="clean signals to write (.npy), a file a station: complex64 (models, N)"
     )
-    options.add_argument("--explain", help="text to write: how each signal was computed, and by which bounds")
     given = options.parse_args(arguments)
     if len(given.out) != len(given.station):
         raise InputError(f"--out: {len(given.out)} files, expected one for each of the stations {given.station}")
     block, tolerance = pick(given.settings, "network", "tolerance")
     network = Network.from_settings(block)
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
-    notes: list[str] | None = [] if given.explain else None
-    result = clean_signals(network, given.station, clouds, read_table(given.motion), tolerance, notes)
-    if notes is not None:
-        with replacing(given.explain) as temporary:
-            temporary.write_text("\n".join(notes))
-    for path, found in zip(given.out, result, strict=True):
-        with replacing(path, found.nbytes) as temporary:
-            np.save(temporary, found)
-        print(f"{path}: {len(found)} signals", file=sys.stderr)
+    result = clean_signals(network, given.station, clouds, read_table(given.motion), tolerance)
+    for path, signals in zip(given.out, result, strict=True):
+        with replacing(path, signals.nbytes) as temporary:
+            np.save(temporary, signals)
+        print(f"{path}: {len(signals)} signals", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -69,10 +69,10 @@ def echo_signal(
     """
     _check_tolerance(tolerance, sample)
     scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)
-    found, left, method, lay = refine.compute(scene, radio, refs, aims, tolerance)
+    found, left, method, seen = refine.compute(scene, radio, refs, aims, tolerance)
     if paths is not None:
         left = np.arange(len(refs))
-        method = method._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
+        method = method._replace(single=False, cheap=0, exact=0, general=len(refs))
     if len(left):
         risks = np.zeros(len(refs))
         check_fault(results.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
@@ -80,8 +80,7 @@ def echo_signal(
         found.bounds[left] = found.totals[left] * share + risks[left] * direction
         found.gaps[left] = np.maximum(found.gaps[left] - 2 * found.bounds[left], 0.0)
     if tolerance is None and paths is None:
-        again = nearest.correct(scene, lay, radio, refs, aims, found, method.pointwise_bound)
-        method = method._replace(again=again)
+        method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
     largest = float(abs(found.values).max())
     bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
     if tolerance is not None and not bound <= tolerance:
@@ -108,22 +107,6 @@ def echo_signals(
     return np.stack([
         echo_signal(network, station, seen, None, aim_m, tolerance, sample=sample).signal
         for station in network.stations
-    ])  # fmt: skip
-
-
-def method_text(result: EchoResult) -> str:
-    """Return in words how a signal was computed and which bounds allowed it."""
-    method = result.method
-    kind = "float32 after the phase" if method.single else "float64"
-    aim = "exact mode" if method.error is None else f"plan for {method.error:.1e} of the sum of amplitudes"
-    return "\n".join([
-        f"target radius {method.size_m:.3g} m, at most {method.spread:.3g} of the range",
-        f"{aim}: {kind}, ranges by {'polynomials' if method.near else 'roots'}, orders of cosine {method.orders[0]}, "
-        f"sine {method.orders[1]}, cell kernel {method.orders[2]}",
-        f"symbols: {method.cheap} by that plan, {method.exact} by the exact one, "
-        f"{method.general} by the pointwise kernel",
-        f"symbols computed again so that complex64 is rounded correctly: {method.again[0]}",
-        f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
     ])  # fmt: skip
 
 

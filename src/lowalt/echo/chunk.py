@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from lowalt.config.network import Network
-from lowalt.echo.api import echo_signal, method_text
+from lowalt.echo.api import echo_signal
 from lowalt.echo.scene import Rigid, target
 from lowalt.machine.progress import reported
 from lowalt.motion import poses
@@ -18,11 +18,10 @@ def clean_signals(
     clouds: Mapping[str, Cloud],
     rows: list[dict],
     tolerance: float | None,
-    notes: list[str] | None = None,
 ) -> np.ndarray:
     """Return clean signals (stations, models, N) complex64 of the motion table `rows` at the stations `names`.
 
-    The beams aim at each cloud's origin at the first symbol. `notes` gets a text a signal: how it was computed.
+    The beams aim at each cloud's origin at the first symbol.
     Raises: InputError naming the sample where a subtype has no cloud or a position cannot be computed with.
     """
     stations, times_s = [network.station(name) for name in names], network.times_s
@@ -34,8 +33,5 @@ def clean_signals(
         aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
         for place, station in enumerate(stations):
             where = f"{sample}, station {station.name}"
-            found = echo_signal(network, station, seen, None, aim, tolerance, sample=where)
-            result[place, index] = found.signal
-            if notes is not None:
-                notes.append(f"{where}\n{method_text(found)}\n")
+            result[place, index] = echo_signal(network, station, seen, None, aim, tolerance, sample=where).signal
     return result

@@ -4,7 +4,7 @@ A double-double is the unevaluated sum of two doubles (about 32 digits). Turns p
 100 km and 4.9 GHz the phase is 2e7 rad, and one double would leave only eight digits of the turn.
 """
 
-from decimal import localcontext
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
@@ -43,25 +43,6 @@ def constants(rows: np.ndarray) -> Exact:
     )  # fmt: skip
 
 
-def _exact(network: Network, station: Station) -> Exact:
-    """The radar's numbers as double-doubles, rounded once from exact fractions."""
-    low, spacing = Fraction(station.frequency_hz), Fraction(network.subcarrier_spacing_hz)
-    carrier = Fraction(network.carrier_hz)
-    kappa = low / carrier
-    centre = low + (network.subcarriers - 1) * spacing / 2
-    sine, cosine = sine_cosine(station.normal_rad)
-    elements = int(np.prod(network.transmit)) * int(np.prod(network.receive))
-    with localcontext() as context:
-        context.prec = DIGITS
-        four_pi = 4 * PI
-        scale = (decimal_of(network.power) / elements).sqrt() * decimal_of(LIGHT / carrier) / (four_pi * four_pi.sqrt())
-    return Exact(
-        pair(sine), pair(cosine), pair(2 * centre / LIGHT), pair(2 * network.subcarriers * spacing / LIGHT),
-        pair(kappa / 2), pair(kappa / 4 * (network.transmit[0] + network.receive[0] - 2)),
-        pair(kappa / 4 * (network.transmit[1] + network.receive[1] - 2)), pair(scale),
-    )  # fmt: skip
-
-
 class Radar(NamedTuple):
     """Constants of one station; `_lo` is the low half of a double-double."""
 
@@ -96,24 +77,27 @@ class Radar(NamedTuple):
 
 @lru_cache(maxsize=64)
 def radar(network: Network, station: Station) -> Radar:
-    """Return the constants of `station` (spec: alpha, a0, kappa and the effective carrier f_k + (M-1) df / 2)."""
-    low, spacing = Fraction(station.frequency_hz), Fraction(network.subcarrier_spacing_hz)
-    centre = low + (network.subcarriers - 1) * spacing / 2
-    exact = _exact(network, station)
+    """Return the constants of `station`, each rounded once from exact fractions.
+
+    Source: spec: alpha, a0, kappa and the effective carrier f_k + (M-1) df / 2.
+    """
+    low, spacing, carrier = map(
+        Fraction, (station.frequency_hz, network.subcarrier_spacing_hz, network.carrier_hz)
+    )  # fmt: skip
+    (transmit_h, transmit_v), (receive_h, receive_v) = network.transmit, network.receive
+    kappa, centre = low / carrier, low + (network.subcarriers - 1) * spacing / 2
+    bandwidth, elements = network.subcarriers * spacing, transmit_h * transmit_v * receive_h * receive_v
+    with localcontext() as context:
+        context.prec = DIGITS
+        four_pi = 4 * PI
+        scale = (decimal_of(network.power) / elements).sqrt() * decimal_of(LIGHT / carrier) / (four_pi * four_pi.sqrt())
+    numbers: tuple[Fraction | Decimal, ...] = (
+        *sine_cosine(station.normal_rad), 2 * centre / LIGHT, 2 * bandwidth / LIGHT, kappa / 2,
+        kappa / 4 * (transmit_h + receive_h - 2), kappa / 4 * (transmit_v + receive_v - 2), scale,
+    )  # fmt: skip
+    exact = Exact(*map(pair, numbers))
     return Radar(
-        np.array(station.position_m, dtype=np.float64),
-        exact.sine[0],
-        exact.cosine[0],
-        *exact.turns,
-        *exact.cells,
-        station.frequency_hz / network.carrier_hz,
-        int(network.transmit[0]),
-        int(network.transmit[1]),
-        int(network.receive[0]),
-        int(network.receive[1]),
-        int(network.subcarriers),
-        exact.scale[0],
-        float(centre),
-        float(network.subcarriers * spacing),
-        np.array(exact),
-    )
+        np.array(station.position_m, dtype=np.float64), exact.sine[0], exact.cosine[0], *exact.turns, *exact.cells,
+        station.frequency_hz / network.carrier_hz, int(transmit_h), int(transmit_v), int(receive_h), int(receive_v),
+        int(network.subcarriers), exact.scale[0], float(centre), float(bandwidth), np.array(exact),
+    )  # fmt: skip

@@ -70,15 +70,6 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     return array if array.flags.writeable else array.copy()
 
 
-def _rotation(value, sample: str) -> tuple[np.ndarray, bool]:
-    """Return the checked rotations, and whether they are one zero repeated, as the poses of nodes are."""
-    shaped = isinstance(value, np.ndarray) and value.ndim == 4 and value.shape[2:] == (3, 3)
-    repeated = shaped and value.size and not any(value.strides)
-    if repeated and not _float("motion.rotation", value[:1, :1], ("N", "P", 3, 3), sample).any():
-        return value, True
-    return _float("motion.rotation", value, ("N", "P", 3, 3), sample), False
-
-
 def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str = "") -> Target:
     """Return the checked target of a motion, `Rigid` or positions (N, L, 3) m, and of its cross sections, (L,) m2 or
     one number for all points.
@@ -90,7 +81,7 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
     """
     where = f"{sample}: " if sample else ""
     if isinstance(motion, Rigid):
-        rotation, still = _rotation(motion.rotation, where)
+        rotation = _float("motion.rotation", motion.rotation, ("N", "P", 3, 3), where)
         symbols, parts = rotation.shape[:2]
         translation = _float("motion.translation", motion.translation, (symbols, parts, 3), where)
         points = _float("motion.points", motion.points, ("L", 3), where)
@@ -102,10 +93,8 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
             raise InputError(f"{where}motion.part spans {part.min()}..{part.max()}, expected 0..{parts - 1}")
         part = part.astype(np.int64)
         count = len(points)
-        if count == parts and np.array_equal(part, np.arange(count)) and (still or not rotation.any()):
+        if count == parts and np.array_equal(part, np.arange(count)) and not rotation.any():
             rotation, points, part = _no_rotation()
-        elif still:
-            rotation = np.zeros(rotation.shape)
     else:
         translation = _float("positions", motion, ("N", "L", 3), where)
         count = translation.shape[1]

@@ -19,9 +19,9 @@ def processor() -> str:
 
 
 def _accelerator() -> str:
-    """First NVIDIA GPU's name by its driver's own tool, without importing a framework."""
+    """First NVIDIA GPU's name by its driver's own tool, without importing a framework; none where it is hidden."""
     tool = shutil.which("nvidia-smi")
-    if not tool:
+    if not tool or os.environ.get("CUDA_VISIBLE_DEVICES") in ("", "-1"):
         return "no GPU"
     query = subprocess.run([tool, "--query-gpu=name", "--format=csv,noheader"], capture_output=True, text=True)
     names = query.stdout.split("\n") if query.returncode == 0 else []

@@ -3,17 +3,13 @@
 numba's own cache looks at the file of a function only. It does not look at the functions that it calls in other
 files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
 kernel's bytecode and options, of all kernels and constants that it uses, of those that these use, and so on. Code that
-is not compiled has no part in it. Processes that need the same machine code at the same time take turns: one compiles,
-the others load what it kept. Whether products are fused and sums reordered is said for every kernel, and numba's own
-parts, such as the product of complex numbers, are compiled for each set of options by themselves: else the first
+is not compiled has no part in it. Whether products are fused and sums reordered is said for every kernel, and numba's
+own parts, such as the product of complex numbers, are compiled for each set of options by themselves: else the first
 kernel of a process to call a function would decide how that function rounds in all others.
 """
 
-import contextlib
-import functools
 import hashlib
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -24,9 +20,6 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.targetconfig import ConfigStack
-
-PATIENCE_S = 180.0
-"""After so long a process goes on without its turn: doing the work twice is better than standing still."""
 
 
 def _text_of(value) -> str:
@@ -118,61 +111,21 @@ cpu_target.target_context.cached_internal_func = _PartsByOptions()
 
 
 class _DigestCache(FunctionCache):
-    """Numba's cache on disk, with the digest of everything compiled in its keys, and turns between processes."""
+    """Numba's cache on disk, with the digest of everything compiled in its keys."""
 
-    counted = True
-    """Whether the function may use counted references, and so allocate."""
-    inner = False
-    """Whether the function has no entry for Python."""
     options: dict[str, Any] | None = None
     """How the function is compiled."""
 
-    @functools.cached_property
-    def turn(self):
-        """The lock under which one process at a time compiles this function."""
-        # Only who compiles needs the module, whose import takes a twentieth of a job's start.
-        from filelock import FileLock
-
-        # In a folder of its own: tools that list kept machine code see no other file.
-        path = Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock"
-        return FileLock(path, timeout=PATIENCE_S, fallback_to_soft=False)
-
     def _index_key(self, sig, codegen):
-        """Numba's key, the digest of the code, the fields of named tuples among the arguments, and a missing entry."""
-        parts = digest(self._py_func, self.options)
-        key = (*super()._index_key(sig, codegen), parts, tuple(map(_fields, sig)))
-        return (*key, "inner") if self.inner else key
+        """Numba's key, the digest of code and options, and the fields of named tuples among the arguments."""
+        return *super()._index_key(sig, codegen), digest(self._py_func, self.options), tuple(map(_fields, sig))
 
     def load_overload(self, sig, target_context):
-        """Return finished machine code for a signature, or None where this process must compile it.
-
-        Like numba's method, except that it does not load the compiler before it looks for finished machine code, and
-        that it waits while another process compiles this function.
-        """
-        code = self._kept(sig, target_context)
-        if code is None and self._enabled:
-            # Numba asks for a function's callees while it compiles it. Kernels do not call each other in a circle, so
-            # no two processes wait for each other.
-            with contextlib.suppress(OSError, RuntimeError):
-                self.turn.acquire()
-            code = self._kept(sig, target_context)
-            if code is not None:
-                self.turn.release()
-        return code
-
-    def save_overload(self, sig, data):
-        """Keep machine code as numba's method does, then let other processes go on."""
-        try:
-            super().save_overload(sig, data)
-        finally:
-            self.turn.release()
-
-    def _kept(self, sig, target_context):
-        """Finished machine code for a signature, None where none is kept."""
+        """Return finished machine code for a signature, or None where none is kept."""
         # numba's method first loads everything that a compilation may need, scipy.linalg included, which takes a third
         # of a job's start. Finished machine code needs at most the runtime of counted references; compilation loads
         # the rest.
-        if self.counted:
+        if self.options["_nrt"]:
             rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             try:
@@ -207,9 +160,9 @@ def kernel(inner: bool = False, **options) -> Callable:
         """Compile a function and give it a cache of this module."""
         compiled = njit(**options)(function)
         compiled._cache = _DigestCache(function)
-        compiled._cache.counted, compiled._cache.options = options["_nrt"], options
+        compiled._cache.options = options
         if inner:
-            compiled.__class__, compiled._cache.inner = _Inner, True
+            compiled.__class__ = _Inner
         return compiled
 
     return wrap

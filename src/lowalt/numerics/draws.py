@@ -25,11 +25,9 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.portable import log, sine_cosine_turns
 
 Size = int | tuple[int, ...] | None
-PERIOD = 1 << 128
-"""Words after which PCG64 repeats itself."""
 _HALF = np.uint64(0xFFFFFFFF)
 COMPILED = 4096
-"""From this many numbers on, and once it is loaded, compiled code makes them: the same bits in less time."""
+"""So many normal numbers are worth loading compiled code, which gives the same bits in less time."""
 
 
 def _count(size: Size) -> int:
@@ -61,10 +59,6 @@ class Draws(np.random.Generator):
 
     def words(self, count: int) -> np.ndarray:
         """Return the next `count` raw words of the bit generator, (count,) uint64."""
-        if count >= COMPILED and "lowalt.numerics.normals" in sys.modules:
-            from lowalt.numerics import raw_words
-
-            return raw_words.words(self.bit_generator, count)
         return self.bit_generator.random_raw(count)
 
     def _halves(self, count: int) -> np.ndarray:
@@ -127,30 +121,14 @@ class Draws(np.random.Generator):
         """Return 0 .. count - 1, each place from the last to `first` swapped with a random place not above it."""
         order, place = list(range(count)), count - 1
         masks = _masks(count)
-        # Take more halves at a time than most shuffles need, and give back those that are left.
-        ahead = isinstance(self.bit_generator, np.random.PCG64)
         while place >= first:
-            # Each place needs at least one half, so without giving back every half that is drawn is used.
-            halves = iter(self._halves((place - first + 1) * (2 if ahead else 1)).tolist())
-            for half in halves:
+            # Each place needs at least one half, so every half that is drawn is used.
+            for half in self._halves(place - first + 1).tolist():
                 partner = half & masks[place]
                 if partner <= place:
                     order[place], order[partner] = order[partner], order[place]
                     place -= 1
-                    if place < first:
-                        break
-            self._give_back(list(halves))
         return np.array(order, np.int64)
-
-    def _give_back(self, halves: list[int]) -> None:
-        """Return the last halves drawn, in their order, as if they had never been drawn."""
-        count = len(halves) + (self._kept is not None)
-        if halves and isinstance(self.bit_generator, np.random.PCG64):
-            self.bit_generator.advance(PERIOD - (count + 1) // 2)
-            # Of a word of which only the upper half is given back, this half waits.
-            self._kept = halves[0] if count % 2 else None
-            if count % 2:
-                self.words(1)
 
     def permutation(self, x, axis: int = 0):
         """Return 0 .. x - 1 in random order, int64, or the entries of an array along its first axis."""

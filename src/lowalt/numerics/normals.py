@@ -7,7 +7,6 @@ divisor can be zero, and without a check for it these loops become vector instru
 import numpy as np
 
 from lowalt.machine.jit import INNER, LEAN
-from lowalt.machine.memory import aligned
 from lowalt.numerics.portable import COSINE, LN2, LOGARITHM, SINE
 
 _L1, _L2, _L3, _L4, _L5, _L6, _L7 = LOGARITHM
@@ -101,30 +100,11 @@ def _fill_pairs(words, work, out):
             some[i, 0], some[i, 1] = real[i], imaginary[i]
 
 
-@LEAN
-def _fill_apart(words, count, work, real, imaginary):
-    """Fill real and imaginary as `apart` does; work: (2, BLOCK)."""
-    for n in range(len(real)):
-        own, other = real[n, real.shape[1] - count :], imaginary[n, imaginary.shape[1] - count :]
-        for first in range(0, count, BLOCK):
-            last = min(first + BLOCK, count)
-            more, lower = work[0, : last - first], work[1, : last - first]
-            _block(words[2 * (n * count + first) :], 1.0, own[first:last], other[first:last], more, lower)
-
-
-def apart(words: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> None:
-    """Fill the last K columns of real (N, K or more) and imaginary (N, K or more) float64, row by row.
-
-    They become the parts of N K complex normals: draws 2 k and 2 k + 1 of `interleaved`; words: (2 N K,) uint64.
-    """
-    _fill_apart(words, len(words) // (2 * len(real)), aligned(2, BLOCK), real, imaginary)
-
-
 def interleaved(words: np.ndarray) -> np.ndarray:
     """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
     out = np.empty((len(words) // 2, 2))
     # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
-    _fill_pairs(words, aligned(4, BLOCK), out)
+    _fill_pairs(words, np.empty((4, BLOCK)), out)
     return out.ravel()
 
 
@@ -135,5 +115,5 @@ def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
     `Draws.standard_normal` on the same words.
     """
     out = np.empty((2, len(words) // 2))
-    fill(words, scale, aligned(2, BLOCK), out)
+    fill(words, scale, np.empty((2, BLOCK)), out)
     return out

@@ -1,9 +1,8 @@
-"""The recipe of a training run: its settings, learning rate over time, optimiser, moving average, fixed randomness.
+"""The recipe of a training run: its settings, rates over time, optimiser, fixed randomness.
 
 Settings are the block `recognition.training` of workflow/schemas/config.schema.yaml, which says what each means.
 """
 
-import copy
 import math
 import os
 
@@ -51,28 +50,6 @@ def averaging(decay: float, step: int) -> float:
     [0.0, 0.333, 0.499]
     """
     return 1 - (1 - decay) / (1 - decay**step) if decay < 1 else 1 - 1 / step
-
-
-class MovingAverage:
-    """A copy of a model, `module`, whose weights are the moving average of the model's.
-
-    timm's `ModelEmaV3` lists all tensors by name at every step, which takes longer than averaging them.
-    """
-
-    def __init__(self, model: nn.Module) -> None:
-        """model: whose weights are averaged; from here on they are moved in place only."""
-        self.module = copy.deepcopy(model).eval().requires_grad_(False)
-        pairs = list(zip(self.module.state_dict().values(), model.state_dict().values(), strict=True))
-        self._averaged = [pair for pair in pairs if pair[0].is_floating_point()]
-        self._copied = [pair for pair in pairs if not pair[0].is_floating_point()]
-
-    @torch.no_grad()
-    def update(self, kept: float) -> None:
-        """Set every weight to kept * average + (1 - kept) * weight, and copy what is no floating-point number."""
-        averages, weights = map(list, zip(*self._averaged, strict=True))
-        torch._foreach_lerp_(averages, weights, 1 - kept)
-        for average, value in self._copied:
-            average.copy_(value)
 
 
 def optimiser(model: nn.Module, block: dict) -> torch.optim.AdamW:

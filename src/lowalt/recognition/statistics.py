@@ -61,20 +61,6 @@ def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -
     }
 
 
-def reliability(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -> list[tuple]:
-    """Return (from, to, mean confidence, accuracy, samples) of each equal-width bin of confidence that has samples.
-
-    Source: Guo et al. 2017, as `calibration`, whose error is the mean gap of these bins weighted by their samples.
-    """
-    confidence, correct = probabilities.max(1), probabilities.argmax(1) == labels
-    place = np.minimum((confidence * bins).astype(int), bins - 1)
-    return [
-        (index / bins, (index + 1) / bins, float(confidence[place == index].mean()),
-         float(correct[place == index].mean()), int((place == index).sum()))
-        for index in np.unique(place).tolist()
-    ]  # fmt: skip
-
-
 def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float:
     """Largest threshold on the probability of the class looked for at which at least `detection` of it is detected.
 

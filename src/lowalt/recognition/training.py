@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from timm.utils import ModelEmaV3
 from torch import nn
 
 from lowalt.files.csv_tables import write_csv
@@ -26,14 +27,7 @@ from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.objective import descent
 from lowalt.recognition.order import batches, epoch_order
-from lowalt.recognition.recipe import (
-    MovingAverage,
-    averaging,
-    optimiser,
-    random_state,
-    schedule,
-    set_random_state,
-)
+from lowalt.recognition.recipe import averaging, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.statistics import cross_entropy
 
@@ -92,7 +86,7 @@ class Trainer:
         shared = as_products(shared) if plain else shared
         self.model = shared.to(machine.device, memory_format=layout)
         self.optimiser = optimiser(self.model, self.block)
-        self.average = MovingAverage(self.model)
+        self.average = ModelEmaV3(self.model)
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model).train()
         # Readers keep their workers over all epochs and validations.
         keys = (self.seed, *run.keys)
@@ -176,7 +170,8 @@ class Trainer:
                 raise InputError(f"training: ten gradients in a row were not finite, last at step {self.at.steps}")
         self.optimiser.zero_grad()
         self.at.steps += 1
-        self.average.update(averaging(self.block["ema"], self.at.steps))
+        self.average.decay = averaging(self.block["ema"], self.at.steps)
+        self.average.update(self.model)
 
     def _validate(self) -> None:
         """Validate the averaged weights, keep the best, and decide whether to stop early."""

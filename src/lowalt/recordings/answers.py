@@ -5,18 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.files.shipped import shipped
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.runs import Trained
-from lowalt.recordings.library import Library
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_network import Windows, facts, rendered
-from lowalt.recordings.windows import windows
+from lowalt.recordings.twin import Twin, radars
+from lowalt.recordings.windows import Windows, facts, rendered, windows
 from lowalt.tiles.image_settings import Images
 
-TWINS = "config/measured/twins.yaml"
 TRAINED_RATIO = 1.25
 """Largest ratio of a recording's carrier and the radar's: speeds in a spectrum scale with it."""
 
@@ -41,16 +37,16 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     path. Raises: InputError where the network knows no recordings, the recording's carrier or channel is not the
     radar's, or the file cannot be read.
     """
-    radars = Library.read(shipped(TWINS)).twins
+    known = radars()
     if "radar" not in settings:
-        raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(radars)}")
+        raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(known)}")
     radar = Twin.from_settings(settings["radar"])
     if not _near(record, radar):
-        near = [name for name, other in radars.items() if _near(record, other)]
+        near = [name for name, other in known.items() if _near(record, other)]
         raise InputError(
             f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
             + (f"expected a network of {near}" if near else "expected a network of a twin at this carrier, which "
-               "`python -m lowalt.recordings keep --twins FILE` trains; the zoo has none")
+               "`studies/twin_networks.py --twins FILE` trains; the zoo has none")
         )  # fmt: skip
     twin = radar.at_carrier(record.carrier_hz)
     intervals = windows(record, twin).astype(np.complex64)

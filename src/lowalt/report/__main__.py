@@ -8,21 +8,11 @@ from pathlib import Path
 from lowalt.config.command import parser, pick, run
 from lowalt.files.atomic import replacing
 from lowalt.machine.side_by_side import together
-from lowalt.motion import read_table
-from lowalt.report.figures.stills import write_stills
 from lowalt.report.inputs import Inputs
 from lowalt.report.page import SECTIONS, page, section
-from lowalt.report.plots import scripts, write_plots
+from lowalt.report.plots import write_plots
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.stage_times import write_stages
-from lowalt.targets.cloud import read
-
-
-def _stills(folder: Path, reported: ReportedRun) -> None:
-    """Write the pictures of the run's points (`stills.write_stills`)."""
-    inputs = reported.inputs
-    clouds = [read(path) for path in inputs.paths("clouds")]
-    write_stills(folder, clouds, inputs.path("gallery").read_bytes(), read_table(inputs.path("motion")))
 
 
 def main(arguments: list[str]) -> None:
@@ -39,10 +29,9 @@ def main(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     reported = ReportedRun(Inputs.read(options.manifest), *pick(options.settings, "config", "published"))
     write_stages(options.stages, reported)
-    calls = [scripts, partial(_stills, options.figures, reported)]
-    script, _, *sections = together(calls + [partial(section, reported, name) for name in SECTIONS], options.jobs)
+    sections = together([partial(section, reported, name) for name in SECTIONS], options.jobs)
     write_plots(options.figures, [plot for made in sections for plot in made.plots])
-    text = page(reported, dict(zip(SECTIONS, sections, strict=True)), script)
+    text = page(reported, dict(zip(SECTIONS, sections, strict=True)))
     with replacing(options.out) as temporary:
         temporary.write_text(text)
     print(json.dumps({"report": options.out, "samples": len(reported.shards)}), file=sys.stderr)

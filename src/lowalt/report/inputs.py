@@ -14,9 +14,7 @@ from lowalt.files.atomic import existing, text_of
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 
-FILES = (
-    "accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "index", "gallery", "motion",
-)  # fmt: skip
+FILES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "index")
 """Names of which every manifest has one file."""
 LISTS = ("clouds", "benchmarks")
 """Names of which every manifest has a list of files."""

@@ -111,28 +111,7 @@
     for (const name of links.keys()) watch.observe(document.getElementById(name));
   }
 
-  // The still picture stays where Vega's scripts fail, and on paper.
-  function plot(figure) {
-    const spec = JSON.parse(figure.querySelector("script").textContent);
-    const still = figure.querySelector("div"), live = document.createElement("div");
-    live.setAttribute("aria-label", spec.description);
-    figure.prepend(live);
-    // Beside the axis and its title, so that a narrow screen shows the whole of a single panel.
-    if (typeof spec.width === "number") spec.width = Math.min(spec.width, figure.clientWidth - 125);
-    const options = { renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false } };
-    window.vegaEmbed(live, spec, options).then(() => { still.hidden = true; }, () => { live.remove(); });
-  }
-
-  function plots() {
-    if (!window.vegaEmbed) return;
-    const watch = new IntersectionObserver((entries) => {
-      for (const entry of entries) if (entry.isIntersecting) { watch.unobserve(entry.target); plot(entry.target); }
-    }, { rootMargin: "400px" });
-    document.querySelectorAll("figure.plot").forEach((figure) => watch.observe(figure));
-  }
-
   document.querySelectorAll("main table:not(.plain)").forEach(equip);
-  plots();
   themes();
   places();
   window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((node) => { node.open = true; }));

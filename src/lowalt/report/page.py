@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import jinja2
 
-from lowalt.report.plots import Plot, plotted, scripts, svg
+from lowalt.report.plots import Plot, plotted
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections import (
     accuracy,
@@ -32,10 +32,10 @@ class PagePart(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A section of a run's page: its HTML, and its plots with their SVG."""
+    """A section of a run's page: its HTML, and its plots."""
 
     html: str
-    plots: list[tuple[Plot, str]]
+    plots: list[Plot]
 
 
 PARTS = (
@@ -79,14 +79,9 @@ def rendered(name: str, values: dict | None) -> str:
     return "" if values is None else templates().get_template(f"sections/{name}.html").render(values)
 
 
-def assembled(title: str, parts: list[dict[str, str]], script: str = "") -> str:
-    """Return a self-contained page of parts with their contents; each has id, title and html.
-
-    script: JavaScript of the plots where it was made before (`plots.scripts`).
-    """
-    drawn = any('<figure class="plot">' in part["html"] for part in parts)
-    plots = (script or scripts()) if drawn else ""
-    return templates().get_template("page.html").render(title=title, parts=parts, plots=plots)
+def assembled(title: str, parts: list[dict[str, str]]) -> str:
+    """Return a self-contained page of parts with their contents; each has id, title and html."""
+    return templates().get_template("page.html").render(title=title, parts=parts)
 
 
 def section(run: ReportedRun, name: str) -> Section:
@@ -95,15 +90,14 @@ def section(run: ReportedRun, name: str) -> Section:
     Raises: InputError for a table that is missing or lacks a column.
     """
     values = _MODULES[name].values(run)
-    plots = [value for value in (values or {}).values() if isinstance(value, Plot)]
-    return Section(rendered(name, values), [(plot, svg(plot)) for plot in plots])
+    return Section(rendered(name, values), [value for value in (values or {}).values() if isinstance(value, Plot)])
 
 
-def page(run: ReportedRun, sections: dict[str, Section], script: str = "") -> str:
-    """Return the whole page of the sections by their names; script: as `assembled` takes it."""
+def page(run: ReportedRun, sections: dict[str, Section]) -> str:
+    """Return the whole page of the sections by their names."""
     parts = []
     for part in PARTS:
         html = "\n".join(sections[_name(module)].html for module in part.sections).strip()
         if html:
             parts.append({"id": part.id, "title": part.title, "html": html})
-    return assembled(f"run “{run.config['run']}”", parts, script)
+    return assembled(f"run “{run.config['run']}”", parts)

@@ -15,7 +15,6 @@ import numpy as np
 from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo import echo_signal
 from lowalt.machine.blas_threads import one_blas_thread
-from lowalt.machine.memory import keep_freed_arrays
 from lowalt.machine.progress import reported
 from lowalt.numerics.power import rms
 from lowalt.scene import waveform
@@ -281,7 +280,6 @@ def received_signal(
     occluders: the target's surfaces, for self-occlusion; clouds: those of all subtypes, for companions.
     Raises: InputError naming the sample that cannot be computed.
     """
-    keep_freed_arrays()
     return SceneSample(scene, observe(scene, station, cloud, row, occluders), clouds).received()
 
 

@@ -45,42 +45,33 @@ def check(config: dict) -> CheckedScene:
         snrs_of(config),
     )
     links = [station.name for station in scene.network.stations if station.transmitter is not None]
-    if links and "direct_path" not in config["effects"]:
-        raise InputError(
-            f"network.stations: {links} are links between two stations, expected effects.direct_path in the same scene"
-        )
-    refused = [name for name in UNKNOWN_ON_LINKS if name in scene.effects]
-    if links and refused:
-        raise InputError(
-            f"effects: {refused} are not modelled between two stations, expected none of them in a network with the "
-            f"links {links}"
-        )
-    refuse_unknown_of(scene.network, scene.effects)
-    if scene.network.guard_subcarriers < 0 and "interference" not in scene.effects:
-        raise InputError(
-            f"network.guard_subcarriers: {scene.network.guard_subcarriers}, sub-bands overlap, expected "
-            "effects.interference in the same scene"
-        )
+    unknown_on_links = [name for name in UNKNOWN_ON_LINKS if name in scene.effects]
     noisy = [snr for snr in scene.snr_db if snr != float("inf")]
-    if "receiver_noise" in scene.effects and noisy:
-        raise InputError(
-            f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget "
-            "or set SNRs, not both"
-        )
-    if noisy and config.get("shards", {}).get("kind") == "recipe" and {"cell_noise", "canceller"} & set(scene.effects):
-        raise InputError(
-            "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or 'signal' in a scene with "
-            "effects.cell_noise or effects.canceller"
-        )
+    recipe = config.get("shards", {}).get("kind") == "recipe"
     regrid = scene.effects.get("slow_time", {"regrid": "zero"})["regrid"]
-    if config.get("spectra", {}).get("times") == "known" and regrid != "zero":
-        raise InputError(
-            f"effects.slow_time.regrid: {regrid!r} makes an even signal, and spectra.times is 'known', expected 'zero'"
-        )
-    if "canceller" in scene.effects and not set(STILL) & set(scene.effects):
-        raise InputError(
-            f"effects.canceller: there is no clutter to cancel, expected one of {list(STILL)} in the same scene"
-        )
+    guard = scene.network.guard_subcarriers
+    refuse_unknown_of(scene.network, scene.effects)
+    for wrong, message in (
+        (links and "direct_path" not in config["effects"],
+         f"network.stations: {links} are links between two stations, expected effects.direct_path in the same scene"),
+        (links and unknown_on_links,
+         f"effects: {unknown_on_links} are not modelled between two stations, expected none of them in a network with "
+         f"the links {links}"),
+        (guard < 0 and "interference" not in scene.effects,
+         f"network.guard_subcarriers: {guard}, sub-bands overlap, expected effects.interference in the same scene"),
+        ("receiver_noise" in scene.effects and noisy,
+         f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget or "
+         "set SNRs, not both"),
+        (noisy and recipe and {"cell_noise", "canceller"} & set(scene.effects),
+         "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or 'signal' in a scene with "
+         "effects.cell_noise or effects.canceller"),
+        (config.get("spectra", {}).get("times") == "known" and regrid != "zero",
+         f"effects.slow_time.regrid: {regrid!r} makes an even signal, and spectra.times is 'known', expected 'zero'"),
+        ("canceller" in scene.effects and not set(STILL) & set(scene.effects),
+         f"effects.canceller: there is no clutter to cancel, expected one of {list(STILL)} in the same scene"),
+    ):  # fmt: skip
+        if wrong:
+            raise InputError(message)
     for effect in effects:
         if hasattr(effect.module, "check"):
             effect.module.check(effect.settings, scene)

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
@@ -255,25 +256,20 @@ def _received(
 
 def verdict(findings: Sequence[Finding]) -> list[str]:
     """Return sentences that say whether the receiver finds its targets, and what would find more of them."""
-    share = _mean([finding.right for finding in findings])
+    share = fmean([finding.right for finding in findings])
     classes = list(dict.fromkeys(finding.category for finding in findings))
     of_class = {name: [finding for finding in findings if finding.category == name] for name in classes}
-    shares = ", ".join(f"{name} {_mean([finding.right for finding in mine]):.0%}" for name, mine in of_class.items())
+    shares = ", ".join(f"{name} {fmean([finding.right for finding in mine]):.0%}" for name, mine in of_class.items())
     lines = [f"The target's range cell, or one next to it, is chosen in {share:.0%} of the symbols: {shares}."]
-    over_db = {name: _mean([finding.over_db for finding in mine]) for name, mine in of_class.items()}
+    over_db = {name: fmean([finding.over_db for finding in mine]) for name, mine in of_class.items()}
     if any(math.isfinite(level) for level in over_db.values()):
         texts = (f"{name} {abs(level):.1f} dB {'above' if level >= 0 else 'below'}" for name, level in over_db.items())
         lines.append(f"Behind the filters the target is, against the loudest cell of all else: {', '.join(texts)} it.")
-    better = {name: _mean([finding.otherwise[name] for finding in findings]) for name in findings[0].otherwise}
+    better = {name: fmean([finding.otherwise[name] for finding in findings]) for name in findings[0].otherwise}
     best = max(better, key=better.__getitem__)
     if share < FOUND and better[best] > share + 0.05:
         lines.append(f"With {best} it would be {better[best]:.0%}.")
     return lines
-
-
-def _mean(values: Sequence[float]) -> float:
-    """Mean of some numbers."""
-    return sum(values) / len(values)
 
 
 def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:

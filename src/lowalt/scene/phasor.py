@@ -7,8 +7,8 @@ from lowalt.machine.jit import kernel
 
 # cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2 on [-1/2, 1/2], to rounding; written out one by one, all steps
 # stay in registers.
-_C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10, _C11 = smooth("cosine", 0.25, 11)[0].tolist()
-_S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11 = smooth("sine", 0.25, 11)[0].tolist()
+_C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10, _C11 = smooth("cosine", 11)[0].tolist()
+_S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11 = smooth("sine", 11)[0].tolist()
 
 
 @kernel(inner=True, forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract"})

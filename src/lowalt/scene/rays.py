@@ -103,7 +103,7 @@ def hidden_by(
     # The last strip is filled up with its last symbol.
     strips = [np.pad(order, (0, -len(order) % strip), "edge").reshape(-1, strip) for order in orders]
     count, result = len(strips[0]), np.ascontiguousarray(hidden.T)
-    work = tuple(map(np.empty, ((count, 15, strip), (count, 15, 2), (9, strip), 12, strip)))
+    work = tuple(map(np.empty, ((count, 15, strip), (9, strip), 12, strip)))
     trees = {p: held for p, held in _trees(_Same(surfaces)).items() if p in casts}
     # A point's own part, which hides it most often, comes first.
     for p, q in sorted(product(trees, range(len(axes))), key=lambda pair: pair[0] != pair[1]):

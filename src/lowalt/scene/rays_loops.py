@@ -44,21 +44,6 @@ def _span(values):
 
 
 @INNER_ORDERED
-def _foreseen(spans, point, toward, bundle):
-    """Fill bundle (12,) with boxes that hold all starts and all ways: their middles, then half their sides.
-
-    spans (15, 2): those of the numbers in pose.
-    """
-    for i in range(3):
-        middle, half, place, moved = spans[9 + i, 0], spans[9 + i, 1], spans[12 + i, 0], spans[12 + i, 1]
-        for j in range(3):
-            middle += spans[3 * i + j, 0] * point[j]
-            half += spans[3 * i + j, 1] * abs(point[j])
-        bundle[i], bundle[6 + i] = middle + toward * (place - middle), half + toward * moved
-        bundle[3 + i], bundle[9 + i] = place - bundle[i], moved + bundle[6 + i]
-
-
-@INNER_ORDERED
 def _sent(pose, point, toward, ray, bundle):
     """Fill ray (9, STRIP): starts, ways to the station, one over each way; and bundle (12,), the boxes around them."""
     for i in range(3):
@@ -173,20 +158,15 @@ def cast(tree, motion, place, order, pair, toward, work, hidden):
 
     tree: `rays.Tree` of p; motion: as in `rays.hidden_by`, points already off their surface; order (strips, STRIP):
     symbols that walk together, some may come twice; pair: (p, q); toward (L,): as in `rays.hidden_by`; work: poses
-    (strips, 15, STRIP), spans (strips, 15, 2), ray (9, STRIP), bundle (12,) and free (STRIP,).
+    (strips, 15, STRIP), ray (9, STRIP), bundle (12,) and free (STRIP,).
     """
     (boxes, triangles, closed), (rotation, translation, points, part) = tree, motion
-    poses, spans, ray, bundle, free = work
+    poses, ray, bundle, free = work
     for strip in range(len(order)):
         _relative(rotation, translation, place, order[strip], pair, poses[strip])
-        for i in range(15):
-            spans[strip, i] = _span(poses[strip, i])
     for l in range(len(points)):  # noqa: E741
         last = 0
         for strip in range(len(order) if part[l] == pair[1] else 0):
-            _foreseen(spans[strip], points[l], toward[l], bundle)
-            if not _can_meet(bundle, boxes[1]):
-                continue
             symbols, left = order[strip], 0.0
             for k in range(STRIP):
                 free[k] = 0.0 if hidden[l, symbols[k]] else 1.0

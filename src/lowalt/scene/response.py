@@ -17,6 +17,7 @@ from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
 from lowalt.scene import response_loops, spherical
+from lowalt.scene.series import chebyshev_points, interpolation, orders_of
 from lowalt.scene.view import View
 
 ERROR = 1e-11
@@ -149,34 +150,7 @@ def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
     if not squint or half == 0.0:
         return np.array([lowest])
     spread = np.pi * half * (_half_diagonal(np.array(network.transmit)) + _half_diagonal(np.array(network.receive)))
-    return lowest + half + half * chebyshev_points(orders_of(spread))
-
-
-def orders_of(argument: float, error: float = ERROR) -> int:
-    """Return how many Chebyshev polynomials hold exp(j argument x), |x| <= 1, within `error`.
-
-    From an order above the argument on, each Bessel function is below half the one before it.
-    """
-    order = int(argument) + 1
-    while 4.0 * abs(jv(order, argument)) > error:
-        order += 1
-    return order
-
-
-def chebyshev_points(count: int) -> np.ndarray:
-    """Return the Chebyshev points (count,) of the first kind on [-1, 1], from 1 downwards."""
-    return np.cos(np.pi * (np.arange(count) + 0.5) / count)
-
-
-def interpolation(count: int, at: np.ndarray) -> np.ndarray:
-    """Return the Lagrange weights (count, K) from values at `chebyshev_points(count)` to those at `at` (K,).
-
-    Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
-    """
-    order = np.arange(count)
-    values = np.cos(np.outer(order, np.arccos(np.clip(at, -1.0, 1.0))))
-    values[1:] *= 2.0
-    return np.cos(np.outer(np.pi * (order + 0.5) / count, order)) @ values / count
+    return lowest + half + half * chebyshev_points(orders_of(spread, ERROR))
 
 
 @lru_cache(maxsize=64)
@@ -187,7 +161,7 @@ def tables(nodes: int, spread: float, count: int) -> tuple[np.ndarray, np.ndarra
     x = (2 m - M + 1) / M. Both must not be changed.
     """
     argument = np.pi * spread * max(count - 1, 1) / count
-    orders, kept = orders_of(argument), orders_of(argument) + nodes
+    orders, kept = orders_of(argument, ERROR), orders_of(argument, ERROR) + nodes
     band = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
     points = chebyshev_points(kept)
     p = np.arange(orders)

@@ -1,9 +1,10 @@
-"""A smooth function of one number at many places: as a Chebyshev series over the stretch that the places cover."""
+"""Chebyshev series: how many terms a wave needs, points, interpolation, and a smooth function at many places."""
 
 from collections.abc import Callable
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from scipy.special import jv
 
 from lowalt.machine.jit import VECTOR
 
@@ -11,6 +12,33 @@ STRIP = 256
 """Places that pass through the loop together."""
 ENOUGH = 1e-14
 """Share of the largest coefficient below which the last quarter of a series must be."""
+
+
+def orders_of(argument: float, error: float) -> int:
+    """Return how many Chebyshev polynomials hold exp(j argument x), |x| <= 1, within `error`.
+
+    From an order above the argument on, each Bessel function is below half the one before it.
+    """
+    order = int(argument) + 1
+    while 4.0 * abs(jv(order, argument)) > error:
+        order += 1
+    return order
+
+
+def chebyshev_points(count: int) -> np.ndarray:
+    """Return the Chebyshev points (count,) of the first kind on [-1, 1], from 1 downwards."""
+    return np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def interpolation(count: int, at: np.ndarray) -> np.ndarray:
+    """Return the Lagrange weights (count, K) from values at `chebyshev_points(count)` to those at `at` (K,).
+
+    Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
+    """
+    order = np.arange(count)
+    values = np.cos(np.outer(order, np.arccos(np.clip(at, -1.0, 1.0))))
+    values[1:] *= 2.0
+    return np.cos(np.outer(np.pi * (order + 0.5) / count, order)) @ values / count
 
 
 @VECTOR

@@ -7,11 +7,12 @@ is a smooth function: a polynomial of a few dozen terms takes less time than the
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import jv
+from scipy import fft
 
 from lowalt.machine.jit import INNER_VECTOR
 from lowalt.scene.phasor import phasor
 from lowalt.scene.response_loops import CHUNK, LOOPS, End
+from lowalt.scene.series import chebyshev_points, orders_of
 
 SYMBOLS = 600
 """Symbols that share a box."""
@@ -37,13 +38,14 @@ def gains(end: End, error: float) -> np.ndarray:
             if counts is None or np.prod(counts) > at[:, 0].size:
                 _sums(end, first, at, out)
                 continue
-            nodes = np.stack(np.meshgrid(*(np.cos(np.pi * (np.arange(k) + 0.5) / k) for k in counts), indexing="ij"))
+            nodes = np.stack(np.meshgrid(*map(chebyshev_points, counts), indexing="ij"))
             grid = middle[:, None] + half[:, None] * nodes.reshape(3, -1)
             values = np.empty((1, len(end.kappas), grid.shape[1]), np.complex128)
             _sums(end, first, grid[None], values)
-            terms = values.reshape(-1, *counts)
-            for axis, count in enumerate(counts, 1):
-                terms = np.moveaxis(np.tensordot(_coefficients(count), terms, (1, axis)), 0, axis)
+            # The cosine transform counts the terms of order 0 twice on each axis.
+            terms = fft.dctn(values.reshape(-1, *counts), axes=(1, 2, 3)) / np.prod(counts)
+            for axis in (1, 2, 3):
+                np.moveaxis(terms, axis, 0)[0] *= 0.5
             terms = terms.reshape(len(terms), -1)
             # Terms that are small together at every frequency are left out.
             size = abs(terms).max(axis=0)
@@ -53,14 +55,6 @@ def gains(end: End, error: float) -> np.ndarray:
             parts = np.concatenate([terms[:, kept].real, terms[:, kept].imag])
             _polynomials(at, (middle, half), counts, powers, parts, out)
     return result
-
-
-def _coefficients(count: int) -> np.ndarray:
-    """The matrix (count, count) from values at Chebyshev points to the coefficients of Chebyshev polynomials."""
-    order = np.arange(count)
-    matrix = np.cos(np.outer(order, np.pi * (order + 0.5) / count)) * 2.0 / count
-    matrix[0] *= 0.5
-    return matrix
 
 
 def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tuple[int, int, int] | None:
@@ -76,13 +70,7 @@ def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tup
         return None
     wave = 2.0 * np.pi * 2.0 * end.turns
     spread = wave * np.array([0.5 * wide + diagonal * nearness, 0.5 * tall + diagonal * nearness, 0.5 * diagonal**2])
-    counts = []
-    for argument in 1.33 * spread * half + 1e-6:
-        order = int(argument) + 1
-        while 4.0 * abs(jv(order, argument)) > 0.1 * error:
-            order += 1
-        counts.append(order + 1)
-    return tuple(counts)
+    return tuple(orders_of(argument, 0.1 * error) + 1 for argument in 1.33 * spread * half + 1e-6)
 
 
 @LOOPS

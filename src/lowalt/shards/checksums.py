@@ -14,8 +14,6 @@ from lowalt.shards.sample_table import table_path
 
 NAME = "SHA256SUMS"
 CARD = ("README.md", "croissant.json", "samples.csv")
-FORMER = ".zenodo.json"
-"""A file of data cards of version 0.2."""
 LINE = re.compile(r"([0-9a-f]{64})  ([^\n]+)\n")
 
 
@@ -33,10 +31,9 @@ def _text(sums: dict[str, str]) -> str:
 def write(index_path: str | Path, index: dict) -> None:
     """Write SHA256SUMS next to an index whose data card is complete.
 
-    The shards are not read again: their checksums are those of the index. A file of former cards is removed.
+    The shards are not read again: their checksums are those of the index.
     """
     folder = Path(index_path).parent
-    (folder / FORMER).unlink(missing_ok=True)
     card = {name: sha256(folder / name) for name in (*CARD, Path(index_path).name)}
     with replacing(folder / NAME) as temporary:
         temporary.write_text(_text(_of_index(index) | card))
@@ -63,7 +60,7 @@ def faults(index_path: str | Path, index: dict) -> Iterator[str]:
         elif name in stated:
             if listed[name] != stated[name]:
                 yield f"{NAME}: its line for {name} differs from the index"
-        elif name not in {*card, FORMER}:
+        elif name not in card:
             yield f"{NAME}: a line for {name}, which is no part of the data set"
         elif not (folder / name).is_file():
             yield f"{name}: missing"

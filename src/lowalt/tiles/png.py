@@ -9,10 +9,10 @@ import struct
 
 import deflate
 import numpy as np
-from PIL import Image
+from numba import njit
+from PIL.PngImagePlugin import PngImageFile
 
 from lowalt.files.errors import InputError
-from lowalt.tiles import filters
 from lowalt.tiles.huffman import zlib_compress
 
 MOST_EXPANSION = 1032
@@ -25,6 +25,35 @@ def _chunk(name: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", deflate.crc32(name + body))
 
 
+@njit(cache=True)
+def apply_paeth(image, out):
+    """Filter image (H, W) uint8 into out (H, W + 1) uint8: filter type 4, then pixel minus Paeth predictor.
+
+    Source: PNG specification (W3C, third edition), section 9.
+    """
+    height, width = image.shape
+    for r in range(height):
+        line = out[r]
+        row = image[r]
+        line[0] = 4
+        if r == 0:
+            line[1] = row[0]
+            for c in range(1, width):
+                line[c + 1] = row[c] - row[c - 1]
+            continue
+        up = image[r - 1]
+        line[1] = row[0] - up[0]
+        for c in range(1, width):
+            a = np.int16(row[c - 1])
+            b = np.int16(up[c])
+            d = np.int16(up[c - 1])
+            to_a = np.int16(abs(b - d))
+            to_b = np.int16(abs(a - d))
+            to_d = np.int16(abs(np.int16(a + b) - np.int16(d + d)))
+            best = a if to_a <= to_b and to_a <= to_d else (b if to_b <= to_d else d)
+            line[c + 1] = np.uint8(np.int16(row[c]) - best)
+
+
 def encode(image: np.ndarray, palette: np.ndarray) -> bytes:
     """Return the PNG file of an index image (H, W) uint8 with a palette (256, 3) uint8.
 
@@ -35,7 +64,7 @@ def encode(image: np.ndarray, palette: np.ndarray) -> bytes:
         raise InputError(f"image: {image.dtype} {image.shape}, expected uint8 (H, W)")
     height, width = image.shape
     rows = np.empty((height, width + 1), np.uint8)
-    filters.apply_paeth(image, rows)
+    apply_paeth(image, rows)
     return packed(image.shape, palette, zlib_compress(rows))
 
 
@@ -74,7 +103,7 @@ def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """
     chunks = _chunks(data)
     header = chunks[0][1] if chunks[0][0] == b"IHDR" and len(chunks[0][1]) == 13 else bytes(13)
-    width, height, depth, colour, _, _, interlace = struct.unpack(">IIBBBBB", header)
+    width, height, depth, colour, *_ = struct.unpack(">IIBBBBB", header)
     if (depth, colour) != (8, 3):
         raise InputError(f"image: PNG of bit depth {depth} and colour type {colour}, expected an 8-bit palette PNG")
     palette = np.zeros((256, 3), np.uint8)
@@ -84,22 +113,12 @@ def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
                 raise InputError(f"image: a palette of {len(body)} bytes, expected up to 256 colours of three bytes")
             table = np.frombuffer(body, np.uint8).reshape(-1, 3)
             palette[: len(table)] = table
-    packed = b"".join(body for name, body in chunks if name == b"IDAT")
-    pixels = height * (width + 1)
-    if not width * height or pixels > MOST_EXPANSION * (len(packed) + 1):
-        raise InputError(f"image: {width} x {height} pixels in {len(packed)} bytes, expected a size that fits them")
-    if interlace:
-        try:
-            with Image.open(io.BytesIO(data)) as picture:
-                return np.array(picture), palette
-        except (OSError, ValueError, SyntaxError) as error:
-            raise InputError(f"image: the interlaced PNG cannot be unpacked ({error})") from error
+    packed = sum(len(body) for name, body in chunks if name == b"IDAT")
+    if not width * height or height * (width + 1) > MOST_EXPANSION * (packed + 1):
+        raise InputError(f"image: {width} x {height} pixels in {packed} bytes, expected a size that fits them")
     try:
-        plain = deflate.zlib_decompress(packed, pixels)
-    except (deflate.DeflateError, ValueError) as error:
+        # `Image.open` refuses large images, which are tiles here.
+        with PngImageFile(io.BytesIO(data)) as picture:
+            return np.array(picture), palette
+    except (OSError, ValueError, SyntaxError) as error:
         raise InputError(f"image: the PNG's pixels cannot be unpacked ({error})") from error
-    image = np.empty((height, width), np.uint8)
-    rows = np.frombuffer(plain, np.uint8)
-    if rows.size != pixels or filters.undo(rows.reshape(height, width + 1), image) >= 0:
-        raise InputError("image: the PNG has too few pixels or an unknown filter")
-    return image, palette

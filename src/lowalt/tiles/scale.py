@@ -42,21 +42,6 @@ class Scale:
         return y if self.name == "linear" else portable.power(y, 1 / self.gamma)
 
 
-def index(values: np.ndarray, scale: Scale, signed: bool) -> np.ndarray:
-    """Return index images of value images, each scaled by its own largest |value|: (..., H, W) -> uint8.
-
-    values: float32 or float64, magnitudes >= 0 or, where `signed`, of both signs.
-    Raises: InputError where a value is not finite.
-    """
-    values = np.asarray(values)
-    if not np.isfinite(values).all():
-        raise InputError("images: a spectrum has a NaN or infinite value")
-    largest = np.abs(values).max(axis=(-2, -1), keepdims=True)
-    x = np.abs(values) / np.where(largest > 0, largest, 1)
-    steps = np.searchsorted(scale.thresholds(127 if signed else 255).astype(values.dtype), x, side="right")
-    return np.where(values < 0, 128 - steps, 128 + steps).astype(np.uint8) if signed else steps.astype(np.uint8)
-
-
 @dataclass(frozen=True)
 class Lookup:
     """Tables that give a float32 x in [0, 1] its step by one comparison.

@@ -18,15 +18,11 @@ class DataProducts:
     def __init__(self, run: Run) -> None:
         """Keep the run."""
         self._run, self._config = run, run.config
-        self._paths: dict[tuple, list[str]] = {}
 
     def _of_chunk(self, folder: str, wildcards: Any) -> list[str]:
         """Files of a folder of the run, one for each subtype of a chunk, in the table's order."""
-        key = folder, wildcards.run, f"{wildcards.group}-{wildcards.part}"
-        if key not in self._paths:
-            names = self._run.plan.chunk(key[2]).members
-            self._paths[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
-        return self._paths[key]
+        names = self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").members
+        return [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
 
     def record_files(self, wildcards: Any) -> list[str]:
         """The user's mesh or recording files that the record of one subtype names."""

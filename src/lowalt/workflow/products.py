@@ -23,7 +23,7 @@ PAGE = (".html", ".css", ".js")
 """Endings of the files that the page is put together from."""
 TABLES = (
     "accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv", "orderings.csv", "alarms.csv",
-    "calibration.csv", "reliability.csv",
+    "calibration.csv",
 )  # fmt: skip
 """Tables of recognition; their rows name a protocol and a scheme."""
 PAGE_TABLES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds")
@@ -104,8 +104,6 @@ class Products(DataProducts):
             "published": block["published"],
             "index": f"{data}/shards/index.json",
             "clouds": [f"{data}/clouds/{subtype}.npz" for subtype in self._run.subtypes],
-            "gallery": f"{data}/clouds.png",
-            "motion": f"{data}/motion/{self._run.plan.chunks[0]}.csv",
             "distances": f"{data}/distances.csv",
             "benchmarks": self.benchmarks(wildcards),
         }

@@ -1,6 +1,6 @@
-"""The disk: whether it can be written, whether a run's files fit on it, and whether a run failed because it is full.
+"""The disk: whether it can be written, and whether a run's files fit on it.
 
-The Snakefile calls `writable` when it is read, `before` when a run starts and `after` when it has failed.
+The Snakefile calls `writable` when it is read and `before` when a run starts; the display names a disk that is full.
 """
 
 import os
@@ -17,7 +17,6 @@ from lowalt.files.errors import InputError, SpaceError
 from lowalt.spectra.catalogue import named
 
 VARIABLE = "LOWALT_SPACE"
-FULL_BYTES = 1 << 20
 TRIAL_BYTES = 1 << 16
 SIGNAL_BYTES = 8
 """Bytes of a complex value of a signal, complex64."""
@@ -109,15 +108,3 @@ def writable(folder: Path, run: str) -> None:
         except OSError as error:
             facts = f"{error.strerror}, {free_bytes(place) / 1e6:.1f} MB free"
             raise InputError(f"{place.resolve()}: cannot write into this folder ({facts})") from None
-
-
-def after(folder: Path = Path()) -> None:
-    """Log one line if the disk is full: a failed job may not have had room to write its own message."""
-    from snakemake.logging import logger
-
-    free = free_bytes(folder / "results")
-    if free < FULL_BYTES:
-        logger.error(
-            f"error: the disk of {(folder / 'results').resolve()} is full ({free / 1e6:.1f} MB free); "
-            "make room, then start the same command again: it goes on where it stopped"
-        )

@@ -1,7 +1,7 @@
 """The settings of every stage as one JSON text each, which holds only the values that the stage reads.
 
 Snakemake compares these texts, so a changed value re-runs the stages that read it and no others. Each method takes the
-wildcards of a job and can stand in a rule's `params:`. A text is made once: Snakemake asks for it again and again.
+wildcards of a job and can stand in a rule's `params:`.
 """
 
 from typing import Any
@@ -20,19 +20,17 @@ MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m", "looks", "look
 """Keys of the block `motion` that decide what is drawn; from `sizes_m` on they may be left out."""
 
 
+def _text(**block: Any) -> str:
+    """The JSON text of a block."""
+    return canonical(block)
+
+
 class Settings:
     """Settings of the stages of one run."""
 
     def __init__(self, run: Run) -> None:
         """Keep the run."""
         self._run, self._config = run, run.config
-        self._texts: dict[tuple, str] = {}
-
-    def _text(self, *key: Any, **block: Any) -> str:
-        """The JSON text of a block, made once for each key."""
-        if key not in self._texts:
-            self._texts[key] = canonical(block)
-        return self._texts[key]
 
     def _blocks(self, *names: str) -> dict:
         """Blocks of the configuration by name."""
@@ -55,18 +53,17 @@ class Settings:
 
     def configuration(self, wildcards: Any) -> str:
         """The whole configuration."""
-        return self._text("configuration", **as_named(self._config))
+        return _text(**as_named(self._config))
 
     def cloud(self, wildcards: Any) -> str:
         """Seed and the merged record of one subtype; occluders read the same."""
         record = self._run.records[self._run.subtypes[wildcards.subtype]]
-        return self._text("cloud", wildcards.subtype, seed=self._config["seed"], record=record)
+        return _text(seed=self._config["seed"], record=record)
 
     def motion(self, wildcards: Any) -> str:
         """Data that a chunk's motion models are drawn from: region, masts in its reach, ranges of its subtypes."""
         block, members = motion_block(self._config), self._chunk(wildcards).members
-        return self._text(
-            "motion", members,
+        return _text(
             seed=self._config["seed"],
             masts_m=masts_in_reach(masts_m(self._config["network"]), **block["region"]),
             motion={key: block[key] for key in MOTION if key in block},
@@ -77,19 +74,19 @@ class Settings:
         """The network as far as it decides the job's station, and the echo's tolerance."""
         tolerance, station = self._config["echo"]["tolerance"], getattr(wildcards, "station", None)
         network = as_far_as(self._config["network"], station) if station else self._config["network"]
-        return self._text("echo", station, network=network, tolerance=tolerance)
+        return _text(network=network, tolerance=tolerance)
 
     def echo_in_scene(self, wildcards: Any) -> str:
         """The network, the echo's tolerance, the scene's effects with their SNRs, and the seed that they draw from."""
         tolerance = self._config["echo"]["tolerance"]
         inside = self._blocks("noise")["noise"] if in_all_cells(self._config["effects"]) else {}
-        return self._text("echo_in_scene", **self._blocks("seed", "network", "effects"), tolerance=tolerance, **inside)
+        return _text(**self._blocks("seed", "network", "effects"), tolerance=tolerance, **inside)
 
     def noise(self, wildcards: Any) -> str:
         """The set of SNRs, the names of the stations, and the canceller that the noise passes."""
         snrs, effects = self._snrs(wildcards), self._config["effects"]
         passed = {"canceller": effects["canceller"] or {}} if "canceller" in effects else {}
-        return self._text("noise", *snrs, **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
+        return _text(**self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
 
     def images(self, wildcards: Any) -> str:
         """Network, spectra and images; what late symbols are drawn from, where spectra know their instants; what
@@ -99,16 +96,16 @@ class Settings:
             late = {"slow_time": self._config["effects"]["slow_time"]}
             blocks["drawn"] = {"seed": self._config["seed"], "effects": late}
         if not of_cells(self._config["spectra"]):
-            return self._text("images", **blocks)
+            return _text(**blocks)
         snrs, tolerance = self._snrs(wildcards), self._config["echo"]["tolerance"]
         cubes = {**self._blocks("seed", "effects"), "tolerance": tolerance, "snr_db": snrs}
-        return self._text("images", *snrs, **blocks, cubes=cubes)
+        return _text(**blocks, cubes=cubes)
 
     def index(self, wildcards: Any) -> str:
         """How motion becomes echoes and signals become tiles: with these and the clouds a sample can be made again."""
         echo = {"tolerance": self._config["echo"]["tolerance"], "effects": self._config["effects"]}
         blocks = self._blocks("network", "spectra", "images")
-        return self._text("index", **blocks, echo=echo, classes=self._run.classes)
+        return _text(**blocks, echo=echo, classes=self._run.classes)
 
     def shard(self, wildcards: Any) -> str:
         """The fold of each sample, its name and its form, and the companions that its record names."""
@@ -119,36 +116,29 @@ class Settings:
         if self._config["shards"]["kind"] == "cube":
             added["echo"] = {"tolerance": self._config["echo"]["tolerance"], "effects": effects}
         blocks = self._blocks("seed", "network", "split", "shards")
-        return self._text("shard", *snrs, **blocks, snr_db=snrs, classes=self._run.classes, **added)
+        return _text(**blocks, snr_db=snrs, classes=self._run.classes, **added)
 
     def cost_table(self, wildcards: Any) -> str:
         """Settings with which the echo is timed, and the rows of the table of targets."""
         blocks = self._blocks("network", "motion", "seed", "cost")
-        return self._text("cost_table", **blocks, published=self._published)
+        return _text(**blocks, published=self._published)
 
     def views(self, wildcards: Any) -> str:
         """Pixels a side of the shrunk images; the SNRs too, where the tiles stage makes them for a whole chunk."""
         size, snrs = int(wildcards.size), self._snrs(wildcards)
         more = {"snr_db": snrs} if self._run.is_reduced(size) else {}
-        return self._text("views", wildcards.size, *snrs, size=size, **more)
+        return _text(size=size, **more)
 
     def training(self, wildcards: Any) -> str:
         """How a network is trained: from its own seed, or from the run's where a job names no training seed."""
         block = self._config["recognition"]
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
         seed = int(wildcards.get("train_seed", self._config["seed"]))
-        return self._text(
-            "training",
-            seed,
-            seed=seed,
-            colour_map=self._config["images"]["colour_map"],
-            classes=self._run.classes,
-            **kept,
-        )
+        return _text(seed=seed, colour_map=self._config["images"]["colour_map"], classes=self._run.classes, **kept)
 
     def evaluation(self, wildcards: Any) -> str:
         """Settings with which a network predicts."""
-        return self._text("evaluation", **self._config["recognition"]["evaluation"])
+        return _text(**self._config["recognition"]["evaluation"])
 
     def backbone(self, wildcards: Any) -> list[str]:
         """The words that name the code of a scheme's backbone, none where a library has it."""
@@ -157,8 +147,8 @@ class Settings:
 
     def seed(self, wildcards: Any) -> str:
         """The run's seed alone, for tables with intervals."""
-        return self._text("seed", **self._blocks("seed"))
+        return _text(**self._blocks("seed"))
 
     def report(self, wildcards: Any) -> str:
         """The whole configuration, and the published values of each subtype."""
-        return self._text("report", config=as_named(self._config), published=self._published)
+        return _text(config=as_named(self._config), published=self._published)

@@ -38,9 +38,9 @@ def add_moments(strip, size, block, moments):
 
 
 @INLINED
-def add_amplitudes(strip, share, point, functions, size):
+def add_amplitudes(strip, share, point, plan, size):
     """Fill the strip's amplitudes by polynomials of the plan's degree; returns sums of |z| and of |z| v^2."""
-    c, s = functions.cosine, functions.sine
+    c, s = plan.cosine, plan.sine
     if len(c) == 6:
         return vector_loops.amplitudes(
             strip, share, point, (c[0], c[1], c[2], c[3], c[4], c[5]), (s[0], s[1], s[2], s[3], s[4], s[5]), size
@@ -57,13 +57,13 @@ def add_amplitudes(strip, share, point, functions, size):
 
 
 @INLINED
-def sum_points(scene, lay, radar, q, n, r, geometry, placing, degrees, plan, block, work):
+def sum_points(sample, n, r, constants, degrees, plan, block, work):
     """Fill work.moments with symbol n's moments, over lay.total / r^2; returns the sums of |z| and of |z| v^2 likewise.
 
-    q: part (or point, without rotations) whose translation is the reference, r (m) away; geometry, placing: of
-    `segment.constants`; degrees: of the gains' polynomials; block: most points added in the strip's type.
+    r: the reference's range (m); constants: of `segment.constants`; degrees: of the gains' polynomials; block: most
+    points added in the strip's type.
     """
-    strip, offsets = work.strip, work.offsets
+    strip, offsets, (geometry, placing) = work.strip, work.offsets, constants
     padded = len(work.share)
     length = strip_size(padded)
     for order in range(work.moments.shape[1]):
@@ -71,14 +71,11 @@ def sum_points(scene, lay, radar, q, n, r, geometry, placing, degrees, plan, blo
     total, second = 0.0, 0.0
     for point in range(0, padded, length):
         size = min(length, padded - point)
-        fill_offsets(scene, lay, radar, q, n, r, point, size, placing, offsets)
-        if plan.near:
-            vector_loops.near_geometry(offsets, geometry, plan.functions.excess, plan.functions.inverse, size, strip)
-        else:
-            vector_loops.geometry(offsets, geometry, size, strip)
+        fill_offsets(sample, n, r, point, size, placing, offsets)
+        vector_loops.geometry(offsets, geometry, size, strip)
         vector_loops.horner(strip.psi, work.typed, np.int64(0), degrees[0], strip.gain_h, size)
         vector_loops.horner(strip.omega, work.typed, np.int64(1), degrees[1], strip.gain_v, size)
-        a, b = add_amplitudes(strip, work.share, point, plan.functions, size)
+        a, b = add_amplitudes(strip, work.share, point, plan, size)
         total += a
         second += b
         add_moments(strip, size, block, work.moments)
@@ -97,13 +94,13 @@ def precision(plan, padded, orders):
 
 
 @LEAN
-def run(scene, lay, radar, q, symbols, aims, approximation, final, work, found):
+def run(sample, symbols, approximation, final, work, found):
     """Compute the symbols into `found`.
 
-    q: part (or point, without rotations) whose translation is the reference; symbols, approximation, work,
-    found: the bundles of `workspace`; final: a lead that is not proved is accepted, because no finer plan exists.
+    sample: `layout.EchoSample`; symbols, approximation, work, found: the bundles of `workspace`; final: a lead that is
+    not proved is accepted, because no finer plan exists.
     """
-    plan, table = approximation.plan, approximation.cells
+    plan, table, radar = approximation.plan, approximation.cells, sample.radar
     orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
     padded = len(work.share)
     unit, block, rounding = precision(plan, padded, orders)
@@ -113,7 +110,7 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, work, found):
         segment = symbols.segments[index]
         start, end = int(segment[START]), int(segment[END])
         degree_h, degree_v, gains = fit_gains(
-            segment, aims, approximation.gains, plan.fit, unit, approximation.fold, work
+            segment, sample.aims, approximation.gains, plan.fit, unit, approximation.fold, work
         )
         if degree_h < 0 or degree_v < 0:
             for i in range(start, end):
@@ -122,13 +119,10 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, work, found):
         for i in range(start, end):
             n, r = symbols.index[i], refs[i, RANGE]
             place = max(0, min(int(np.rint((refs[i, REST] + 0.5) * PLACES)), PLACES))
-            centre = place / PLACES - 0.5
-            geometry, placing = constants(radar, refs[i], segment, aims, centre, half)
-            total, second = sum_points(
-                scene, lay, radar, q, n, r, geometry, placing, (degree_h, degree_v), plan, block, work
-            )
+            placed = constants(sample, refs[i], segment, place / PLACES - 0.5, half)
+            total, second = sum_points(sample, n, r, placed, (degree_h, degree_v), plan, block, work)
             # Amplitudes were relative to their sum, so that float32 neither overflows nor vanishes.
-            scale = lay.total / (r * r)
+            scale = sample.lay.total / (r * r)
             for order in range(orders):
                 moments[0, order] *= scale
                 moments[1, order] *= scale
@@ -142,9 +136,8 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, work, found):
             bound += plan.phase * min(total * extents[i, SIZE], peaks * extents[i, MEAN])
             found.totals[n], found.bounds[n] = total, bound
             state, row, tie, lead = certify(
-                table, place, centre, moments, extents[i, SIZE] * radar.cells, (total, second),
-                table.error + 4.0 * rounding * (sizes[0] + sizes[1] + sizes[2]), bound, radar.subcarriers, work.sums,
-                work.far,
+                table, place, extents[i, SIZE] * radar.cells, (total, second),
+                table.error + 4.0 * rounding * (sizes[0] + sizes[1] + sizes[2]), bound, radar.subcarriers, work,
             )  # fmt: skip
             if lead <= 0.0 and not final:
                 state = UNCERTAIN

@@ -1,12 +1,11 @@
 """Which precision and which polynomials a sample gets: the cheapest whose proved error bound is allowed."""
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo.fast.polynomials import array_rule, smooth
+from lowalt.echo.fast.polynomials import CosineSum, array_rule, smooth
 from lowalt.echo.radar import Radar
 
 SPREAD_LIMIT = 0.22
@@ -15,39 +14,26 @@ FINEST = 1e-15
 """Accuracy asked of every polynomial in the exact mode."""
 
 
-class Functions(NamedTuple):
-    """Coefficients of the polynomials that replace functions: relative range difference over eps and r_ref / r in
-    float64; cosine and sine in the type of the sums (see `polynomials.smooth`)."""
-
-    excess: np.ndarray
-    inverse: np.ndarray
-    cosine: np.ndarray
-    sine: np.ndarray
-
-
 class EchoPlan(NamedTuple):
     """How a sample is computed. `fit`: error of gains and cell kernels; `share`, `peak`: the other errors' bound
     relative to the sum of amplitudes and to the sum of peak amplitudes; `phase`: rounding of the phase relative to the
-    sum of amplitudes times distances from the reference, per metre; `single`: float32 after the phase; `near`:
-    ranges by polynomials rather than roots."""
+    sum of amplitudes times distances from the reference, per metre; `single`: float32 after the phase; `cosine`,
+    `sine`: coefficients of `polynomials.smooth` in the type of the sums."""
 
     fit: float
     share: float
     peak: float
     phase: float
     single: bool
-    near: bool
-    functions: Functions
+    cosine: np.ndarray
+    sine: np.ndarray
 
 
 class ArrayGains(NamedTuple):
-    """The horizontal and vertical array gains as sums of cosines: weights of sum 1, and rates, largest first, in rad
-    per unit of direction cosine."""
+    """The horizontal and the vertical array gain."""
 
-    weights_h: np.ndarray
-    rates_h: np.ndarray
-    weights_v: np.ndarray
-    rates_v: np.ndarray
+    horizontal: CosineSum
+    vertical: CosineSum
 
 
 COSINE_DEGREES = (5, 7, 10)
@@ -62,8 +48,8 @@ SINGLE_ERROR = 400 * 2.0**-24
 def array_gains(radar: Radar) -> ArrayGains:
     """Return the array gains of a station as sums of cosines."""
     return ArrayGains(
-        *array_rule(radar.transmit_h, radar.receive_h, radar.kappa),
-        *array_rule(radar.transmit_v, radar.receive_v, radar.kappa),
+        array_rule(radar.transmit_h, radar.receive_h, radar.kappa),
+        array_rule(radar.transmit_v, radar.receive_v, radar.kappa),
     )
 
 
@@ -72,45 +58,30 @@ def round_up(value: float, steps: int = 2) -> float:
     return 2.0 ** (math.ceil(steps * math.log2(max(value, 1e-9))) / steps)
 
 
-def echo_plan(radar: Radar, spread: float, size_m: float, points: int, error: float) -> EchoPlan:
+def echo_plan(radar: Radar, points: int, error: float) -> EchoPlan:
     """Return the cheapest plan whose bound is about `error` relative to the sum of amplitudes.
 
-    spread: largest target radius over range; size_m: largest radius (m). `error` below FINEST means the exact mode.
+    `error` is rounded down to a power of two, so that few cell kernels serve all samples; below FINEST it means the
+    exact mode.
     """
-    return _echo_plan(
-        radar.turns, radar.kappa, radar.transmit_h + radar.receive_h - 2, radar.transmit_v + radar.receive_v - 2,
-        min(0.5, round_up(2.01 * spread + spread * spread)), round_up(size_m), -(-points // 512),
-        2.0 ** math.floor(math.log2(max(error, FINEST))),
-    )  # fmt: skip
-
-
-@lru_cache(maxsize=4096)
-def _echo_plan(turns, kappa, rate_h, rate_v, reach, size_m, strips, error) -> EchoPlan:
-    """Compute the plan for rounded sizes, so that many samples share it."""
-    wave = 2 * np.pi * turns * 2 * size_m
-    array_phase = np.pi * kappa / 2 * (rate_h + rate_v)
-    unit = 2.0**-53
-    single = error > SINGLE_ERROR
-    coarse = 2.0**-24 if single else unit
-    part = error / 6
-    excess, excess_error = smooth("excess", reach, 4)
-    inverse, inverse_error = smooth("inverse", reach, 3)
-    near = wave * excess_error + (2 + array_phase) * inverse_error <= 2 * part
-    if not near:
-        excess_error = inverse_error = 0.0
+    error = 2.0 ** math.floor(math.log2(max(error, FINEST)))
+    elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
+    array_phase = np.pi * radar.kappa / 2 * (elements - 4)
+    unit, single = 2.0**-53, error > SINGLE_ERROR
+    coarse, kind = (2.0**-24, np.float32) if single else (unit, np.float64)
     for degree in COSINE_DEGREES:
-        cosine, cosine_error = smooth("cosine", 0.25, degree)
-        sine, sine_error = smooth("sine", 0.25, degree)
-        if cosine_error + 0.5 * sine_error <= 2 * part:
+        cosine, cosine_error = smooth("cosine", degree)
+        sine, sine_error = smooth("sine", degree)
+        if cosine_error + 0.5 * sine_error <= error / 3:
             break
     # Order k of cosine and sine rounds 2 k + 2 times: at half a turn at most 85 roundings in both; the turn itself
     # and the products that make the amplitude another 16.
-    rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + strips * unit
-    share = wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
-    kind = np.float32 if single else np.float64
-    functions = Functions(excess, inverse, cosine.astype(kind), sine.astype(kind))
-    peak = array_phase * inverse_error + 8 * array_phase * unit
-    return EchoPlan(max(part, FINEST), share, peak, 64 * np.pi * turns * unit, single, bool(near), functions)
+    rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + -(-points // 512) * unit
+    share = cosine_error + 0.5 * sine_error + rounding
+    return EchoPlan(
+        max(error / 6, FINEST), share, 8 * array_phase * unit, 64 * np.pi * radar.turns * unit, single,
+        cosine.astype(kind), sine.astype(kind),
+    )  # fmt: skip
 
 
 def pointwise_bound(radar: Radar, size_m: float, points: int) -> tuple[float, float]:

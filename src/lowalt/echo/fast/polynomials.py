@@ -6,6 +6,7 @@ coefficients are Bessel functions, |2 J_p(B)| <= 2 (B/2)^p / p!; B is the band t
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -16,6 +17,13 @@ TOP = 40
 """Highest degree of any polynomial here; a stretch that would need more goes to the pointwise kernel."""
 EXTRA = 8
 """Taylor orders beyond the degree that are folded back into it (economisation)."""
+
+
+class CosineSum(NamedTuple):
+    """Weights and rates (K,) of sum w cos(rate x): rates >= 0, the largest first."""
+
+    weights: np.ndarray
+    rates: np.ndarray
 
 
 @LEAN
@@ -66,15 +74,16 @@ def folding() -> np.ndarray:
 
 
 @VECTOR
-def economised(weights, rates, phase, centre, half, degree, fold, room, out):
-    """Fill out[: degree + 1] with powers-of-s coefficients of sum w cos(rate x + phase), x = centre + half s.
+def economised(cosines, centre, half, degree, fold, room, out):
+    """Fill out[: degree + 1] with powers-of-s coefficients of a `CosineSum` at x = centre + half s.
 
-    Rates are not negative; room (3, at least as many as rates): work array.
+    fold: of `folding`; room (3, at least as many as rates): work array.
     """
+    weights, rates = cosines
     count = len(weights)
     term, even, odd = room[0], room[1], room[2]
     for i in range(count):
-        angle = rates[i] * centre + phase
+        angle = rates[i] * centre
         term[i], even[i], odd[i] = weights[i], math.cos(angle), -math.sin(angle)
     out[:] = 0.0
     for p in range(degree + EXTRA + 1):
@@ -97,8 +106,8 @@ def economised(weights, rates, phase, centre, half, degree, fold, room, out):
                 out[k] += fold[degree, p - degree - 1, k] * value
 
 
-def _half(weights: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the same sum of cosines with the rates r and -r joined: only rates >= 0, largest first."""
+def _half(weights: np.ndarray, rates: np.ndarray) -> CosineSum:
+    """Return the same sum of cosines with the rates r and -r joined."""
     order = np.argsort(-rates, kind="stable")
     weights, rates = weights[order], rates[order]
     keep = (len(rates) + 1) // 2
@@ -106,12 +115,12 @@ def _half(weights: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarra
     if len(rates) % 2:
         weights[-1] /= 2
         rates = np.append(rates[: keep - 1], 0.0)
-    return weights, np.ascontiguousarray(rates[:keep])
+    return CosineSum(weights, np.ascontiguousarray(rates[:keep]))
 
 
 @lru_cache(maxsize=64)
-def cell_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return weights and rates (rad a cell) of a short cosine sum equal to the cell kernel of `count` subcarriers.
+def cell_rule(count: int) -> CosineSum:
+    """Return a short cosine sum (rates in rad a cell) equal to the cell kernel of `count` subcarriers.
 
     Gauss rule of the subcarriers' own uniform discrete measure (recurrence of the discrete Chebyshev polynomials):
     32 nodes are exact to degree 63, which leaves less than 1e-17 at seven cells' distance.
@@ -129,8 +138,8 @@ CELL_REACH = 7.0
 
 
 @lru_cache(maxsize=64)
-def array_rule(transmit: int, receive: int, kappa: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return weights (of sum 1) and rates (rad per unit of cosine) of U_{T-1} U_{R-1} / (T R) as a cosine sum."""
+def array_rule(transmit: int, receive: int, kappa: float) -> CosineSum:
+    """Return U_{T-1} U_{R-1} / (T R) as a cosine sum: weights of sum 1, rates in rad per unit of direction cosine."""
     weights = np.convolve(np.ones(transmit), np.ones(receive)) / (transmit * receive)
     top = transmit + receive - 2
     return _half(weights, np.pi * kappa / 2 * (top - 2.0 * np.arange(top + 1)))
@@ -150,35 +159,26 @@ def _nodes() -> tuple[np.ndarray, np.ndarray]:
     return np.cos(angle), matrix
 
 
-@lru_cache(maxsize=1024)
-def _expansion(kind: str, reach: float) -> tuple[np.ndarray, np.ndarray]:
+@lru_cache(maxsize=2)
+def _expansion(kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the Chebyshev coefficients (96,) of a function of `smooth`, and the error of stopping at each degree."""
     s, matrix = _nodes()
-    if kind in ("cosine", "sine"):
-        turn = 8 * np.arctan(np.longdouble(1)) * np.sqrt(reach / 2 + reach / 2 * s)
-        value = np.cos(turn) if kind == "cosine" else 8 * np.arctan(np.longdouble(1)) * np.sin(turn) / turn
-    else:
-        root = np.sqrt(1 + reach * s)
-        value = 1 / root if kind == "inverse" else 1 / (1 + root)
+    turn = 8 * np.arctan(np.longdouble(1)) * np.sqrt((1 + s) / 8)
+    value = np.cos(turn) if kind == "cosine" else 8 * np.arctan(np.longdouble(1)) * np.sin(turn) / turn
     coefficients = matrix @ value
     noise = max(64 * float(np.finfo(np.longdouble).eps), 1e-17) * float(abs(coefficients).max())
     size = np.where(abs(coefficients) < noise, 0, abs(coefficients)).astype(np.float64)
     return coefficients, np.append(np.cumsum(size[::-1])[::-1][1:], 0.0) + 2e-16
 
 
-@lru_cache(maxsize=1024)
-def smooth(kind: str, reach: float, degree: int) -> tuple[np.ndarray, float]:
-    """Return a polynomial of `degree` for one of four functions on [-reach, reach]: coefficients and error bound.
+@lru_cache(maxsize=64)
+def smooth(kind: str, degree: int) -> tuple[np.ndarray, float]:
+    """Return a polynomial of `degree` in x = t^2 for |t| <= 1/2: coefficients and error bound.
 
-    kind "inverse": (1 + x)^(-1/2); "excess": (sqrt(1 + x) - 1) / x; both have their only singularity at x = -1.
-    "cosine", "sine": cos(2 pi t), sin(2 pi t) / t as functions of x = t^2, from 0 to reach. The bound is the sum of the
-    Chebyshev coefficients left out, computed with 96 nodes, plus rounding.
+    kind: "cosine" for cos(2 pi t), "sine" for sin(2 pi t) / t. The bound is the sum of the Chebyshev coefficients left
+    out, computed with 96 nodes, plus rounding.
     """
-    coefficients, tails = _expansion(kind, reach)
-    powers = chebyshev.cheb2poly(coefficients[: degree + 1])
-    if kind in ("cosine", "sine"):
-        inner = np.polynomial.Polynomial(np.array([-1, 2 / np.longdouble(reach)], np.longdouble))
-        powers = np.polynomial.Polynomial(powers)(inner).coef
-    else:
-        powers = powers / np.longdouble(reach) ** np.arange(len(powers))
+    coefficients, tails = _expansion(kind)
+    inner = np.polynomial.Polynomial(np.array([-1, 8], np.longdouble))
+    powers = np.polynomial.Polynomial(chebyshev.cheb2poly(coefficients[: degree + 1]))(inner).coef
     return powers.astype(np.float64), float(tails[degree])

@@ -17,14 +17,15 @@ DRIFT = 1.0
 
 
 @LEAN
-def fill_extents(scene, first, lay, refs, radar, out):
-    """Fill the table of extents out (N, 5) and return its largest SPREAD.
+def fill_extents(sample, refs, out):
+    """Fill the table of extents out (N, 5) of an `EchoSample` and return its largest SPREAD.
 
-    first: the part (or point, without rotations) whose translation is the reference. Each point of a group is at most
-    radius x norm away from the group's moved centre, where `norm` bounds the norm of the part's matrix.
+    Each point of a group is at most radius x norm away from the group's moved centre, where `norm` bounds the norm of
+    the part's matrix.
     """
-    rotation, translation = scene.rotation, scene.translation
-    parts, centres, radii = lay.parts, lay.centres, lay.radii
+    rotation, translation, first, radar = sample.scene.rotation, sample.scene.translation, sample.first, sample.radar
+    groups = sample.lay.groups
+    parts, centres, radii = groups.parts, groups.centres, groups.radii
     worst = 0.0
     for n in range(len(refs)):
         r = refs[n, RANGE]
@@ -35,7 +36,7 @@ def fill_extents(scene, first, lay, refs, radar, out):
                 y = translation[n, p, 1] - translation[n, first, 1]
                 z = translation[n, p, 2] - translation[n, first, 2]
                 away = math.sqrt(x * x + y * y + z * z)
-                size, mean = max(size, away), mean + lay.weights[p] * away
+                size, mean = max(size, away), mean + groups.weights[p] * away
         else:
             for group in range(len(parts)):
                 p = parts[group]
@@ -49,7 +50,7 @@ def fill_extents(scene, first, lay, refs, radar, out):
                 bound = norm(rotation, n, p) if radii[group] > 0.0 else 0.0
                 away = math.sqrt(x * x + y * y + z * z)
                 size = max(size, away + bound * radii[group])
-                mean += lay.weights[group] * away + bound * lay.strays[group]
+                mean += groups.weights[group] * away + bound * groups.strays[group]
         size *= 1.0 + 1e-12
         out[n, PSI] = (radar.cosine * refs[n, Y] - radar.sine * refs[n, X]) / r if r > 0.0 else 0.0
         out[n, OMEGA] = refs[n, Z] / r if r > 0.0 else 0.0

@@ -8,23 +8,23 @@ import numpy as np
 from lowalt.echo.fast import vector_loops
 from lowalt.echo.fast.polynomials import TOP, degree_for, economised, tail
 from lowalt.echo.fast.range_bounds import OMEGA_CENTRE, OMEGA_HALF, PSI_CENTRE, PSI_HALF
-from lowalt.echo.fast.strip import Geometry, PartPose, Placing
+from lowalt.echo.fast.strip import Geometry, Placing
 from lowalt.echo.pointwise.reference_range import RANGE, REST, TURN, X, Y, Z
 from lowalt.machine.jit import INLINED
 
 
 @INLINED
-def fit_gain(weights, rates, centre, half, error, unit, fold, work, row):
+def fit_gain(gain, centre, half, error, unit, fold, work, row):
     """Fit a gain on centre +- half to `error` into a row of `work`; returns (degree, error bound with roundings).
 
     The degree is -1 where the polynomial would be too long. unit: the rounding of the type it is evaluated in. Order k
     rounds its argument, its coefficient, its products and sums: at most 3 k + 3 roundings of |c_k|.
     """
-    band = rates[0] * half
+    band = gain.rates[0] * half
     degree = degree_for(band, error)
     if degree > TOP:
         return -1, 0.0
-    economised(weights, rates, 0.0, centre, half, degree, fold, work.taylor, work.coefficients[row])
+    economised(gain, centre, half, degree, fold, work.taylor, work.coefficients[row])
     rounding = 0.0
     for k in range(degree + 1):
         work.typed[row, k] = work.coefficients[row, k]
@@ -40,22 +40,22 @@ def fit_gains(segment, aims, gains, error, unit, fold, work):
     """
     centre_h, centre_v = segment[PSI_CENTRE] - aims[0], segment[OMEGA_CENTRE] - aims[1]
     degree_h, bound_h = fit_gain(
-        gains.weights_h, gains.rates_h, centre_h, segment[PSI_HALF], error, unit, fold, work, np.int64(0)
-    )
+        gains.horizontal, centre_h, segment[PSI_HALF], error, unit, fold, work, np.int64(0)
+    )  # fmt: skip
     degree_v, bound_v = fit_gain(
-        gains.weights_v, gains.rates_v, centre_v, segment[OMEGA_HALF], error, unit, fold, work, np.int64(1)
-    )
+        gains.vertical, centre_v, segment[OMEGA_HALF], error, unit, fold, work, np.int64(1)
+    )  # fmt: skip
     return degree_h, degree_v, bound_h + bound_v + bound_h * bound_v
 
 
 @INLINED
-def constants(radar, ref, segment, aims, centre, half):
+def constants(sample, ref, segment, centre, half):
     """Return a symbol's `Geometry` and `Placing`.
 
     ref, segment: rows of their tables; centre, half: the range in cells, from the symbol's nearest whole cell, that the
     cell kernel is expanded about, and the range at |v| = 1.
     """
-    r = ref[RANGE]
+    radar, aims, r = sample.radar, sample.aims, ref[RANGE]
     hx = (radar.cosine * ref[X] + radar.sine * ref[Y]) / r
     hy = (radar.cosine * ref[Y] - radar.sine * ref[X]) / r
     hz = ref[Z] / r
@@ -80,41 +80,34 @@ def constants(radar, ref, segment, aims, centre, half):
 
 
 @INLINED
-def fill_offsets(scene, lay, radar, q, n, r, first, size, placing, offsets):
-    """Fill the offsets with points first..first + size of symbol n, relative to the reference and over r_ref = r.
-
-    The reference is the translation of part q (of point q where there are no rotations).
-    """
-    rotation, translation, starts = scene.rotation, scene.translation, lay.starts
-    cosine, sine, scale = radar.cosine, radar.sine, 1.0 / r
+def fill_offsets(sample, n, r, first, size, placing, offsets):
+    """Fill the offsets with points first..first + size of symbol n, relative to the reference and over r_ref = r."""
+    rotation, translation, q = sample.scene.rotation, sample.scene.translation, sample.first
+    groups, cosine, sine, scale = sample.lay.groups, sample.radar.cosine, sample.radar.sine, 1.0 / r
     x0, y0, z0 = translation[n, q, 0], translation[n, q, 1], translation[n, q, 2]
     if rotation.shape[0] == 0:
         end = min(first + size, translation.shape[1])
-        vector_loops.place_nodes(translation, n, q, first, end - first, cosine, sine, scale, placing, offsets)
+        vector_loops.place_nodes(translation, n, q, first, end - first, (cosine, sine, scale), placing, offsets)
     else:
-        end = min(first + size, starts[len(lay.parts)])
+        end = min(first + size, groups.starts[len(groups.parts)])
         # Unsigned indices, as in `vector_loops`: a signed one costs a test for a negative value at every access.
         at, none, one, two = np.uint64(n), np.uint64(0), np.uint64(1), np.uint64(2)
-        for group in range(len(lay.parts)):
-            low, high = starts[group], starts[group + 1]
+        for group in range(len(groups.parts)):
+            low, high = groups.starts[group], groups.starts[group + 1]
             if low < first or low >= end:
                 continue
-            p = np.uint64(lay.parts[group])
+            p = np.uint64(groups.parts[group])
             a, b, c = rotation[at, p, none, none], rotation[at, p, one, none], rotation[at, p, two, none]
             d, e, f = rotation[at, p, none, one], rotation[at, p, one, one], rotation[at, p, two, one]
             g, h, k = rotation[at, p, none, two], rotation[at, p, one, two], rotation[at, p, two, two]
             x, y = translation[at, p, none] - x0, translation[at, p, one] - y0
-            pose = PartPose(
-                (cosine * a + sine * b) * scale, (cosine * d + sine * e) * scale, (cosine * g + sine * h) * scale,
-                (cosine * b - sine * a) * scale, (cosine * e - sine * d) * scale, (cosine * h - sine * g) * scale,
-                c * scale, f * scale, k * scale,
-                (cosine * x + sine * y) * scale, (cosine * y - sine * x) * scale,
-                (translation[at, p, two] - z0) * scale,
+            pose = (
+                ((cosine * a + sine * b) * scale, (cosine * d + sine * e) * scale, (cosine * g + sine * h) * scale),
+                ((cosine * b - sine * a) * scale, (cosine * e - sine * d) * scale, (cosine * h - sine * g) * scale),
+                (c * scale, f * scale, k * scale),
+                ((cosine * x + sine * y) * scale, (cosine * y - sine * x) * scale,
+                 (translation[at, p, two] - z0) * scale),
             )  # fmt: skip
-            still = abs(a) + abs(b) + abs(c) + abs(d) + abs(e) + abs(f) + abs(g) + abs(h) + abs(k)
-            if still == 0.0:
-                vector_loops.place_still(pose, placing, high - low, offsets, low - first)
-            else:
-                vector_loops.place_part(lay.x, lay.y, lay.z, low, high - low, pose, placing, offsets, low - first)
+            vector_loops.place_part(sample.lay.coordinates, low, high - low, pose, placing, offsets, low - first)
     for i in range(end - first, size):
         offsets.eps[i], offsets.y[i], offsets.z[i] = 0.0, 0.0, 0.0

@@ -31,23 +31,6 @@ class Placing(NamedTuple):
     z_shift: float
 
 
-class PartPose(NamedTuple):
-    """A part's matrix and its offset from the reference, in the array's axes (normal, horizontal, up), over r_ref."""
-
-    xx: float
-    xy: float
-    xz: float
-    yx: float
-    yy: float
-    yz: float
-    zx: float
-    zy: float
-    zz: float
-    x: float
-    y: float
-    z: float
-
-
 class Geometry(NamedTuple):
     """One symbol's constants: shifts of the scaled direction cosines psi and omega; scale and shift that take the
     relative range difference to [-1, 1]; turns of phase per relative range difference, per psi and per omega; the

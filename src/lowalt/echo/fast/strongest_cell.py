@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lowalt.echo.fast.cell_kernel import SIDE
+from lowalt.echo.fast.cell_kernel import PLACES, SIDE
 from lowalt.echo.pointwise.arg_max import NEAR_TIE, strongest_of
 from lowalt.machine.jit import INLINED, INNER_VECTOR, LEAN
 
@@ -67,16 +67,16 @@ def far_limit(far, distance, half, count):
 
 
 @INLINED
-def certify(table, place, centre, moments, size, totals, error, bound, count, sums, far):
+def certify(table, place, size, totals, error, bound, count, work):
     """Return (state, row in `sums`, near-tie, lead) of one symbol's strongest cell.
 
     The cells about the target are computed first. All 2 SIDE + 1 follow if the bound cannot exclude the others. table:
-    `cell_kernel.CellPolynomials`; place: row of its tables; centre: that place in cells from the nearest whole cell;
-    size: largest distance of a point from the reference (cells); totals: sums of |z| and of |z| v^2; error: relative to
-    them, of the sums in `far_moments`; bound: of the error of any cell's sum; sums, far: work arrays.
+    `cell_kernel.CellPolynomials`; place: row of its tables; size: largest distance of a point from the reference
+    (cells); totals: sums of |z| and of |z| v^2; error: relative to them, of the sums in `far_moments`; bound: of the
+    error of any cell's sum; work: `workspace.Workspace`, which holds the moments.
     lead: lower bound of |sum| in the strongest cell less |sum| in any other, negative where none is proved.
     """
-    half = table.half
+    half, centre, moments, sums, far = table.half, place / PLACES - 0.5, work.moments, work.sums, work.far
     far_moments(table.sines, place, moments, half, totals[0], totals[1], error, far)
     margin = 0.6 + 1.5 * size
     first = SIDE + max(-SIDE, min(math.ceil(centre - margin), SIDE))

@@ -46,13 +46,15 @@ def horner(x, c, row, degree, out, size):
 
 
 @INNER_VECTOR
-def place_part(px, py, pz, low, size, pose, placing, offsets, at):
+def place_part(coordinates, low, size, pose, placing, offsets, at):
     """Fill the offsets from `at` with `size` points of a part from `low`, and with up to MULTIPLE - 1 beyond.
 
-    px, py, pz: all points in their parts' frames (m). The loop takes whole vectors: single steps would cost more.
+    coordinates: those of all points in their parts' frames (m); pose: rows of the part's matrix and its offset from the
+    reference, in the array's axes (normal, horizontal, up), over r_ref. The loop takes whole vectors: single steps
+    would cost more.
     """
-    xx, xy, xz, yx, yy, yz = pose.xx, pose.xy, pose.xz, pose.yx, pose.yy, pose.yz
-    zx, zy, zz, x0, y0, z0 = pose.zx, pose.zy, pose.zz, pose.x, pose.y, pose.z
+    px, py, pz = coordinates
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz), (x0, y0, z0) = pose
     hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
     eps, ey, ez = offsets
     at, low = np.uint64(at), np.uint64(low)
@@ -67,21 +69,12 @@ def place_part(px, py, pz, low, size, pose, placing, offsets, at):
 
 
 @INNER_VECTOR
-def place_still(pose, placing, size, offsets, at):
-    """Do as `place_part` for a part whose matrix is zero, as a node's is: all its points stand at its offset."""
-    hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
-    eps, ey, ez = offsets
-    a, b, c = pose.x, pose.y, pose.z
-    e = a * (hx + a) + b * (hy + b) + c * (hz + c)
-    y, z = b * y_scale + y_shift, c * z_scale + z_shift
-    at = np.uint64(at)
-    for i in range(np.uint64(-(-size // MULTIPLE) * MULTIPLE)):
-        eps[at + i], ey[at + i], ez[at + i] = e, y, z
+def place_nodes(translation, n, q, low, size, axes, placing, offsets):
+    """Do as `place_part` for `size` points from `low` that are parts of their own, relative to the point q.
 
-
-@INNER_VECTOR
-def place_nodes(translation, n, q, low, size, cosine, sine, scale, placing, offsets):
-    """Do as `place_part` for `size` points from `low` that are parts of their own, relative to the point q."""
+    axes: cosine and sine of the array's normal, and 1 / r_ref.
+    """
+    cosine, sine, scale = axes
     hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
     eps, ey, ez = offsets
     n, low, q = np.uint64(n), np.uint64(low), np.uint64(q)
@@ -109,27 +102,6 @@ def geometry(offsets, constants, size, strip):
         r = math.sqrt(1.0 + e)
         q = 1.0 / (r + r * r)
         d, f = e * (q * r), q + q * r
-        p, o = ey[i] * f - cp, ez[i] * f - co
-        t = td * d + tp * p + to * o + t0
-        psi[i] = p
-        omega[i] = o
-        cells[i] = su * d + cu
-        turn[i] = t - np.rint(t)
-        square[i] = f * f
-
-
-@INNER_VECTOR
-def near_geometry(offsets, constants, excess, inverse, size, strip):
-    """Do as `geometry`, with polynomials in eps for the range difference over eps (degree 4) and r_ref / r (3)."""
-    cp, co, su, cu, td, tp, to, t0 = constants
-    c0, c1, c2, c3, c4 = excess[0], excess[1], excess[2], excess[3], excess[4]
-    f0, f1, f2, f3 = inverse[0], inverse[1], inverse[2], inverse[3]
-    eps, ey, ez = offsets
-    psi, omega, cells, turn, square = strip.psi, strip.omega, strip.cells, strip.turn, strip.square
-    for i in range(np.uint64(size)):
-        e = eps[i]
-        d = e * ((((c4 * e + c3) * e + c2) * e + c1) * e + c0)
-        f = ((f3 * e + f2) * e + f1) * e + f0
         p, o = ey[i] * f - cp, ez[i] * f - co
         t = td * d + tp * p + to * o + t0
         psi[i] = p

@@ -78,7 +78,7 @@ def workspace(approximation: Approximation, amplitude: np.ndarray) -> Workspace:
     """
     kind = np.float32 if approximation.plan.single else np.float64
     gains = approximation.gains
-    rates = max(len(gains.rates_h), len(gains.rates_v))
+    rates = max(len(gains.horizontal.rates), len(gains.vertical.rates))
     total = amplitude.sum()
     return Workspace(
         np.empty((3, rates)), np.empty((2, approximation.cells.kernels.shape[2])), np.empty((2, TOP + 1)),

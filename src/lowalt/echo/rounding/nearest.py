@@ -9,13 +9,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from lowalt.echo.fast.layout import Layout
+from lowalt.echo.fast.layout import EchoSample
 from lowalt.echo.fast.workspace import Found
 from lowalt.echo.pointwise import results as pointwise
-from lowalt.echo.radar import Radar
-from lowalt.echo.rounding import double
 from lowalt.echo.rounding.sums import ROWS, cell_value
-from lowalt.echo.scene import EchoScene
 from lowalt.machine.jit import INLINED, LEAN
 from lowalt.numerics.exact.arithmetic import two_sum
 
@@ -63,26 +60,19 @@ def to_odd(high, low, bits):
 
 
 @LEAN
-def compute_again(scene, lay, radar, symbols, found, work, bits):
-    """Replace the values of `symbols` (K,) in their strongest cells by closer ones.
+def compute_again(sample, symbols, found, work, bits):
+    """Replace the values of `symbols` (K,) in their strongest cells by sums in double-double.
 
-    First: sums in double of phases in double-double. Where their bound leaves the nearest complex64 open, everything
-    is computed in double-double. work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols
-    that needed the second, and the number for which its error still leaves the nearest complex64 open.
+    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols whose nearest complex64 the
+    error of these sums still leaves open.
     """
-    twice, still = 0, 0
-    share = double.share(len(lay.root))
+    still = 0
     for n in symbols:
-        x, y = double.cell_value(scene, lay, radar, n, found.cells[n], work)
-        if same_single(x, share * found.totals[n]) and same_single(y, share * found.totals[n]):
-            found.values[n] = complex(x, y)
-            continue
-        twice += 1
-        real, imag = cell_value(scene, lay, radar, n, found.cells[n], work)
+        real, imag = cell_value(sample, n, found.cells[n], work)
         error = ERROR * found.totals[n]
         still += not (same_double(real, error, bits) and same_double(imag, error, bits))
         found.values[n] = complex(to_odd(real[0], real[1], bits), to_odd(imag[0], imag[1], bits))
-    return twice, still
+    return still
 
 
 @INLINED
@@ -95,35 +85,33 @@ def same_double(x, error, bits):
 
 
 def correct(
-    scene: EchoScene, lay: Layout, radar: Radar, refs: np.ndarray,
-    aims: tuple[float, float], found: Found, pointwise_bound: tuple[float, float],
-) -> tuple[int, int, int]:  # fmt: skip
+    sample: EchoSample, refs: np.ndarray, found: Found, pointwise_bound: tuple[float, float]
+) -> tuple[int, int]:  # fmt: skip
     """Make every value of `found` round to the complex64 nearest to the true value, in the truly strongest cell.
 
-    Returns how many symbols were computed again, how many of them in double-double throughout, and how many that leaves
-    open. Cells whose strengths
-    differ by less than its error count as equal: the lowest index wins.
+    Returns how many symbols were computed again, and how many that leaves open. Cells whose strengths differ by less
+    than its error count as equal: the lowest index wins.
     """
     open_ones = np.empty(len(refs), np.int64)
     count, unproved = doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)
     if not count:
-        return 0, 0, 0
+        return 0, 0
     open_ones = open_ones[:count]
-    work, bits = np.empty((ROWS, len(lay.root) + 4)), np.empty(1, np.int64)
+    work, bits = np.empty((ROWS, len(sample.lay.root) + 4)), np.empty(1, np.int64)
     for n in open_ones[found.gaps[open_ones] <= 0.0] if unproved else ():
-        cells = _contenders(scene, radar, refs, aims, found, int(n), pointwise_bound)
+        cells = _contenders(sample, refs, int(n), pointwise_bound)
         if len(cells) > 1:
-            pairs = [cell_value(scene, lay, radar, n, cell, work) for cell in cells]
+            pairs = [cell_value(sample, n, cell, work) for cell in cells]
             strengths = [sum((Fraction(high) + Fraction(low)) ** 2 for high, low in pair) for pair in pairs]
             least = max(strengths) - 4 * Fraction(ERROR * found.totals[n]) * Fraction(abs(found.values[n]))
             cells = [cell for cell, strength in zip(cells, strengths, strict=True) if strength >= least]
         found.cells[n] = min(cells)
-    return len(open_ones), *compute_again(scene, lay, radar, open_ones, found, work, bits)
+    return len(open_ones), compute_again(sample, open_ones, found, work, bits)
 
 
-def _contenders(scene, radar, refs, aims, found: Found, n: int, pointwise_bound) -> list[int]:
+def _contenders(sample: EchoSample, refs: np.ndarray, n: int, pointwise_bound: tuple[float, float]) -> list[int]:
     """Return the cells of symbol n that may be the strongest by the error bounds of float64."""
-    part = slice(n, n + 1)
+    scene, radar, aims, part = sample.scene, sample.radar, sample.aims, slice(n, n + 1)
     here = scene._replace(translation=scene.translation[part], rotation=scene.rotation[part])
     direct = pointwise.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
     one, risks, cells = Found.empty(1), np.zeros(1), np.empty((1, radar.subcarriers), np.complex128)

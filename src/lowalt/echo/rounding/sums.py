@@ -20,8 +20,10 @@ ROWS = 16
 
 
 @INNER
-def place(scene, lay, station, n, work):
+def place(sample, n, work):
     """Fill rows X, Y, Z with the vectors from the station to all points at symbol n; padding stands at one metre."""
+    scene, station, groups = sample.scene, sample.radar.station, sample.lay.groups
+    x, y, z = sample.lay.coordinates
     for i in range(work.shape[1]):
         for row in range(6):
             work[row, i] = 0.0 if row else 1.0
@@ -31,16 +33,16 @@ def place(scene, lay, station, n, work):
                 at = two_sum(scene.translation[n, i, axis], -station[axis])
                 work[2 * axis, i], work[2 * axis + 1, i] = at
         return
-    for group in range(len(lay.parts)):
-        p = lay.parts[group]
-        low, high = np.uint64(lay.starts[group]), np.uint64(lay.starts[group + 1])
+    for group in range(len(groups.parts)):
+        p = groups.parts[group]
+        low, high = np.uint64(groups.starts[group]), np.uint64(groups.starts[group + 1])
         for axis in range(3):
             a, b, c = scene.rotation[n, p, axis, 0], scene.rotation[n, p, axis, 1], scene.rotation[n, p, axis, 2]
             origin = two_sum(scene.translation[n, p, axis], -station[axis])
             row, below = np.uint64(2 * axis), np.uint64(2 * axis + 1)
             # Whole vectors of four are written: the next group overwrites the surplus, and the padding has no weight.
             for i in range(low, low + (high - low + np.uint64(3)) // np.uint64(4) * np.uint64(4)):
-                at = add(add(product(a, lay.x[i]), product(b, lay.y[i])), product(c, lay.z[i]))
+                at = add(add(product(a, x[i]), product(b, y[i])), product(c, z[i]))
                 work[row, i], work[below, i] = add(at, origin)
 
 
@@ -117,26 +119,20 @@ def phase_of(cell, count):
     return sine_cosine(divide((float((count - 1) * cell % (2 * count)), 0.0), (2.0 * count, 0.0)))
 
 
-@INNER
-def seen(scene, lay, radar, n, cell, work):
-    """Fill rows X to AMPLITUDE with how the station sees all points at symbol n; cell: the range cell's index."""
-    x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])
-    z = two_sum(scene.aim[2], -radar.station[2])
-    exact = constants_of(radar.exact)
-    _, _, psi0, omega0 = cosines(x, y, z, exact)
-    place(scene, lay, radar.station, n, work)
-    geometry(work, lay.root, lay.rcs, exact, (psi0, omega0), float(cell), float(radar.subcarriers))
-
-
 @LEAN
-def cell_value(scene, lay, radar, n, cell, work):
+def cell_value(sample, n, cell, work):
     """Return the real and imaginary part, double-doubles, of range cell `cell` at symbol n.
 
-    radar: `radar.Radar`, of which whole numbers, the station's position and the double-doubles are used; work (ROWS,
-    padded L + 4): work array. No point may stand in the station.
+    sample: `layout.EchoSample`, of whose radar whole numbers, the station's position and the double-doubles are used;
+    work (ROWS, padded L + 4): work array. No point may stand in the station.
     """
-    points = len(lay.root)
-    seen(scene, lay, radar, n, cell, work)
+    scene, lay, radar = sample.scene, sample.lay, sample.radar
+    x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])
+    z = two_sum(scene.aim[2], -radar.station[2])
+    exact, points = constants_of(radar.exact), len(lay.root)
+    _, _, psi0, omega0 = cosines(x, y, z, exact)
+    place(sample, n, work)
+    geometry(work, lay.root, lay.rcs, exact, (psi0, omega0), float(cell), float(radar.subcarriers))
     for row, elements, squared in patterns(radar):
         if elements > 1.0:
             times_dirichlet(work, row, elements, squared, points)
@@ -144,7 +140,7 @@ def cell_value(scene, lay, radar, n, cell, work):
     real, imag = (0.0, 0.0), (0.0, 0.0)
     for i in range(points):
         real, imag = add(real, (work[TURN, i], work[TURN + 1, i])), add(imag, (work[CELL, i], work[CELL + 1, i]))
-    factor = divide(constants_of(radar.exact).scale, (float(radar.subcarriers), 0.0))
+    factor = divide(exact.scale, (float(radar.subcarriers), 0.0))
     real, imag = multiply(real, factor), multiply(imag, factor)
     s, c = phase_of(cell, radar.subcarriers)
     return subtract(multiply(real, c), multiply(imag, s)), add(multiply(real, s), multiply(imag, c))

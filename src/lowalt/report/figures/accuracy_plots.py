@@ -1,84 +1,89 @@
-"""Plots of what the networks recognise: over SNR, by true and recognised class, over distance and over confidence."""
+"""Plots of what the networks recognise: over SNR, and by true and recognised class."""
 
-from lowalt.report.figures.style import SNR_LABELS
-from lowalt.report.plots import Plot
+import math
+
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from lowalt.report.figures.style import COLOURS, SNR_LABELS, plain
+from lowalt.report.plots import Plot, drawn
 
 PAGE_WIDTH, CELL = 960, 46
 """Width of the page's column, and of a cell of a matrix, in pixels; 100.0 fits into a cell."""
-_PICKED = {"name": "picked", "select": {"type": "point", "fields": ["scheme"]}, "bind": "legend"}
-_FADE = {"condition": {"param": "picked", "value": 1}, "value": 0.1}
-_ACCURACY = {"field": "accuracy_percent", "type": "quantitative", "scale": {"zero": False}, "title": "accuracy (%)"}
-_BELOW = {"orient": "bottom", "title": None, "columns": 4}
-_SCHEME = {"field": "scheme", "type": "nominal", "legend": _BELOW}
-
-
-def _lines(across: dict, further: dict | None = None) -> dict:
-    """A line and its points over `across`, a colour a scheme; the legend picks schemes."""
-    encoding = {"x": across, "y": _ACCURACY, "color": _SCHEME, "opacity": _FADE, **(further or {})}
-    return {"encoding": encoding, "layer": [
-        {"mark": {"type": "line", "tooltip": {"content": "data"}}, "params": [_PICKED]},
-        {"mark": {"type": "point", "filled": True, "size": 45, "tooltip": {"content": "data"}}},
-    ]}  # fmt: skip
+SOURCES = {"this run": "-", "paper": "--"}
+"""Style of the lines of each source."""
 
 
 def over_snr(ours: dict, published: dict) -> Plot:
     """Return accuracy over SNR, a panel a protocol; dashed is the published value on the paper's own data.
 
-    ours, published: protocol -> scheme -> SNR label -> percent. Pointing at an SNR marks it in all panels.
+    ours, published: protocol -> scheme -> SNR label -> percent.
     """
     rows = [
         {"protocol": f"{protocol} subtypes", "scheme": scheme, "snr_db": SNR_LABELS.get(label, label),
          "accuracy_percent": round(value, 3), "source": source}
-        for source, table in (("this run", ours), ("paper", published))
+        for source, table in zip(SOURCES, (ours, published), strict=True)
         for protocol, schemes in table.items() if protocol in ours
         for scheme, values in schemes.items() if scheme in ours[protocol]
         for label, value in values.items() if label != "avg"
     ]  # fmt: skip
     infinite = set(SNR_LABELS.values())
-    order = sorted({row["snr_db"] for row in rows}, key=lambda snr: float("inf" if snr in infinite else snr))
-    across = {"field": "snr_db", "type": "ordinal", "sort": order, "title": "SNR (dB)", "axis": {"labelAngle": 0}}
-    dash = {
-        "field": "source",
-        "type": "nominal",
-        "sort": ["this run", "paper"],
-        "legend": {"orient": "bottom", "title": None},
-    }
-    shown = _lines(across, {"strokeDash": dash})
-    at = {"name": "at", "select": {"type": "point", "encodings": ["x"], "nearest": True, "on": "pointerover",
-                                   "clear": "pointerout"}}  # fmt: skip
-    # The line under the pointer repeats each SNR; a screen reader passes it over.
-    rule = {"mark": {"type": "rule", "color": "gray", "aria": False}, "params": [at], "encoding": {
-        "y": {"value": 0}, "y2": {"value": 280}, "strokeDash": {"value": [2, 2]}, "color": {"value": "gray"},
-        "opacity": {"condition": {"param": "at", "empty": False, "value": 0.8}, "value": 0},
-    }}  # fmt: skip
-    spec = {"facet": {"column": {"field": "protocol", "title": None}},
-            "spec": {"width": 430, "height": 280, **shown, "layer": [rule, *shown["layer"]]}}  # fmt: skip
-    return Plot("accuracy_over_snr", "recognition accuracy over SNR by scheme and protocol", spec, rows)
+    levels = sorted({row["snr_db"] for row in rows}, key=lambda snr: float("inf" if snr in infinite else snr))
+    schemes = list(dict.fromkeys(row["scheme"] for row in rows))
+    colours = {scheme: COLOURS[number % len(COLOURS)] for number, scheme in enumerate(schemes)}
+    lines: dict[tuple, list[dict]] = {}
+    for row in rows:
+        lines.setdefault((row["protocol"], row["scheme"], row["source"]), []).append(row)
+    names = [f"{protocol} subtypes" for protocol in ours]
+    figure = Figure(figsize=(6.5 * len(names), 4 + 0.2 * math.ceil(len(schemes) / 4)), layout="constrained")
+    for panel, name in zip(plain(figure.subplots(1, len(names), sharey=True, squeeze=False)), names, strict=True):
+        for (protocol, scheme, source), line in lines.items():
+            if protocol == name:
+                places, values = (
+                    [levels.index(row["snr_db"]) for row in line],
+                    [row["accuracy_percent"] for row in line],
+                )
+                panel.plot(places, values, SOURCES[source], marker="o", markersize=4, color=colours[scheme])
+        panel.set(title=name, xlabel="SNR (dB)", xticks=range(len(levels)), xticklabels=levels)
+    figure.axes[0].set_ylabel("accuracy (%)")
+    handles = [Line2D([], [], color=colour, label=scheme) for scheme, colour in colours.items()]
+    handles += [Line2D([], [], linestyle=style, color="0.5", label=source) for source, style in SOURCES.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    return drawn("accuracy_over_snr", "recognition accuracy over SNR by scheme and protocol", figure, rows)
 
 
 def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
-    """Return row-normalised confusion matrices, one a (protocol, scheme); counts as `tables.confusion` gives them.
+    """Return row-normalised confusion matrices, one a (protocol, scheme); counts as `pivots.confusion` gives them.
 
     A class without samples has dashes in its row. The more classes, the fewer matrices stand side by side.
     """
-    rows = []
-    for (protocol, scheme), cells in counts.items():
-        for true in categories:
-            total = sum(cells.get((true, guess), 0) for guess in categories)
-            for guess in categories:
-                samples = cells.get((true, guess), 0)
-                percent = 100 * samples / total if total else 0.0
-                rows.append({"panel": f"{protocol}: {scheme}", "true": true, "recognised_as": guess, "samples": samples,
-                             "percent": round(percent, 2), "shown": f"{percent:.1f}" if total else "-"})  # fmt: skip
-    axes = {name: {"field": field, "type": "nominal", "sort": list(categories), "title": title}
-            for name, field, title in (("x", "recognised_as", "recognised as (%)"), ("y", "true", "true"))}  # fmt: skip
-    shade = {"field": "percent", "type": "quantitative", "scale": {"scheme": "blues", "domain": [0, 100]}}
-    ink = {"condition": {"test": "datum.percent > 50", "value": "white"}, "value": "black"}
-    text = {"text": {"field": "shown", "type": "nominal"}, "color": ink}
-    cells = {"type": "rect", "tooltip": {"content": "data"}}
-    layers = [{"mark": cells, "encoding": {"color": {**shade, "legend": None}}},
-              {"mark": {"type": "text", "fontSize": 11, "aria": False}, "encoding": text}]  # fmt: skip
-    spec = {"facet": {"field": "panel", "title": None, "sort": None},
-            "columns": max(1, PAGE_WIDTH // (CELL * len(categories) + 40)),
-            "spec": {"width": {"step": CELL}, "height": {"step": CELL}, "encoding": axes, "layer": layers}}  # fmt: skip
-    return Plot("confusion", "confusion matrices in percent of the true class", spec, rows)
+    count = len(categories)
+    columns = max(1, min(len(counts), PAGE_WIDTH // (CELL * count + 40)))
+    side = (CELL * count + 40) / 72
+    figure = Figure(figsize=(columns * side, math.ceil(len(counts) / columns) * (side + 0.6)), layout="constrained")
+    panels = plain(figure.subplots(math.ceil(len(counts) / columns), columns, squeeze=False))
+    rows: list[dict] = []
+    for panel, ((protocol, scheme), cells) in zip(panels, counts.items(), strict=False):
+        totals = [sum(cells.get((true, guess), 0) for guess in categories) for true in categories]
+        shares = [[100 * cells.get((true, guess), 0) / total if total else 0.0 for guess in categories]
+                  for true, total in zip(categories, totals, strict=True)]  # fmt: skip
+        panel.pcolormesh(shares, cmap="Blues", vmin=0, vmax=100, edgecolors="white")
+        for line, (true, total) in enumerate(zip(categories, totals, strict=True)):
+            for column, guess in enumerate(categories):
+                percent = shares[line][column]
+                shown = f"{percent:.1f}" if total else "-"
+                ink = {"color": "white" if percent > 50 else "0.2", "ha": "center", "va": "center"}
+                panel.text(column + 0.5, line + 0.5, shown, **ink)
+                rows.append({"panel": f"{protocol}: {scheme}", "true": true, "recognised_as": guess,
+                             "samples": cells.get((true, guess), 0), "percent": round(percent, 2),
+                             "shown": shown})  # fmt: skip
+        centres = [number + 0.5 for number in range(count)]
+        panel.set_title(f"{protocol}: {scheme}", fontsize=9)
+        panel.set(xlabel="recognised as (%)", ylabel="true", aspect="equal")
+        panel.set_xticks(centres, categories, rotation=90)
+        panel.set_yticks(centres, categories)
+        panel.invert_yaxis()
+        panel.grid(False)
+    for panel in panels[len(counts) :]:
+        panel.set_axis_off()
+    return drawn("confusion", "confusion matrices in percent of the true class", figure, rows)

@@ -2,20 +2,36 @@
 
 import base64
 import io
+import re
 
 import matplotlib
+import numpy as np
 from PIL import Image
 
 from lowalt.numerics.picture_layout import settle
 
 matplotlib.use("Agg")  # no screen on a cluster node
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 DPI, SVG_DPI = 110, 72
 """Dots per inch of PNG figures; points per inch of SVG ones, which matplotlib lays out at that resolution."""
 
 SNR_LABELS = {"inf": "∞"}
+COLOURS = ["#0969da", "#bc4c00", "#1a7f37", "#8250df", "#bf3989", "#9a6700", "#6e7781", "#1b7c83", "#cf222e", "#953800"]
+"""Colours of lines, which stand out on white and on black."""
+
+
+def plain(panels: np.ndarray) -> list[Axes]:
+    """Return the panels of a plot as a list, in a look for light and dark pages: grey lines and a faint grid."""
+    for panel in panels.flat:
+        panel.patch.set_visible(False)
+        panel.grid(alpha=0.4)
+        panel.tick_params(color="0.5")
+        for name, spine in panel.spines.items():
+            spine.set(color="0.5", visible=name in ("left", "bottom"))
+    return list(panels.flat)
 
 
 def png(figure: Figure, colours: int = 0) -> bytes:
@@ -35,13 +51,18 @@ def png(figure: Figure, colours: int = 0) -> bytes:
 
 
 def svg(figure: Figure) -> str:
-    """Return the figure as SVG and close it; no dates and no random names inside, so equal figures are equal texts."""
+    """Return the figure as SVG in pixels, without a background, and close it.
+
+    Letters stay letters. No dates and no random names are inside, so equal figures are equal texts.
+    """
     buffer = io.StringIO()
-    with plt.rc_context({"svg.hashsalt": "lowalt"}):
+    with plt.rc_context({"svg.hashsalt": "lowalt", "svg.fonttype": "none"}):
         settle(figure, SVG_DPI)
-        figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
+        nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        figure.savefig(buffer, format="svg", bbox_inches="tight", metadata=nothing, facecolor="none")
     plt.close(figure)
-    return buffer.getvalue()
+    text = buffer.getvalue()
+    return re.sub(r'(width|height)="([\d.]+)pt"', r'\1="\2"', text[text.index("<svg") :])
 
 
 def embedded(data: bytes) -> str:

@@ -13,7 +13,7 @@ from lowalt.report.reported_run import ReportedRun
 
 NAMES = (
     "lowalt", "snakemake", "numpy", "scipy", "numba", "llvmlite", "pillow", "deflate", "trimesh", "pymeshlab", "torch",
-    "torchvision", "timm", "matplotlib", "vl-convert-python",
+    "torchvision", "timm", "matplotlib",
 )  # fmt: skip
 """Packages whose version can change a run's outputs, or the page."""
 BASE = "config/default.yaml"

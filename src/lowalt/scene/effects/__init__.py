@@ -1,9 +1,9 @@
 """The effects of a scene, one file each in the folder of its place: what such a file offers, and the order of all.
 
 An effect `effects/PLACE/NAME.py` defines SOURCE, where its law comes from, and DEFAULTS, every parameter with its
-value. All that it does is one or more of the functions below. `idle(settings)` says where its settings change nothing:
-the effect is then dropped. `check(settings, scene)` raises InputError where they contradict the rest of a scene
-(`checks.CheckedScene`).
+value. All that it does is one or more of the functions below. IDLE, which may be left out, lists settings that change
+nothing: where all values of an entry are set, the effect is dropped. `check(settings, scene)` raises InputError where
+settings contradict the rest of a scene (`checks.CheckedScene`).
 
 | place | function | returns |
 |---|---|---|
@@ -115,7 +115,8 @@ class NamedEffect(NamedTuple):
     @property
     def idle(self) -> bool:
         """Whether the settings change nothing."""
-        return hasattr(self.module, "idle") and self.module.idle(self.settings)
+        entries = getattr(self.module, "IDLE", ())
+        return any(all(self.settings[key] == value for key, value in entry.items()) for entry in entries)
 
 
 def dotted(name: str) -> str:

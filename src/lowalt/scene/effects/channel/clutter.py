@@ -30,11 +30,7 @@ SOURCE = (
 DEFAULTS = {
     "gamma": 0.03, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5, "correlation_m": 20.0,
 }  # fmt: skip
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the land reflects nothing."""
-    return settings["gamma"] == 0
+IDLE = [{"gamma": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -1,9 +1,10 @@
 """Other targets in the beam: a flock, a bird next to a drone, a car under it. The label stays the primary target's.
 
-Companions stand around the target at the first symbol and move on. Each is a target of its own: points, moving parts,
-cross sections, motion effects and paths as the scene gives them. Their complex echoes add to the target's before the
-strongest range cell is chosen, which may be a companion's. Beams point at the primary target, and set SNRs refer to
-its echo alone. Records of samples name the companions' subtypes.
+Companions stand around the target at the first symbol, with a standard deviation of `spread_m` on each axis, and move
+on; in a flock their speeds differ from the target's by a standard deviation of `speed_mps`. Each is a target of its
+own: points, moving parts, cross sections, motion effects and paths as the scene gives them. Their complex echoes add to
+the target's before the strongest range cell is chosen, which may be a companion's. Beams point at the primary target,
+and set SNRs refer to its echo alone. Records of samples name the companions' subtypes.
 """
 
 import math
@@ -23,14 +24,10 @@ SOURCE = (
     "targets); the spread of a flock: estimate"
 )
 DEFAULTS = {"subtypes": [], "count": [1, 3], "spread_m": 4.0, "speed_mps": 1.0}
+IDLE = [{"count": [0, 0]}]
 
 TRIES = 200
 """Draws of a place that keeps clear of the other targets, before the spread counts as too small."""
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the target is always alone."""
-    return settings["count"] == [0, 0]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -17,11 +17,7 @@ SOURCE = (
     "1995, ch. 3 (range sum, direct path) and ch. 6 (Doppler of the bisector)"
 )
 DEFAULTS = {"loss_db": 0.0}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the direct path is lost; links hear their target alone."""
-    return settings["loss_db"] is None
+IDLE = [{"loss_db": None}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -10,11 +10,7 @@ from lowalt.scene.view import View
 
 SOURCE = "3GPP TR 38.901, section 7.3, Table 7.3-1 (element of 8 dBi, 65 degrees wide, 30 dB front to back)"
 DEFAULTS = Element()._asdict()
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the element is isotropic: no gain and no side or back loss."""
-    return settings["gain_dbi"] == 0 and settings["back_db"] == 0
+IDLE = [{"gain_dbi": 0, "back_db": 0}]
 
 
 def element(settings: dict) -> Element:

@@ -20,6 +20,7 @@ SOURCE = (
     "(reciprocity): estimates; birds take the small UAV's spread and loss: estimate"
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
+IDLE = [{"pattern": False, "spread_db": 0}]
 
 CUT = 3.0
 """Standard deviations above its mean at which the log-normal factor is cut (TR 38.901, Eq. 7.9.4-1)."""
@@ -29,11 +30,6 @@ BISTATIC = {LARGE_UAV: (6.05, 1.33), VEHICLE: (6.0, 1.65)}
 """k1 (dB) and k2 of Eq. 7.9.2-3."""
 BISTATIC_DB = 3.0
 """Loss of a target without a pattern where both ends stand on opposite sides (Eq. 7.9.2-2)."""
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the cross section keeps its mean."""
-    return not settings["pattern"] and settings["spread_db"] == 0
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -23,13 +23,9 @@ SOURCE = (
     "Proc. F 131, 1984"
 )
 DEFAULTS = {"permittivity": None, "conductivity_s_m": None, "roughness_m": 0.0, "polarisation": "vertical"}
+IDLE = [{"permittivity": 1, "conductivity_s_m": 0}]
 KNOWN_GHZ = 1.0, 10.0
 """Carriers between which the properties of medium dry ground are known, which stand for those not given."""
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the ground has the air's permittivity and no conductivity, and so reflects nothing."""
-    return settings["permittivity"] == 1 and settings["conductivity_s_m"] == 0
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

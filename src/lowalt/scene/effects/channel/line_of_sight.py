@@ -16,11 +16,7 @@ SOURCE = (
     "near the 17 dB between TR 36.777's path losses without and with line of sight at 300 m, height 50 m, 4.9 GHz"
 )
 DEFAULTS = {"environment": "UMa", "blocked_db": 20.0}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether a blocked echo is as strong as any."""
-    return settings["blocked_db"] == 0
+IDLE = [{"blocked_db": 0}]
 
 
 def probability(environment: str, flat_m: float, height_m: float) -> float:

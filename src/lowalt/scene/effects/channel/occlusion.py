@@ -94,8 +94,9 @@ def _surfaces(view: View) -> dict:
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 0 where not.
 
-    Behind bent blades it is the share that goes around them instead. On a link each way has the root of the factor that
-    a station at its end has: a point hidden from either end by opaque surfaces does not echo.
+    Behind `bent` blades it is the share that goes around them instead, behind `transparent` ones 1. On a link each way
+    has the root of the factor that a station at its end has: a point hidden from either end by opaque surfaces does
+    not echo.
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
     ends = view.ends()

@@ -17,11 +17,7 @@ SOURCE = (
     "array); standard deviation of a tenth of the default array's 6.4 degrees beam: estimate"
 )
 DEFAULTS = {"sigma_deg": 0.64, "update_s": None}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the beams point at the target's place at the first symbol, as without this effect."""
-    return settings["sigma_deg"] == 0 and settings["update_s"] is None
+IDLE = [{"sigma_deg": 0, "update_s": None}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -8,7 +8,8 @@ range cells.
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.scene.response import chebyshev_points, interpolation, orders_of
+from lowalt.scene.response import ERROR
+from lowalt.scene.series import chebyshev_points, interpolation, orders_of
 from lowalt.scene.view import View
 
 SOURCE = (
@@ -28,6 +29,6 @@ def instants(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
     useful_s, count = 1.0 / network.symbol_rate_hz, network.subcarriers
     moved_m = np.linalg.norm(view.at(view.times_s + useful_s).places - view.places, axis=2).max()
     highest_hz = view.station.frequency_hz + count * network.subcarrier_spacing_hz
-    needed = orders_of(2.0 * np.pi * highest_hz / SPEED_OF_LIGHT * float(moved_m))
+    needed = orders_of(2.0 * np.pi * highest_hz / SPEED_OF_LIGHT * float(moved_m), ERROR)
     delays_s = 0.5 * useful_s * (chebyshev_points(needed) + 1.0)
     return delays_s, interpolation(needed, 2.0 * np.arange(count) / count - 1.0)

@@ -24,11 +24,7 @@ DEFAULTS = {
     "facades": [[250.0, 60.0, 90.0, 80.0, 30.0], [120.0, 240.0, -30.0, 80.0, 30.0], [380.0, 240.0, 210.0, 80.0, 30.0]],
     "permittivity": 5.24, "conductivity_s_m": 0.16,
 }  # fmt: skip
-
-
-def idle(settings: dict) -> bool:
-    """Return whether there are no facades, or they are like air."""
-    return not settings["facades"] or (settings["permittivity"] == 1 and settings["conductivity_s_m"] == 0)
+IDLE = [{"facades": []}, {"permittivity": 1, "conductivity_s_m": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -1,10 +1,10 @@
 """Canceller of the land's echoes on range cells, over the symbols of a look.
 
-mean and pulse cancel what stands still. Wind moves land, and it passes them; `clutter` is made for the
-spectrum of windblown land: of the covariance that land has over the symbols, it removes every component that lies less
-than `depth_db` below the land's power, and leaves all else as it is. What it costs a target follows from the target's
-radial speed alone. All filters are scaled to unit noise gain, so that a set SNR means the same before and
-behind them.
+`mean` and `pulse` cancel what stands still; land that the wind moves passes them. `clutter` is made for the spectrum of
+windblown land at one carrier and symbol interval: of the covariance that land has over the symbols, it removes every
+component that lies less than `depth_db` below the land's power, and leaves all else as it is. What it costs a target
+follows from the target's radial speed alone. All filters are scaled to unit noise gain, so that a set SNR means the
+same before and behind them.
 """
 
 import math
@@ -21,19 +21,14 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, their response and "
-    "noise gain); A. M. Haimovich, Y. "
-    "Bar-Ness, An eigenanalysis interference canceler, IEEE Trans. Signal Process. 39(1), 1991 (clutter); its "
-    "covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
+    "noise gain); A. M. Haimovich, Y. Bar-Ness, An eigenanalysis interference canceler, IEEE Trans. Signal Process. "
+    "39(1), 1991 (clutter); its covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
 )
 DEFAULTS = {
     "kind": "mean", "order": 1,
     "wind_mps": 4.5, "depth_db": 50.0, "carrier_hz": 4.9e9, "symbol_interval_s": 2.5e-3,
 }  # fmt: skip
-
-
-def idle(settings: dict) -> bool:
-    """Return True for kind none, or a difference of order 0."""
-    return settings["kind"] == "none" or (settings["kind"] == "pulse" and settings["order"] == 0)
+IDLE = [{"kind": "none"}, {"kind": "pulse", "order": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

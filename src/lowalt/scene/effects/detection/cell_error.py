@@ -11,11 +11,7 @@ SOURCE = (
     "footnote to Eq. 7's signal model); wrong cells that follow from noise are receiver_noise"
 )
 DEFAULTS = {"probability": 0.1, "spread_cells": 2}
-
-
-def idle(settings: dict) -> bool:
-    """Return True where no cell is ever wrong."""
-    return settings["probability"] == 0 or settings["spread_cells"] == 0
+IDLE = [{"probability": 0}, {"spread_cells": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

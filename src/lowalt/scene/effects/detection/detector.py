@@ -42,7 +42,10 @@ def factor(count: int, false_alarm: float) -> float:
 
 
 def exceeds(settings: dict, power: np.ndarray) -> np.ndarray:
-    """Return which cells of the powers (N, M) exceed their threshold, (N, M) bool; ranges wrap around."""
+    """Return which cells of the powers (N, M) exceed their threshold, (N, M) bool; ranges wrap around.
+
+    The threshold follows the mean of `training` cells on either side, beyond the `guard` cells next to the cell.
+    """
     guard, training = settings["guard"], settings["training"]
     weights = np.full(2 * (guard + training) + 1, 0.5 / training)
     weights[training:-training] = 0.0

@@ -3,7 +3,8 @@
 Turbulence is a field frozen into the mean wind; the target meets it at its airspeed. Drag carries the target along
 with the air. Its control asks for a thrust against speed and displacement, and the attitude follows with a lag: a
 multirotor tilts by atan(a / g) towards the acceleration a of its thrust alone, a bird banks. Drag tilts nothing.
-Turbulence, velocity, place and thrust are one linear process, discretised exactly.
+Turbulence, velocity, place and thrust are one linear process, discretised exactly. `wind_mps` is the mean wind 20 ft
+(6 m) above ground.
 """
 
 from functools import lru_cache
@@ -24,6 +25,7 @@ SOURCE = (
     + flight.SOURCE
 )
 DEFAULTS = {"wind_mps": 7.7}
+IDLE = [{"wind_mps": 0}]
 
 SPEED_GAIN, PLACE_GAIN = 0.18, 0.0171
 """Thrust against speed times the attitude's lag, and against displacement times its square; stable at any drag."""
@@ -36,11 +38,6 @@ ROUGHNESS_FT = 2.0
 SLOWEST_MPS = 0.1
 """Least airspeed, below which turbulence would stand still around the target."""
 GRAVITY_MPS2 = flight.GRAVITY_MPS2
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the air stands still."""
-    return settings["wind_mps"] == 0
 
 
 def turbulence(height_m: float, wind_mps: float) -> tuple[np.ndarray, np.ndarray]:

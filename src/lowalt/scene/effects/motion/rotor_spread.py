@@ -17,11 +17,7 @@ SOURCE = (
     "magnitudes: flight logs of multirotors, second-hand"
 )
 DEFAULTS = {"spread": 0.05, "wander": 0.02, "correlation_s": 1.5}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether each rotor turns at the rate of the motion table times its own factor."""
-    return settings["spread"] == 0 and settings["wander"] == 0
+IDLE = [{"spread": 0, "wander": 0}]
 
 
 def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator) -> Perturbation:

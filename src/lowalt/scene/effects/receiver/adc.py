@@ -9,11 +9,7 @@ SOURCE = (
     "A. Gersho, R. M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise quantiser, overload)"
 )
 DEFAULTS = {"bits": 12, "backoff_db": 12.0}
-
-
-def idle(settings: dict) -> bool:
-    """Return True without a number of bits."""
-    return not settings["bits"]
+IDLE = [{"bits": None}, {"bits": 0}]
 
 
 def quantise(samples: np.ndarray, bits: int, full_scale: float) -> np.ndarray:

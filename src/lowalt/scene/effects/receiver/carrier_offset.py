@@ -11,11 +11,7 @@ SOURCE = (
     "IEEE Trans. Commun. 42(10), 1994, Eqs. 1 to 4; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017}
-
-
-def idle(settings: dict) -> bool:
-    """Return True where no station's oscillator is off."""
-    return settings["fixed_ppm"] == 0 and settings["sigma_ppm"] == 0
+IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -19,11 +19,7 @@ SOURCE = (
     "Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter gain M of M subcarriers)"
 )
 DEFAULTS = {"snr_db": None}
-
-
-def idle(settings: dict) -> bool:
-    """Return True at an SNR of infinity."""
-    return settings["snr_db"] == math.inf
+IDLE = [{"snr_db": math.inf}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -18,14 +18,10 @@ SOURCE = (
     "IEEE GLOBECOM 1994; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
+IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
 
 ROUNDING = 1e-14
 """Largest share of a sample that the series of the stretch leaves out."""
-
-
-def idle(settings: dict) -> bool:
-    """Return True where no station's clock is off."""
-    return settings["fixed_ppm"] == 0 and settings["sigma_ppm"] == 0
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -9,11 +9,7 @@ SOURCE = (
     "(frequency-independent IQ mismatch)"
 )
 DEFAULTS = {"gain_db": 0.5, "phase_deg": 2.0}
-
-
-def idle(settings: dict) -> bool:
-    """Return True where both branches are equal and in quadrature."""
-    return settings["gain_db"] == 0 and settings["phase_deg"] == 0
+IDLE = [{"gain_db": 0, "phase_deg": 0}]
 
 
 def coefficients(settings: dict) -> tuple[complex, complex]:

@@ -36,16 +36,13 @@ DEFAULTS = {
     "loop_hz": 100.0,
     "reference": [[1.0, -46.0], [10.0, -76.0], [100.0, -96.0]],
 }  # fmt: skip
+IDLE = [{"points": []}]
+"""points, reference: offset (Hz) and L(f) (dBc/Hz) of the oscillator and of what its loop follows up to loop_hz."""
 
 SPLIT = 16
 """Symbol rates at which slow ends and fast begins."""
 OCTAVE, EVENLY = 64, 12
 """Frequencies of the fast part in an octave, and in a subcarrier's spacing from EVENLY such spacings on."""
-
-
-def idle(settings: dict) -> bool:
-    """Return True for a spectrum without points."""
-    return not settings["points"]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

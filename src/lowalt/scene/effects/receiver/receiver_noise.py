@@ -10,14 +10,10 @@ SOURCE = (
     "S. M. Kay, Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter gain)"
 )
 DEFAULTS = {"noise_figure_db": 7.0, "temperature_k": 290.0}
+IDLE = [{"temperature_k": 0}]
 
 BOLTZMANN = 1.380649e-23
 """J/K, exact by definition of the kelvin."""
-
-
-def idle(settings: dict) -> bool:
-    """Return True at 0 K, where there is no thermal noise."""
-    return settings["temperature_k"] == 0
 
 
 def variance(settings: dict, bandwidth_hz: float) -> float:

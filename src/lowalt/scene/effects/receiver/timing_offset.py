@@ -15,11 +15,7 @@ SOURCE = (
     "IEEE Trans. Commun. 47(11), 1999 (window offset inside the guard interval is a linear phase)"
 )
 DEFAULTS = {"fixed_s": 0.0, "sigma_s": 2e-8, "prefix_slack_s": 2.9e-7}
-
-
-def idle(settings: dict) -> bool:
-    """Return True where no station's window is off."""
-    return settings["fixed_s"] == 0 and settings["sigma_s"] == 0
+IDLE = [{"fixed_s": 0, "sigma_s": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

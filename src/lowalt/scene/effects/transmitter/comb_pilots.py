@@ -14,11 +14,7 @@ SOURCE = (
     "3GPP TS 38.211, 7.4.1.5 and 7.4.1.7 (reference signals on combs); C. Sturm, W. Wiesbeck, Proc. IEEE 99(7), 2011"
 )
 DEFAULTS = {"spacing": 4, "offset": 0}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether all subcarriers are pilots."""
-    return settings["spacing"] == 1
+IDLE = [{"spacing": 1}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

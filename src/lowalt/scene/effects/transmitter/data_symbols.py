@@ -12,11 +12,7 @@ SOURCE = (
     "sensing, Proc. IEEE 99(7), 2011"
 )
 DEFAULTS = {"order": 16}
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the data are QPSK, as without this effect."""
-    return settings["order"] == 4
+IDLE = [{"order": 4}]
 
 
 def constellation(order: int) -> np.ndarray:

@@ -16,13 +16,9 @@ SOURCE = (
     "1991; smoothness 2 of a solid-state amplifier, and back-off: estimate"
 )
 DEFAULTS = {"backoff_db": 8.0}
+IDLE = [{"backoff_db": None}]
 
 OVERSAMPLING = 4
-
-
-def idle(settings: dict) -> bool:
-    """Return whether the amplifier never saturates."""
-    return settings["backoff_db"] is None
 
 
 def rapp(samples: np.ndarray, saturation: float) -> np.ndarray:

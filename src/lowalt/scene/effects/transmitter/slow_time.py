@@ -18,14 +18,10 @@ SOURCE = (
     "Sampling, 2001, ch. 1; spectra of missing samples: P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, 2.4"
 )
 DEFAULTS = {"tdd_period_s": 0.01, "downlink": 0.75, "missing": 0.0, "jitter_s": 0.0, "regrid": "zero"}
+IDLE = [{"downlink": 1, "missing": 0, "jitter_s": 0}]
 
 FEWEST = 2
 """Least number of symbols in a look."""
-
-
-def idle(settings: dict) -> bool:
-    """Return whether every symbol is sent, and on time."""
-    return settings["downlink"] == 1 and settings["missing"] == 0 and settings["jitter_s"] == 0
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

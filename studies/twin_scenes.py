@@ -15,24 +15,28 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
     second         share of samples with a second target of the same scene, and its level_db (optional)
-    receiver       settings of `lowalt.recordings.receiver` (in a twin: only those that differ from its receiver)
+    receiver       settings of `twin_receiver.Receiver` (in a twin: only those that differ from its receiver)
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from twin_courses import Course, hover, straight, to_and_fro
+from twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
+from twin_receiver import Receiver, received
 
+from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
 from lowalt.numerics.power import rms
 from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
-from lowalt.recordings.courses import Course, hover, straight, to_and_fro
 from lowalt.recordings.presence import present
-from lowalt.recordings.receiver import Receiver, received
-from lowalt.recordings.twin import Twin, beam_gain, echo, sized, still_row, strengthened, textured
+from lowalt.recordings.twin import Twin, radars, settings_of
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
+from lowalt.targets.records import load_records
 
 MARGIN = 40
 """Symbols simulated before and after a stretch; they take the transients of the filters and of the analytic signal."""
@@ -189,3 +193,56 @@ def intervals(
             result[number, again] = _interval(twin, scene["receiver"], signal, receiver_keys)
         names.append(name)
     return result, names
+
+
+@dataclass(frozen=True)
+class Library:
+    """All twins of a configuration: name -> twin, its measured sets, and category -> scenes, receivers filled in."""
+
+    seed: int
+    twins: dict[str, Twin]
+    sets: dict[str, list[str]]
+    scenes: dict[str, dict[str, list[dict]]]
+    records: dict[str, dict]
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Library":
+        """Return the library in a YAML file such as `config/measured/twins.yaml`, read by `twin.settings_of`.
+
+        Raises: InputError naming the key that is missing or wrong.
+        """
+        block, twins = settings_of(path), radars(path)
+        try:
+            records = load_records(block["targets"]["table"], block["targets"]["records"])
+            sets = {name: list(twin["sets"]) for name, twin in block["twins"].items()}
+            scenes = {
+                name: {
+                    category: [
+                        {**scene, "receiver": twin["receiver"] | scene.get("receiver", {})}
+                        for scene in {**block["scenes"], **twin.get("scenes", {})}[category]
+                    ]
+                    for category in CATEGORIES
+                }
+                for name, twin in block["twins"].items()
+            }
+            return cls(int(block["seed"]), twins, sets, scenes, records)
+        except KeyError as error:
+            raise InputError(f"{path}: key {error} is missing") from None
+
+    def simulated(self, twin: str, category: str, count: int, purpose: str, receivers: int = 1):
+        """Return simulated intervals (count, receivers, symbols) of a category, and the names of their subtypes.
+
+        The category's scenes share the `count` intervals evenly. `purpose` keys the random streams: equal purposes give
+        equal scenes.
+        """
+        scenes = self.scenes[twin][category]
+        subtypes_of_all = dict.fromkeys(name for scene in scenes for name in scene["subtypes"])
+        clouds = clouds_of(self.records, list(subtypes_of_all), self.seed)
+        parts, names = [], []
+        for number, scene in enumerate(scenes):
+            share = len(range(number, count, len(scenes)))
+            keys = (purpose, twin, category, number)
+            signals, subtypes = intervals(self.twins[twin], scene, clouds, self.seed, keys, share, receivers)
+            parts.append(signals)
+            names += subtypes
+        return np.concatenate(parts), names

@@ -1,17 +1,15 @@
 """The radar's twin: what was set is read back out of its signals, and its courses keep their laws."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from twin_courses import hover, straight, to_and_fro
+from twin_echo import beam_gain, blade_points, echo, still_row, strengthened, textured
+from twin_receiver import Receiver, received
+from twin_scenes import MARGIN, clouds_of, heard, samples, stretch
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
-from lowalt.recordings.courses import hover, straight, to_and_fro
-from lowalt.recordings.presence import present
-from lowalt.recordings.receiver import Receiver, received
-from lowalt.recordings.scenes import MARGIN, clouds_of, heard, samples, stretch
-from lowalt.recordings.twin import Twin, beam_gain, blade_points, echo, still_row, strengthened, textured
+from lowalt.recordings.twin import Twin
 from lowalt.targets.records import load_records
 
 QUIET = {
@@ -196,17 +194,3 @@ def test_wander_has_its_rms_in_decibels_and_flicker_its_corner():
     low, corner, high = (density[np.arange(2000) * 2.5 // width == place].mean()
                          for width, place in ((5.0, 0), (5.0, 10), (50.0, 10)))  # fmt: skip
     assert (corner / low, high / low) == pytest.approx((0.5, 0.0106), rel=0.15)
-
-
-def test_intervals_without_a_target_are_left_out():
-    rng = np.random.default_rng(0)
-    intervals = 0.01 * (rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400)))
-    assert present(intervals, TWIN).all()
-    looking = replace(TWIN, detect_db=15.0)
-    assert not present(intervals, looking).any()
-    intervals[10:20] += 0.01 * np.exp(2j * np.pi * 0.1 * np.arange(400))
-    assert present(intervals, looking).nonzero()[0].tolist() == list(range(10, 20))
-    # A drift slower than any target does not count as one.
-    slow = replace(looking, slowest_mps=10.0)
-    intervals[25:35] += np.exp(2j * np.pi * 0.001 * np.arange(400))
-    assert present(intervals, slow).nonzero()[0].tolist() == list(range(10, 20))

@@ -98,7 +98,7 @@ def estimate(
 
 def main(arguments: list[str]) -> None:
     """Write a row of every overlay."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.measure.estimate", description=__doc__)
+    line = argparse.ArgumentParser(prog="scale_table.py", description=__doc__)
     line.add_argument("--stages", required=True, help="stages.csv of a finished run")
     line.add_argument("--costs", required=True, help="table of lowalt.measure.accuracy_cost (.csv)")
     line.add_argument("--schema", required=True, help="schema of the configuration (.yaml)")

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from twin_echo import radii, sized
+from twin_receiver import Receiver, clipped, highpassed, received
+from twin_scenes import MARGIN, Library, clouds_of, intervals, samples, stretch
 
 from lowalt.files.errors import InputError
-from lowalt.recordings.library import Library
-from lowalt.recordings.presence import ENOUGH, noise_floor, present
-from lowalt.recordings.receiver import Receiver, clipped, highpassed, received
-from lowalt.recordings.scenes import MARGIN, clouds_of, intervals, samples, stretch
-from lowalt.recordings.twin import Twin, radii, sized
+from lowalt.recordings.twin import Twin
 
 QUIET = {
     "snr_db": 80.0, "flicker_db": -80.0, "flicker_hz": 5.0, "wander_db": 0.0, "leak_db": -80.0, "hum_db": -80.0,
@@ -57,40 +56,6 @@ def test_clipping_limits_and_hum_has_its_harmonics():
     assert lines[150] < 1e-3 * lines[50]
     with pytest.raises(InputError, match=r"unknown \['hmu'\]"):
         Receiver.from_settings({**QUIET, "hmu": 1.0})
-
-
-def test_the_floor_is_the_mean_of_the_noise_whatever_its_colour_and_number():
-    rng = np.random.default_rng(0)
-    colour = np.linspace(1.0, 100.0, 4000)
-    for count in (1, 3, 40):
-        floor = noise_floor(colour * rng.exponential(size=(count, 4000)), 0.005)
-        # A running median of single exponential powers is ln 2 of their mean; of many windows the largest of three
-        # neighbours counts, which lies higher.
-        wanted = {1: np.log(2), 3: np.log(2), 40: 1.46}[count]
-        assert np.mean(floor[300:-300] / colour[300:-300]) == pytest.approx(wanted, rel=0.05)
-
-
-def test_the_floor_follows_a_hill_and_not_a_line():
-    power = np.ones((1, 1000))
-    # The median reaches 0.5 m/s to either side: a hill of 0.6 m/s is floor, a line of 0.4 m/s is none.
-    power[:, 200:260] = 5.0
-    power[:, 600:640] = 7.0
-    np.testing.assert_array_equal(noise_floor(power, 0.01), np.where(power[0] == 5.0, 5.0, 1.0))
-
-
-def test_coloured_noise_and_a_line_that_stays_are_no_target():
-    rng, time = np.random.default_rng(0), np.arange(400)
-    intervals = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
-    coloured = np.fft.ifft(np.fft.fft(intervals) * np.where(np.arange(400) < 60, 20.0, 1.0))
-    assert not present(coloured, LOOKING).any()
-    stays = coloured + 3 * np.exp(2j * np.pi * 0.5 * time)
-    assert not present(stays, LOOKING).any()
-    assert present(stays[: ENOUGH - 1], LOOKING).all()
-    stays[5:9] += 3 * np.exp(2j * np.pi * 0.7 * time)
-    assert present(stays, LOOKING).nonzero()[0].tolist() == [5, 6, 7, 8]
-    # Where the noise is known, a recording of one window is enough.
-    assert not present(coloured[:1], LOOKING, coloured[1:2]).any()
-    assert present(stays[5:6], LOOKING, coloured[1:2]).all()
 
 
 def test_a_real_channel_records_the_real_part_and_a_complex_one_both():

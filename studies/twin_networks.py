@@ -1,41 +1,37 @@
-"""The network of a radar's twin: it learns from simulated windows alone and names the windows of recordings.
+"""Networks of measured radars, which learn from simulated windows of their twins alone.
 
-The images are those of the data set: spectra, tiles and shrinking by the same functions, one station. The network and
-its training are those of `lowalt.recognition`. Recordings are never trained or validated on.
+    python studies/twin_networks.py --models FOLDER --out results/zoo
+
+keeps a network of every radar in a zoo, from where `lowalt predict` takes it, in 8 bits; one that FOLDER lacks is
+trained first. The images are those of the data set: spectra, tiles and shrinking by the same functions, one station.
+Recordings are never trained or validated on.
 """
 
+import argparse
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 from torch import nn
+from twin_scenes import Library
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.config.command import run
 from lowalt.config.layers import load_yaml, merge
 from lowalt.files.errors import InputError
+from lowalt.recognition import zoo
 from lowalt.recognition.checkpoint import identity
 from lowalt.recognition.inference import Machine
+from lowalt.recognition.model_file import of_run
 from lowalt.recognition.recipe import check, seeded
 from lowalt.recognition.recogniser import built
-from lowalt.recognition.samples import Facts, Samples
 from lowalt.recognition.schemes import named
 from lowalt.recognition.training import Trainer, TrainingRun
-from lowalt.recordings.library import Library
-from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin import TWINS
+from lowalt.recordings.windows import Windows, facts, rendered
 from lowalt.tiles.image_settings import Images
-from lowalt.tiles.render import Renderer, split
-from lowalt.tiles.resample import resize
 
-
-class Windows(Samples):
-    """Samples in memory, as a trainer reads them: images (n, 3, size, size) uint8, and the facts of each."""
-
-    def __init__(self, images: np.ndarray, facts: Facts) -> None:
-        """Keep the images and their facts."""
-        self.images, self.facts, self.size = images, facts, images.shape[-1]
-
-    def views(self, numbers: np.ndarray) -> np.ndarray:
-        """Index images (len(numbers), 3, size, size) uint8 of the samples `numbers`."""
-        return self.images[numbers]
+RECOGNITION = "config/measured/recognition.yaml"
 
 
 def settings(path: str | Path) -> dict:
@@ -51,29 +47,6 @@ def settings(path: str | Path) -> dict:
         return {**result, **simulation, "images": default["images"], "seed": default["seed"]}
     except KeyError as error:
         raise InputError(f"{path}: key {error} is missing") from None
-
-
-def rendered(intervals: np.ndarray, twin: Twin, images: Images, size: int) -> np.ndarray:
-    """Return the images (n, 3, size, size) uint8 of coherent intervals (n, symbols), at a radar's own carrier."""
-    renderer = Renderer(twin.network(intervals.shape[1]), twin.spectra(), images)
-    result = np.empty((len(intervals), len(renderer.spectra), size, size), np.uint8)
-    for number, interval in enumerate(intervals):
-        result[number] = resize(split(renderer.tile(interval[None].astype(np.complex64)), len(renderer.spectra)), size)
-    return result
-
-
-def facts(labels: np.ndarray, names: list[str], models: np.ndarray, snr: np.ndarray, fold: str) -> Facts:
-    """Return the facts of n samples.
-
-    labels (n,); names: subtypes or file names; models (n,): their numbers; snr (n,): number of the receiver."""
-    count = len(labels)
-    unknown = np.full((count, 1), np.nan)
-    keys = [f"{name}-{model:06d}-{int(number)}" for name, model, number in zip(names, models, snr, strict=True)]
-    return Facts(
-        key=np.array(keys),
-        subtype=np.array(names), model=models, snr_db=snr, group=np.full(count, "seen"), fold=np.full(count, fold),
-        label=labels, range_m=unknown, aspect_rad=unknown,
-    )  # fmt: skip
 
 
 def simulated(library: Library, name: str, block: dict, fold: str) -> Windows:
@@ -114,3 +87,28 @@ def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder
     })  # fmt: skip
     model.load_state_dict(weights)
     return model.eval()
+
+
+def main(arguments: list[str]) -> None:
+    """Keep a network of every radar in a zoo, in 8 bits; one that --models lacks is trained on its twin first."""
+    line = argparse.ArgumentParser(prog="twin_networks.py", description=main.__doc__)
+    line.add_argument("--twins", default=TWINS, help=f"radars and scenes (default: {TWINS})")
+    line.add_argument("--recognition", default=RECOGNITION, help=f"network and training (default: {RECOGNITION})")
+    line.add_argument("--models", required=True, type=Path, help="folder of networks, RADAR-SEED/model.pt")
+    line.add_argument("--out", required=True, type=Path, help="folder to write")
+    options = line.parse_args(arguments)
+    library, block = Library.read(options.twins), settings(options.recognition)
+    seed = block["seeds"][0]
+    for name, twin in library.twins.items():
+        path, validation = options.models / f"{name}-{seed}/model.pt", simulated(library, name, block, "validation")
+        if not path.is_file():
+            windows = {"train": simulated(library, name, block, "train"), "validation": validation}
+            train(block, windows, name, seed, path.parent)
+        made_with = {"network": twin.network_settings(), "spectra": twin.spectra_settings(), "images": block["images"]}
+        content = replace(of_run(path), input={**made_with, "radar": asdict(twin)})
+        measured = zoo.kept(content, path, validation, name, options.out)
+        print(f"{name}: {measured['percent']:.2f} % of {measured['samples']} simulated windows right")
+
+
+if __name__ == "__main__":
+    run(main)
