@@ -43,6 +43,7 @@ def test_pick_wants_exactly_its_keys():
 @pytest.mark.parametrize("stage", ["targets", "motion", "echo", "noise", "tiles", "report"])
 def test_a_stage_says_what_is_wrong_and_ends_with_2(stage, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["", "--settings", "@nowhere.json"])
+    monkeypatch.delitem(sys.modules, f"lowalt.{stage}.__main__", raising=False)
     with pytest.raises(SystemExit) as stopped:
         runpy.run_module(f"lowalt.{stage}", None, "__main__")
     said = capsys.readouterr()
