@@ -92,10 +92,11 @@ SMALL = 1e-4
 """An error that is far above all roundings, and whose square is far below it."""
 
 
-def bounded(monkeypatch, plan: dict, cells: dict) -> tuple:
+def bounded(monkeypatch, plan: dict, cells: dict, array: tuple[int, int] = (16, 4)) -> tuple:
     """A signal of one symbol whose plan and cell kernels have these errors: (result, its bound, sum of peak amplitudes,
     the points' distances from the reference)."""
-    net, motion = network(symbols=1), cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
+    net = network(symbols=1, transmit=array, receive=array)
+    motion = cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
     made, tabulated = refine.echo_plan, refine.cell_polynomials
     none = {"share": 0.0, "peak": 0.0, "phase": 0.0}
     with monkeypatch.context() as patch:
@@ -104,8 +105,8 @@ def bounded(monkeypatch, plan: dict, cells: dict) -> tuple:
         found = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], SMALL * 100)
     places = positions(motion)[0]
     r = np.linalg.norm(places - net.stations[0].position_m, axis=1)
-    # Both arrays of 64 elements, whose weights have unit norm: a0 G = 64.
-    peaks = 64 * 299_792_458 / 4.9e9 / (4 * np.pi) ** 1.5 * (1 / r**2).sum()
+    # The weights of both arrays have unit norm: a0 G is the number of elements of one.
+    peaks = np.prod(array) * 299_792_458 / 4.9e9 / (4 * np.pi) ** 1.5 * (1 / r**2).sum()
     away = np.linalg.norm(places - motion.translation[0, 0], axis=1)
     return found, found.bound * abs(found.signal[0]), peaks, away
 
@@ -122,7 +123,9 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
     assert SMALL * peaks < bound < 1.1 * SMALL * peaks and found.totals[0] - total == pytest.approx(bound, rel=1e-3)
     assert bounded(monkeypatch, {}, {"error": SMALL})[1] == pytest.approx(SMALL * total, rel=1e-3)
     # Gains may be off by as much as they are fitted to, on either side of the arrays.
-    assert 0.02 * SMALL * peaks < bounded(monkeypatch, {"fit": SMALL}, {})[1] < 2.1 * SMALL * peaks
+    for array in ((16, 1), (1, 16)):
+        _, bound, peaks, _ = bounded(monkeypatch, {"fit": SMALL}, {}, array)
+        assert 0.02 * SMALL * peaks < bound < 1.1 * SMALL * peaks
     phase = bounded(monkeypatch, {"phase": SMALL}, {})[1] / SMALL
     assert total * away.min() < phase < 1.3 * total * away.max()
     # A moment of order k takes 3 k + 1 roundings of a power, and those of its product and of the sums.
