@@ -4,11 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from numpy.polynomial.polynomial import polyval
 from scipy.spatial.transform import Rotation
 from test_echo import cloud_in_motion, network, positions
 
 from lowalt.config.network import Station
 from lowalt.echo import Path, Rigid, api, echo_matrix, echo_signal, refine
+from lowalt.echo.fast.error_model import echo_plan, pointwise_bound
 from lowalt.echo.fast.range_bounds import (
     END,
     MEAN,
@@ -26,6 +28,7 @@ from lowalt.echo.fast.range_bounds import (
 )
 from lowalt.echo.pointwise.reference_range import RANGE
 from lowalt.echo.pointwise.results import far_bound
+from lowalt.echo.radar import radar
 
 NET = network(symbols=6)
 SEEN = NET.stations[0]
@@ -136,6 +139,25 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
 def test_an_error_of_the_sums_takes_twice_its_size_from_the_lead(monkeypatch):
     plain, worse = (bounded(monkeypatch, {"share": share}, {})[0] for share in (0.0, SMALL))
     assert worse.gap[0] == pytest.approx(plain.gap[0] - 2 * SMALL * plain.totals[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-7, 1e-3])
+def test_a_plan_allows_for_what_its_cosine_and_sine_leave_out_and_round(error):
+    """Order k of a series in t^2 rounds 2 k + 2 times by Horner's rule, weighted by its coefficient at half a turn."""
+    plan = echo_plan(radar(NET, SEEN), 400, error)
+    t = np.linspace(0, 0.5, 400).astype(np.longdouble)
+    cosine, sine = (polyval(t * t, each.astype(np.longdouble)) for each in (plan.cosine, plan.sine))
+    left_out = abs(cosine + 1j * t * sine - np.exp(2j * np.pi * t)).max()
+    often = (2 * np.arange(len(plan.cosine)) + 2) * 0.25 ** np.arange(len(plan.cosine))
+    rounded = np.hypot(often @ abs(plan.cosine), often @ abs(plan.sine) / 2) * np.finfo(plan.cosine.dtype).eps / 2
+    assert left_out + rounded < plan.share < 3 * left_out + 1.5 * rounded + 1e-12
+    assert plan.single == (error == 1e-3) and (error == 0.0 or left_out < error)
+
+
+def test_the_pointwise_bound_allows_for_roundings_of_the_phase_of_large_targets():
+    radio = radar(NET, SEEN)
+    small, large = (pointwise_bound(radio, size_m, 40)[0] for size_m in (1.0, 100.0))
+    assert large - small > 4 * np.pi * radio.turns * 99.0 * 2.0**-53
 
 
 def on_axis(cells: float) -> tuple[Station, np.ndarray]:
