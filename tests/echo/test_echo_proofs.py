@@ -173,6 +173,9 @@ def test_the_pointwise_bound_of_one_point_in_the_beam_is_that_of_its_sum_and_of_
     share, direction = found.method.pointwise_bound
     assert share > 0 and direction > 0 and found.bound == pytest.approx(share + direction, rel=1e-6)
     assert (found.method.cheap, found.method.exact, found.method.general) == (0, 0, 1)
+    # Over several paths both count with the sizes of their gains.
+    more = echo_signal(NET, station, place, 1.0, place[0, 0], paths=[Path(), Path(0.0, -3j)])
+    assert more.bound * abs(more.signal[0]) == pytest.approx(4 * found.bound * abs(found.signal[0]), rel=1e-6)
 
 
 def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
