@@ -121,10 +121,12 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
     assert bound < 1e-11 * total < peaks
     # Where amplitudes are in error, their sum may be larger by as much.
     found, bound, *_ = bounded(monkeypatch, {"share": SMALL}, {})
-    assert (bound, found.totals[0] - total) == pytest.approx((SMALL * total, SMALL * total), rel=1e-3)
+    assert (bound, found.totals[0] - total) == pytest.approx((SMALL * total, SMALL * total), rel=1e-3, abs=0)
     found, bound, *_ = bounded(monkeypatch, {"peak": SMALL}, {})
-    assert SMALL * peaks < bound < 1.1 * SMALL * peaks and found.totals[0] - total == pytest.approx(bound, rel=1e-3)
-    assert bounded(monkeypatch, {}, {"error": SMALL})[1] == pytest.approx(SMALL * total, rel=1e-3)
+    assert SMALL * peaks < bound < 1.1 * SMALL * peaks and found.totals[0] - total == pytest.approx(
+        bound, rel=1e-3, abs=0
+    )
+    assert bounded(monkeypatch, {}, {"error": SMALL})[1] == pytest.approx(SMALL * total, rel=1e-3, abs=0)
     # Gains may be off by as much as they are fitted to, on either side of the arrays.
     for array in ((16, 1), (1, 16)):
         _, bound, peaks, _ = bounded(monkeypatch, {"fit": SMALL}, {}, array)
@@ -138,7 +140,7 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
 
 def test_an_error_of_the_sums_takes_twice_its_size_from_the_lead(monkeypatch):
     plain, worse = (bounded(monkeypatch, {"share": share}, {})[0] for share in (0.0, SMALL))
-    assert worse.gap[0] == pytest.approx(plain.gap[0] - 2 * SMALL * plain.totals[0], rel=1e-3)
+    assert worse.gap[0] == pytest.approx(plain.gap[0] - 2 * SMALL * plain.totals[0], rel=1e-3, abs=0)
 
 
 @pytest.mark.parametrize("error", [0.0, 1e-7, 1e-3])
@@ -171,11 +173,11 @@ def test_the_pointwise_bound_of_one_point_in_the_beam_is_that_of_its_sum_and_of_
     station, place = on_axis(30.0)
     found = echo_signal(NET, station, place, 1.0, place[0, 0], paths=[Path()])
     share, direction = found.method.pointwise_bound
-    assert share > 0 and direction > 0 and found.bound == pytest.approx(share + direction, rel=1e-6)
+    assert share > 0 and direction > 0 and found.bound == pytest.approx(share + direction, rel=1e-6, abs=0)
     assert (found.method.cheap, found.method.exact, found.method.general) == (0, 0, 1)
     # Over several paths both count with the sizes of their gains.
     more = echo_signal(NET, station, place, 1.0, place[0, 0], paths=[Path(), Path(0.0, -3j)])
-    assert more.bound * abs(more.signal[0]) == pytest.approx(4 * found.bound * abs(found.signal[0]), rel=1e-6)
+    assert more.bound * abs(more.signal[0]) == pytest.approx(4 * found.bound * abs(found.signal[0]), rel=1e-6, abs=0)
 
 
 def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
@@ -186,7 +188,7 @@ def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
     lead, found = strengths[-1] - strengths[-2], echo_signal(*arguments, paths=[Path()])
     bound = found.bound * abs(found.signal[0])
     assert 0.05 * lead < bound < 0.4 * lead
-    assert found.gap[0] == pytest.approx(lead - 2 * bound, rel=0.01)
+    assert found.gap[0] == pytest.approx(lead - 2 * bound, rel=0.01, abs=0)
 
 
 @pytest.mark.parametrize("seed", range(8))
