@@ -70,7 +70,8 @@ $(DOCS): $(BASE)
 	$(call install,$(call of_extra,docs))
 	touch $@
 
-# Where the packages of training are not there yet, they come while the data are made; so does the machine code. Bytecode of torch takes ten seconds: written once here, not by two trainings at a time.
+# Where the packages of training are not there yet, they come while the data are made; so does the machine code. Bytecode
+# of torch takes ten seconds: written once here, not by two trainings at a time.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
 	@test -e $(SETUP) || { $(SAMPLE) & \
 		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile && \

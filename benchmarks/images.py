@@ -32,8 +32,7 @@ from lowalt.machine.hardware import describe
 from lowalt.shards.tar import Writer
 from lowalt.spectra import Spectra
 from lowalt.tiles import Images, Renderer, Scale, encode, paint
-from lowalt.tiles.filters import apply_paeth
-from lowalt.tiles.png import packed
+from lowalt.tiles.png import apply_paeth, packed
 
 FLOORS_DB = (20.0, 25.0, 30.0, 35.0, 40.0)
 SCALES = [Scale("linear"), Scale("power", gamma=0.5), *(Scale("decibel", floor) for floor in FLOORS_DB)]

@@ -2,16 +2,13 @@
 
 import importlib
 import re
-import shutil
 import sys
 
 import pytest
 
-from dataset import build, publish
-from test_tutorials import FENCE, FOLDER, NEEDS, ROOT, SHARDS, linked_tree
+from test_tutorials import FENCE, FOLDER, ROOT
 
 PAGES = sorted(path.stem for path in FOLDER.glob("*.md"))
-LONG = sorted(set(PAGES) - {"effect"})
 
 
 @pytest.fixture
@@ -85,23 +82,6 @@ def test_cells_run_in_order_in_the_checkout_and_a_failing_line_is_not_passed_ove
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", LONG)
-def test_a_long_notebook_runs(made, page, checkout, tmp_path_factory):
-    if page in SHARDS:
-        pytest.importorskip(NEEDS[page])
-        shards = publish(build(tmp_path_factory.mktemp("made") / "shards", "image"), checkout / "made")
-        (checkout / "results/default").mkdir(parents=True)
-        shutil.copytree(shards, checkout / "results/default/shards")
-    run(book(made, page), checkout)
-
-
-@pytest.mark.slow
-def test_the_notebook_of_an_effect_runs_once_its_entry_is_in_the_schema(made, checkout):
-    (checkout / "workflow").unlink()
-    shutil.copytree(ROOT / "workflow", checkout / "workflow")
-    (checkout / "src").unlink()
-    linked_tree(checkout / "src", "lowalt/scene/effects/receiver")
-    entry = next(code for _, title, code in FENCE.findall((FOLDER / "effect.md").read_text()) if title == "entry")
-    schema = checkout / "workflow/schemas/config.schema.yaml"
-    schema.write_text(schema.read_text().replace("      squint:", f"{entry}      squint:", 1))
-    assert "dc_offset" in run(book(made, "effect"), checkout)
+def test_the_notebook_of_a_first_data_set_runs_whole(made, checkout):
+    """With the run that `test_tutorials` leaves out."""
+    run(book(made, "first_data_set"), checkout)

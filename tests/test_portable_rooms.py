@@ -7,7 +7,7 @@ import pytest
 
 TARGETS = (
     "aircraft", "assemble", "bird", "builtin", "cyclist", "gait", "gait_run", "gait_walk", "quadruped",
-    "sampling", "skeleton", "surfaces", "uav", "uav_pieces", "vehicle",
+    "skeleton", "surfaces", "uav", "uav_pieces", "vehicle",
 )  # fmt: skip
 ROOT = Path(__file__).parent.parent / "src/lowalt"
 FILES = sorted(

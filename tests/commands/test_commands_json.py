@@ -10,14 +10,13 @@ import pytest
 import yaml
 
 from lowalt.__main__ import main
-from lowalt.commands import spectra, workflow
+from lowalt.commands import workflow
 from lowalt.commands.command_line import as_json
 from lowalt.config.layers import load, plain
 from lowalt.files.atomic import replacing
 from lowalt.report.figures import mesh_picture, target_picture
 from lowalt.scene import explanation
 from lowalt.scene.effects import PLACES
-from lowalt.tiles.render import Renderer
 from lowalt.workflow.board import Board, Job
 from lowalt.workflow.status import FOLDER, PLANNED_JOBS
 from meshes import quadrotor
@@ -128,16 +127,6 @@ def test_spectra_answers_with_the_size_of_each(answer, capsys):
         ("vrp", 256, 144), ("trp", 1024, 392), ("vt", 123, 392),
     ]  # fmt: skip
     assert all(one["image_ms"] > 0 for one in found["spectra"])
-
-
-def test_a_spectrum_that_knows_its_gaps_is_timed_with_some(monkeypatch):
-    given = []
-    monkeypatch.setattr(Renderer, "image", lambda self, signal, *rest: given.append(signal))
-    config = load([ROOT / "config/default.yaml"], SCHEMA)
-    for times in ("even", "known"):
-        spectra.facts({**config, "spectra": {**config["spectra"], "times": times}})
-        assert len(given[-1]) == 400 and (given[-1][3::4] == 0).all() == (times == "known")
-        assert (abs(np.delete(given[-1], np.s_[3::4])) > 0).all()
 
 
 def test_targets_answer_from_mesh_to_picture(answer, tmp_path, monkeypatch):

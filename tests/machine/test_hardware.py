@@ -30,20 +30,3 @@ def test_a_machine_is_named_by_processor_cores_memory_and_first_gpu(tool, status
     monkeypatch.setattr(hardware.os, "sched_getaffinity", lambda process: {3, 4, 7} if process == 0 else {1})
     monkeypatch.setattr(hardware.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 24 * 2**18}.get)
     assert hardware.describe() == f"AMD EPYC  9B45; 3 cores; 24 GiB; {wanted}"
-
-
-def test_the_processor_s_name_is_the_system_s_or_that_of_its_kind(monkeypatch):
-    def given(text):
-        def read(path):
-            if text is None:
-                raise OSError
-            return text
-
-        return read
-
-    monkeypatch.setattr(hardware.platform, "processor", lambda: "")
-    monkeypatch.setattr(hardware.platform, "machine", lambda: "aarch64")
-    lines = "processor\t: 0\nvendor_id\t: AMD\nmodel name\t: AMD  EPYC 9B45\nprocessor : 1\nmodel name\t: other\n"
-    for text, wanted in ((lines, "AMD EPYC 9B45"), ("processor : 0\n", "aarch64"), (None, "aarch64")):
-        monkeypatch.setattr(hardware.Path, "read_text", given(text))
-        assert hardware.processor() == wanted

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from lowalt.files.errors import InputError
 from lowalt.measure import accuracy_cost, network_speed
 from lowalt.recognition import predictions, samples, schemes, statistics
+from trainings import with_training
 
 SNRS = (3.0, np.inf)
 HEAD = ",".join((*schemes.COLUMNS, *schemes.OPTIONAL))
@@ -165,37 +166,27 @@ def test_the_least_time_is_the_least_and_warm_up_is_not_counted():
     assert least_s(work, 20.0, lambda: now[0]) == 30.0
 
 
-def test_a_network_s_times_are_a_sample_s_and_what_takes_too_long_is_left_out(monkeypatch):
+@pytest.mark.parametrize(
+    ("limit_s", "batch", "inference_64", "trained"),
+    [
+        (0.3, 4, 1 / 64, 4),
+        # A call of 1 ms leaves no room for 64 samples in 50 ms; a fourth of 8 ms has none for two training samples, nor
+        # has a fourth of 20 ms, which is room for one and two thirds.
+        (0.05, 4, None, 4), (0.008, 4, None, 1), (0.02, 4, None, 1),
+        # A step is judged by a sample's share of the largest batch timed, since a GPU takes one sample as long as
+        # several; where no larger batch fits, by one sample's 1 ms: room for 5 samples.
+        (0.065, 8, 1 / 64, 8), (0.06, 8, None, 4),
+    ],
+)  # fmt: skip
+def test_a_network_s_times_are_a_sample_s_and_what_takes_too_long_is_left_out(
+    monkeypatch, limit_s, batch, inference_64, trained
+):
     # A clock that moves by a millisecond whenever it is read: every call takes one, whatever the machine is busy with.
     ticks = iter(range(10**9))
     monkeypatch.setattr(network_speed, "_clock", lambda *_: lambda: 1e-3 * next(ticks))
-
-    training = {
-        "steps": 10, "batch": 4, "snrs_per_model": 1, "rate": 1e-3, "backbone_rate": 1.0, "weight_decay": 0.0,
-        "warmup": 0.1, "clip": 1.0, "label_smoothing": 0.0, "alone": 0.5, "ema": 0.9, "precision": "fp32",
-        "channels_last": True, "compile": False, "validate_every": 5, "patience": 0, "checkpoint_s": 9.0, "threads": 1,
-        "workers": 0,
-    }  # fmt: skip
-    block = {"backbone": "test_vit", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
-             "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
-    given = {"seed": 1, "size": 32, "colour_map": "gray", "network": block, "training": training, "augmentation": {},
-             "classes": ["a", "b", "c", "d"]}  # fmt: skip
-    nine = network_speed.measure(schemes.Scheme("nine", (0, 1, 2), (0, 1, 2)), given, 0.3)
-    one = network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.3)
-    for times in (nine, one):
-        assert times["inference_ms_1"] == pytest.approx(1.0)
-        assert times["inference_ms_64"] == pytest.approx(1 / 64)
-        assert times["train_batch"] == 4
-        assert times["train_ms"] == pytest.approx(1 / 4)
-    # A call of 1 ms leaves no room for 64 samples in 50 ms; a fourth of 8 ms has none for two training samples.
-    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.05)["inference_ms_64"] is None
-    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.008)["train_batch"] == 1
-    # Room for one and two thirds of a sample is room for one.
-    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.02)["train_batch"] == 1
-    # A step is judged by a sample's share of the largest batch timed, since a GPU takes one sample as long as several.
-    wide = given | {"training": training | {"batch": 8}}
-    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), wide, 0.065)["train_batch"] == 8
-    # Where no larger batch fits, by one sample's 1 ms: room for 5 samples.
-    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), wide, 0.06)["train_batch"] == 4
-    # Only the modality embedding grows with the spectra.
-    assert nine["parameters"] - one["parameters"] == 2 * 64
+    scheme, given = schemes.Scheme("one", (0,), (0,)), with_training(batch=batch, alone=0.5)
+    times = network_speed.measure(scheme, given, limit_s)
+    assert times["inference_ms_1"] == pytest.approx(1.0) and times["train_batch"] == trained
+    assert times["inference_ms_64"] == (inference_64 and pytest.approx(inference_64))
+    assert times["train_ms"] == pytest.approx(1 / trained)
+    assert times["parameters"] > 1000 and times["steps"] == given["training"]["steps"]

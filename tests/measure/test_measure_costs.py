@@ -2,9 +2,7 @@
 
 import copy
 from dataclasses import replace
-from types import SimpleNamespace
 
-import mpmath
 import numpy as np
 import pytest
 
@@ -74,12 +72,6 @@ def test_the_truth_is_the_value_of_the_strongest_cell_at_two_symbols_and_the_dee
     assert set(judged[0]) != set(judged[1])
 
 
-def test_an_error_is_the_largest_at_a_judged_symbol_over_the_largest_signal():
-    signal = np.array([1.0, 4j, -8.0, 2.0])
-    assert echo_cost.error(signal, {0: mpmath.mpc(1.5), 1: mpmath.mpc(9j), 3: mpmath.mpc(-2)}) == 5 / 8
-    assert echo_cost.error(signal, {0: mpmath.mpc(1)}) == 0
-
-
 def test_the_table_has_every_method_and_its_error():
     pytest.importorskip("finufft")
     block = {"motion": MOTION, "seed": 1, "distance_m": 150.0, "points": [6, 40], "tolerances": [1e-3, 1e-15],
@@ -92,13 +84,3 @@ def test_the_table_has_every_method_and_its_error():
     assert [(row["method"], row["tolerance"], row["points"]) for row in rows] == wanted
     single, double, transform, exact, loose = (row["relative_error"] for row in rows[5:])
     assert 1e-6 < single < 1e-1 and double < 1e-10 and transform < 1e-8 and exact < 1e-13 and loose < 1e-3
-
-
-def test_a_row_is_the_mean_time_and_the_largest_error_of_all_clouds(monkeypatch):
-    found = iter([{("a", ""): (1.0, 0.5)}, {("a", ""): (3.0, 0.25)}])
-    asked = []
-    monkeypatch.setattr(echo_cost, "sample", lambda *given: asked.append(given[-2:]))
-    monkeypatch.setattr(echo_cost, "measured", lambda *given: next(found))
-    block = {"motion": {}, "seed": 1, "distance_m": 30.0, "points": [9]}
-    (row,) = echo_cost.measure(None, [SimpleNamespace(subtype="x")] * 2, {"x": {}}, block)
-    assert (row["seconds"], row["relative_error"], row["points"]) == (2.0, 0.5, 9) and asked == [(30.0, 9)] * 2

@@ -21,9 +21,10 @@ def test_attitude_turns_about_z_then_x_then_y_as_published():
     np.testing.assert_allclose(attitude(quarter, 0, 0) @ [0, 1, 0], [-1, 0, 0], atol=1e-15)
     np.testing.assert_allclose(attitude(0, quarter, 0) @ [0, 1, 0], [0, 0, 1], atol=1e-15)
     np.testing.assert_allclose(attitude(0, 0, quarter) @ [0, 0, 1], [1, 0, 0], atol=1e-15)
-    np.testing.assert_allclose(
-        attitude(0.3, 0.5, 0.7), attitude(0.3, 0, 0) @ attitude(0, 0.5, 0) @ attitude(0, 0, 0.7), atol=1e-15
-    )
+    whole, parts = attitude(0.3, 0.5, 0.7), (attitude(0.3, 0, 0), attitude(0, 0.5, 0), attitude(0, 0, 0.7))
+    np.testing.assert_allclose(whole, parts[0] @ parts[1] @ parts[2], atol=1e-15)
+    for part in parts:
+        np.testing.assert_allclose(part @ part.T, np.eye(3), atol=1e-15)
 
 
 def test_rodrigues_keeps_the_axis_and_adds_angles():

@@ -78,6 +78,12 @@ def looks_of(dataset: Dataset, subtype: str, track: int) -> list[dict]:
     return [dataset.row(Place(group, subtype, track * LOOKS + look, 3.0)) for look in range(LOOKS)]
 
 
+def places_of(config: dict) -> tuple[np.ndarray, np.ndarray, dict]:
+    """Masts (S, 2) m, corners (K, 2) m of the region, and the settings of the motion of a configuration."""
+    masts = np.array(masts_m(config["network"]), float)
+    return masts, region_polygon(masts, None), motion_block(config)
+
+
 def goes_on(cloud, rows: list[dict]):
     """Assert that all points end a look where they begin the next: place, heading, phases of parts and gait at once."""
     for row, after in itertools.pairwise(rows):
@@ -99,8 +105,7 @@ def test_nothing_jumps_between_looks(which, subtype, request):
 
 @pytest.mark.parametrize("subtype", ["EH 216 S", "Owl", "NIO ET5T 2023"])
 def test_a_drawn_path_is_made_of_coordinated_turns_inside_the_cell(dataset, subtype):
-    masts = np.array(masts_m(dataset.config["network"]), float)
-    corners, settings = region_polygon(masts, None), motion_block(dataset.config)
+    masts, corners, settings = places_of(dataset.config)
     cell = Cell(corners, masts, 10.0)
     cloud, published = dataset.clouds["NIO ET5T 2023" if "NIO" in subtype else "DJI Mini 2"], TABLE[subtype]
     times = np.linspace(0, 1, 9)
@@ -136,10 +141,9 @@ def test_a_target_turns_to_climb_the_other_way_while_it_can_still_go_on_for_a_lo
 
 
 def test_rotors_with_rates_of_their_own_go_on_from_look_to_look(dataset):
-    cloud, masts = dataset.clouds["DJI Mini 2"], np.array(masts_m(dataset.config["network"]), float)
+    cloud = dataset.clouds["DJI Mini 2"]
     own = replace(cloud, record=cloud.record | {"rate_factors": {cloud.names[cloud.parts_of("rotor")[1]]: 1.37}})
-    settings, published = motion_block(dataset.config), TABLE["DJI Mini 2"]
-    goes_on(own, model_rows(1, own, published, masts, region_polygon(masts, None), settings, 0))
+    goes_on(own, model_rows(1, own, TABLE["DJI Mini 2"], *places_of(dataset.config), 0))
 
 
 def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circle_is_one_turn(dataset, tmp_path):
@@ -148,13 +152,11 @@ def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circl
         return np.stack([250 + 20 * np.cos(angle), 144 + 20 * np.sin(angle), 0 * time_s], axis=-1)
 
     config = configuration(track=written(tmp_path / "log.csv", np.linspace(0, 12.5, 500), places=circle))
-    cloud, masts = dataset.clouds["NIO ET5T 2023"], np.array(masts_m(config["network"]), float)
-    corners, settings = region_polygon(masts, None), motion_block(config)
+    masts, corners, settings = places_of(config)
     path = path_of(settings, corners, masts)
-    given = 1, cloud, TABLE["NIO ET5T 2023"], masts, corners
-    plain, sized = (
-        model_rows(*given, settings | sizes, 0, path) for sizes in ({}, {"sizes_m": {"Vehicle": [6.0, 9.0]}})
-    )
+    given = 1, dataset.clouds["NIO ET5T 2023"], TABLE["NIO ET5T 2023"], masts, corners
+    plain = model_rows(*given, settings, 0, path)
+    sized = model_rows(*given, settings | {"sizes_m": {"Vehicle": [6.0, 9.0]}}, 0, path)
     assert [row["turn_radps"] for row in plain] == pytest.approx([2 * np.pi / 10] * LOOKS, rel=1e-3)
     scale = sized[0][SCALE]
     assert scale > 1.2 and [row["rate_hz"] * scale for row in sized] == pytest.approx([row["rate_hz"] for row in plain])
@@ -191,17 +193,13 @@ def test_a_track_is_in_one_fold_whole(dataset):
 def test_the_motion_stage_writes_the_rows_of_the_samples(which, request, tmp_path):
     tracks = request.getfixturevalue(which)
     settings = Settings(run_of(merge(OVERLAY, {"motion": tracks.config["motion"]})))
-    clouds = [str(tmp_path / f"{number}.npz") for number, name in enumerate(SUBTYPES[:1])]
-    write_cloud(clouds[0], tracks.clouds[SUBTYPES[0]])
+    cloud, path, again = (tmp_path / name for name in ("cloud.npz", "motion.csv", "again.csv"))
+    write_cloud(cloud, tracks.clouds[SUBTYPES[0]])
     wildcards = type("", (), {"group": "seen", "part": "00000"})()
-    path = tmp_path / "motion.csv"
-    motion(["--settings", settings.motion(wildcards), "--clouds", *clouds, "--group", "seen", "--first", "0",
+    motion(["--settings", settings.motion(wildcards), "--clouds", str(cloud), "--group", "seen", "--first", "0",
             "--count", str(4 * LOOKS), "--out", str(path)])  # fmt: skip
-    rows = read_table(path)
-    assert [(row["model"], row["track"], row["look"]) for row in rows] == [
-        (number, *divmod(number, LOOKS)) for number in range(4 * LOOKS)
-    ]
-    again = tmp_path / "again.csv"
+    numbers = [(row["model"], row["track"], row["look"]) for row in read_table(path)]
+    assert numbers == [(number, *divmod(number, LOOKS)) for number in range(4 * LOOKS)]
     write_table(again, [row for track in range(4) for row in looks_of(tracks, SUBTYPES[0], track)])
     assert again.read_bytes() == path.read_bytes()
 
@@ -261,10 +259,9 @@ def test_degrees_become_metres_about_the_first_row(tmp_path, dataset):
 def test_a_bad_log_is_refused_in_one_sentence(tmp_path, text, words):
     path = tmp_path / "log.csv"
     path.write_text(text)
-    settings = motion_block(configuration(track=str(path)))
-    masts = np.array(masts_m(configuration()["network"]), float)
+    masts, corners, settings = places_of(configuration(track=str(path)))
     with pytest.raises(InputError, match=words) as refused:
-        path_of(settings, region_polygon(masts, None), masts)
+        path_of(settings, corners, masts)
     assert str(path) in str(refused.value) and "\n" not in str(refused.value)
 
 

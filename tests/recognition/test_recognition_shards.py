@@ -204,13 +204,6 @@ def test_views_from_the_tiles_stage_are_those_from_decoded_images_byte_for_byte(
         assert (tmp_path / "reduced.npz").read_bytes() == (tmp_path / "decoded.npz").read_bytes()
 
 
-def test_reduced_images_leave_the_tiles_as_they_are_and_none_are_made_unasked(dataset, tmp_path):
-    reduce_tiles(dataset, tmp_path / "with", "seen", (24,))
-    reduce_tiles(dataset, tmp_path / "without", "seen", ())
-    assert (tmp_path / "with/tiles.npz").read_bytes() == (tmp_path / "without/tiles.npz").read_bytes()
-    assert [path.name for path in (tmp_path / "without").iterdir()] == ["tiles.npz"]
-
-
 def test_reduced_images_of_another_size_chunk_or_snr_are_refused_by_name(dataset, tmp_path):
     options = reduce_tiles(dataset, tmp_path, "seen", (24,))[24]
     other = reduce_tiles(dataset, tmp_path, "unseen", (24,))[24]

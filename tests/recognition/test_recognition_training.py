@@ -117,28 +117,6 @@ def test_early_stopping_counts_validations_without_gain_and_no_patience_asked_fo
     assert len(history.splitlines()) == 1 + 4
 
 
-@pytest.mark.parametrize("change", [{"steps": 0}, {"rate": -1.0}, {"precision": "fp16"}, {"warmup": 2}, {"epochs": 3},
-                                    {"batch": True}, {"ema": math.nan}, {"threads": 1.0}])  # fmt: skip
-def test_wrong_training_settings_are_refused_by_name(change):
-    with pytest.raises(InputError, match=rf"recognition\.training: .*{next(iter(change))}.*, expected"):
-        recipe.check({**TRAINING, **change})
-
-
-@pytest.mark.parametrize("change", [{"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1}])
-def test_wrong_augmentation_is_refused_by_name(views, tmp_path, change):
-    settings = {**SETTINGS, "augmentation": {**SETTINGS["augmentation"], **change}}
-    with pytest.raises(InputError, match=rf"recognition\.augmentation: .*{next(iter(change))}.*, expected"):
-        train(views, tmp_path, settings)
-
-
-def test_settings_that_may_be_left_out_change_nothing_then():
-    checked = recipe.check(TRAINING)
-    assert checked == {**TRAINING, "accumulate": 1, "activation_checkpointing": False}
-    assert recipe.check({**TRAINING, "batch": 3, "accumulate": 3})["accumulate"] == 3
-    with pytest.raises(InputError, match="accumulate is 4, expected at most batch, 3"):
-        recipe.check({**TRAINING, "batch": 3, "accumulate": 4})
-
-
 def test_batches_follow_each_epoch_s_order_and_validations_the_steps_and_the_end(views, tmp_path):
     read = []
 
@@ -158,18 +136,16 @@ def test_batches_follow_each_epoch_s_order_and_validations_the_steps_and_the_end
     assert [row.split(",")[:3] for row in rows] == [["3", "0", "39"], ["6", "1", "78"], ["8", "2", "104"]]
 
 
-@pytest.mark.parametrize("last", [True, False])
-def test_weights_lie_in_memory_as_the_settings_say_and_products_stand_for_convolutions_in_float32(
-    views, tmp_path, last
+@pytest.mark.parametrize(("last", "precision", "kind"), [(True, "fp32", MatrixProduct), (False, "bf16", nn.Conv2d)])
+def test_weights_lie_in_memory_as_asked_and_products_stand_for_convolutions_in_float32(
+    views, tmp_path, last, precision, kind
 ):
-    for precision, kind in (("fp32", MatrixProduct), ("bf16", nn.Conv2d)):
-        settings = with_training(channels_last=last)
-        settings["training"] = recipe.check(settings["training"])
-        machine = inference.Machine(torch.device("cpu"), precision)
-        run = loop.TrainingRun(("a",), "x", tmp_path)
-        model = loop.Trainer(nn.Conv2d(4, 8, 3), sources(views), SCHEME.columns, settings, run, machine).model
-        assert model.weight.is_contiguous(memory_format=torch.channels_last) == last
-        assert type(model) is kind and model.training
+    settings = with_training(channels_last=last)
+    settings["training"] = recipe.check(settings["training"])
+    run, machine = loop.TrainingRun(("a",), "x", tmp_path), inference.Machine(torch.device("cpu"), precision)
+    model = loop.Trainer(nn.Conv2d(4, 8, 3), sources(views), SCHEME.columns, settings, run, machine).model
+    assert model.weight.is_contiguous(memory_format=torch.channels_last) == last
+    assert type(model) is kind and model.training
 
 
 def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
@@ -311,3 +287,21 @@ def test_the_kept_weights_are_the_last_of_the_best_validations(monkeypatch, view
     weights = checkpoint.load(tmp_path / "model.pt")[1]["weights"]
     assert all(torch.equal(value, kept[2][name]) for name, value in weights.items())
     assert len({float(state["classifier.0.weight"].sum()) for state in kept}) == 4
+
+
+@pytest.mark.parametrize(("block", "change"), [
+    *(("training", change) for change in (
+        {"steps": 0}, {"rate": -1.0}, {"precision": "fp16"}, {"warmup": 2}, {"epochs": 3}, {"batch": True},
+        {"ema": math.nan}, {"threads": 1.0})),
+    *(("augmentation", change) for change in ({"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1})),
+])  # fmt: skip
+def test_wrong_settings_are_refused_by_name(views, tmp_path, block, change):
+    with pytest.raises(InputError, match=rf"recognition\.{block}: .*{next(iter(change))}.*, expected"):
+        train(views, tmp_path, {**SETTINGS, block: {**SETTINGS[block], **change}})
+
+
+def test_a_batch_has_at_least_a_sample_a_part_and_one_part_where_nothing_is_said():
+    assert recipe.check(TRAINING) == {**TRAINING, "accumulate": 1, "activation_checkpointing": False}
+    assert recipe.check({**TRAINING, "batch": 3, "accumulate": 3})["accumulate"] == 3
+    with pytest.raises(InputError, match="accumulate is 4, expected at most batch, 3"):
+        recipe.check({**TRAINING, "batch": 3, "accumulate": 4})

@@ -25,39 +25,6 @@ def test_bootstrap_depends_on_the_generator_alone_and_not_on_names_of_clusters()
     assert one.low <= one.value <= one.high
 
 
-def nested(rng, seeds, subtypes, models, spreads):
-    """Shares of correct samples (seeds, subtypes x models) with known deviations of seeds, subtypes and models."""
-    seed, subtype, model = spreads
-    shape = (seeds, subtypes, models)
-    parts = seed * rng.standard_normal((seeds, 1, 1)), subtype * rng.standard_normal((1, subtypes, 1))
-    values = parts[0] + parts[1] + model * rng.standard_normal(shape[1:])
-    return np.broadcast_to(values, shape).reshape(seeds, -1)
-
-
-@pytest.mark.parametrize(
-    ("spreads", "whole", "width"),
-    # Student's quantiles of 4 and of 19 degrees of freedom, of two schemes with three seeds and of 20 subtypes.
-    [
-        ((0.0, 0.0, 1.0), False, 0.1),
-        ((0.0, 1.0, 0.0), True, 2.093 / 1.96 / math.sqrt(20)),
-        ((1.0, 0.0, 0.0), True, 2.776 / 1.96),
-    ],
-    ids=["motion models", "subtypes", "seeds"],
-)
-def test_an_interval_is_as_wide_as_the_level_that_varies_makes_it(spreads, whole, width):
-    """Twenty subtypes of five models, three seeds: 1.96 times the standard error of a mean of 100, 20 or 3 values."""
-    found, names = [], np.repeat(np.arange(20), 5)
-    for trial in range(40):
-        one = nested(stream(trial, "one"), 3, 20, 5, spreads)
-        low, high = intervals.strict_difference(
-            one, np.zeros_like(one), np.full(100, 6), names, whole, stream(trial, "draw"), 600
-        )[1:]
-        # The standard error of this trial's own values, where only seeds vary.
-        own = width * one.mean(1).std(ddof=1) / math.sqrt(3) if spreads[0] else width
-        found.append((high - low) / (2 * 1.96 * own))
-    assert np.mean(found) == pytest.approx(1.0, abs=0.06)
-
-
 @pytest.mark.parametrize("level", ["seeds", "subtypes", "models of known subtypes", "all three"])
 def test_a_95_percent_interval_holds_the_truth_about_that_often(level):
     """93 to 97 % should hold it, give or take two standard errors of 400 trials, 1.1 % each."""
@@ -82,14 +49,6 @@ def test_a_motion_model_brings_one_value_however_many_snrs_it_has():
     first, count, shares = intervals.model_shares(motion, [np.array([1, 0, 0, 1, 1]), np.ones(5)])
     assert motion[first].tolist() == ["a", "b"] and count.tolist() == [2, 3]
     np.testing.assert_allclose(shares, [[1 / 2, 2 / 3], [1, 1]])
-
-
-def test_the_95_percent_interval_of_a_mean_is_196_standard_errors_wide_on_either_side():
-    values = stream(3, "normal").standard_normal(400)
-    value, low, high = intervals.bootstrap(np.arange(400), values, stream(4, "b"), 20_000)
-    error = values.std() / 20
-    assert (high - value) / error == pytest.approx(1.96, rel=0.04)
-    assert (value - low) / error == pytest.approx(1.96, rel=0.04)
 
 
 def test_calibration_of_a_perfectly_calibrated_and_of_an_overconfident_model():

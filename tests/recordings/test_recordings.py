@@ -124,6 +124,11 @@ def test_damaged_and_unknown_files_are_refused_by_name(tmp_path):
         ({"columns": [0, 0]}, r"columns: value \[0, 0\], expected every item once"),
         ({"columns": [0, 1]}, r"columns is \[0, 1\], expected one for channel 'real'"),
         ({"moves": "away"}, r"moves is 'away', expected channel 'complex' with it"),
+        ({"layout": "iqiq"}, r"layout is 'iqiq', expected channel 'complex'"),
+        ({"layout": "qiqi"}, r"here: layout: value 'qiqi', expected one of"),
+        ({"dtype": "object"}, r"here: dtype: value 'object', expected one of"),
+        ({"trust": "file", "rate_hz": RATE}, r"here: trust: value 'file', expected one of"),
+        ({"trust": "record"}, r"expected trust together with rate_hz"),
     ],
 )
 def test_a_wrong_record_is_refused_by_key(tmp_path, change, words):

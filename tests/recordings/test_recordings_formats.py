@@ -61,19 +61,6 @@ def test_cut_and_unknown_raw_files_are_refused(tmp_path):
         read(entry(tmp_path, "a.iq", layout="iqiq", dtype="int16"))
 
 
-@pytest.mark.parametrize("key, value", [("layout", "qiqi"), ("dtype", "object"), ("trust", "file")])
-def test_unknown_layouts_types_and_trust_are_refused(tmp_path, key, value):
-    with pytest.raises(InputError, match=f"here: {key}: value '{value}', expected one of"):
-        entry(tmp_path, "a.iq", **{key: value})
-
-
-def test_contradictions_of_a_record_are_refused(tmp_path):
-    with pytest.raises(InputError, match="layout is 'iqiq', expected channel 'complex'"):
-        entry(tmp_path, "a.iq", "real", layout="iqiq")
-    with pytest.raises(InputError, match="expected trust together with rate_hz"):
-        entry(tmp_path, "a.wav", trust="record", rate_hz=None)
-
-
 @pytest.mark.parametrize("cell", ["{:.3f}{:+.3f}j", "({:.3f}{:+.3f}j)", "{:.3f}{:+.3f}i", "{:.3f} {:+.3f}i"])
 def test_complex_cells_are_read_however_they_are_written(tmp_path, cell):
     values = wave(500)

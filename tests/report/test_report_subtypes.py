@@ -9,31 +9,14 @@ from made_predictions import SUBTYPES, run_files
 
 def test_reasons_are_those_of_test_samples_and_the_worst_subtype_stands_first(tmp_path):
     path, found, _ = run_files(tmp_path, "unseen", "ABC:VRP", 0.6)
-    rows = [
-        {
-            "protocol": "seen",
-            "scheme": "ABC:VRP",
-            "subtype": name,
-            "category": CATEGORIES[label],
-            "accuracy_percent": str(20 + 7 * place),
-        }
-        for place, (name, (_, label)) in enumerate(SUBTYPES.items())
-    ]
-    rows += [
-        {**row, "protocol": "unseen", "accuracy_percent": str(90 - float(row["accuracy_percent"]))}
-        for row in rows
-        if SUBTYPES[row["subtype"]][0] == "unseen"
-    ]
+    rows = [{"protocol": "seen", "scheme": "ABC:VRP", "subtype": name, "category": CATEGORIES[label],
+             "accuracy_percent": str(20 + 7 * place)}
+            for place, (name, (_, label)) in enumerate(SUBTYPES.items())]  # fmt: skip
+    rows += [{**row, "protocol": "unseen", "accuracy_percent": str(90 - float(row["accuracy_percent"]))}
+             for row in rows if SUBTYPES[row["subtype"]][0] == "unseen"]  # fmt: skip
     tables = {"subtypes": rows, "distances": []}
-    inputs = type(
-        "Inputs",
-        (),
-        {
-            "__contains__": lambda self, name: True,
-            "paths": lambda self, name: [path],
-            "table": lambda self, name, *columns: tables[name],
-        },
-    )()
+    methods = {"__contains__": lambda *_: True, "paths": lambda *_: [path], "table": lambda _, name, *__: tables[name]}
+    inputs = type("Inputs", (), methods)()
     shown = subtypes.values(SimpleNamespace(inputs=inputs, shards=SimpleNamespace(classes=CATEGORIES)))
     assert set(shown["reasons"]) == {name for name, (group, _) in SUBTYPES.items() if group == "unseen"}
     last = [float([*values.values()][-1]) for _, _, values in shown["rows"]]

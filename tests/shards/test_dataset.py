@@ -29,9 +29,15 @@ from lowalt.targets.cloud import write as write_cloud
 from lowalt.targets.records import records_of
 from lowalt.tiles.__main__ import main as tiles
 from lowalt.tiles.png import decode
-from small_configuration import configuration
+from small_configuration import configuration as usual
 
 ROOT = Path(__file__).parents[2]
+
+
+def configuration(**changes) -> dict:
+    """The small data set in half of the default's band, so that cubes have half of its cells."""
+    config = usual(**changes)
+    return config | {"network": config["network"] | {"subcarriers": 128}}
 
 
 @pytest.fixture(scope="module")

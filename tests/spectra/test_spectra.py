@@ -117,27 +117,15 @@ def test_laws_of_scale_and_delay():
     np.testing.assert_array_equal(trp(signal[5:])[:, :300], trp(signal)[:, 5:305])
 
 
-def test_windows_are_one_fewer_than_usual():
+def test_windows_are_one_fewer_than_usual_and_a_signal_without_one_is_refused_by_name():
     assert [windows(400, 256, 1, "vrp"), windows(400, 8, 1, "trp"), windows(400, 8, 3, "vt")] == [144, 392, 130]
-
-
-@pytest.mark.parametrize("symbols", [255, 256])
-def test_a_signal_no_longer_than_a_window_is_refused_by_name(symbols):
-    with pytest.raises(InputError, match=r"spectrum vrp.*256.*257"):
-        vrp(noise(symbols))
-    with pytest.raises(InputError, match="vrp"):
-        Spectra().check(symbols)
-    with pytest.raises(InputError, match="spectrum trp"):
-        trp(noise(8))
-    with pytest.raises(InputError, match="spectrum vt"):
-        vt(noise(8), CARRIER, INTERVAL)
-
-
-def test_a_signal_needs_a_hop_more_than_the_window():
+    refused = ((lambda: vrp(noise(256)), "vrp.*256.*257"), (lambda: trp(noise(8)), "trp"), (
+        lambda: vt(noise(8), CARRIER, INTERVAL), "vt"), (lambda: Spectra().check(256), "vrp"))  # fmt: skip
     steps = Spectra(vrp=Fourier(256, 5, 256))
     steps.check(261)
-    with pytest.raises(InputError, match="at least 261 symbols"):
-        steps.check(260)
+    for call, words in (*refused, (lambda: steps.check(260), "at least 261 symbols")):
+        with pytest.raises(InputError, match=f"spectrum .*{words}"):
+            call()
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -183,12 +171,8 @@ def test_settings_default_to_the_published_ones():
         ("trp", {"window": 1}, "window is 1"),
         ("trp", {"hop": True}, "hop is True"),
         ("vt", {"window": 0}, "window is 0"),
-        ("vt", {"hop": 0}, "hop is 0"),
         ("vt", {"speed_step_mps": True}, "step_mps is True"),
-        ("vt", {"speed_min_mps": 6.1}, "min < max"),
-        ("trp", {"hop": 0}, "hop"),
         ("trp", {"overlap": 3}, "overlap"),
-        ("vt", {"speed_step_mps": 0}, "step"),
         ("vt", {"speed_min_mps": 7.0}, "min < max"),
         ("vt", {"speed_max_mps": float("inf")}, "speed_max_mps"),
     ],

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
 from lowalt.targets.gallery import caption
-from lowalt.targets.mocap_cycle import closed, find_cycle
 from lowalt.targets.mocap_files import read_skeleton
-from lowalt.targets.mocap_motion import Motion, nodes_m
+from lowalt.targets.mocap_motion import Motion, closed, find_cycle, nodes_m
 from lowalt.targets.skeleton import LIMBS, NODES, PARENTS, rotation
 from walkers import asf, cloud_of, walk, write_files
 

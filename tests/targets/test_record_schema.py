@@ -1,20 +1,15 @@
 """The schema of records: it knows the keys that the code knows, describes each, and the page of keys shows them."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 from key_pages import records_page
 
 from lowalt.files.errors import InputError
 from lowalt.targets import bird, record_schema, uav
 from lowalt.targets.builtin import MODULES
+from lowalt.targets.make import SOURCES
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import ALL_AXES, SIZES
-from lowalt.targets.records import SOURCES, load_table, merge
 
-ROOT = Path(__file__).parents[2]
-TABLE = load_table(ROOT / "config/targets.csv")
 SCHEMA = record_schema.schema()
 
 
@@ -46,18 +41,3 @@ def test_the_page_of_keys_describes_every_key_and_every_figure():
     bare = SCHEMA | {"sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
     with pytest.raises(InputError, match="gait has no description"):
         records_page(bare)
-
-
-@pytest.mark.parametrize(
-    ("file", "name", "change", "message"),
-    [
-        ("pedestrian", "Walking Pedestrian 1", {"person": 3}, "here: person: value 3, expected type string"),
-        ("uav", "DJI Mini 2", {"sources": {"maker": 1}}, "here: sources.maker: value 1, expected type string"),
-        ("uav", "DJI Mini 2", {"like": "Boat"}, "like: value 'Boat', expected one of"),
-    ],
-)
-def test_values_of_another_type_are_refused_by_key(file, name, change, message):
-    record = yaml.safe_load((ROOT / f"config/targets/{file}.yaml").read_text())[name]
-    assert merge(TABLE[name], record, "here")
-    with pytest.raises(InputError, match=message):
-        merge(TABLE[name], record | change, "here")

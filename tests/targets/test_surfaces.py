@@ -9,20 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
-from lowalt.targets.sampling import face_normals, sample_faces, thin
 from lowalt.targets.surfaces import (
     Surface,
     airfoil,
     box,
     cylinder,
     ellipsoid,
+    face_normals,
     foil,
     hull,
     inside,
     loft,
     merged,
     ring,
+    sample_faces,
     superellipse,
+    thin,
     tube,
     volume,
 )

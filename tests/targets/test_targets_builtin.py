@@ -177,11 +177,10 @@ def test_a_positive_angle_raises_both_wing_tips(clouds, name):
     assert [cloud.kinds[p] for p in range(5)] == ["body", "wing", "wing", "wing", "wing"]
     for inner, outer in zip(wings[::2], wings[1::2], strict=True):
         assert cloud.parents[inner] == -1 and cloud.parents[outer] == inner
-        tip = np.argmax(abs(cloud.points[cloud.part == outer][:, 0]))
-        rest = cloud.points[cloud.part == outer][tip]
-        assert rotated(cloud, outer, 0.2)[tip, 2] > rest[2]
-        side = np.argmax(abs(cloud.points[cloud.part == inner][:, 0]))
-        assert rotated(cloud, inner, 0.2)[side, 2] > cloud.points[cloud.part == inner][side, 2]
+        for part in (inner, outer):
+            rest = cloud.points[cloud.part == part]
+            tip = np.argmax(abs(rest[:, 0]))
+            assert rotated(cloud, part, 0.2)[tip, 2] > rest[tip, 2]
         # The segments meet at the second hinge, and the first is nearer the body.
         reach = abs(cloud.points[cloud.part == inner][:, 0]).max()
         assert reach == pytest.approx(abs(cloud.hinges[outer, 0]), rel=1e-3)

@@ -31,6 +31,18 @@ def draft(path: Path, *words: str) -> tuple[int, Path]:
     return main(["target", "new", str(path), "--inputs", str(path.parent), "--out", str(out), *words]), out
 
 
+@pytest.fixture
+def refused(tmp_path, capsys, monkeypatch):
+    """A function of a file and words that returns why `target new` refuses it; pictures go to the test's folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def error(path: Path, *words: str) -> str:
+        assert draft(path, *words)[0] == 2
+        return capsys.readouterr().err
+
+    return error
+
+
 def cloud(out: Path) -> Cloud:
     """The cloud of a drafted record."""
     made = out.with_suffix(".npz")
@@ -91,20 +103,19 @@ def test_blades_far_from_one_another_are_taken_together_where_the_number_is_know
         assert np.linalg.norm(HUBS - middle, axis=1).min() < 0.01
 
 
-def test_arms_are_no_rotors_where_propellers_are_missing(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_arms_are_no_rotors_where_propellers_are_missing(tmp_path, refused):
     shapes = {name: shape for name, shape in hull().items() if "plate" not in name}
-    assert draft(saved(tmp_path / "craft.obj", shapes), "--subtype", "DJI Mavic 3 Pro")[0] == 2
-    assert "0 rotors found, expected 4" in capsys.readouterr().err
+    assert "0 rotors found, expected 4" in refused(
+        saved(tmp_path / "craft.obj", shapes), "--subtype", "DJI Mavic 3 Pro"
+    )
     # Two alike pieces may be two blades of one rotor.
     two = {"hull": box((0.4, 0.1, 0.1)), "a": disc((0.3, 0, 0.1)), "b": disc((-0.3, 0, 0.1))}
-    assert draft(saved(tmp_path / "two.obj", two), "--category", "UAV")[0] == 2
-    assert "0 rotors found, expected at least one" in capsys.readouterr().err
+    assert "0 rotors found, expected at least one" in refused(saved(tmp_path / "two.obj", two), "--category", "UAV")
     # Motors are none either, where their names say so.
-    for kind, status in (("part", 0), ("MotorMount.", 2)):
-        path = saved(tmp_path / f"{kind}.obj", {"hull": box((0.2, 0.12, 0.06))} | four(kind, 0.02))
-        assert draft(path, "--category", "UAV", "--rotors", "4")[0] == status
-    assert "0 rotors found, expected 4" in capsys.readouterr().err
+    part, mount = (saved(tmp_path / f"{kind}.obj", {"hull": box((0.2, 0.12, 0.06))} | four(kind, 0.02))
+                   for kind in ("part", "MotorMount."))  # fmt: skip
+    assert draft(part, "--category", "UAV", "--rotors", "4")[0] == 0
+    assert "0 rotors found, expected 4" in refused(mount, "--category", "UAV", "--rotors", "4")
 
 
 def test_names_tell_rotors_of_any_size_and_axis_and_skids_are_none(tmp_path):
@@ -134,33 +145,29 @@ def test_wheels_tell_the_front_of_a_vehicle_that_is_wider_than_long(tmp_path):
     assert np.abs(cloud(path.with_suffix(".yaml")).axes[1:, 0]) == pytest.approx(1)
 
 
-def test_wheels_that_no_name_tells_are_asked_for_by_number(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_wheels_that_no_name_tells_are_asked_for_by_number(tmp_path, refused):
     shapes = rover("drum", (1.2, 2.4, 0.3), 0.5, 0.8)
     words = (saved(tmp_path / "rover.obj", shapes), "--category", "Vehicle", "--unit", "m", "--up", "z")
-    assert draft(*words)[0] == 2
-    assert "4 wheels found, expected --wheels 4 where that is all" in capsys.readouterr().err
+    assert "4 wheels found, expected --wheels 4 where that is all" in refused(*words)
     assert draft(*words, "--wheels", "4")[0] == 0
     assert cloud(tmp_path / "rover.yaml").kinds.count("wheel") == 4
     bare = saved(tmp_path / "bare.obj", {"hull": shapes["hull"]})
-    assert draft(bare, *words[1:])[0] == 2 and "0 wheels found" in capsys.readouterr().err
+    assert "0 wheels found" in refused(bare, *words[1:])
     assert draft(bare, *words[1:], "--wheels", "0")[0] == 0
 
 
-def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(tmp_path, refused):
     path = saved(tmp_path / "craft.obj", hull() | four("part"))
-    assert draft(path, "--subtype", "DJI Matrice 600 Pro")[0] == 2
-    error = capsys.readouterr().err
+    error = refused(path, "--subtype", "DJI Matrice 600 Pro")
     assert "0 rotors found, expected 6" in error and "craft-pieces.png" in error and "--moving 3 5+6" in error
     assert Image.open(tmp_path / "craft-pieces.png").size[0] > 1000
     assert not path.with_suffix(".yaml").exists()
-    assert draft(path, "--category", "UAV")[0] == 2 and "expected --rotors 4 where" in capsys.readouterr().err
+    assert "expected --rotors 4 where" in refused(path, "--category", "UAV")
     parts = inspect_mesh(path, "UAV", "m").components
     numbers = [str(n) for n, part in enumerate(parts, 1) if part.piece.startswith("part")]
     assert draft(path, "--category", "UAV", "--unit", "m", "--moving", *numbers)[0] == 0
     assert cloud(path.with_suffix(".yaml")).kinds.count("rotor") == 4
-    assert draft(path, "--category", "UAV", "--moving", "99")[0] == 2 and "--moving is '99'" in capsys.readouterr().err
+    assert "--moving is '99'" in refused(path, "--category", "UAV", "--moving", "99")
 
 
 def without_a_side(shape: trimesh.Trimesh, axis: int) -> trimesh.Trimesh:
@@ -169,20 +176,21 @@ def without_a_side(shape: trimesh.Trimesh, axis: int) -> trimesh.Trimesh:
     return trimesh.Trimesh(shape.vertices, shape.faces[(heights > heights.min() + 1e-9).any(axis=1)])
 
 
-def test_one_half_of_a_craft_is_refused_and_a_whole_one_on_one_side_of_the_file_s_axes_is_not(tmp_path, capsys):
+def test_one_half_of_a_craft_is_refused_and_a_whole_one_on_one_side_of_the_file_s_axes_is_not(tmp_path, refused):
     shapes = hull() | four("rotor")
     right = {name: shape for name, shape in shapes.items() if shape.bounds[0, 1] > -1e-9}
     closed = right | {"hull": box((0.2, 0.06, 0.06), (0, 0.03, 0))}
     open_half = right | {"hull": without_a_side(closed["hull"], 1)}
     away = {name: shape.copy().apply_translation([0, 0.3, 0]) for name, shape in open_half.items()}
     for name, half in (("closed", closed), ("open", open_half), ("away", away)):
-        assert draft(saved(tmp_path / f"{name}.obj", half), "--category", "UAV")[0] == 2
-        assert f"{name}.obj: one half of a target, cut off along y" in capsys.readouterr().err
+        assert f"{name}.obj: one half of a target, cut off along y" in refused(
+            saved(tmp_path / f"{name}.obj", half), "--category", "UAV"
+        )
     corner = {name: shape.copy().apply_translation([0.23, 0.21, 0.1]) for name, shape in shapes.items()}
     assert draft(saved(tmp_path / "corner.obj", corner), "--category", "UAV")[0] == 0
     van = {"hull": without_a_side(box((4, 2, 2)), 0)}
     words = (saved(tmp_path / "van.obj", van), "--category", "Vehicle", "--unit", "m", "--up", "z", "--wheels", "0")
-    assert draft(*words)[0] == 2 and "or give --front x where" in capsys.readouterr().err
+    assert "or give --front x where" in refused(*words)
     assert draft(*words, "--front", "x")[0] == 0
 
 
@@ -227,16 +235,14 @@ def test_a_size_that_does_not_fit_is_refused_with_the_line_to_write(factor, word
     assert re.search(words, error)
 
 
-def test_blades_by_name_of_which_some_stand_alone_are_asked_for_by_number(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_blades_by_name_of_which_some_stand_alone_are_asked_for_by_number(tmp_path, refused):
     shapes = {"hull": box((0.2, 0.12, 0.06))}
     for index, (x, y) in enumerate(HUBS):
         for side in (-1, 1):
             shape = box((0.1, 0.01, 0.004), (side * 0.055, 0, 0))
             shapes[f"blade{index}{side}"] = turned(shape, np.pi / 4 * (index == 0), [0, 0, 1], (x, y, 0.06))
     path = saved(tmp_path / "craft.obj", shapes)
-    assert draft(path, "--category", "UAV")[0] == 2
-    assert "5 rotors found, expected --rotors 5 where that is all" in capsys.readouterr().err
+    assert "5 rotors found, expected --rotors 5 where that is all" in refused(path, "--category", "UAV")
     assert draft(path, "--category", "UAV", "--rotors", "4")[0] == 0
 
 
@@ -265,12 +271,12 @@ def test_wings_reach_the_body_of_a_bird_whether_it_is_longer_than_its_span_or_no
     assert np.ptp(found.points[:, 1]) == pytest.approx(long, rel=0.03)
 
 
-def test_a_bird_whose_sides_size_or_kind_cannot_be_seen_is_asked_for(tmp_path, capsys):
+def test_a_bird_whose_sides_size_or_kind_cannot_be_seen_is_asked_for(tmp_path, refused):
     path = bird(tmp_path, 0.3, lean=0.07)
-    assert draft(path, "--category", "Bird")[0] == 2
-    assert "left and right of the bird cannot be seen, expected --up and --front" in capsys.readouterr().err
-    assert draft(path, "--category", "Bird", "--size", "717", "--up", "z", "--front", "y")[0] == 2
-    assert "expected 0.08 to 2.5 m for a Bird: give --unit or --size" in capsys.readouterr().err
-    assert draft(path)[0] == 2 and not path.with_suffix(".yaml").exists()
-    assert "bird.obj: its category cannot be seen, expected --category UAV" in capsys.readouterr().err
+    assert "left and right of the bird cannot be seen, expected --up and --front" in refused(path, "--category", "Bird")
+    assert "expected 0.08 to 2.5 m for a Bird: give --unit or --size" in refused(
+        path, "--category", "Bird", "--size", "717", "--up", "z", "--front", "y"
+    )
+    assert "bird.obj: its category cannot be seen, expected --category UAV" in refused(path)
+    assert not path.with_suffix(".yaml").exists()
     assert draft(path, "--category", "Bird", "--up", "z", "--front", "y")[0] == 0

@@ -42,13 +42,9 @@ def test_each_is_as_large_as_its_row_says_and_the_forty_stay_as_they_are(clouds)
     plain = CONFIG["targets"]
     assert load_records(plain["table"], plain["records"]) == {name: RECORDS[name] for name in list(RECORDS)[:40]}
     assert len(MORE) == 10
-    for name, extent in {
-        "Cessna 172S": (11.0, 8.28, None), "JOUAV CW-15": (3.54, None, None), "City bus": (2.55, 11.95, 3.076),
-        "Weather balloon": (1.8, 1.8, None),
-    }.items():  # fmt: skip
-        found = np.ptp(clouds[name].points, axis=0)
-        for value, wanted in zip(found, extent, strict=True):
-            assert wanted is None or value == pytest.approx(wanted, rel=0.01)
+    for name, extent in {"Cessna 172S": (11.0, 8.28), "JOUAV CW-15": (3.54,), "City bus": (2.55, 11.95, 3.076),
+                         "Weather balloon": (1.8, 1.8), "Agusta A109A": (10.97,)}.items():  # fmt: skip
+        assert np.ptp(clouds[name].points, axis=0)[: len(extent)] == pytest.approx(extent, rel=0.01)
     rotor = clouds["MD 520N"]
     blades = rotor.points[rotor.part == 1]
     assert portable.norm(blades[:, :2] - rotor.hinges[1, :2]).max() == pytest.approx(8.33 / 2, rel=0.01)
@@ -56,12 +52,8 @@ def test_each_is_as_large_as_its_row_says_and_the_forty_stay_as_they_are(clouds)
     assert len(turns) == 5 and len(blades) % 5 == 0
     hexacopter = clouds["Yuneec H520"]
     assert hexacopter.kinds.count("rotor") == 6
-    reach = portable.norm(hexacopter.hinges[1:, :2])
-    assert np.allclose(reach, 0.52 / 2)
+    assert np.allclose(portable.norm(hexacopter.hinges[1:, :2]), 0.52 / 2)
     tail = clouds["Agusta A109A"]
-    assert tail.names == ("body", "main rotor", "tail rotor") and np.ptp(tail.points[:, 0]) == pytest.approx(
-        10.97, 0.01
-    )
     assert np.allclose(tail.hinges[1] - tail.hinges[2], [0.33, 6.57, 0.72]) and np.allclose(tail.axes[2], [1, 0, 0])
     counts = tail.record["points_by_part"]
     # Points go by the area of the blades: 4 x 10.97 x 0.335 and 2 x 1.89 x 0.199.

@@ -133,13 +133,6 @@ def test_a_shard_that_is_deleted_by_hand_is_made_again(finished):
 
 
 # Here jobs have really run; tests/workflow/test_workflow_reruns.py changes each setting and the code of each stage.
-def test_a_changed_setting_re_runs_its_stage_and_what_follows(finished, tmp_path):
-    path = tmp_path / "change.yaml"
-    path.write_text(yaml.safe_dump({"noise": {"snr_db": [9, float("inf")]}}))
-    rules = planned(finished, "--configfile", "overlay.yaml", str(path), "--", "data")
-    assert rules - {"data", "configuration", "gallery"} == following("noise")
-
-
 def test_edited_code_re_runs_its_stage_and_what_follows(finished):
     path = finished / "src/lowalt/echo/api.py"
     before = path.read_text()
@@ -149,15 +142,6 @@ def test_edited_code_re_runs_its_stage_and_what_follows(finished):
     finally:
         path.write_text(before)
     assert rules == following("echo")
-
-
-def test_a_wrong_configuration_starts_no_job(tmp_path, finished):
-    path = tmp_path / "wrong.yaml"
-    path.write_text(yaml.safe_dump({"targets": {"select": ["Dodo"]}}))
-    text = snakemake(finished, "--configfile", "overlay.yaml", str(path), "--", "data", status=2)
-    head, sentence = text.split("error: ")
-    assert sentence.startswith("targets.select: ['Dodo'], expected names of the table")
-    assert head.count("\n") <= 1 and sentence.strip().count("\n") == 0
 
 
 def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(finished, tmp_path):

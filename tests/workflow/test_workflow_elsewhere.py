@@ -3,20 +3,12 @@
 from pathlib import Path
 from types import SimpleNamespace
 
-import pytest
-
 from lowalt.files.shipped import SHIPPED, as_named, located
 from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow.sources import code, sources
 from lowalt.workflow.stage_settings import Settings
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(autouse=True)
-def checkout(monkeypatch):
-    """Paths of the default configuration are relative to the checkout."""
-    monkeypatch.chdir(ROOT)
 
 
 def test_code_is_the_sources_relative_to_the_checkout_or_absolute_elsewhere(tmp_path, monkeypatch):

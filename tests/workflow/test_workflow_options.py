@@ -18,12 +18,6 @@ from lowalt.workflow.stage_settings import Settings
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 
 
-@pytest.fixture(autouse=True)
-def checkout(monkeypatch):
-    """Paths of the default configuration are relative to the checkout."""
-    monkeypatch.chdir(Path(__file__).parents[2])
-
-
 @pytest.mark.parametrize(("name", "given", "words"), [
     ("occluders", {"occluders": ["a b", "c"]}, ["--occluders", "a b", "c"]),
     ("powers", {"powers": ["a", "b"]}, ["--powers", "a", "b"]),

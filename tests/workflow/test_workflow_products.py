@@ -19,12 +19,6 @@ ROOT = Path(__file__).parents[2]
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 
 
-@pytest.fixture(autouse=True)
-def checkout(monkeypatch):
-    """Paths of the default configuration are relative to the checkout."""
-    monkeypatch.chdir(ROOT)
-
-
 def test_the_default_run_names_what_it_trains_in_the_configuration_s_order():
     run = run_of({"recognition": {"seeds": [4, 5], "protocols": ["unseen"]}})
     assert run.trainings == [

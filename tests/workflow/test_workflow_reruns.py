@@ -50,16 +50,12 @@ from snakemake_texts import declared
 pytest.importorskip("snakemake")
 pytestmark = pytest.mark.workflow
 
-TRAINING = {"recognition": {"training": {"steps": 50}}}
 CHANGES = {
     # The settings of each stage.
     "seed": Change(WHOLE - MANIFEST, overlay={"seed": 5}),
-    "tilt": Change(MOTION, overlay={"motion": {"tilt_deg": 10.0}}),
     "guard subcarriers": Change(ECHO | TILES | SHARD | INDEX, overlay={"network": {"guard_subcarriers": 20}}),
-    "tolerance": Change(ECHO, overlay={"echo": {"tolerance": 1e-3}}),
     "scene": Change(ECHO, ("power.npy",), overlay={"effects": {"adc": {}}}),
     "SNR list": Change(NOISE | SHARD, overlay={"noise": {"snr_db": [9, float("inf")]}}),
-    "spectra": Change(TILES | INDEX, overlay={"spectra": {"vrp": {"hop": 2}}}),
     "colour map": Change(TILES | INDEX | TRAIN, overlay={"images": {"colour_map": "magma"}}),
     "more motion models": Change(
         set(), ("Missing output files",), overlay={"motion": {"models": 30}}, expected=grown("00002")
@@ -81,15 +77,11 @@ CHANGES = {
         ("Missing output files", "Params have changed", "Set of input files has changed"),
         overlay={"network": {"stations": {"D": {"position_m": [800.0, 800.0, 25.0], "normal_deg": 225.0}}}},
     ),
-    "split": Change(SHARD, overlay={"split": {"val": 2, "train": 7}}),
     "kind of shards": Change(
         set(),
         overlay={"shards": {"kind": "signal"}},
         expected=with_what_follows(SHARD | SETTINGS | MANIFEST, images=False),
     ),
-    "training steps": Change(TRAIN, overlay=TRAINING),
-    "network": Change(TRAIN, overlay={"recognition": {"network": {"heads": 2}}}),
-    "augmentation": Change(TRAIN, overlay={"recognition": {"augmentation": {"mirror": 0.0}}}),
     "nodes": Change(
         TRAIN, ("'lowalt.recognition.nodes', '2', '1'",), overlay={"recognition": {"processes": 2, "nodes": 2}}
     ),

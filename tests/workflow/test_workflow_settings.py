@@ -25,12 +25,6 @@ SETTINGS_OF = {
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 
 
-@pytest.fixture(autouse=True)
-def checkout(monkeypatch):
-    """Paths of the default configuration are relative to the checkout."""
-    monkeypatch.chdir(ROOT)
-
-
 @pytest.mark.parametrize(
     ("overlay", "changed"),
     [

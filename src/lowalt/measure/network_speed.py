@@ -109,11 +109,10 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
-    line.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
     line.add_argument("--out", required=True, help="record to write (.json)")
     options = line.parse_args(arguments)
     scheme = named(options.schemes, options.scheme, options.stations)
-    record = measure(scheme, scheme.settled(options.settings), options.limit_s)
+    record = measure(scheme, scheme.settled(options.settings))
     with replacing(options.out) as temporary:
         temporary.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
 

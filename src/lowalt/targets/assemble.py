@@ -15,8 +15,7 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.sampling import face_normals, sample_faces, thin
-from lowalt.targets.surfaces import Surface, inside, merged
+from lowalt.targets.surfaces import Surface, face_normals, inside, merged, sample_faces, thin
 
 CANDIDATES_PER_POINT = 12
 """Dense samples drawn for each wanted point before the farthest-point thinning."""

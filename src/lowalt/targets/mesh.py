@@ -25,7 +25,7 @@ from lowalt.targets.mesh_parts import Pool, cut_parts, hinged, pool_of, refuse_s
 from lowalt.targets.mesh_record import body_axes, check_record, ordered_parts
 from lowalt.targets.mesh_size import refuse_implausible, sized
 from lowalt.targets.record_schema import record_files
-from lowalt.targets.sampling import thin
+from lowalt.targets.surfaces import thin
 
 __all__ = ["check_record", "mesh_cloud"]
 

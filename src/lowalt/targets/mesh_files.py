@@ -1,7 +1,7 @@
 """Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a target.
 
 Files are read in `mesh_scene`; pymeshlab repairs, since its filters keep two million triangles within seconds and a
-gigabyte; sampling is `sampling`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
+gigabyte; sampling is that of `surfaces`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
 """
 
 import warnings
@@ -16,7 +16,7 @@ from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import stated_metres
-from lowalt.targets.mesh_obj import stated_unit
+from lowalt.targets.mesh_polygons import stated_unit
 from lowalt.targets.mesh_scene import selected
 from lowalt.targets.surfaces import Surface, merged
 

@@ -15,8 +15,8 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.numerics.matrices import thinnest
 from lowalt.targets.mesh_files import Mesh, joined, read_mesh
-from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation
+from lowalt.targets.surfaces import face_normals, sample_faces
 
 SHARED_LIMIT = 0.01
 """Largest share of its samples that a region may have in common with another: regions that touch share a border."""

@@ -1,7 +1,16 @@
-"""Pieces of mesh files, their polygons and strips of triangles, as viewers show them: a polygon with a dent is cut by
-earcut, not as a fan."""
+"""Pieces of mesh files, and files of polygons, OBJ and PLY, as viewers show them: a polygon with a dent is cut by
+earcut, not as a fan; strips are triangles.
 
+Of OBJ files vertices, faces and the names of objects, groups and materials are read; of PLY files polygons of any and
+of mixed sizes, and strips, in text and in both binary orders. trimesh counts negative indices of OBJ from the file's
+end, cuts polygons as fans and splits by one kind of name at a time; it drops strips of PLY, and takes all faces of a
+binary file to be as long as its first (Blender writes mixed ones).
+Sources: Wavefront's Object Files (.obj), version 3.0; Greg Turk, The PLY Polygon File Format (1994).
+"""
+
+import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -83,3 +92,160 @@ def stripped(strip: np.ndarray) -> np.ndarray:
         result.append(faces)
     faces = np.concatenate(result)
     return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+
+
+NAMES = ("o", "g", "usemtl")
+
+
+def read_obj(path: Path) -> list[Piece]:
+    """Return the surface of each object, group and material of a file.
+
+    Raises: InputError naming the file and the line that cannot be read, or the face that has no such vertex.
+    """
+    places: list[list[float]] = []
+    corners: list[int] = []
+    counts: list[int] = []
+    owners: list[int] = []
+    keys: dict[tuple[str, ...], int] = {}
+    now = dict.fromkeys(NAMES, "")
+    text = path.read_text(encoding="utf-8-sig", errors="replace").replace("\\\n", " ")
+    for number, line in enumerate(text.splitlines(), 1):
+        word, _, values = line.strip().partition(" ")
+        try:
+            if word == "v":
+                places.append([*map(float, values.split()[:3])])
+                if len(places[-1]) < 3:
+                    raise ValueError("fewer than three coordinates")
+            elif word == "f":
+                face = [int(corner.split("/", 1)[0]) for corner in values.split("#", 1)[0].split()]
+                # A negative index counts back from the vertices so far.
+                corners += [index - 1 if index > 0 else len(places) + index if index else -1 for index in face]
+                counts.append(len(face))
+                owners.append(keys.setdefault(tuple(now.values()), len(keys)))
+            elif word in NAMES:
+                now[word] = values.strip()
+        except (ValueError, OverflowError) as error:
+            raise InputError(f"{path}: line {number}: {line.strip()[:60]!r} cannot be read ({error})") from None
+    vertices = np.array(places, float).reshape(-1, 3)
+    faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
+    owner, pieces = np.array(owners, int)[polygon], []
+    # trimesh's own names of materials, from the last to the first, which records may have.
+    base = next((names[0] for names in keys if names[0]), path.name)
+    materials = list(dict.fromkeys(names[2] for names in keys))[::-1]
+    older = {name: f"{base}_{index}" if index else base for index, name in enumerate(materials)}
+    for names, index in keys.items():
+        used, inverse = np.unique(faces[owner == index], return_inverse=True)
+        known = [name for name in names if name] or [path.name]
+        known += [older[names[2]]] if len(materials) > 1 and older[names[2]] not in {key[0] for key in keys} else []
+        pieces.append(Piece(vertices[used], inverse.reshape(-1, 3), tuple(dict.fromkeys(known))))
+    return pieces
+
+
+def stated_unit(path: Path) -> str:
+    """Return the unit that a comment at the start of an OBJ file names, as a word of `UNITS_M`; "" where none does.
+
+    Blender, SketchUp and others write such as "# File units = inches"; a comment names it after the word unit.
+    """
+    words = {"m": "met(?:er|re)s?|m", "cm": "centimet(?:er|re)s?|cm", "mm": "millimet(?:er|re)s?|mm",
+             "in": "inch(?:es)?|in", "ft": "f(?:ee|oo)t|ft"}  # fmt: skip
+    with path.open(errors="replace") as file:
+        for line, _ in zip(file, range(200), strict=False):
+            stated = re.match(r"\s*#.*\bunits?\b\W*(?:(?:in|is|are)\b)?\W*1?\W*([a-z]+)", line, re.IGNORECASE)
+            for unit, pattern in words.items() if stated else ():
+                if re.fullmatch(pattern, stated[1], re.IGNORECASE):
+                    return unit
+    return ""
+
+
+TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
+}  # fmt: skip
+ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+class _Ply:
+    """A PLY file: `elements` (name, count, properties as words), and its data, read from the front."""
+
+    def __init__(self, data: bytes) -> None:
+        end = data.index(b"end_header")
+        self.data, self.at, self.elements = data, data.index(b"\n", end) + 1, []
+        lines = [line.split() for line in data[:end].decode("latin-1").splitlines()]
+        kind = next((words[1] for words in lines if words[:1] == ["format"]), "")
+        if not data.startswith(b"ply") or kind not in ORDERS:
+            raise ValueError(f"format {kind!r}, expected a PLY of format {list(ORDERS)}")
+        for words in lines:
+            if words[:1] == ["element"]:
+                if not words[2].isdecimal():
+                    raise ValueError(f"{words[2]!r} of {words[1]}, expected a count")
+                self.elements.append((words[1], int(words[2]), []))
+            elif words[:1] == ["property"]:
+                self.elements[-1][2].append(words[1:])
+        self.order = ORDERS[kind]
+        if not self.order:  # the numbers of a text, as if they were stored one by one
+            self.data, self.at = np.array(data[self.at :].split(), float).tobytes(), 0
+
+    def dtype(self, word: str) -> np.dtype:
+        """The type of a number as it is stored."""
+        return np.dtype(self.order + TYPES[word]) if self.order else np.dtype("f8")
+
+    def take(self, dtype: np.dtype, count: int) -> np.ndarray:
+        """The next `count` numbers or records. Raises: ValueError where the file ends before."""
+        values = np.frombuffer(self.data, dtype, count, self.at) if count else np.zeros(0, dtype)
+        self.at += dtype.itemsize * count
+        return values
+
+    def size(self, words: list[str]) -> int:
+        """The length of the next list. Raises: ValueError where it is negative."""
+        size = int(self.take(self.dtype(words[1]), 1)[0])
+        if size < 0:
+            raise ValueError(f"a list of {size} numbers")
+        return size
+
+    def element(self, count: int, properties: list[list[str]]) -> dict[str, np.ndarray | list[np.ndarray]]:
+        """The values of an element's properties by name: at once where all lists of a property are as long as its first
+        one, else list by list."""
+        if not count or not properties:
+            return {}
+        start, fields = self.at, []
+        for number, words in enumerate(properties):
+            kind = self.dtype(words[-2])
+            if words[0] == "list":
+                size = min(self.size(words), len(self.data))
+                fields.append((f"size {number}", self.dtype(words[1])))
+                kind = np.dtype((kind, (size,)))
+            fields.append((words[-1], kind))
+            self.at = start + np.dtype(fields).itemsize
+        self.at, rows = start, np.dtype(fields)
+        if start + rows.itemsize * count <= len(self.data):
+            table = self.take(rows, count)
+            if all((table[name] == table[name][0]).all() for name in table.dtype.names if name.startswith("size ")):
+                return {words[-1]: table[words[-1]] for words in properties}
+        self.at, values = start, {words[-1]: [] for words in properties}
+        for _ in range(count):
+            for words in properties:
+                size = self.size(words) if words[0] == "list" else 1
+                values[words[-1]].append(self.take(self.dtype(words[-2]), size))
+        return values
+
+
+def read_ply(path: Path) -> list[Piece]:
+    """Return a file's one surface, which has the file's name.
+
+    Raises: exceptions of many types for a damaged file.
+    """
+    ply, vertices, polygons, faces = _Ply(path.read_bytes()), np.zeros((0, 3)), [], []
+    for name, count, properties in ply.elements:
+        values = ply.element(count, properties)
+        lists = next((values[word] for word in ("vertex_indices", "vertex_index") if word in values), [])
+        if name == "vertex" and values:
+            vertices = np.stack([np.asarray(values[axis], float).reshape(-1) for axis in "xyz"], axis=1)
+        elif name == "face":
+            polygons = lists
+        elif name.startswith("tristrip"):
+            faces += [stripped(np.asarray(strip).astype(np.int64)) for strip in lists]
+    if len(polygons):
+        counts = np.array([len(polygon) for polygon in polygons])
+        faces.append(triangulated(vertices, counts, np.concatenate(polygons).astype(np.int64))[0])
+    return [Piece(vertices, np.concatenate(faces) if faces else np.zeros((0, 3), np.int64), (path.name,))]

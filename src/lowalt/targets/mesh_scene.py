@@ -1,6 +1,6 @@
 """The pieces of a mesh file by name: a scene's surfaces, and the objects, groups and materials of an OBJ file.
 
-OBJ, PLY and GLB have readers of their own (`mesh_obj`, `mesh_ply`, `mesh_glb`), which say why; trimesh reads STL and
+OBJ, PLY and GLB have readers of their own (`mesh_polygons`, `mesh_glb`), which say why; trimesh reads STL and
 DAE and places a scene's surfaces. Every error names the file and the reason. This module repairs no surface and knows
 no target.
 """
@@ -15,9 +15,7 @@ import numpy as np
 from lowalt.files.errors import InputError, reading
 from lowalt.targets.mesh_collada import for_trimesh
 from lowalt.targets.mesh_glb import read_glb
-from lowalt.targets.mesh_obj import read_obj
-from lowalt.targets.mesh_ply import read_ply
-from lowalt.targets.mesh_polygons import Piece
+from lowalt.targets.mesh_polygons import Piece, read_obj, read_ply
 
 
 def _scene(path: Path) -> list[Piece]:

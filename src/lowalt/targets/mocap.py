@@ -1,6 +1,6 @@
 """Recordings: from CMU's skeleton and motion files to a cyclic track of the 31 nodes.
 
-`mocap_files` reads the files, `mocap_motion` turns the bones, `mocap_cycle` finds and closes the best cycle. This
+`mocap_files` reads the files, `mocap_motion` turns the bones, finds and closes the best cycle. This
 module checks records and makes a cloud of the published height from the cycle. Axes of the result: x right, y front,
 z up, metres.
 """
@@ -16,10 +16,19 @@ from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
-from lowalt.targets.mocap_cycle import closed, find_cycle, refuse_short, refuse_strange_rate
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import moved, read_bvh, read_joints, to_nodes
-from lowalt.targets.mocap_motion import Motion, front, nodes_m, posed, refuse_glitches
+from lowalt.targets.mocap_motion import (
+    Motion,
+    closed,
+    find_cycle,
+    front,
+    nodes_m,
+    posed,
+    refuse_glitches,
+    refuse_short,
+    refuse_strange_rate,
+)
 from lowalt.targets.record_schema import record_files
 from lowalt.targets.skeleton import NODES, node_cloud, stature_m
 

@@ -1,20 +1,41 @@
-"""The motion of a recording: angles turn the bones of the skeleton.
+"""The motion of a recording: angles turn the bones of the skeleton, and the stretch whose end is most like its start is
+found and closed to a cycle without a jump.
 
 Axes of the result: x right, y front, z up, metres. The files themselves are read in `mocap_files`.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
+from lowalt.numerics.matrices import nearest_rotations
 from lowalt.numerics.portable import applied, product
 from lowalt.targets.mocap_files import Skeleton
 from lowalt.targets.skeleton import NODES, PARENTS, forward_kinematics, rotation
 
 FROM_FILE = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 """File axes (x left, y up, z front) to ours (x right, y front, z up): a proper rotation."""
+
+FADE_S = 0.15
+"""Length of the cross-fade that closes a cycle: about a quarter of a step, at most a sixth of the recording."""
+
+SHORTEST_S = 0.5
+"""Shortest cycle that is looked for in a long recording: about two steps of the fastest sprinters."""
+
+SHORTEST_GAIT_S = 0.3
+"""Shortest cycle that is accepted in a short recording: half of the shortest stride."""
+
+WALK_RATIO_S = (0.29, 0.62)
+"""Step length (m) times the time of a step (s), of a person of USUAL_M: adults have 0.38 at every speed of walking and
+runners 0.4 to 0.55; a rate that is wrong by two doubles or halves it. Source: Sekiya and Nagasaki, Gait and Posture 7
+(1998); our own limits around CMU's walks and runs, which have 0.34 to 0.52."""
+USUAL_M = 1.75
+
+BLOCK = 256
+"""Number of starts of a cycle that are compared with all ends in one matrix product."""
 
 
 @dataclass(frozen=True)
@@ -87,3 +108,106 @@ def refuse_glitches(positions: np.ndarray, rate_hz: float, limit_mps2: float, wh
             f"expected at most {limit_mps2:.0f}: a glitch or a pose before the motion, to leave out by first_frame or "
             "last_frame"
         )
+
+
+def refuse_short(frames: int, rate_hz: float, where: str) -> None:
+    """Raise InputError naming `where` if the recording is shorter than two cycles of SHORTEST_GAIT_S.
+
+    In a short recording `find_cycle` looks for cycles of half its length and longer.
+    """
+    needed = math.ceil(2 * SHORTEST_GAIT_S * rate_hz)
+    if frames < needed:
+        raise InputError(
+            f"{where}: {frames} frames, {frames / rate_hz:.3g} s, expected at least {needed} "
+            f"({2 * SHORTEST_GAIT_S:g} s at {rate_hz:g} Hz) for a cycle of a walk or run"
+        )
+
+
+def refuse_strange_rate(track: np.ndarray, rate_hz: float, speed_mps: float, stature: float, where: str) -> None:
+    """Raise InputError naming `where` if the steps of a closed cycle are too quick or too slow for their length.
+
+    track: (F, 31, 3) m, front +y; stature: of the person, in m. Nothing is said of a cycle whose feet do not swing.
+    """
+    apart = track[:, NODES.index("ltibia"), 1] - track[:, NODES.index("rtibia"), 1]
+    swing = np.abs(np.fft.rfft(apart - apart.mean()))
+    if np.ptp(apart) < 0.05 * stature or len(swing) < 2:
+        return
+    step_s = len(track) / rate_hz / int(swing[1:].argmax() + 1) / 2
+    ratio = speed_mps * step_s**2 * USUAL_M / stature
+    if not WALK_RATIO_S[0] <= ratio <= WALK_RATIO_S[1]:
+        other = rate_hz / 2 if ratio < WALK_RATIO_S[0] else rate_hz * 2
+        raise InputError(
+            f"{where}: at {rate_hz:g} frames a second it moves {speed_mps:.2f} m/s in {1 / step_s:.2g} steps a second, "
+            f"unlike a person; is it of {other:g}? Write the right rate, `rate_hz: {other:g}`, or to insist "
+            f"`rate_hz: {rate_hz:g}`"
+        )
+
+
+def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
+    """Return (start, end, fade, mismatch) of the cycle start..end-1 that closes best, in frames and metres.
+
+    The mismatch of two frames is the root mean square over the nodes of the difference in place and of the difference
+    in velocity times the fade's length, without the horizontal motion of the root. Among the cycles whose mismatch is
+    at most 1.5 times the least, the longest is taken, for variety. A cycle must move at least half as fast as the
+    fastest one, so that standing is no cycle. At least `fade` frames follow its end.
+    """
+    frames = len(motion.root_m)
+    fade = max(1, min(round(FADE_S * motion.rate_hz), frames // 6))
+    shortest = max(2 * fade, 2, min(round(SHORTEST_S * motion.rate_hz), frames // 2))
+    positions = nodes_m(motion)
+    positions[..., :2] -= positions[:, :1, :2]
+    velocity = np.gradient(positions, axis=0) * fade
+    state = np.concatenate([positions, velocity], axis=1).reshape(frames, -1)
+    place, square = motion.root_m[:, :2], portable.dot(state, state)
+    # Only pairs (start, end) of a few starts at a time: all pairs of a long recording would take gigabytes.
+    blocks = [np.arange(first, min(first + BLOCK, frames)) for first in range(0, frames, BLOCK)]
+    fastest = max(_speeds(place, starts, shortest, fade).max() for starts in blocks)
+    least, candidates = np.inf, []
+    for starts in blocks:
+        distance = square[starts, None] + square - 2 * product(state[starts], state.T)
+        distance = np.sqrt(np.maximum(distance, 0) / len(NODES))
+        distance[_speeds(place, starts, shortest, fade) < max(fastest / 2, 0.0)] = np.inf
+        least = min(least, float(distance.min()))
+        row, end = np.nonzero(distance <= 1.5 * least)
+        candidates.append(np.stack([starts[row], end, distance[row, end]], axis=1))
+    start, end, distance = np.concatenate(candidates).T
+    good = distance <= 1.5 * least
+    longest = (end - start)[good].max()
+    best = np.flatnonzero(good & (end - start == longest))
+    best = best[np.argmin(distance[best])]
+    start, end = int(start[best]), int(end[best])
+    return start, end, fade, float(portable.norm(state[start] - state[end]) / np.sqrt(len(NODES)))
+
+
+def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:
+    """Return the horizontal speed (S, F) in metres a frame from each start to each end.
+
+    The value is -1 where the two are no cycle: fewer than `shortest` frames lie between them, or fewer than `fade`
+    frames follow the end.
+    """
+    ends = np.arange(len(place))[None]
+    length = ends - starts[:, None]
+    way = portable.norm(place[None] - place[starts, None])
+    return np.where((length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0)
+
+
+def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.ndarray]:
+    """Return the cycle start..end-1, closed in place and velocity, and the drift (2,) in m/s taken out of it.
+
+    The root's uniform horizontal drift over the cycle is taken out; its bob and sway stay. The first `fade` frames of
+    the cycle are blended with the frames that follow its end, by weights w that rise from 0 to 1 with slope zero at
+    both ends: w x first frames + (1 - w) x following frames. Blended rotations are made orthogonal again, so bones keep
+    their lengths.
+    """
+    count = end - start
+    drift = (motion.root_m[end] - motion.root_m[start]) / count * [1, 1, 0]
+    root = motion.root_m - np.arange(-start, len(motion.root_m) - start)[:, None] * drift
+    turned = motion.turned[start:end].copy()
+    place = np.arange(fade) / fade
+    weight = place**2 * (3 - 2 * place)
+    after = slice(end, end + fade)
+    looped = root[start:end].copy()
+    looped[:fade] = weight[:, None] * looped[:fade] + (1 - weight[:, None]) * root[after]
+    weight = weight[:, None, None, None]
+    turned[:fade] = nearest_rotations(weight * turned[:fade] + (1 - weight) * motion.turned[after])
+    return Motion(looped, turned, motion.bones_m, motion.rate_hz), drift[:2] * motion.rate_hz

@@ -13,8 +13,7 @@ from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut_parts, inside
 from lowalt.targets.mesh_record import body_axes, ordered_parts
 from lowalt.targets.occluders import GRAIN, longest_edge, quartered
-from lowalt.targets.sampling import face_normals
-from lowalt.targets.surfaces import Surface, merged
+from lowalt.targets.surfaces import Surface, face_normals, merged
 
 TRIANGLES = 1500
 """Most triangles a part keeps."""

@@ -9,10 +9,10 @@ import struct
 
 import deflate
 import numpy as np
+from numba import njit
 from PIL.PngImagePlugin import PngImageFile
 
 from lowalt.files.errors import InputError
-from lowalt.tiles.filters import apply_paeth
 from lowalt.tiles.huffman import zlib_compress
 
 MOST_EXPANSION = 1032
@@ -23,6 +23,35 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 def _chunk(name: bytes, body: bytes) -> bytes:
     """A chunk of a PNG: length, name, body, checksum."""
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", deflate.crc32(name + body))
+
+
+@njit(cache=True)
+def apply_paeth(image, out):
+    """Filter image (H, W) uint8 into out (H, W + 1) uint8: filter type 4, then pixel minus Paeth predictor.
+
+    Source: PNG specification (W3C, third edition), section 9.
+    """
+    height, width = image.shape
+    for r in range(height):
+        line = out[r]
+        row = image[r]
+        line[0] = 4
+        if r == 0:
+            line[1] = row[0]
+            for c in range(1, width):
+                line[c + 1] = row[c] - row[c - 1]
+            continue
+        up = image[r - 1]
+        line[1] = row[0] - up[0]
+        for c in range(1, width):
+            a = np.int16(row[c - 1])
+            b = np.int16(up[c])
+            d = np.int16(up[c - 1])
+            to_a = np.int16(abs(b - d))
+            to_b = np.int16(abs(a - d))
+            to_d = np.int16(abs(np.int16(a + b) - np.int16(d + d)))
+            best = a if to_a <= to_b and to_a <= to_d else (b if to_b <= to_d else d)
+            line[c + 1] = np.uint8(np.int16(row[c]) - best)
 
 
 def encode(image: np.ndarray, palette: np.ndarray) -> bytes:
