@@ -13,7 +13,7 @@ from skips import Skips
 # `test_contributing` copies the tree: in the copy it would be compiled once more.
 LONG = (
     "test_workflow", "test_effects", "test_workflow_reruns", "test_recognition_resume", "test_recognition_training",
-    "test_wheel", "test_contributing", "test_recognition_ranks", "test_stations", "test_echo", "test_bytes",
+    "test_wheel", "test_contributing", "test_recognition_ranks", "test_echo", "test_bytes",
     "test_house", "test_dataset", "test_workflow_locks", "test_classes", "test_effects_occlusion",
     "test_recognition_sharing", "test_recognition_memory",
     "test_report_plots", "test_effects_every", "test_attacks", "test_recordings_unseen", "test_benchmarks_long_run",

@@ -1,23 +1,31 @@
-"""Classes are the words of the table of targets: two, five and others go from clouds to the page."""
+"""Classes are the words of the table of targets, stations those of the network: all go from clouds to the page."""
 
 import json
 import re
 
 import numpy as np
 import pytest
+import yaml
 
-from chain import SNRS, TARGETS, WAVE, recognised, reported, simulated
+from chain import SIZE, SNRS, TARGETS, WAVE, recognised, reported, simulated
 from lowalt.config import classes
-from lowalt.config.layers import load
+from lowalt.config.layers import load, merge
+from lowalt.config.network import Network, station_names
 from lowalt.files.atomic import sha256
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
+from lowalt.recognition import schemes
 from lowalt.report.page import PARTS
-from lowalt.targets.records import load_table, merge
+from lowalt.targets.records import load_table
+from lowalt.targets.records import merge as merged
 from pages import sound
 
-STATIONS = {"A": {"position_m": [0.0, 0.0, 25.0], "normal_deg": 60.0}}
-NETWORK = WAVE | {"stations": STATIONS}
+STATIONS = ("west", "A", "east", "B2", "north")
+"""Not in alphabetical order, of one letter and of more."""
+PLACES = {
+    name: {"position_m": [100.0 * number, 20.0 * number, 25.0], "normal_deg": 60.0 + 10 * number}
+    for number, name in enumerate(STATIONS)
+}
 FIVE = {**TARGETS, "Glider": "Fixed-wing", "DJI Avata": "UAV"}
 TWO = {"Heron": "Large bird", "Crow": "Small bird", "Eagle": "Large bird"}
 TABLE = "config/targets.csv"
@@ -29,13 +37,14 @@ def rows(targets):
     return {name: row | {"name": name, "category": category} for name, category in targets.items()}
 
 
-@pytest.mark.parametrize("targets", [FIVE, TWO], ids=["five", "two"])
-def test_every_command_takes_the_classes_of_the_table(tmp_path, targets):
+@pytest.mark.parametrize(("count", "targets"), [(1, FIVE), (5, TWO)], ids=["five classes", "five stations"])
+def test_every_command_takes_the_classes_of_the_table_and_any_stations(tmp_path, count, targets):
     pytest.importorskip("torch")
     names = tuple(dict.fromkeys(targets.values()))
+    network = WAVE | {"stations": {name: PLACES[name] for name in STATIONS[:count]}}
     schema = "workflow/schemas/config.schema.yaml"
-    config = load(["config/default.yaml"], schema) | {"run": "own", "network": NETWORK, "noise": {"snr_db": SNRS}}
-    clouds = simulated(tmp_path, NETWORK, targets)
+    config = load(["config/default.yaml"], schema) | {"run": "own", "network": network, "noise": {"snr_db": SNRS}}
+    clouds, stations = simulated(tmp_path, network, targets), sorted(STATIONS[:count])
     from lowalt.recognition.runs import load as load_model
     from lowalt.recognition.score import score
     from lowalt.shards import ShardSet
@@ -48,39 +57,63 @@ def test_every_command_takes_the_classes_of_the_table(tmp_path, targets):
         entry = shards.record(number)
         assert names[entry["label"]] == entry["category"] == targets[entry["subtype"]]
         assert shards.labels[number] == entry["label"]
+    # Rows of the tile are the stations, in the order in which their sub-bands follow each other.
+    assert shards.tile(0).shape == (count * 32, 3 * 32)
+    assert [station.name for station in Network.from_settings(network).stations] == stations
     table = {"name": "samples.csv", "path": "samples.csv", "bytes": 1, "sha256": "0"}
-    assert f"Class: {', '.join(f'{n} {name}' for n, name in enumerate(names))}." in json.dumps(
-        metadata(shards.index, table, {})
-    )
+    listed = f"Class: {', '.join(f'{n} {name}' for n, name in enumerate(names))}."
+    assert listed in json.dumps(metadata(shards.index, table, {}))
     assert f"({', '.join(map(classes.plural, names))})" in description(shards)
-    recognised(tmp_path, NETWORK, config, clouds, targets)
+    scheme = recognised(tmp_path, network, config, clouds, targets)
+    views = np.load(tmp_path / "views-train.npz")["views"]
+    # Of five motion models of a subtype three are for training and one for the test, at every SNR.
+    assert views.shape == (3 * len(SNRS) * len(targets), 3 * count, SIZE, SIZE)
+    assert count == 1 or not np.array_equal(views[:, :3], views[:, 3:6])
     trained = load_model(tmp_path / "model/model.pt")
     assert trained.classes == names and trained.model.classifier.out_features == len(names)
     predictions = read_csv(tmp_path / "p.csv")
     columns = [f"p_{classes.word(name)}" for name in names]
     assert [name for name in predictions[0] if name.startswith("p_")] == columns
     assert len(score(tmp_path / "p.csv", tmp_path / "index.json", "seen")["confusion"]) == len(names)
+    (average,) = [line for line in read_csv(tmp_path / "accuracy.csv") if line["snr_db"] == "avg"]
+    assert average["scheme"] == scheme and int(average["samples"]) == len(SNRS) * len(targets)
     confusion = read_csv(tmp_path / "confusion.csv")
     assert {row["category"] for row in confusion} == {row["predicted"] for row in confusion} == set(names)
-    # Of each subtype one motion model of five is for the test, at every SNR.
     for name in names:
         of_class = sum(int(row["samples"]) for row in confusion if row["category"] == name)
         assert of_class == len(SNRS) * list(targets.values()).count(name)
-    words = [classes.word(name) for name in names[1:]]
-    with (tmp_path / "alarms.csv").open() as file:
-        header = file.readline().strip().split(",")
-    ends = ("percent", "low", "high")
+    header = (tmp_path / "alarms.csv").read_text().splitlines()[0].split(",")
+    words, ends = [classes.word(name) for name in names[1:]], ("percent", "low", "high")
     assert header[4:] == [f"{rate}_{end}" for rate in ("detected", *words) for end in ends]
     text = reported(tmp_path, config, clouds, rows(targets))
-    page = sound(text)
     # Parts that the run has nothing for are left out.
-    assert page.links[1:] == [f"#{part.id}" for part in PARTS if f'<section id="{part.id}"' in text]
-    assert page.links[1:4] == ["#run", "#samples", "#results"]
+    assert sound(text).links[1:] == [f"#{part.id}" for part in PARTS if f'<section id="{part.id}"' in text]
     assert f"<code>{sha256(tmp_path / 'index.json')}</code>" in text
+    assert f"{count} base station" in text and f"<td>{scheme}</td>" in text
+    # A panel of the viewer for the echo and for each of the three spectra of each station.
+    assert [text.count(f">{station}: ") for station in stations] == [4] * count
     shown = json.loads(re.search(r'id="viewer-data">(.*?)</script>', text)[1])
     assert shown["classes"] == list(names)
     assert {sample["category"] for sample in shown["samples"]} == set(names)
     assert all(targets[sample["subtype"]] == sample["category"] for sample in shown["samples"])
+
+
+def test_a_station_of_the_layer_below_is_taken_out_and_a_scheme_must_name_known_ones(tmp_path):
+    schema = "workflow/schemas/config.schema.yaml"
+    overlay = {"network": {"stations": {"A": None, "C": None, "tower": PLACES["west"]}}}
+    path = tmp_path / "overlay.yaml"
+    path.write_text(yaml.safe_dump(overlay))
+    config = load(["config/default.yaml", path], schema)
+    assert station_names(config["network"]) == ["B", "tower"]
+    path.write_text(yaml.safe_dump(merge(config, {"network": {"stations": {"B": None, "tower": None}}})))
+    with pytest.raises(InputError, match="stations"):
+        load([path], schema)
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nboth,B+tower,VRP,mean,,seen\none,tower,VRP,mean,,seen\n")
+    assert schemes.named(table, "both", ["B", "tower"]).stations == (0, 1)
+    assert schemes.named(table, "one", ["B", "tower"]).stations == (1,)
+    with pytest.raises(InputError, match=r"line 2: stations 'B\+tower', expected some of \('A', 'B'\)"):
+        schemes.named(table, "both", ["A", "B"])
 
 
 def test_labels_are_places_in_the_order_of_first_rows():
@@ -106,11 +139,11 @@ def test_names_of_classes_stay_apart_as_columns():
 def test_a_class_of_its_own_needs_to_know_what_it_is_like():
     row = load_table(TABLE)["DJI Mini 2"] | {"category": "Other"}
     with pytest.raises(InputError, match="here: category is 'Other', expected a key `like`"):
-        merge(row, {"source": "builtin"}, "here")
+        merged(row, {"source": "builtin"}, "here")
     with pytest.raises(InputError, match="here: like: value 'Plane'"):
-        merge(row, {"source": "builtin", "like": "Plane"}, "here")
+        merged(row, {"source": "builtin", "like": "Plane"}, "here")
     with pytest.raises(InputError, match=r"no \['speed_lo', 'speed_hi'\], expected m/s for a target like a Vehicle"):
-        merge(row, {"source": "builtin", "like": "Vehicle"}, "here")
+        merged(row, {"source": "builtin", "like": "Vehicle"}, "here")
 
 
 def test_heights_are_looked_up_by_subtype_then_class_then_what_it_is_like():

@@ -21,7 +21,7 @@ from lowalt.workflow.locks import TOKEN, Owner, guarded, holders, numbers, refus
 ROOT = Path(__file__).parents[2]
 KEYS = {"input": ["in.txt"], "output": ["out.txt"]}
 # The process id of a process that has ended, and whose number the system has not given to another.
-GONE = Owner(pid=2**22 + 1, token="gone")
+GONE = Owner(pid=2**22 + 1)
 
 SNAKEFILE = """
 from lowalt.workflow import mends
@@ -93,7 +93,7 @@ def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_
     program = "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True); time.sleep(60)"
     heeding, stubborn, another = jobs = [
         subprocess.Popen([sys.executable, "-c", program.format(answer)], env=os.environ | {TOKEN: token}, stdout=-1)
-        for answer, token in (("SIG_DFL", "gone"), ("SIG_IGN", "gone"), ("SIG_IGN", "another"))
+        for answer, token in (("SIG_DFL", GONE.token), ("SIG_IGN", GONE.token), ("SIG_IGN", "another"))
     ]
     for job in jobs:
         job.stdout.readline()
@@ -121,27 +121,30 @@ import sys, time
 from pathlib import Path
 from lowalt.workflow.locks import Owner, guarded, numbers, take, take_over
 
-folder, start = Path(sys.argv[1]), float(sys.argv[2])
-time.sleep(start - time.time())
+folder = Path(sys.argv[1])
+print("ready", flush=True)
+while not (folder / "go").exists():
+    time.sleep(0.001)
 with guarded(folder):
     take_over(folder / "locks", lambda line: None)
-    if not numbers(folder / "locks"):
+    free = not numbers(folder / "locks")
+    if free:
         time.sleep(0.02)
         held = take(folder / "locks", Owner(), {"input": [], "output": ["out.txt"]})
-        print("won")
+print("won" if free else "lost", flush=True)
 sys.stdin.read()
 """
 
 
 def test_of_many_that_find_a_dead_owner_at_the_same_moment_one_wins(tmp_path):
     leave(tmp_path / "locks")
-    start = str(time.time() + 1.5)
-    command = [sys.executable, "-c", RACE, str(tmp_path), start]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    racers = [subprocess.Popen(command, **pipes) for _ in range(6)]
-    time.sleep(2.2)
-    said = [racer.communicate("")[0] for racer in racers]
-    assert sorted(said) == [""] * 5 + ["won\n"]
+    racers = [subprocess.Popen([sys.executable, "-c", RACE, str(tmp_path)], **pipes) for _ in range(6)]
+    assert [racer.stdout.readline() for racer in racers] == ["ready\n"] * 6
+    (tmp_path / "go").touch()
+    assert sorted(racer.stdout.readline() for racer in racers) == ["lost\n"] * 5 + ["won\n"]
+    for racer in racers:
+        racer.communicate("")
 
 
 def test_a_process_that_dies_inside_the_guard_lets_go(tmp_path):
