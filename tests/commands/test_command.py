@@ -2,11 +2,11 @@
 
 import errno
 import json
+import runpy
 import sys
 
 import pytest
 
-from forks import ended
 from lowalt.config.command import pick, refusal, run, settings
 from lowalt.files.atomic import existing, replacing, sha256
 from lowalt.files.errors import InputError
@@ -40,12 +40,15 @@ def test_pick_wants_exactly_its_keys():
         pick({"a": 1, "c": 3}, "a", "b")
 
 
-def test_a_stage_says_in_one_line_what_is_wrong():
-    stages = ["targets", "motion", "echo", "noise", "tiles", "report"]
-    call = "import runpy, sys; sys.argv = ['', '--settings', '@nowhere.json']; runpy.run_module({!r}, None, '__main__')"
-    for status, said, complained in ended([call.format(f"lowalt.{stage}") for stage in stages]):
-        assert (status, said) == (2, "")
-        assert "no file at nowhere.json" in complained and "Traceback" not in complained
+@pytest.mark.parametrize("stage", ["targets", "motion", "echo", "noise", "tiles", "report"])
+def test_a_stage_says_what_is_wrong_and_ends_with_2(stage, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["", "--settings", "@nowhere.json"])
+    monkeypatch.delitem(sys.modules, f"lowalt.{stage}.__main__", raising=False)
+    with pytest.raises(SystemExit) as stopped:
+        runpy.run_module(f"lowalt.{stage}", None, "__main__")
+    said = capsys.readouterr()
+    assert (stopped.value.code, said.out) == (2, "")
+    assert "no file at nowhere.json" in said.err and "Traceback" not in said.err
 
 
 def test_a_path_that_the_system_refuses_is_named_in_one_line(tmp_path, monkeypatch, capsys):

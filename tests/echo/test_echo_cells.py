@@ -68,6 +68,16 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
     assert deep > 0.3 or limit <= 1.6 * truth.max() + 1e-3 * total
 
 
+def test_moments_of_far_cells_are_bounded_with_the_orders_that_the_series_of_the_sine_lacks():
+    """|sum z sin(pi u) y^k| of points at one end of the stretch, where a sine of few orders is cut the most."""
+    table = cell_polynomials(64, 0.3, 1e-2)
+    for place, v in ((3, 1.0), (16, -1.0), (29, 0.9)):
+        powers, far, y = v ** np.arange(table.kernels.shape[2]), np.empty(4), table.half * v
+        far_moments(table.sines, place, np.stack([2 * powers, -powers]), table.half, 2.3, 2.3 * v * v, table.error, far)
+        sine = abs(2 - 1j) * np.sin(np.pi * (place / PLACES - 0.5 + y))
+        assert (far >= abs(sine) * abs(y) ** np.arange(4)).all()
+
+
 def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
     net = network(symbols=30)
     rng = np.random.default_rng(3)

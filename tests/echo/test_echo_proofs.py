@@ -4,11 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from numpy.polynomial.polynomial import polyval
 from scipy.spatial.transform import Rotation
 from test_echo import cloud_in_motion, network, positions
 
 from lowalt.config.network import Station
 from lowalt.echo import Path, Rigid, api, echo_matrix, echo_signal, refine
+from lowalt.echo.fast.error_model import echo_plan, pointwise_bound
 from lowalt.echo.fast.range_bounds import (
     END,
     MEAN,
@@ -26,6 +28,7 @@ from lowalt.echo.fast.range_bounds import (
 )
 from lowalt.echo.pointwise.reference_range import RANGE
 from lowalt.echo.pointwise.results import far_bound
+from lowalt.echo.radar import radar
 
 NET = network(symbols=6)
 SEEN = NET.stations[0]
@@ -92,10 +95,11 @@ SMALL = 1e-4
 """An error that is far above all roundings, and whose square is far below it."""
 
 
-def bounded(monkeypatch, plan: dict, cells: dict) -> tuple:
+def bounded(monkeypatch, plan: dict, cells: dict, array: tuple[int, int] = (16, 4)) -> tuple:
     """A signal of one symbol whose plan and cell kernels have these errors: (result, its bound, sum of peak amplitudes,
     the points' distances from the reference)."""
-    net, motion = network(symbols=1), cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
+    net = network(symbols=1, transmit=array, receive=array)
+    motion = cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
     made, tabulated = refine.echo_plan, refine.cell_polynomials
     none = {"share": 0.0, "peak": 0.0, "phase": 0.0}
     with monkeypatch.context() as patch:
@@ -104,8 +108,8 @@ def bounded(monkeypatch, plan: dict, cells: dict) -> tuple:
         found = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], SMALL * 100)
     places = positions(motion)[0]
     r = np.linalg.norm(places - net.stations[0].position_m, axis=1)
-    # Both arrays of 64 elements, whose weights have unit norm: a0 G = 64.
-    peaks = 64 * 299_792_458 / 4.9e9 / (4 * np.pi) ** 1.5 * (1 / r**2).sum()
+    # The weights of both arrays have unit norm: a0 G is the number of elements of one.
+    peaks = np.prod(array) * 299_792_458 / 4.9e9 / (4 * np.pi) ** 1.5 * (1 / r**2).sum()
     away = np.linalg.norm(places - motion.translation[0, 0], axis=1)
     return found, found.bound * abs(found.signal[0]), peaks, away
 
@@ -117,12 +121,16 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
     assert bound < 1e-11 * total < peaks
     # Where amplitudes are in error, their sum may be larger by as much.
     found, bound, *_ = bounded(monkeypatch, {"share": SMALL}, {})
-    assert (bound, found.totals[0] - total) == pytest.approx((SMALL * total, SMALL * total), rel=1e-3)
+    assert (bound, found.totals[0] - total) == pytest.approx((SMALL * total, SMALL * total), rel=1e-3, abs=0)
     found, bound, *_ = bounded(monkeypatch, {"peak": SMALL}, {})
-    assert SMALL * peaks < bound < 1.1 * SMALL * peaks and found.totals[0] - total == pytest.approx(bound, rel=1e-3)
-    assert bounded(monkeypatch, {}, {"error": SMALL})[1] == pytest.approx(SMALL * total, rel=1e-3)
+    assert SMALL * peaks < bound < 1.1 * SMALL * peaks and found.totals[0] - total == pytest.approx(
+        bound, rel=1e-3, abs=0
+    )
+    assert bounded(monkeypatch, {}, {"error": SMALL})[1] == pytest.approx(SMALL * total, rel=1e-3, abs=0)
     # Gains may be off by as much as they are fitted to, on either side of the arrays.
-    assert 0.02 * SMALL * peaks < bounded(monkeypatch, {"fit": SMALL}, {})[1] < 2.1 * SMALL * peaks
+    for array in ((16, 1), (1, 16)):
+        _, bound, peaks, _ = bounded(monkeypatch, {"fit": SMALL}, {}, array)
+        assert 0.02 * SMALL * peaks < bound < 1.1 * SMALL * peaks
     phase = bounded(monkeypatch, {"phase": SMALL}, {})[1] / SMALL
     assert total * away.min() < phase < 1.3 * total * away.max()
     # A moment of order k takes 3 k + 1 roundings of a power, and those of its product and of the sums.
@@ -132,7 +140,26 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
 
 def test_an_error_of_the_sums_takes_twice_its_size_from_the_lead(monkeypatch):
     plain, worse = (bounded(monkeypatch, {"share": share}, {})[0] for share in (0.0, SMALL))
-    assert worse.gap[0] == pytest.approx(plain.gap[0] - 2 * SMALL * plain.totals[0], rel=1e-3)
+    assert worse.gap[0] == pytest.approx(plain.gap[0] - 2 * SMALL * plain.totals[0], rel=1e-3, abs=0)
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-7, 1e-3])
+def test_a_plan_allows_for_what_its_cosine_and_sine_leave_out_and_round(error):
+    """Order k of a series in t^2 rounds 2 k + 2 times by Horner's rule, weighted by its coefficient at half a turn."""
+    plan = echo_plan(radar(NET, SEEN), 400, error)
+    t = np.linspace(0, 0.5, 400).astype(np.longdouble)
+    cosine, sine = (polyval(t * t, each.astype(np.longdouble)) for each in (plan.cosine, plan.sine))
+    left_out = abs(cosine + 1j * t * sine - np.exp(2j * np.pi * t)).max()
+    often = (2 * np.arange(len(plan.cosine)) + 2) * 0.25 ** np.arange(len(plan.cosine))
+    rounded = np.hypot(often @ abs(plan.cosine), often @ abs(plan.sine) / 2) * np.finfo(plan.cosine.dtype).eps / 2
+    assert left_out + rounded < plan.share < 3 * left_out + 1.5 * rounded + 1e-12
+    assert plan.single == (error == 1e-3) and (error == 0.0 or left_out < error)
+
+
+def test_the_pointwise_bound_allows_for_roundings_of_the_phase_of_large_targets():
+    radio = radar(NET, SEEN)
+    small, large = (pointwise_bound(radio, size_m, 40)[0] for size_m in (1.0, 100.0))
+    assert large - small > 4 * np.pi * radio.turns * 99.0 * 2.0**-53
 
 
 def on_axis(cells: float) -> tuple[Station, np.ndarray]:
@@ -146,8 +173,11 @@ def test_the_pointwise_bound_of_one_point_in_the_beam_is_that_of_its_sum_and_of_
     station, place = on_axis(30.0)
     found = echo_signal(NET, station, place, 1.0, place[0, 0], paths=[Path()])
     share, direction = found.method.pointwise_bound
-    assert share > 0 and direction > 0 and found.bound == pytest.approx(share + direction, rel=1e-6)
+    assert share > 0 and direction > 0 and found.bound == pytest.approx(share + direction, rel=1e-6, abs=0)
     assert (found.method.cheap, found.method.exact, found.method.general) == (0, 0, 1)
+    # Over several paths both count with the sizes of their gains.
+    more = echo_signal(NET, station, place, 1.0, place[0, 0], paths=[Path(), Path(0.0, -3j)])
+    assert more.bound * abs(more.signal[0]) == pytest.approx(4 * found.bound * abs(found.signal[0]), rel=1e-6, abs=0)
 
 
 def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
@@ -158,7 +188,7 @@ def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
     lead, found = strengths[-1] - strengths[-2], echo_signal(*arguments, paths=[Path()])
     bound = found.bound * abs(found.signal[0])
     assert 0.05 * lead < bound < 0.4 * lead
-    assert found.gap[0] == pytest.approx(lead - 2 * bound, rel=0.01)
+    assert found.gap[0] == pytest.approx(lead - 2 * bound, rel=0.01, abs=0)
 
 
 @pytest.mark.parametrize("seed", range(8))

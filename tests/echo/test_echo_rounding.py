@@ -127,10 +127,12 @@ def test_a_sum_of_two_doubles_rounds_once():
 
 
 def test_near_ties_of_cells_go_to_the_truly_strongest():
+    """Points half way between two cells in many directions: their distances round to either side."""
     net = network(symbols=1)
-    station = net.stations[0]
-    for step in range(-3, 4):
-        edge = np.array([[[30.5 * net.cell_m * (1 + step * 2.0**-52), 0.0, 25.0]]])
+    station, rng = net.stations[0], np.random.default_rng(1)
+    for _ in range(30):
+        way = rng.normal((3.0, 0.0, 0.0))
+        edge = (np.array(station.position_m) + 30.5 * net.cell_m * way / np.linalg.norm(way))[None, None]
         result = echo_signal(net, station, edge, 1.0, (150.0, 1.0, 26.0))
         with mpmath.workdps(60):
             values = reference.cells_mp(net, station, edge[0].tolist(), [1.0], (150.0, 1.0, 26.0), [30, 31], 60)

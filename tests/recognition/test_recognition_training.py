@@ -272,7 +272,7 @@ def test_the_average_is_that_of_all_weights_so_far_by_powers_of_the_decay(views,
         torch.testing.assert_close(averages[count - 1], expected, rtol=0, atol=2e-6)
 
 
-def test_the_kept_weights_are_the_last_of_the_best_validations(monkeypatch, views, tmp_path):
+def test_the_final_weights_are_those_validated_last_of_the_best(monkeypatch, views, tmp_path):
     right, kept = iter([0.4, 0.8, 0.8, 0.6]), []
 
     def told(model, source, numbers, *_, **named):

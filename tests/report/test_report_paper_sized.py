@@ -1,8 +1,5 @@
 """A page with tables of the paper's size: every published scheme in both protocols, 40 subtypes, 6 SNRs, 5 seeds."""
 
-import html
-import json
-import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +11,7 @@ from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import assembled, rendered
 from lowalt.report.sections import accuracy, comparisons, confusion, subtypes
 from lowalt.targets.records import load_table
-from pages import browsed, sound
+from pages import sound
 
 pytestmark = pytest.mark.slow
 PUBLISHED = "config/published_accuracy.csv"
@@ -71,19 +68,3 @@ def test_a_page_of_the_paper_s_tables_is_whole_and_light(page):
     assert len(found["Accuracy of each subtype, percent"]["rows"]) == 40
     assert sum(len(table["rows"]) for table in found.values()) > 100
     assert len(page.encode()) < 8e6
-
-
-def test_its_tables_sort_and_filter_in_a_browser(page, tmp_path):
-    script = """
-    const named = (one) => one.caption.textContent.includes("each subtype");
-    const table = [...document.querySelectorAll("table")].find(named), rows = [...table.tBodies[0].rows];
-    const value = (row) => parseFloat(row.cells[row.cells.length - 1].textContent), head = table.tHead.rows[0];
-    head.cells[head.cells.length - 1].querySelector("button").click();
-    const column = [...table.tBodies[0].rows].map(value);
-    const field = table.closest(".scroll").previousElementSibling.querySelector("input");
-    field.value = "Crow"; field.dispatchEvent(new Event("input"));
-    document.body.dataset.said = JSON.stringify([column, rows.filter((row) => !row.hidden).length]);
-    """
-    found = re.search('data-said="(.*?)"', browsed(tmp_path, page, script), re.S)[1]
-    column, shown = json.loads(html.unescape(found))
-    assert len(column) == 40 and column == sorted(column) and 1 <= shown <= 40

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError
-from lowalt.targets.mesh_files import read_mesh, stated_unit_m
-from lowalt.targets.mesh_scene import pieces
+from lowalt.targets.mesh_files import pieces, read_mesh, stated_unit_m
 from real_inputs import FOLDER
 from shown_meshes import CORNERS, FACES, STRIP, TETRAHEDRON, dae, glb, ply, prism, skinned
 

@@ -272,11 +272,14 @@ def test_wings_reach_the_body_of_a_bird_whether_it_is_longer_than_its_span_or_no
 
 
 def test_a_bird_whose_sides_size_or_kind_cannot_be_seen_is_asked_for(tmp_path, refused):
-    path = bird(tmp_path, 0.3, lean=0.07)
-    assert "left and right of the bird cannot be seen, expected --up and --front" in refused(path, "--category", "Bird")
-    assert "expected 0.08 to 2.5 m for a Bird: give --unit or --size" in refused(
-        path, "--category", "Bird", "--size", "717", "--up", "z", "--front", "y"
+    path, axes = bird(tmp_path, 0.3, lean=0.07), ("--category", "Bird", "--up", "z", "--front", "y")
+    assert "left and right of the bird cannot be seen, expected --up" in refused(path, "--category", "Bird")
+    assert "expected 0.08 to 2.5 m for a Bird: give --unit or --size" in refused(path, *axes, "--size", "717")
+    corner = trimesh.Trimesh(
+        [[9, 9, 9], [10, 9, 9], [9, 10, 9], [9, 9, 10]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
     )
+    one_sided = saved(tmp_path / "a.obj", {"a": corner})
+    assert "a.obj: its surface has no right wing, expected one on each side" in refused(one_sided, *axes, "--unit", "m")
     assert "bird.obj: its category cannot be seen, expected --category UAV" in refused(path)
     assert not path.with_suffix(".yaml").exists()
-    assert draft(path, "--category", "Bird", "--up", "z", "--front", "y")[0] == 0
+    assert draft(path, *axes)[0] == 0

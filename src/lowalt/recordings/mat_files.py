@@ -1,6 +1,6 @@
 """Variables of MATLAB files, read in a process of their own: scipy's and HDF5's readers crash on some damaged files.
 
-    python -m lowalt.recordings.mat_files FILE.mat OUT.npz
+    python mat_files.py FILE.mat OUT.npz
 
 The archive holds the numeric variables as `0`, `1`, ... and `names`, a JSON list of their names. A field of a struct is
 named `struct.field`. Files of version 7.3 are HDF5.
@@ -33,7 +33,8 @@ def read_mat(path: Path) -> dict[str, np.ndarray]:
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "variables.npz"
-        line = [sys.executable, "-m", "lowalt.recordings.mat_files", str(path), str(out)]
+        # By its path, so that the process does not import the rest of this room.
+        line = [sys.executable, "-P", __file__, str(path), str(out)]
         ended = subprocess.run(line, capture_output=True, text=True, errors="replace")
         if ended.returncode:
             reason = ended.stderr.strip().splitlines()[-1:] or [f"the reader ended with {ended.returncode}"]

@@ -52,7 +52,7 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
         name = KEY.fullmatch(key)[1]
         group = models.setdefault((label, name in unseen), {})
         group.setdefault(name, []).append(number)
-    rounds: list[list[int]] = [[] for _ in range(MODELS * SNRS)]
+    picks: list[tuple[int, int]] = []
     for _, subtypes in sorted(models.items()):
         known = [name for name in sorted(subtypes) if any(keys[n] in predicted for n in subtypes[name])]
         of_model: dict[tuple, list[int]] = {}
@@ -62,9 +62,8 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
         for place, (_, numbers) in enumerate(sorted(of_model.items())[:MODELS]):
             levels = sorted(numbers, key=lambda number: shards.snrs_db[number])
             steps_shown = dict.fromkeys([len(levels) - 1, 0, len(levels) // 2][:SNRS])
-            for step, level in enumerate(steps_shown):
-                rounds[step * MODELS + place].append(levels[level])
-    return [number for some in rounds for number in some]
+            picks += [(step * MODELS + place, levels[level]) for step, level in enumerate(steps_shown)]
+    return [number for _, number in sorted(picks, key=lambda pick: pick[0])]
 
 
 def predicted_keys(paths: Iterable[str | Path]) -> set[str]:

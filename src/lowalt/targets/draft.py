@@ -81,13 +81,18 @@ def row_lines(
 
 
 def _wings(inspection: Inspection) -> list[str]:
-    """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle."""
+    """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle.
+
+    Raises: InputError where one side has no surface.
+    """
     front, up = "xyz".index(inspection.front[-1]), "xyz".index(inspection.up[-1])
     right = 3 - front - up
     sign = body_axes(inspection.front, inspection.up)[0, right]
     middle, lines = (inspection.low + inspection.high)[right] / 2, []
     for name, side in (("left wing", -sign), ("right wing", sign)):
         out = side * (inspection.points[:, right] - middle)
+        if out.max() <= 0:
+            raise InputError(f"{inspection.path}: its surface has no {name}, expected one on each side of its middle")
         root = inspection.points[(out > inspection.shoulder_m) & (out < 1.3 * inspection.shoulder_m)]
         hinge = np.median(root, axis=0) if len(root) else (inspection.low + inspection.high) / 2
         hinge[right] = middle + side * inspection.shoulder_m
@@ -151,6 +156,7 @@ def drafted(
     own. `groups` are the components that move, `stated_axes` those of "up" and "front" that the user stated. Lines that
     end in CONFIRM hold guesses. Boxes take moving parts out of the body; a bird's wings are the surface farther out
     than `shoulder_m`.
+    Raises: InputError where a bird has no surface on one side.
     """
     category, kind = inspection.category, MOVING_KIND[inspection.category]
     groups = sorted(groups, key=lambda group: group[0].centre.tolist())

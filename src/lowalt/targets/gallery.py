@@ -92,18 +92,15 @@ def figure(clouds: list[Cloud]):
     """Return the matplotlib figure: every cloud fills its panel, in the order given."""
     from matplotlib.figure import Figure
 
-    rows: list[tuple[float, list[Cloud]]] = []
-    for first in range(0, len(clouds), COLUMNS):
-        members = clouds[first : first + COLUMNS]
-        spans = np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members])
-        # Every panel of a row has the same shape, that of its tallest cloud.
-        rows.append((float(np.clip((spans[:, 1] / spans[:, 0]).max(), 0.3, 1.3)), members))
-    heights = [2.6 * aspect + 0.45 for aspect, _ in rows]
+    spans = np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in clouds])
+    # Every panel of a row has the same shape, that of its tallest cloud.
+    aspects = [float(np.clip((row[:, 1] / row[:, 0]).max(), 0.3, 1.3))
+               for row in np.split(spans, range(COLUMNS, len(spans), COLUMNS))]  # fmt: skip
+    heights = [2.6 * aspect + 0.45 for aspect in aspects]
     result = Figure(figsize=(2.7 * COLUMNS, sum(heights)), dpi=DPI, layout="constrained")
-    grid = result.add_gridspec(len(rows), COLUMNS, height_ratios=heights)
-    for row, (aspect, members) in enumerate(rows):
-        for column, cloud in enumerate(members):
-            _panel(result.add_subplot(grid[row, column]), cloud, aspect)
+    grid = result.add_gridspec(len(aspects), COLUMNS, height_ratios=heights)
+    for number, cloud in enumerate(clouds):
+        _panel(result.add_subplot(grid[divmod(number, COLUMNS)]), cloud, aspects[number // COLUMNS])
     return result
 
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from lowalt.files.atomic import existing
 from lowalt.targets.guesses import Component, Group, cut_axis, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
-from lowalt.targets.mesh_files import UNITS_M, Mesh, metres, read_mesh, stated_unit_m
+from lowalt.targets.mesh_files import UNITS_M, Mesh, metres, pieces, read_mesh, stated_unit_m
 from lowalt.targets.mesh_polygons import Piece
-from lowalt.targets.mesh_scene import pieces
 
 SLICES = 40
 """Number of slices of a bird from its middle to a wing tip; the height of each is measured."""

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
-from lowalt.targets.mesh_files import SUFFIXES
-from lowalt.targets.mesh_scene import selected
+from lowalt.targets.mesh_files import SUFFIXES, selected
 
 LARGEST_BYTES, MOST_FILES = 16 << 20, 200
 DEEPEST = 50
