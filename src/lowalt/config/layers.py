@@ -114,9 +114,9 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     A file that the working directory lacks is taken from those that came with the package.
     Raises: InputError naming file, key and value.
 
-    >>> config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
-    >>> config["run"]
-    'tiny'
+        >>> config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
+        >>> config["run"], config["noise"]["snr_db"]
+        ('tiny', [3, inf])
     """
     result: dict = {}
     for path in paths:

@@ -69,12 +69,12 @@ def echo_signal(
 
     A point of 0.01 m2 that stands 226 m from station A, in cell 46 of 4.9 m each:
 
-    >>> from lowalt.config.layers import overlaid
-    >>> network = Network.from_settings(overlaid([])["network"])
-    >>> point = np.array([200.0, 100.0, 60.0])
-    >>> result = echo_signal(network, network.stations[0], np.tile(point, (network.symbols, 1, 1)), 0.01, point)
-    >>> result.signal.shape, int(result.cell[0]), result.bound < 1e-12
-    ((400,), 46, True)
+        >>> from lowalt.config.layers import overlaid
+        >>> network = Network.from_settings(overlaid([])["network"])
+        >>> point = np.array([200.0, 100.0, 60.0])
+        >>> result = echo_signal(network, network.stations[0], np.tile(point, (network.symbols, 1, 1)), 0.01, point)
+        >>> result.signal.shape, int(result.cell[0]), result.bound < 1e-12
+        ((400,), 46, True)
     """
     _check_tolerance(tolerance, sample)
     scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)

@@ -22,10 +22,10 @@ def add_noise(
     where noise is to be drawn.
     Source: paper, section V-A; unit-power circular noise has variance 1/2 a component.
 
-    >>> signal = np.exp(1j * np.arange(10_000))
-    >>> noise = add_noise(signal, 13.0, np.random.default_rng(0)) - signal
-    >>> round(float(10 * np.log10(np.mean(abs(noise) ** 2))), 1)
-    -13.0
+        >>> signal = np.exp(1j * np.arange(10_000))
+        >>> noise = add_noise(signal, 13.0, np.random.default_rng(0)) - signal
+        >>> round(float(10 * np.log10(np.mean(abs(noise) ** 2))), 1)
+        -13.0
     """
     signal = np.asarray(signal, dtype=np.complex128)
     if signal.size == 0 or not np.isfinite(signal).all():

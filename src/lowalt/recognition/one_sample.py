@@ -50,11 +50,13 @@ def _signals(path: Path) -> np.ndarray:
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     """Return the probability of each category for one signal file or tile, in full precision.
 
-    >>> from lowalt.recognition.zoo import opened
-    >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4).astype(np.complex64))
-    >>> model, settings = opened("default-seen")
-    >>> list(predict(model, Path("sample.npy"), settings))
-    ['UAV', 'Bird', 'Vehicle', 'Pedestrian']
+    A signal of three stations, by a model of the zoo:
+
+        >>> from lowalt.recognition.zoo import opened
+        >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4).astype(np.complex64))
+        >>> model, settings = opened("default-seen")
+        >>> list(predict(model, Path("sample.npy"), settings))
+        ['UAV', 'Bird', 'Vehicle', 'Pedestrian']
     """
     return answer(trained, images_of(path, settings), settings, str(path))
 

@@ -46,8 +46,8 @@ def averaging(decay: float, step: int) -> float:
     A constant weight d would keep the first, random weights in the average for 1 / (1 - d) steps. Source: the bias
     correction of Kingma and Ba, Adam, 2015, section 3.
 
-    >>> [round(averaging(0.5, step), 3) for step in (1, 2, 9)]
-    [0.0, 0.333, 0.499]
+        >>> [round(averaging(0.5, step), 3) for step in (1, 2, 9)]
+        [0.0, 0.333, 0.499]
     """
     return 1 - (1 - decay) / (1 - decay**step) if decay < 1 else 1 - 1 / step
 

@@ -74,15 +74,17 @@ def made_occluders(records: dict[str, dict], seed: int, inputs: Path | None) -> 
 class Dataset:
     """The samples of a configuration by number: group by group, model by model, subtype by subtype, SNR by SNR.
 
-    >>> from lowalt.config.layers import overlaid
-    >>> config = overlaid(["config/tiny.yaml"])
-    >>> config["targets"].update(select=["Crow"])
-    >>> samples = Dataset(config)
-    >>> image, signal, record = samples[0]
-    >>> len(samples), image.shape, signal.shape, record["snr_db"]
-    (20, (768, 768), (3, 400), 3.0)
-    >>> samples.classes[samples.labels[0]]
-    'Bird'
+    A crow's first second, at 3 dB:
+
+        >>> from lowalt.config.layers import overlaid
+        >>> config = overlaid(["config/tiny.yaml"])
+        >>> config["targets"]["select"] = ["Crow"]
+        >>> samples = Dataset(config)
+        >>> image, signal, record = samples[0]
+        >>> len(samples), image.shape, signal.shape, record["snr_db"]
+        (20, (768, 768), (3, 400), 3.0)
+        >>> samples.classes[samples.labels[0]]
+        'Bird'
     """
 
     def __init__(

@@ -17,9 +17,9 @@ def vrp(signals: np.ndarray, settings: Spectra | None = None) -> np.ndarray:
 
     A tone of 50 Hz in looks every 2.5 ms stands an eighth of the rows above zero:
 
-    >>> tone = np.exp(2j * np.pi * 50.0 * 2.5e-3 * np.arange(400))
-    >>> vrp(tone).shape, int(vrp(tone)[:, 0].argmax())
-    ((256, 144), 160)
+        >>> tone = np.exp(2j * np.pi * 50.0 * 2.5e-3 * np.arange(400))
+        >>> vrp(tone).shape, int(vrp(tone)[:, 0].argmax())
+        ((256, 144), 160)
     """
     return spectrum("vrp").definition(signals, (settings or Spectra())["vrp"], "vrp", 0.0, 0.0)
 

@@ -31,12 +31,14 @@ MOST_PIXELS = 2**29
 class Renderer:
     """Everything that is the same for all samples: twiddles, weights, tables. Reusable, holds its work arrays.
 
-    >>> from lowalt.config.layers import overlaid
-    >>> config = overlaid([])
-    >>> renderer = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
-    >>> tile = renderer.tile(np.exp(0.8j * np.arange(1200).reshape(3, 400)).astype(np.complex64))
-    >>> tile.shape, split(tile, spectra=3).shape
-    ((768, 768), (9, 256, 256))
+    Three stations' tones:
+
+        >>> from lowalt.config.layers import overlaid
+        >>> config = overlaid([])
+        >>> renderer = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
+        >>> tile = renderer.tile(np.exp(0.8j * np.arange(1200).reshape(3, 400)).astype(np.complex64))
+        >>> tile.shape, split(tile, spectra=3).shape
+        ((768, 768), (9, 256, 256))
     """
 
     def __init__(self, network: Network, spectra: Spectra, images: Images) -> None:

@@ -68,6 +68,7 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
               xlabel="processor-seconds of data and training")  # fmt: skip
     for axis in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
         axis("{x:g}")
+    panel.tick_params(axis="x", which="both", length=3.5, pad=3.5)
     panel.margins(x=0.15)
     panel.legend(loc="lower right", frameon=False)
     words = "accuracy on unseen subtypes over the processor-seconds of data and training, with 95 % intervals"
