@@ -3,16 +3,14 @@
 import json
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
-from lowalt.recognition.predictions import Predictions
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
 from lowalt.report.pivots import by_scheme, confusion, spreads
-from lowalt.report.sections import comparisons, other_runs, overview, recognition_cost, simulation_cost, subtypes
+from lowalt.report.sections import comparisons, other_runs, overview, recognition_cost, simulation_cost
 from lowalt.report.stage_times import stage_times
 
 
@@ -106,18 +104,3 @@ def test_the_first_words_are_the_best_scheme_beside_the_paper_s_and_what_one_see
 def test_one_seed_cannot_tell_an_ordering():
     row = {"scheme": "A", "over": "B", "protocol": "seen", "ordering": "not ranked"}
     assert comparisons.ordering_words([row]).startswith("Whether the paper's orderings hold takes three training seeds")
-
-
-def test_reasons_are_read_from_the_wrong_samples():
-    """Two motion models at two SNRs, seen from the side (wrong) and from the front (right)."""
-    wrong = np.array([True, True, False, False])
-    said = Predictions(
-        np.array(list("abcd")), np.full(4, "Crow"), np.full(4, "unseen"), np.full(4, "test"), np.array([0, 0, 1, 1]),
-        np.array([3.0, 8.0, 3.0, 8.0]), np.ones(4, int), np.ones(4), np.where(wrong, 90.0, 0.0),
-        np.eye(4)[np.where(wrong, 0, 1)],
-    )  # fmt: skip
-    assert subtypes.reasons(said, ("UAV", "Bird", "Vehicle", "Pedestrian")) == {
-        "Crow": "called UAV in 100% of its errors; 1 of 2 motion models are wrong at every SNR; wrong more often seen "
-        "from the side"
-    }
-    assert subtypes.reasons(said.take(~wrong), ("UAV", "Bird", "Vehicle", "Pedestrian")) == {}

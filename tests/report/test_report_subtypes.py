@@ -2,7 +2,11 @@
 
 from types import SimpleNamespace
 
+import numpy as np
+import pytest
+
 from lowalt.config.classes import CATEGORIES
+from lowalt.recognition.predictions import Predictions
 from lowalt.report.sections import subtypes
 from made_predictions import SUBTYPES, run_files
 
@@ -17,9 +21,39 @@ def test_reasons_are_those_of_test_samples_and_the_worst_subtype_stands_first(tm
     tables = {"subtypes": rows, "distances": []}
     methods = {"__contains__": lambda *_: True, "paths": lambda *_: [path], "table": lambda _, name, *__: tables[name]}
     inputs = type("Inputs", (), methods)()
-    shown = subtypes.values(SimpleNamespace(inputs=inputs, shards=SimpleNamespace(classes=CATEGORIES)))
+    shards = SimpleNamespace(classes=CATEGORIES, keys=np.sort(found.key).astype("S"), record=lambda _: {"motion": {}})
+    shown = subtypes.values(SimpleNamespace(inputs=inputs, shards=shards))
     assert set(shown["reasons"]) == {name for name, (group, _) in SUBTYPES.items() if group == "unseen"}
     last = [float([*values.values()][-1]) for _, _, values in shown["rows"]]
     assert last == sorted(last)
     models = len({key.rpartition("-")[0] for key in found.key[found.subtype == "Owl"].tolist()})
     assert f"of {models} motion models are wrong" in shown["reasons"]["Owl"]
+
+
+SPEEDS = np.linspace(2.0, 24.0, 24)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "count", "words"),
+    [
+        (SPEEDS > 14.0, "11 of 24", ", most of them faster (median 19.2 against 7.74 m/s)"),
+        (SPEEDS < 10.0, "9 of 24", ", most of them slower (median 5.83 against 17.3 m/s)"),
+        (np.arange(24) % 2 == 0, "12 of 24", ""),
+        (SPEEDS > 21.0, "4 of 24", ""),
+    ],
+)  # fmt: skip
+def test_motion_models_that_are_always_wrong_are_told_apart_by_what_differs_most(wrong, count, words):
+    """Speeds rise from model to model, all else is alike; four models are too few, and every second one is no trait."""
+    model = np.repeat(np.arange(24), 2)
+    columns = {"key": [f"crow-{number}-{snr}" for number in range(24) for snr in (3, 8)], "subtype": ["Crow"] * 48,
+               "group": ["unseen"] * 48, "fold": ["test"] * 48, "model": model, "snr_db": np.tile([3.0, 8.0], 24),
+               "label": np.ones(48, int), "range_m": np.full(48, 200.0), "aspect_deg": np.full(48, 30.0),
+               "probabilities": np.eye(4)[np.where(wrong[model], 0, 1)]}  # fmt: skip
+    found = Predictions(**{name: np.asarray(column) for name, column in columns.items()})
+    motion = {"x_m": 200.0, "vx_mps": 0.0, "vy_mps": 0.0, "z_m": 60.0, "rate_hz": None}
+    shards = SimpleNamespace(
+        keys=found.key.astype("S"), record=lambda number: {"motion": motion | {"vz_mps": -SPEEDS[number // 2]}}
+    )
+    sentence = subtypes.reasons(found, CATEGORIES, subtypes.traits_of(shards, found))["Crow"]
+    assert sentence == f"called UAV in 100% of its errors; {count} motion models are wrong at every SNR{words}"
+    assert subtypes.reasons(found.take(found.correct), CATEGORIES, {}) == {}

@@ -1,17 +1,28 @@
 """Section: accuracy of every subtype, the worst first with what their errors have in common."""
 
+from collections.abc import Mapping
+
 import numpy as np
+from scipy.stats import mannwhitneyu
 
 from lowalt.recognition.predictions import Predictions, read, record
 from lowalt.recognition.protocols import folds
 from lowalt.report.reported_run import ReportedRun
+from lowalt.shards import ShardSet
 
 ACCURACY = ("protocol", "scheme", "subtype", "category", "accuracy_percent")
 DISTANCES = ("category", "subtype", "nearest_trained", "trained_distance", "trained_size_ratio")
 
-
 WORST = 6
 """Subtypes that are shown with a reason."""
+TRAITS = {
+    "speed": ("faster", "slower", " m/s"), "distance": ("farther away", "nearer", " m"),
+    "height": ("higher up", "lower down", " m"), "rate": ("with quicker parts", "with slower parts", " Hz"),
+    "along": ("seen more from the front or rear", "seen more from the side", ""),
+}  # fmt: skip
+"""What may set motion models apart: words where it is larger and where it is smaller, and its unit."""
+FEWEST, CHANCE = 5, 0.05
+"""Fewest motion models of a kind that are compared; how often chance alone may name a trait."""
 
 
 def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
@@ -25,8 +36,13 @@ def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str
     return list(columns), [(name, category, values) for (name, category), values in table.items()]
 
 
-def reasons(predictions: Predictions, classes: tuple[str, ...]) -> dict[str, str]:
-    """Return by subtype what its wrong samples have in common, in a sentence; "" where none is wrong."""
+def reasons(
+    predictions: Predictions, classes: tuple[str, ...], traits: Mapping[str, dict[str, float]]
+) -> dict[str, str]:
+    """Return by subtype what its wrong samples have in common, in a sentence; subtypes without any are left out.
+
+    traits: numbers of TRAITS by the name of a motion model, as `Predictions.motion` gives it.
+    """
     sentences = {}
     for subtype in np.unique(predictions.subtype):
         of_subtype = predictions.take(predictions.subtype == subtype)
@@ -34,17 +50,44 @@ def reasons(predictions: Predictions, classes: tuple[str, ...]) -> dict[str, str
         if not len(wrong):
             continue
         called = classes[np.bincount(wrong.guesses).argmax()]
-        models = np.unique(of_subtype.motion)
-        always = sum(not of_subtype.correct[of_subtype.motion == model].any() for model in models)
-        along = np.abs(np.cos(np.radians(of_subtype.aspect_deg)))
+        models = np.unique(of_subtype.motion).tolist()
+        sometimes = set(of_subtype.take(of_subtype.correct).motion.tolist())
+        always = [model for model in models if model not in sometimes]
         words = f"called {called} in {np.mean(wrong.guesses == classes.index(called)):.0%} of its errors; "
-        words += f"{always} of {len(models)} motion models are wrong at every SNR"
-        if np.isfinite(along).all():
-            apart = along[~of_subtype.correct].mean() - along.mean()
-            if abs(apart) > 0.1:
-                words += f"; wrong more often seen {'from the front or rear' if apart > 0 else 'from the side'}"
-        sentences[str(subtype)] = words
+        words += f"{len(always)} of {len(models)} motion models are wrong at every SNR"
+        sentences[str(subtype)] = words + _apart(always, sorted(sometimes), traits)
     return sentences
+
+
+def _apart(some: list[str], others: list[str], traits: Mapping[str, dict[str, float]]) -> str:
+    """Words for the trait by which motion models differ most from others, "" where chance may well be the cause."""
+    some, others = ([model for model in models if model in traits] for models in (some, others))
+    if min(len(some), len(others)) < FEWEST:
+        return ""
+    here, there = ({name: [traits[model][name] for model in models] for name in TRAITS} for models in (some, others))
+    chances = {name: mannwhitneyu(here[name], there[name]).pvalue for name in TRAITS}
+    name = min(chances, key=chances.__getitem__)
+    if not chances[name] < CHANCE / len(TRAITS):
+        return ""
+    low, high = np.median(here[name]), np.median(there[name])
+    larger, smaller, unit = TRAITS[name]
+    return f", most of them {larger if low > high else smaller} (median {low:.3g} against {high:.3g}{unit})"
+
+
+def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str, float]]:
+    """Return the numbers of TRAITS by motion model, seen from the first station; none where nothing says the motion."""
+    numbers = {key.decode(): number for number, key in enumerate(shards.keys.tolist())}
+    result = {}
+    for name, first in zip(*(part.tolist() for part in np.unique(predictions.motion, return_index=True)), strict=True):
+        motion = shards.record(numbers[str(predictions.key[first])])["motion"]
+        if motion.get("x_m") is not None:
+            result[name] = {
+                "speed": float(np.linalg.norm([motion[f"v{axis}_mps"] for axis in "xyz"])),
+                "distance": float(predictions.range_m[first]), "height": motion["z_m"],
+                "rate": motion.get("rate_hz") or 0.0,
+                "along": float(abs(np.cos(np.radians(predictions.aspect_deg[first])))),
+            }  # fmt: skip
+    return result
 
 
 def values(run: ReportedRun) -> dict | None:
@@ -57,7 +100,8 @@ def values(run: ReportedRun) -> dict | None:
     in_common = {}
     if files:
         tested = folds(record(files[-1])["protocol"], "test")
-        in_common = reasons(read(files[-1], run.shards.classes).of(tested), run.shards.classes)
+        predictions = read(files[-1], run.shards.classes).of(tested)
+        in_common = reasons(predictions, run.shards.classes, traits_of(run.shards, predictions))
     return (
         {"columns": columns, "rows": rows, "distances": distances, "reasons": in_common, "worst": WORST}
         if rows
