@@ -28,7 +28,7 @@ from lowalt.recognition.recogniser import built
 from lowalt.recognition.schemes import named
 from lowalt.recognition.training import Trainer, TrainingRun
 from lowalt.recordings.twin import TWINS
-from lowalt.recordings.windows import Windows, facts, rendered
+from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.tiles.image_settings import Images
 
 RECOGNITION = "config/measured/recognition.yaml"

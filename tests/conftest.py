@@ -48,17 +48,6 @@ def pytest_collection_finish():
     gc.enable()
 
 
-@pytest.fixture(scope="session", autouse=True)
-def records_checked_once():
-    """Let the process check each built-in record once."""
-    from checked_records import checked_once
-    from lowalt.targets import records
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(records, "merge", checked_once())
-        yield
-
-
 @pytest.fixture
 def mlcroissant(monkeypatch, tmp_path):
     """Croissant's reference implementation, unpacking into a folder of the test's own.

@@ -1,4 +1,4 @@
-"""Every effect alone on two processors: how far its numbers are apart."""
+"""Every effect alone, and whole scenes, on two processors: how far their numbers are apart."""
 
 import numpy as np
 import pytest
@@ -49,3 +49,30 @@ def test_an_effect_gives_the_numbers_of_another_processor(signals, name):
     if name == "none":
         assert (here == there).all()
     assert abs(here - there).max() <= CLOSE * abs(here).max()
+
+
+SCENE = """
+import sys
+import numpy as np
+from lowalt.config.layers import overlaid
+from lowalt.shards.dataset import Dataset
+found = []
+for scene in ("urban", "worst"):
+    config = overlaid([f"config/scenes/{scene}.yaml"])
+    config["targets"]["select"] = ["Owl"]
+    # Surfaces would have to be made first.
+    config["effects"].pop("occlusion", None)
+    dataset = Dataset(config)
+    found.append(dataset.maker.signal(dataset.row(dataset.place(0)), np.inf))
+np.save(sys.argv[1], np.stack(found))
+"""
+
+
+@pytest.mark.slow
+def test_signals_of_scenes_agree_but_for_the_last_bit_of_few(tmp_path):
+    for name in ("native", "x86-64-v2"):
+        run(name, "-c", SCENE, str(tmp_path / f"{name}.npy"))
+    here, there = (np.load(tmp_path / f"{name}.npy") for name in ("native", "x86-64-v2"))
+    assert here.shape == (2, 3, 400) and abs(here).min(axis=(1, 2)).max() > 0
+    assert (here != there).mean() < 0.1
+    assert (abs(here - there).max(axis=(1, 2)) < CLOSE * abs(here).max(axis=(1, 2))).all()

@@ -20,7 +20,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, runs
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recordings.windows import Windows, facts, rendered
+from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.tiles import join
 from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import encode

@@ -37,7 +37,8 @@ from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
 from lowalt.recordings.twin import Twin
-from lowalt.recordings.windows import Windows, at_symbol_rate, facts, rendered
+from lowalt.recordings.window_samples import Windows, facts, rendered
+from lowalt.recordings.windows import at_symbol_rate
 from lowalt.tiles.image_settings import Images
 
 FOLDER = Path("config/measured")

@@ -45,7 +45,7 @@ def test_a_waveform_says_its_band_in_its_own_terms(waveform, kind, sweep_s, ofdm
 def test_the_defaults_subcarriers_go_and_ofdm_by_name_leaves_no_trace():
     sweeping = checked({"waveform": SWEEP})
     assert {"subcarriers", "subcarrier_spacing_hz", "guard_subcarriers"}.isdisjoint(sweeping["network"])
-    # The configuration that a run writes beside its results is read again.
+    # A run writes its configuration into its folder, and reads it again.
     assert check(copy.deepcopy(sweeping), SCHEMA) == check(merge(DEFAULT, sweeping), SCHEMA) == sweeping
     assert checked({"waveform": {"kind": "ofdm"}}) == checked({"waveform": None}) == DEFAULT
 

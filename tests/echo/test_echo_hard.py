@@ -25,6 +25,55 @@ def test_hard_case(name):
     assert error < 1e-9 and error <= bound
 
 
+def seen(name):
+    """Ranges (m) of a case's points and of its aim, and their direction cosines across and up, by dot products."""
+    case = CASES[name]
+    assert case.station.position_m == (0.0, 0.0, 25.0) and case.station.normal_rad == 0
+    places = np.vstack([case.points_m, case.aim_m]) - case.station.position_m
+    ranges = np.linalg.norm(places, axis=1)
+    return ranges, places[:, 1] / ranges, places[:, 2] / ranges
+
+
+def test_places_lie_as_far_away_in_the_direction_asked_for():
+    np.testing.assert_allclose(away(7.0), [0, 0, 25] + 7 * np.array([1, 0.3, 0.1]) / np.sqrt(1.1), rtol=1e-15)
+    np.testing.assert_allclose(away(5.0, 0.0, -3.0, 4.0), [0.0, -3.0, 29.0], rtol=1e-15)
+    np.testing.assert_allclose(cluster(90, 4000).mean(0), away(90), atol=0.05)
+    np.testing.assert_allclose(cluster(90, 4000).std(0), 0.5, atol=0.03)
+
+
+def test_every_case_is_as_hard_as_its_name_says():
+    """Distances in cells and waves, angles and numbers: what makes each case hard."""
+    for name in ("straight above", "at the beam's centre"):
+        _, across, up = seen(name)
+        np.testing.assert_allclose([across, up], [across[:1].repeat(2), up[:1].repeat(2)], rtol=1e-15, atol=0)
+    np.testing.assert_array_equal(seen("straight above")[1:], [[0, 0], [1, 1]])
+    assert (CASES["behind the array"].points_m[:, 0] < -50).all() and CASES["behind the array"].aim_m[0] < 0
+    ranges, across, up = seen("on a grating lobe")
+    np.testing.assert_allclose(ranges, 100)
+    kappa = CASES["on a grating lobe"].station.frequency_hz / CASES["on a grating lobe"].network.carrier_hz
+    np.testing.assert_allclose(kappa * np.diff(across), -2)
+    assert (abs(up) == 0).all()
+    cells = {"at a cell's edge": 30.5, "at a cell's centre": 30, "at the unambiguous range": 256}
+    for name, wanted in cells.items():
+        assert seen(name)[0][:-1] / CELL == pytest.approx([wanted], rel=1e-12)
+    assert seen("past the unambiguous range")[0] / CELL == pytest.approx(1.7 * 256, rel=0.1)
+    metres = {"at 1 cm": 0.01, "at 100 km": 1e5, "100 km at 77 GHz": 1e5, "one point": 77.7}
+    for name, wanted in metres.items():
+        assert seen(name)[0][:-1] == pytest.approx([wanted] * (len(seen(name)[0]) - 1), rel=2e-5)
+    assert CASES["100 km at 77 GHz"].station.frequency_hz == CASES["100 km at 77 GHz"].network.carrier_hz == 77e9
+    assert len(CASES["one point"].points_m) == 1
+    sizes = np.ptp(CASES["larger than its range"].points_m, axis=0)
+    assert sizes.max() > seen("larger than its range")[0][-1]
+    # A way there and back that differs by half a wave of the middle subcarrier.
+    near, far, _ = seen("deep fade")[0]
+    assert far - near == pytest.approx(C / (4.9e9 + 127.5 * 120e3) / 4, rel=1e-9) and near == pytest.approx(30.2 * CELL)
+    assert abs(judged("deep fade")[0]) < 0.02 * abs(judged("one point")[0])
+    for name in CASES.keys() - {"on a grating lobe", "behind the array", "larger than its range", "deep fade"}:
+        _, across, up = seen(name)
+        # The beams are about 0.1 wide across and 0.5 upwards.
+        assert abs(across - across[-1]).max() < 0.2 and abs(up - up[-1]).max() < 0.3, name
+
+
 def test_a_hundred_thousand_points():
     net, points = NET, np.repeat(cluster(130, 50), 2000, axis=0)
     result = echo_signal(net, net.stations[0], points[None], 1.0, away(128))

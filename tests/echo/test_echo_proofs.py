@@ -10,6 +10,7 @@ from test_echo import cloud_in_motion, network, positions
 
 from lowalt.config.network import Station
 from lowalt.echo import Path, Rigid, api, echo_matrix, echo_signal, refine
+from lowalt.echo.fast.cell_kernel import PLACES
 from lowalt.echo.fast.error_model import echo_plan, pointwise_bound
 from lowalt.echo.fast.range_bounds import (
     END,
@@ -136,6 +137,21 @@ def test_each_kind_of_error_adds_its_own_part_to_the_bound(monkeypatch):
     # A moment of order k takes 3 k + 1 roundings of a power, and those of its product and of the sums.
     heavy = bounded(monkeypatch, {}, {"sizes": (1e6, 0.0, 0.0)})[1] / (1e6 * total)
     assert 30 * 2.0**-53 < heavy < 300 * 2.0**-53
+
+
+def test_roundings_of_higher_moments_count_with_the_points_distances_from_the_place(monkeypatch):
+    """v is a point's range in cells beyond the nearest of the places for which kernels stand, over the plan's half."""
+    halves = []
+    tabulated = refine.cell_polynomials
+    monkeypatch.setattr(refine, "cell_polynomials", lambda *given: halves.append(tabulated(*given)) or halves[-1])
+    sizes = np.diag([1e9] * 3)
+    total, mixed, second = (bounded(monkeypatch, {}, {"sizes": tuple(size)})[1] for size in sizes)
+    motion = cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
+    cells = np.linalg.norm(positions(motion)[0] - SEEN.position_m, axis=1) / NET.cell_m
+    centre = np.linalg.norm(motion.translation[0, 0] - SEEN.position_m) / NET.cell_m
+    v = (cells - np.rint(centre * PLACES) / PLACES) / halves[0].half
+    assert second / total == pytest.approx(np.average(v**2, weights=cells**-2.0), rel=0.01, abs=0)
+    assert mixed / total == pytest.approx(np.sqrt(second / total), rel=1e-6, abs=0)
 
 
 def test_an_error_of_the_sums_takes_twice_its_size_from_the_lead(monkeypatch):

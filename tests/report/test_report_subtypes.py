@@ -30,30 +30,52 @@ def test_reasons_are_those_of_test_samples_and_the_worst_subtype_stands_first(tm
     assert f"of {models} motion models are wrong" in shown["reasons"]["Owl"]
 
 
-SPEEDS = np.linspace(2.0, 24.0, 24)
+RISING = np.linspace(2.0, 24.0, 24)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "count", "words"),
+    ("wrong", "behind", "count", "words"),
     [
-        (SPEEDS > 14.0, "11 of 24", ", most of them faster (median 19.2 against 7.74 m/s)"),
-        (SPEEDS < 10.0, "9 of 24", ", most of them slower (median 5.83 against 17.3 m/s)"),
-        (np.arange(24) % 2 == 0, "12 of 24", ""),
-        (SPEEDS > 21.0, "4 of 24", ""),
+        (RISING > 14.0, False, "11 of 24", ", most of them faster (median 19.2 against 7.74 m/s)"),
+        (RISING < 10.0, False, "9 of 24", ", most of them slower (median 5.83 against 17.3 m/s)"),
+        (RISING < 10.0, True, "9 of 24", ", most of them seen more from the front or rear "
+                                            "(median 0 against 90° from nose or tail)"),
+        (np.arange(24) % 2 == 0, False, "12 of 24", ""),
+        (RISING > 21.0, False, "4 of 24", ""),
+        # With p = 0.045 speed alone would be named; among five traits chance often gives as much.
+        (np.isin(np.arange(24), [4, 10, 13, 15, 18, 20, 22, 23]), False, "8 of 24", ""),
     ],
 )  # fmt: skip
-def test_motion_models_that_are_always_wrong_are_told_apart_by_what_differs_most(wrong, count, words):
-    """Speeds rise from model to model, all else is alike; four models are too few, and every second one is no trait."""
+def test_motion_models_that_are_always_wrong_are_told_apart_by_what_differs_most(wrong, behind, count, words):
+    """Speeds rise from model to model; `behind`: they do not, and those that are wrong fly away; all else is alike."""
     model = np.repeat(np.arange(24), 2)
     columns = {"key": [f"crow-{number}-{snr}" for number in range(24) for snr in (3, 8)], "subtype": ["Crow"] * 48,
                "group": ["unseen"] * 48, "fold": ["test"] * 48, "model": model, "snr_db": np.tile([3.0, 8.0], 24),
-               "label": np.ones(48, int), "range_m": np.full(48, 200.0), "aspect_deg": np.full(48, 30.0),
+               "label": np.ones(48, int), "range_m": np.full(48, 200.0),
+               "aspect_deg": np.where(behind & wrong[model], 180.0, 90.0),
                "probabilities": np.eye(4)[np.where(wrong[model], 0, 1)]}  # fmt: skip
     found = Predictions(**{name: np.asarray(column) for name, column in columns.items()})
     motion = {"x_m": 200.0, "vx_mps": 0.0, "vy_mps": 0.0, "z_m": 60.0, "rate_hz": None}
+    speeds = np.full(24, 9.0) if behind else RISING
     shards = SimpleNamespace(
-        keys=found.key.astype("S"), record=lambda number: {"motion": motion | {"vz_mps": -SPEEDS[number // 2]}}
+        keys=found.key.astype("S"), record=lambda number: {"motion": motion | {"vz_mps": -speeds[number // 2]}}
     )
     sentence = subtypes.reasons(found, CATEGORIES, subtypes.traits_of(shards, found))["Crow"]
     assert sentence == f"called UAV in 100% of its errors; {count} motion models are wrong at every SNR{words}"
     assert subtypes.reasons(found.take(found.correct), CATEGORIES, {}) == {}
+
+
+def test_traits_are_the_record_s_own_numbers_and_those_of_the_first_station():
+    columns = {"key": ["crow-0", "car-7", "rec-0"], "subtype": ["Crow", "Car", "Rec"], "group": ["seen"] * 3,
+               "fold": ["test"] * 3, "model": [0, 7, 0], "snr_db": [3.0] * 3, "label": [1, 2, 0],
+               "range_m": [150.0, 80.0, np.nan], "aspect_deg": [150.0, 20.0, np.nan],
+               "probabilities": np.eye(4)[[1, 2, 0]]}  # fmt: skip
+    found = Predictions(**{name: np.asarray(column) for name, column in columns.items()})
+    motion = {"x_m": 9.0, "vx_mps": 3.0, "vy_mps": -4.0, "vz_mps": 12.0, "z_m": 60.0, "rate_hz": 7.5}
+    records = [motion, motion | {"vz_mps": 0.0, "rate_hz": None}, {}]
+    shards = SimpleNamespace(keys=found.key.astype("S"), record=lambda number: {"motion": records[number]})
+    traits = subtypes.traits_of(shards, found)
+    wanted = {"Crow/0": (13.0, 150.0, 60.0, 7.5, 30.0), "Car/7": (5.0, 80.0, 60.0, 0.0, 20.0)}
+    assert set(traits) == set(wanted)
+    for name, values in wanted.items():
+        assert list(traits[name]) == list(subtypes.TRAITS) and [*traits[name].values()] == pytest.approx(values)

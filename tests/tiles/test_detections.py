@@ -56,9 +56,9 @@ def test_an_echo_in_noise_is_found_at_its_range_and_folded_speed(dataset, speed_
     assert best["over_db"] == pytest.approx(10 * np.log10(network.symbols / (2 * 1.5)), abs=2)
     wrong = detections(held(network, cells, 54, speed_mps), network, station)[0]
     assert wrong["cell"] == 51 and not wrong["true"]
-    # Ranges wrap around: the last cell is beside the first.
-    beside = detections(held(network, np.roll(cells, -52, axis=1), 0, speed_mps), network, station)[0]
-    assert beside["cell"] == network.subcarriers - 1 and beside["true"]
+    # Ranges wrap around: the first cell follows the last.
+    wrapped = detections(held(network, np.roll(cells, -52, axis=1), 0, speed_mps), network, station)[0]
+    assert wrapped["cell"] == network.subcarriers - 1 and wrapped["true"]
 
 
 def test_a_target_longer_than_the_guard_hides_itself(dataset):

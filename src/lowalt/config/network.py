@@ -81,7 +81,7 @@ def masts_m(block: dict) -> list[list[float]]:
 
 
 TERMS = {"ofdm": set(), "fmcw": {"sweep_hz", "sweep_s", "samples"}, "cw": set()}
-"""What a waveform says of itself beside its kind."""
+"""Keys that a waveform of each kind has, next to `kind`."""
 OFDM = ("subcarriers", "subcarrier_spacing_hz", "guard_subcarriers")
 """Keys of a `network` block that only OFDM has."""
 

@@ -10,7 +10,8 @@ from lowalt.recognition.runs import Trained
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
 from lowalt.recordings.twin import Twin, radars
-from lowalt.recordings.windows import Windows, facts, rendered, windows
+from lowalt.recordings.window_samples import Windows, facts, rendered
+from lowalt.recordings.windows import windows
 from lowalt.tiles.image_settings import Images
 
 TRAINED_RATIO = 1.25

@@ -18,7 +18,7 @@ WORST = 6
 TRAITS = {
     "speed": ("faster", "slower", " m/s"), "distance": ("farther away", "nearer", " m"),
     "height": ("higher up", "lower down", " m"), "rate": ("with quicker parts", "with slower parts", " Hz"),
-    "along": ("seen more from the front or rear", "seen more from the side", ""),
+    "aspect": ("seen more from the side", "seen more from the front or rear", "° from nose or tail"),
 }  # fmt: skip
 """What may set motion models apart: words where it is larger and where it is smaller, and its unit."""
 FEWEST, CHANCE = 5, 0.05
@@ -59,19 +59,23 @@ def reasons(
     return sentences
 
 
-def _apart(some: list[str], others: list[str], traits: Mapping[str, dict[str, float]]) -> str:
-    """Words for the trait by which motion models differ most from others, "" where chance may well be the cause."""
-    some, others = ([model for model in models if model in traits] for models in (some, others))
-    if min(len(some), len(others)) < FEWEST:
+def _apart(always: list[str], sometimes: list[str], traits: Mapping[str, dict[str, float]]) -> str:
+    """Words for the trait that tells motion models that are always wrong from those that are sometimes right.
+
+    "" where there are too few of either, or where chance may well be the cause.
+    """
+    wrong, right = ([traits[model] for model in models if model in traits] for models in (always, sometimes))
+    if min(len(wrong), len(right)) < FEWEST:
         return ""
-    here, there = ({name: [traits[model][name] for model in models] for name in TRAITS} for models in (some, others))
-    chances = {name: mannwhitneyu(here[name], there[name]).pvalue for name in TRAITS}
+    values = {name: ([of[name] for of in wrong], [of[name] for of in right]) for name in TRAITS}
+    chances = {name: mannwhitneyu(*both).pvalue for name, both in values.items()}
     name = min(chances, key=chances.__getitem__)
     if not chances[name] < CHANCE / len(TRAITS):
         return ""
-    low, high = np.median(here[name]), np.median(there[name])
+    of_wrong, of_right = map(np.median, values[name])
     larger, smaller, unit = TRAITS[name]
-    return f", most of them {larger if low > high else smaller} (median {low:.3g} against {high:.3g}{unit})"
+    words = larger if of_wrong > of_right else smaller
+    return f", most of them {words} (median {of_wrong:.3g} against {of_right:.3g}{unit})"
 
 
 def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str, float]]:
@@ -85,7 +89,7 @@ def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str,
                 "speed": float(np.linalg.norm([motion[f"v{axis}_mps"] for axis in "xyz"])),
                 "distance": float(predictions.range_m[first]), "height": motion["z_m"],
                 "rate": motion.get("rate_hz") or 0.0,
-                "along": float(abs(np.cos(np.radians(predictions.aspect_deg[first])))),
+                "aspect": float(90 - abs(90 - predictions.aspect_deg[first])),
             }  # fmt: skip
     return result
 
