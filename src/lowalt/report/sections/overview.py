@@ -1,4 +1,4 @@
-"""Section: what the run is, its accuracies beside the paper's in one sentence each, and three of its tiles."""
+"""Section: what the run is, its accuracies beside the paper's in one sentence each, and a tile of each of its first classes."""
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
@@ -8,8 +8,8 @@ from lowalt.report.pivots import by_scheme, macro_f1
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections.accuracy import COLUMNS
 
-TILES = 3
-"""Tiles at the top of the page."""
+TILES = 4
+"""Most tiles at the top of the page."""
 
 
 def verdict(here: float, paper: float | None, classes: int, seeds: int) -> str:
