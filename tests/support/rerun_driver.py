@@ -1,4 +1,4 @@
-"""Runs of Snakemake in one process, so that imports and the check of records are paid for once: a plan of a workplace,
+"""Runs of Snakemake in one process, so that imports are paid for once: a plan of a workplace,
 the files that it names, and a plan after each of several changes. The process's folder is the workplace."""
 
 import contextlib
@@ -9,9 +9,6 @@ import re
 from pathlib import Path
 
 from snakemake.cli import main
-
-from checked_records import checked_once
-from lowalt.targets import records
 
 
 def said(*arguments: str) -> str:
@@ -48,7 +45,6 @@ def edited(path: Path, old: str, new: str):
 
 def run() -> None:
     """Write what the first plan, and the plan after each change of changes.json, print: said.json."""
-    records.merge = checked_once()
     Path("change.yaml").write_text("{}")
     plans = {"whole": said("--dry-run")}
     make_files(plans["whole"])

@@ -1,4 +1,4 @@
-"""Section: what the run is, its accuracies beside the paper's in one sentence each, and a tile of each of its first classes."""
+"""Section: what the run is, its accuracies beside the paper's in one sentence each, and a tile of each category."""
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
