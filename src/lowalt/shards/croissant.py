@@ -59,7 +59,7 @@ RESPONSIBLE = {
     "dataCollection": "All samples are simulated from the configuration in README.md. No radar recorded them.",
     "dataCollectionType": ["Software Collection"],
     "dataPreprocessingProtocol": ["README.md names the spectra, the noise and the scaling of the images."],
-    "dataAnnotationProtocol": "The label is the class of the target that was simulated. No person annotated samples.",
+    "dataAnnotationProtocol": ["The label is the class of the target that was simulated. No person annotated samples."],
     "dataUseCases": [
         "Training, validation and test of networks that recognise low-altitude targets in the echoes of base stations.",
         "Not suitable alone as evidence of the accuracy of a radar in operation.",
