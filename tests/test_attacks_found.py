@@ -87,7 +87,7 @@ def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
     path = tmp_path / "a.wav"
     path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
     with pytest.raises(InputError, match=r"a\.wav: a \.wav file without a format or without samples"):
-        read(Record(file=path, carrier_hz=24e9, channel="real", source="test", licence="none"))
+        read(Record(file=path, carrier_hz=24e9, channel="real"))
 
 
 @pytest.mark.parametrize(
