@@ -1,10 +1,11 @@
 """The command `lowalt`, for people: run the workflow, look at scenes, spectra, samples and runs, make own targets.
 
-Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input. Stages have commands of their own
-(python -m lowalt.STAGE).
+Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input, 130 interrupted. Stages have commands of
+their own (python -m lowalt.STAGE).
 """
 
 import argparse
+import signal
 import sys
 
 from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
@@ -26,8 +27,11 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         answer: Answer = options.act(options)
     except (InputError, OSError) as error:
-        print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
+        print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("interrupted: the same command goes on from here", file=sys.stderr)
+        return 128 + signal.SIGINT
     text = as_json(answer.facts) if options.json else answer.text
     if text:
         print(text)

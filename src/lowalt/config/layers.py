@@ -12,7 +12,7 @@ import yaml
 
 from lowalt.config.command import parser, run
 from lowalt.config.network import OFDM
-from lowalt.config.schema import faults, plain, with_numbers
+from lowalt.config.schema import check_brought, faults, plain, with_numbers
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.shipped import located, shipped
@@ -114,6 +114,20 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     for path in paths:
         result = merge(result, load_yaml(shipped(path)))
     return located(check(result, shipped(schema_path)))
+
+
+def of_run(folder: str | Path) -> dict:
+    """Return the configuration in a run's folder, plain values only; it may be of an older schema.
+
+    The folder may be a stranger's, so that nothing in it may choose code (`named_code.allowed`).
+    Raises: InputError naming the folder that is no run's, or the file and the key that is wrong.
+    """
+    path = Path(folder) / "config.yaml"
+    if not path.is_file():
+        raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
+    config = load_yaml(path)
+    check_brought("settings", config, path)
+    return config
 
 
 def overlaid(overlays: Iterable[str | Path]) -> dict:
