@@ -14,11 +14,8 @@ def averages(path: str | Path) -> dict[tuple[str, str], float]:
     Raises: InputError where the file is missing or no such table.
     """
     rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent")
-    return {
-        (row["scheme"], row["protocol"]): number(row, "accuracy_percent", path)
-        for row in rows
-        if row["snr_db"] == "avg"
-    }
+    means = [row for row in rows if row["snr_db"] == "avg"]
+    return {(row["scheme"], row["protocol"]): number(row, "accuracy_percent", path) for row in means}
 
 
 def lines(folder: Path) -> list[str]:
