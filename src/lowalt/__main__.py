@@ -8,7 +8,7 @@ import argparse
 import sys
 from importlib import import_module
 
-from lowalt.commands.catalogue import COMMANDS
+from lowalt.commands.command_table import COMMANDS
 from lowalt.files.errors import InputError
 
 

@@ -1,4 +1,4 @@
-"""What a command imports before it answers: packages that take long to import come only with the work that needs them."""
+"""What a command imports before it answers: packages that are slow to import come with the work that needs them."""
 
 import subprocess
 import sys

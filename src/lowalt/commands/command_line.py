@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.commands.catalogue import COMMANDS
+from lowalt.commands.command_table import COMMANDS
 
 
 class Answer(NamedTuple):

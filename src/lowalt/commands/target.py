@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import yaml
 
-from lowalt.commands.catalogue import COMMANDS
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.commands.command_table import COMMANDS
 from lowalt.files.atomic import existing, replacing, slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
