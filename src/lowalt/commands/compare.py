@@ -14,10 +14,9 @@ from lowalt.workflow.closing import averages
 MEASURED = ("accuracy_percent", "processor_s", "data")
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `compare` to a parser's commands."""
-    meaning = "two finished runs: what differs in configuration, accuracy, time and bytes"
-    line = add_command(commands, "compare", run, meaning, "lowalt compare results/default results/tiny")
+    line = add_command(commands, name, run)
     line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
 
 

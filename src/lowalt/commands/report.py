@@ -20,10 +20,9 @@ from lowalt.files.yaml_files import load_yaml
 BASE = "config/default.yaml"
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `report` to a parser's commands."""
-    meaning = "make the page of one run again, or a page that links all runs and compares any two"
-    line = add_command(commands, "report", run, meaning, "lowalt report results/default, or lowalt report --gallery")
+    line = add_command(commands, name, run)
     line.add_argument("run", type=Path, nargs="?", help="folder of a run that was started here")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only name the files that would be made, and why")

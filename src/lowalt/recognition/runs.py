@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import timm
 import torch
 from torch import nn
 
@@ -27,6 +26,7 @@ from lowalt.machine.hardware import describe
 from lowalt.recognition import checkpoint, inference, metrics, predictions, recipe, recogniser
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.light_timm import timm
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
@@ -161,8 +161,8 @@ def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, truste
         return build(bare, block, size, state["colour_map"], classes)
 
     if name == named_backbone and build is built:
-        return filled(fresh, lambda: torch.zeros(2, views, size, size, dtype=torch.uint8), state["weights"], path)
-    # The user's own code may not know of the device without memory.
+        return filled(fresh, lambda: torch.zeros(1, views, size, size, dtype=torch.uint8), state["weights"], path)
+    # Code that the user names is trusted, and only its author knows what it answers.
     model = fresh()
     refuse_unfit(state["weights"], model, path)
     model.load_state_dict(state["weights"])
