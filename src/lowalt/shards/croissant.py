@@ -62,20 +62,16 @@ RESPONSIBLE = {
     "dataAnnotationProtocol": ["The label is the class of the target that was simulated. No person annotated samples."],
     "dataUseCases": [
         "Training, validation and test of networks that recognise low-altitude targets in the echoes of base stations.",
-        "Not suitable alone as evidence of the accuracy of a radar in operation.",
-    ],
+        "Not suitable alone as evidence of the accuracy of a radar in operation."],
     "dataBiases": [
         "Motion models are drawn from the intervals of the configuration, not from observed traffic.",
-        "Subtypes within a class are equally frequent, whatever their share among real targets.",
-    ],
+        "Subtypes within a class are equally frequent, whatever their share among real targets."],
     "dataLimitations": [
         "Only the effects that the configuration names are simulated; README.md lists the known limits.",
-        "Built-in targets are parametric models with published sizes and rates, not measured objects.",
-    ],
+        "Built-in targets are parametric models with published sizes and rates, not measured objects."],
     "dataSocialImpact": "Recognition of drones serves the safety of the low airspace. The same methods can monitor the "
                         "movements of people.",
-    "personalSensitiveInformation": ["None is simulated. A recording of a person's gait that a user adds as an input "
-                                     "keeps its own terms."],
+    "personalSensitiveInformation": ["None is simulated. Recordings of gaits that a user adds keep their own terms."],
     "dataReleaseMaintenancePlan": "README.md has the configuration and the versions that make the same bytes again.",
 }  # fmt: skip
 """Properties of the responsible-AI vocabulary. Source: Croissant RAI specification 1.0 (MLCommons)."""
