@@ -56,7 +56,7 @@ class ExplainedSample(NamedTuple):
 class Finding(NamedTuple):
     """One sample at one station.
 
-    right: share of symbols whose chosen cell is within one of the target's; over_db: the target in its cell over the
+    radial_mps: mean rate of the target's range over the look (m/s); right: share of symbols whose chosen cell is within one of the target's; over_db: the target in its cell over the
     mean power of the loudest cell of all else, behind the filters (dB, inf without anything else); otherwise: share
     right with other detection: each of CANCELLERS where the scene has one, with and without a detector.
     """
@@ -66,6 +66,7 @@ class Finding(NamedTuple):
     model: int
     station: str
     range_m: float
+    radial_mps: float
     right: float
     over_db: float
     otherwise: dict[str, float]
@@ -159,9 +160,11 @@ def finding(
         for added in ("",) if "detector" in named else ("", "detector"):
             label = " and ".join(filter(None, (kind and f"canceller {kind}", added))) or "the same"
             otherwise[label] = _right(sample, detection + called({added: {}} if added else {}), target_cell)
-    range_m = float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m)))
+    view, range_m = sample.view, float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m)))
+    ways_m = view.ways_m(view.places.mean(axis=1))
+    radial_mps = float((ways_m[-1] - ways_m[0]) / (2 * (view.times_s[-1] - view.times_s[0])))
     return Finding(
-        row["category"], row["subtype"], row["model"], station.name, range_m,
+        row["category"], row["subtype"], row["model"], station.name, range_m, radial_mps,
         _right(sample, sample.detection, target_cell), float(over_db), otherwise,
         levels(sample.view, scene.effects, sample.power) if listed else [],
     )  # fmt: skip
