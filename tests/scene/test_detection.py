@@ -142,6 +142,14 @@ def test_symbols_without_a_detection_take_the_predicted_cell():
     assert abs(found - place)[120:140].max() <= 1 and (found == place)[140:].mean() > 0.95
 
 
+def test_the_mean_takes_one_part_of_n_of_the_noise_and_the_clutter_filter_without_wind_makes_up_for_it():
+    noise = normals(12, 20, 4000)
+    left = filtered({"kind": "mean"}, noise)
+    assert np.mean(abs(left) ** 2) / np.mean(abs(noise) ** 2) == pytest.approx(1 - 1 / 20, rel=0.005)
+    still = filtered({"kind": "clutter", "wind_mps": 0.0}, noise)
+    np.testing.assert_allclose(still, left * np.sqrt(20 / 19), atol=1e-12)
+
+
 THRESHOLDS = [(cfar, window) for cfar in detector.NAMES["cfar"] for window in detector.NAMES["range_window"]]
 
 

@@ -21,8 +21,9 @@ def detections(
 
     A value of the range-Doppler map is detected where it is the largest of its neighbours and exceeds its threshold,
     which noise passes with probability `false_alarm`; `guard`, `training`, `cfar` and `range_window` are those of the
-    effect `detector`. It is the target's where it is within one cell and two speeds of what is true at some symbol; for a
-    companion give `cube._replace(truth=cube.others[0])`.
+    effect `detector`.
+    It is the target's where it is within one cell and two speeds of what is true at some symbol; for a companion
+    give `cube._replace(truth=cube.others[0])`.
     Raises: InputError for an unknown name, or for fewer than two guard cells with range_window "hann".
     Source: Finn & Johnson 1968; Rohling 1983; Richards 2014, 6.5.
     """

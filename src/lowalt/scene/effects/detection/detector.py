@@ -13,7 +13,7 @@ of a target in range hide others too; the window `hann` lowers them, at the cost
 import math
 
 import numpy as np
-from scipy.ndimage import convolve1d, rank_filter
+from scipy.ndimage import convolve1d
 from scipy.optimize import brentq
 
 from lowalt.config.network import SPEED_OF_LIGHT
@@ -98,18 +98,20 @@ def exceeds(settings: dict, power: np.ndarray) -> np.ndarray:
     is then independent, and the false-alarm rate is exact.
     """
     guard, training = settings["guard"], settings["training"]
-    used = np.zeros(2 * (guard + training) + 1, bool)
-    step = 1 if settings["range_window"] == "none" else 1 + HANN_REACH
-    used[guard + training + guard + 1 :: step] = True
-    used |= used[::-1]
-    count = int(used.sum())
+    reach, step = guard + training, 1 if settings["range_window"] == "none" else 1 + HANN_REACH
+    used = np.arange(guard + 1, reach + 1, step)
+    used = np.concatenate([-used, used])
     if settings["cfar"] == "cell_averaging":
-        level = factor(count, settings["false_alarm"]) * convolve1d(power, used / count, mode="wrap")
-    else:
-        rank = math.ceil(0.75 * count)
-        level = rank_filter(power, rank - 1, footprint=used[None], mode="wrap")
-        level *= ordered_factor(count, rank, settings["false_alarm"])
-    return power > level
+        weights = np.zeros(2 * reach + 1)
+        weights[reach + used] = 1.0 / len(used)
+        return power > factor(len(used), settings["false_alarm"]) * convolve1d(power, weights, mode="wrap")
+    rank = math.ceil(0.75 * len(used))
+    scaled = ordered_factor(len(used), rank, settings["false_alarm"]) * power
+    # A cell exceeds the rank-th smallest of these thresholds where it exceeds at least `rank` of them.
+    below = np.zeros(power.shape, np.int32)
+    for offset in used:
+        below += np.roll(scaled, offset, axis=1) < power
+    return below >= rank
 
 
 def choose(settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
