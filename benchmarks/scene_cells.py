@@ -28,14 +28,15 @@ TANGENTIAL_MPS = 0.1
 """Three speed bins, each lambda / (2 T), of a look of one second at 4.9 GHz."""
 
 
-def findings(root: Path, path: Path, models: int) -> list[Finding]:
-    """Return the findings of a shipped scene; root: the repository's folder."""
+def findings(root: Path, path: Path, models: int, category: str | None = None) -> list[Finding]:
+    """Return the findings of a shipped scene, of one class if named; root: the repository's folder."""
     config = load([root / "config/default.yaml", path], root / "workflow/schemas/config.schema.yaml")
     config["targets"]["table"] = str(root / config["targets"]["table"])
     config["targets"]["records"] = [str(root / name) for name in config["targets"]["records"]]
     firsts: dict[str, str] = {}
     for name, record in records_of(config["targets"], None).items():
-        firsts.setdefault(record["published"]["category"], name)
+        if category in (None, record["published"]["category"]):
+            firsts.setdefault(record["published"]["category"], name)
     chosen = samples(config, None, [(name, model) for name in firsts.values() for model in range(models)])
     scene, clouds = scene_of(config), {sample.cloud.subtype: sample.cloud for sample in chosen}
     return [finding(scene, station, sample, clouds) for sample in chosen for station in scene.network.stations]

@@ -92,7 +92,6 @@ def echo_signal(
         method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
     largest = float(abs(found.values).max())
     worst = float(found.bounds.max())
-    # A target of no cross section has no echo, which is exact.
     bound = worst / largest if largest > 0 else np.inf if worst > 0 else 0.0
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
