@@ -3,9 +3,10 @@
     python benchmarks/scene_cells.py --out results/reference/scene_cells.csv
 
 The samples are the first motion models of the first subtype of each class, at every station and link of the scene. A
-symbol is right where the chosen cell is within one of the target's; the level is the target in its cell over the mean
-power of the loudest cell of all else (land, noise, other stations), behind the canceller. A sample is tangential where
-its mean radial speed is below TANGENTIAL_MPS: still land has the same Doppler, and a canceller removes both.
+symbol is right where the chosen cell is within one of that in which the target's echo appears (the observed truth); the
+level is the target in its cell over the mean power of the loudest cell of all else (land, noise, other stations),
+behind the canceller. A sample is tangential where its mean radial speed is below TANGENTIAL_MPS: still land has the
+same Doppler, and a canceller removes both.
 
 `finding` of `lowalt.scene.explanation` alone decides what the target's cell is.
 """

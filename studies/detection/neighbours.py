@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from lowalt.config.layers import load
-from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import Network
 from lowalt.files.csv_tables import write_csv
 from lowalt.numerics.streams import stream
 from lowalt.spectra.cube import TRUTH, Cube
@@ -41,14 +41,15 @@ def network() -> Network:
 def echo(radio: Network, cell: float, speed_mps: float, amplitude: complex) -> np.ndarray:
     """Return the range cells (N, M) of a point in a range cell, which need not be whole, that recedes at a speed."""
     response = np.exp(-2j * np.pi * np.arange(radio.subcarriers) * cell / radio.subcarriers)
-    turns = 2 * speed_mps * radio.times_s * radio.stations[0].frequency_hz / SPEED_OF_LIGHT
+    turns = np.arange(SYMBOLS) * speed_mps / (2 * radio.largest_mps(radio.stations[0]))
     return amplitude * np.exp(-2j * np.pi * turns)[:, None] * np.fft.ifft(response)
 
 
 def seen(radio: Network, cells: np.ndarray, cell: float, speed_mps: float, rule: tuple[str, str]) -> bool:
     """Return whether a detection is that of a target in a cell at a speed; the look was chosen around CELL."""
     truth = np.zeros((SYMBOLS, len(TRUTH)))
-    truth[:, TRUTH.index("cell")], truth[:, TRUTH.index("radial_mps")] = np.rint(cell), speed_mps
+    truth[:, [TRUTH.index(name) for name in ("cell", "observed_cell")]] = np.rint(cell)
+    truth[:, [TRUTH.index(name) for name in ("radial_mps", "observed_mps")]] = speed_mps
     cube = Cube(cells.astype(np.complex64), np.full(SYMBOLS, CELL), truth)
     found = detections(cube, radio, radio.stations[0], cfar=rule[0], range_window=rule[1])
     return bool(found["true"].any())
