@@ -73,6 +73,14 @@ def cells(kept):
     return dict(zip(module.COLUMNS, row, strict=True))
 
 
+def truth(kept):
+    module = program("benchmarks/observed_truth.py")
+    config = module.block_of(ROOT, kept["scene"])
+    found = module.distances(config, kept["scene"], int(kept["symbols"]), module.LOOKS)
+    largest = (f"{max(values):.3f}" for values in zip(*found, strict=True))
+    return {"looks": len(found)} | dict(zip(module.COLUMNS[4:], largest, strict=True))
+
+
 def scale(kept, tmp_path):
     module = program("docs/scale_table.py")
     overlay = f"config/{kept['configuration']}.yaml"
@@ -161,6 +169,7 @@ def made_rotors(kept):
 
 REMADE = {
     "results/reference/scene_cells.csv": cells, "results/reference/scale.csv": scale,
+    "results/reference/observed_truth.csv": truth,
     "results/benchmarks/fuzz.csv": fuzzed, "results/benchmarks/interval_coverage.csv": coverage,
     "results/benchmarks/planted_faults.csv": fault, "results/benchmarks/rounding.csv": rounding,
     "results/benchmarks/scene_levels.csv": scene_level, "results/benchmarks/target_levels.csv": target_level,
