@@ -67,7 +67,7 @@ def snakemake(folder: Path, *arguments: str, cores: int = 2, status: int = 0) ->
 
 def planned(folder: Path, *arguments: str) -> set[str]:
     """The rules a dry run would execute."""
-    text = snakemake(folder, "--dry-run", *arguments)
+    text = snakemake(folder, "--dry-run", "--printshellcmds", *arguments)
     return set(re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE))
 
 
@@ -309,7 +309,7 @@ def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, 
 
 def test_the_catalogue_s_snakefile_plans_the_same_run(finished):
     """It reads the other file, by which nothing of a finished run is left to do."""
-    text = snakemake(finished, "--dry-run", "--snakefile", "workflow/Snakefile")
+    text = snakemake(finished, "--dry-run", "--printshellcmds", "--snakefile", "workflow/Snakefile")
     assert "Nothing to be done" in text and not re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE)
 
 
