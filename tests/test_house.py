@@ -19,7 +19,7 @@ from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
 GROUND = ("files", "machine", "numerics", "config")
-STAGES = [name for name in STREET if name not in (*GROUND, "measure", "workflow", "commands")]
+STAGES = [name for name in STREET if name not in (*GROUND, "drafting", "measure", "workflow", "commands")]
 
 
 @pytest.mark.parametrize("stage", STREET)
@@ -158,10 +158,10 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (11, 1020), "config": (8, 1030), "echo": (27, 2570), "files": (11, 665), "machine": (9, 460),
-    "measure": (6, 590), "motion": (10, 1010), "noise": (4, 175), "numerics": (13, 940), "recognition": (44, 4570),
-    "recordings": (13, 1130), "report": (32, 1795), "scene": (72, 5860), "shards": (22, 2672), "spectra": (16, 920),
-    "targets": (43, 6310), "tiles": (16, 1478), "workflow": (15, 1740),
+    "commands": (11, 1020), "config": (8, 1030), "drafting": (8, 1315), "echo": (27, 2570), "files": (11, 665),
+    "machine": (9, 460), "measure": (6, 590), "motion": (10, 1010), "noise": (4, 175), "numerics": (13, 940),
+    "recognition": (44, 4570), "recordings": (13, 1130), "report": (32, 1795), "scene": (72, 5860),
+    "shards": (22, 2672), "spectra": (16, 920), "targets": (36, 4995), "tiles": (16, 1478), "workflow": (15, 1740),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 

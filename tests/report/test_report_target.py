@@ -8,9 +8,9 @@ from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgba
 
 from craft import craft
+from lowalt.drafting.guesses import Component
+from lowalt.drafting.inspection import Inspection
 from lowalt.report.figures import mesh_picture, target_picture
-from lowalt.targets.guesses import Component
-from lowalt.targets.inspection import Inspection
 
 
 @pytest.fixture

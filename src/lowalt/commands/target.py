@@ -11,18 +11,18 @@ import numpy as np
 import yaml
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.drafting.draft import chosen, drafted, refuse_miscount
+from lowalt.drafting.guesses import UNUSUAL, USUAL_M
+from lowalt.drafting.inspection import described, inspect_mesh
+from lowalt.drafting.robot_files import is_description, read_robot
+from lowalt.drafting.robots import category_of, drafted_robot, parts_of, write_parts
 from lowalt.files.atomic import existing, replacing, slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
-from lowalt.targets.draft import chosen, drafted, refuse_miscount
-from lowalt.targets.guesses import UNUSUAL, USUAL_M
-from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import MOVING_KIND
 from lowalt.targets.records import estimates, load_table, merge, read_records, with_row
-from lowalt.targets.robot_files import is_description, read_robot
-from lowalt.targets.robots import category_of, drafted_robot, parts_of, write_parts
 
 AXES = ("x", "-x", "y", "-y", "z", "-z")
 KINDS = ("UAV", "Bird", "Vehicle")

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.drafting.draft import alternating, record_text, row_lines, size_word
+from lowalt.drafting.guesses import TURNING
+from lowalt.drafting.robot_geometry import Joint, Robot
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.targets.draft import alternating, record_text, row_lines, size_word
-from lowalt.targets.guesses import TURNING
 from lowalt.targets.mesh_files import LARGEST_TRIANGLES
 from lowalt.targets.mesh_record import MOVING_KIND
-from lowalt.targets.robot_geometry import Joint, Robot
 
 
 def _called(joint: Joint, kind: str) -> bool:

@@ -7,8 +7,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from lowalt.drafting.robot_geometry import DEEPEST, Files, Robot, direction, numbers, place_of, primitive, shown
 from lowalt.numerics import portable
-from lowalt.targets.robot_geometry import DEEPEST, Files, Robot, direction, numbers, place_of, primitive, shown
 
 
 def _clear(values: dict[str, str]) -> bool:

@@ -9,10 +9,10 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
+from lowalt.drafting.guesses import guessed_axes, guessed_unit
+from lowalt.drafting.inspection import described, inspect_mesh
 from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import read
-from lowalt.targets.guesses import guessed_axes, guessed_unit
-from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.make import make
 from lowalt.targets.records import load_table, merge, read_records
 from meshes import box, quadrotor

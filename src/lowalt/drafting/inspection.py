@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.drafting.guesses import Component, Group, cut_axis, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
 from lowalt.files.atomic import existing
-from lowalt.targets.guesses import Component, Group, cut_axis, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
 from lowalt.targets.mesh_files import UNITS_M, Mesh, metres, pieces, read_mesh, stated_unit_m
 from lowalt.targets.mesh_polygons import Piece
 

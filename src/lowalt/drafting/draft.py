@@ -9,10 +9,10 @@ import numpy as np
 import yaml
 
 from lowalt.config.classes import AIRBORNE
+from lowalt.drafting.guesses import TURNING, Group
+from lowalt.drafting.inspection import Inspection
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
-from lowalt.targets.guesses import TURNING, Group
-from lowalt.targets.inspection import Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND, body_axes
 
 MARGIN = 0.02

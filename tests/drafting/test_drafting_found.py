@@ -10,9 +10,9 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
+from lowalt.drafting.inspection import inspect_mesh
 from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import Cloud, read
-from lowalt.targets.inspection import inspect_mesh
 from meshes import box, saved
 
 HUBS = np.array([(0.13, 0.11), (0.13, -0.11), (-0.13, 0.11), (-0.13, -0.11)])

@@ -8,10 +8,10 @@ import trimesh
 import yaml
 
 from lowalt.__main__ import main
+from lowalt.drafting.robot_files import read_robot
+from lowalt.drafting.robots import Joint, parts_of
 from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, read
-from lowalt.targets.robot_files import read_robot
-from lowalt.targets.robots import Joint, parts_of
 from made_robots import HUBS, MJCF, SDF, urdf
 
 
