@@ -9,7 +9,7 @@ import sys
 
 from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
 from lowalt.commands.command_line import Answer, as_json
-from lowalt.config.command import refusal
+from lowalt.config.command import refusal, warn_in_one_line
 from lowalt.files.errors import InputError
 
 
@@ -23,6 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
         part.add_to(commands)
     completion.add_to(commands, line)
     options = line.parse_args(arguments)
+    warn_in_one_line()
     try:
         answer: Answer = options.act(options)
     except (InputError, OSError) as error:

@@ -5,6 +5,7 @@ Sources: ROS, urdf/XML (link, joint); SDFormat 1.4 to 1.11 and its proposal on p
 """
 
 import re
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -23,6 +24,8 @@ TEMPLATES = {
     ".erb": "erb FILE > robot.sdf",
 }  # fmt: skip
 """Templates of descriptions by suffix, and what expands them."""
+UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
+"""Elements inside a description that say nothing about shapes and joints; macros in them do no harm."""
 
 
 def _geometry(element: Element | None, base: Path, files: Files) -> np.ndarray:
@@ -60,8 +63,8 @@ def _pose(element: Element) -> np.ndarray:
 
 
 def _before_1_5(root: Element) -> bool:
-    """Whether a file is of an SDF whose axes are in the model's frame."""
-    return float(root.get("version", "1.5")) < 1.45
+    """Return whether a file's SDF version is below 1.5: the axes of its joints are then given in the model's frame."""
+    return tuple(int(number) for number in root.get("version", "1.5").split(".")) < (1, 5)
 
 
 class _Links:
@@ -191,6 +194,14 @@ class _Links:
         return self.robot
 
 
+def _used(element: Element) -> Iterator[Element]:
+    """Yield an element and the elements below it, except those that say nothing about shapes and joints."""
+    yield element
+    for child in element:
+        if child.tag not in UNUSED:
+            yield from _used(child)
+
+
 def is_description(path: Path) -> bool:
     """Whether a file's name is that of a robot's description or of a template of one."""
     return path.suffix.lower() in (*KINDS, *TEMPLATES)
@@ -212,7 +223,7 @@ def read_robot(path: Path, inputs: Path) -> Robot:
         root = files.parsed(path)
         if root.tag not in readers:
             raise ValueError(f"<{root.tag}>, expected one of {sorted(readers)}")
-        if any("xacro" in str(item.tag) or re.search(r"\$[{(]|\{\{", str(item.attrib)) for item in root.iter()):
+        if any("xacro" in item.tag or re.search(r"\$[{(]|\{\{", str(item.attrib)) for item in _used(root)):
             raise ValueError(f"it holds macros, expected what they expand to: {TEMPLATES['.xacro']}")
         robot = readers[root.tag](root, path.resolve().parent)
     surfaces = [triangles for of_link in robot.surfaces.values() for triangles in of_link]

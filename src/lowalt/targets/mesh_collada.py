@@ -62,6 +62,15 @@ def stated_metres(path: Path) -> float | None:
     return None
 
 
+def stated_up(path: Path) -> str | None:
+    """Return the axis up, y or z, that a COLLADA file states, None where it says nothing or x.
+
+    Raises: InputError where the file is no XML.
+    """
+    said = {(element.text or "").strip() for element in parsed(path).iter() if _name(element) == "up_axis"}
+    return {"Y_UP": "y", "Z_UP": "z"}.get(said.pop()) if len(said) == 1 else None
+
+
 def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     """Return a COLLADA file whose polygons are triangles, cut as viewers cut them, and the names of its geometries by
     their ids: those of the nodes that show them, and their own.
