@@ -156,7 +156,9 @@ class Files:
             raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
         unit = (stated_metres(path) or 1.0) if path.suffix.lower() == ".dae" else 1.0
         pieces = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
-        triangles = np.concatenate(pieces or [np.zeros((0, 3, 3))]) * unit * scale
+        if not pieces:
+            raise InputError(f"{name!r} has no triangle, expected a surface")
+        triangles = np.concatenate(pieces) * unit * scale
         return triangles[:, ::-1] if np.prod(scale) < 0 else triangles
 
 

@@ -56,8 +56,13 @@ def category_of(robot: Robot) -> str:
     Raises: InputError where both or neither are there.
     """
     kinds = ("rotor", "wheel")
-    named = [kind for kind in kinds if any(joint.endless and _called(joint, kind) for joint in robot.joints)]
-    named = named or [kind for kind in kinds if any(TURNING[kind].search(link) for link in robot.surfaces)]
+    turning_joints = [joint for joint in robot.joints if joint.endless and not _steers(joint)]
+    called = {kind: sum(_called(joint, kind) for joint in turning_joints) for kind in kinds}
+    # A plane may have one wheel beside a motor; a vehicle has at least two, or nothing else that turns.
+    least = {"rotor": 1, "wheel": min(2, len(turning_joints))}
+    named = [kind for kind in kinds if called[kind] and called[kind] >= least[kind]]
+    if not any(called.values()):
+        named = [kind for kind in kinds if any(TURNING[kind].search(link) for link in robot.surfaces)]
     if len(named) == 1:
         return "UAV" if named == ["rotor"] else "Vehicle"
     seen = "both rotors and wheels" if named else "neither rotors nor wheels"
@@ -82,7 +87,7 @@ def parts_of(robot: Robot, kind: str) -> tuple[dict[str, Joint], dict[str, np.nd
         triangles.setdefault(taken.get(link, "body"), []).extend(surfaces)
     if "body" not in triangles:
         raise InputError("no surface is left for the body, expected links that do not turn")
-    parts = {name: np.concatenate(surfaces) for name, surfaces in triangles.items() if surfaces}
+    parts = {name: np.concatenate(surfaces) for name, surfaces in triangles.items() if sum(map(len, surfaces))}
     return {name: joint for name, joint in joints.items() if name in parts}, parts
 
 

@@ -14,6 +14,8 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_polygons import triangulated
 
+UNUSED = ("library_images", "library_effects", "library_materials", "bind_material")
+
 
 class _Plain(ElementTree.TreeBuilder):
     """A tree of XML without a document type, which could name entities."""
@@ -78,6 +80,11 @@ def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     Raises: InputError naming the file where it is no XML or has skins; other exceptions for a damaged file.
     """
     root = parsed(path)
+    for parent in root.iter():
+        # pycollada leaves a surface out whose material names an image that it does not find; no material counts here.
+        parent.attrib.pop("material", None)
+        for child in [child for child in parent if _name(child) in UNUSED]:
+            parent.remove(child)
     elements = {element.get("id"): element for element in root.iter() if element.get("id")}
     for parent in root.iter():
         if _name(parent) == "instance_controller":

@@ -28,6 +28,8 @@ AXES = ("right x (m)", "front y (m)", "up z (m)")
 NORMALS = 150
 """Normals drawn at most: more would hide the points."""
 FRAMES, MOST_FRAMES = 24, 96
+STEPS = 48
+"""Steps of a cycle at which the paths of tips are drawn; a multiple of eight."""
 FLOOR_DB = -40.0
 CONFIG = SHIPPED / "config/default.yaml"
 
@@ -126,21 +128,59 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
         panel.figure.colorbar(picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05)
 
 
+def most_moved(cloud: Cloud, frames: np.ndarray) -> np.ndarray:
+    """Return the numbers of the points whose paths are drawn, of frames (T, L, 3) m: the point of each moving part that
+    travels farthest, or the four nodes of a recording that do. Empty where nothing moves."""
+    travelled = np.linalg.norm(np.diff(frames, axis=0), axis=2).sum(axis=0)
+    if len(cloud.track):
+        return np.argsort(-travelled, kind="stable")[:4]
+    parts = [np.flatnonzero(cloud.part == part) for part, kind in enumerate(cloud.kinds) if kind != "body"]
+    return np.array([part[travelled[part].argmax()] for part in parts if len(part)], int)
+
+
+def _instants(panels, cloud: Cloud, row: dict) -> None:
+    """The target at four instants of a cycle, and the paths of the tips of its moving parts over the whole cycle.
+
+    A part that turns is seen along its axis, wings from behind, and a recording from the right.
+    """
+    length = cycle_s(cloud, row)
+    frames = positions(cloud, still_row(row), np.linspace(0, length, STEPS + 1))
+    tips = most_moved(cloud, frames)
+    along = np.abs(np.nan_to_num(cloud.axes)).sum(axis=0) if not len(cloud.track) else np.array([1.0, 0, 0])
+    view = {2: DIRECTIONS[0], 0: DIRECTIONS[1], 1: DIRECTIONS[2]}[int(along.argmax())]
+    _, across, up = view
+    middle, half = _limits(frames)
+    for panel, step in zip(panels, (np.arange(len(panels)) * STEPS) // len(panels), strict=True):
+        # Two blades look the same after half a turn, so an eighth of the cycle is added in each panel.
+        step = int(step / 2) if "rotor" in cloud.kinds or "wheel" in cloud.kinds else int(step)
+        _view(panel, cloud, frames[step], view, middle, half)
+        panel.plot(frames[:, tips, across], frames[:, tips, up], color="tab:red", linewidth=0.7)
+        panel.plot(frames[step, tips, across], frames[step, tips, up], "o", color="tab:red", markersize=4)
+        panel.set(title=f"{view[0]}, {1000 * step / STEPS * length:.3g} ms of {1000 * length:.3g} ms")
+
+
 def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:
-    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, and one motion model's spectra.
+    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, the target at four instants of a
+    cycle with the paths of its tips, and one motion model's spectra.
 
     The motion model is drawn as the workflow draws them, for the network of the configuration.
     Raises: InputError where there is no such configuration, or the target's motion cannot be drawn.
     """
     config = load_yaml(config_path)
     row = _motion_row(cloud, config, seed)
-    figure, panels = plt.subplots(2, 3, figsize=(14, 8.6))
+    figure = plt.figure(figsize=(14, 13))
+    grid = figure.add_gridspec(3, 12)
+    views, instants, spectra = (
+        [figure.add_subplot(grid[line, 12 // count * place : 12 // count * (place + 1)]) for place in range(count)]
+        for line, count in ((0, 3), (1, 4), (2, 3))
+    )
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
-    for panel, view in zip(panels[0], DIRECTIONS, strict=True):
+    for panel, view in zip(views, DIRECTIONS, strict=True):
         _view(panel, cloud, points, view, middle, half)
         _marks(panel, cloud, view, middle, half)
-    _spectra(panels[1], cloud, row, config)
+    _instants(instants, cloud, row)
+    _spectra(spectra, cloud, row, config)
     size = " x ".join(f"{value:.3g}" for value in np.ptp(points, axis=0))
     doubts = "".join(f"\nwarning: {text}" for text in cloud.record.get("warnings", []))
     about = f"{cloud.subtype} ({cloud.category}, {cloud.record['source']})"
