@@ -271,6 +271,53 @@ def test_wings_reach_the_body_of_a_bird_whether_it_is_longer_than_its_span_or_no
     assert np.ptp(found.points[:, 1]) == pytest.approx(long, rel=0.03)
 
 
+def test_a_glb_s_bird_is_y_up_and_one_wing_or_a_span_that_no_bird_has_is_refused(tmp_path, refused):
+    shape = trimesh.load(bird(tmp_path, 0.3), force="mesh", process=False)
+    shape.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))  # z up becomes y up
+    whole, half, spread = (tmp_path / f"{name}.glb" for name in ("whole", "half", "spread"))
+    shape.export(whole)
+    assert draft(whole, "--category", "Bird")[0] == 0
+    text = whole.with_suffix(".yaml").read_text()
+    assert "up: y  # as the file's format defines it" in text and "the mirror plane" in text
+    wings = cloud(whole.with_suffix(".yaml"))
+    assert np.sign(wings.hinges[1:, 0]).tolist() == [-1, 1]
+    kept = shape.triangles_center[:, 0] > -0.05
+    trimesh.Trimesh(shape.vertices, shape.faces[kept], process=False).export(half)
+    assert "half.glb: its sides along x do not mirror one another" in refused(half, "--category", "Bird")
+    shape.apply_scale([9, 1, 1])
+    shape.apply_scale(0.3)
+    shape.export(spread)
+    assert "expected a span of 0.7 to 6.0 lengths" in refused(spread, "--category", "Bird")
+
+
+def test_georeferenced_coordinates_keep_all_their_digits(tmp_path):
+    shapes = hull() | four("prop")
+    away = {name: shape.copy().apply_translation([465999.8, 5246999.9, 400.0]) for name, shape in shapes.items()}
+    clouds = []
+    for name, one in (("near", shapes), ("away", away)):
+        status, out = draft(saved(tmp_path / f"{name}.obj", one), "--category", "UAV", "--subtype", "a", "--unit", "m")
+        assert status == 0
+        clouds.append(cloud(out))
+    np.testing.assert_allclose(clouds[1].hinges[1:], clouds[0].hinges[1:], atol=2e-4)
+    np.testing.assert_allclose(np.ptp(clouds[1].points, axis=0), np.ptp(clouds[0].points, axis=0), atol=1e-4)
+
+
+def test_unusual_sizes_are_questioned_and_a_glb_whose_unit_cannot_be_metres_is_recognised(tmp_path, refused):
+    shapes = rover("wheel", (0.9, 2.1, 0.5), 0.35, 0.7)
+    toy, vehicle = saved(tmp_path / "toy.obj", shapes), ("--category", "Vehicle")
+    assert "measures 2.1 m in the unit 'm' (guessed from the size), expected 2.5" in refused(toy, *vehicle)
+    assert draft(toy, *vehicle, "--size", "4.2")[0] == 0
+    whole = trimesh.Scene()
+    for name, shape in rover("wheel", (1.8, 4.4, 0.9), 0.75, 1.3).items():
+        turned(shape, -np.pi / 2, [1, 0, 0])
+        shape.apply_scale(100)
+        whole.add_geometry(shape, node_name=name, geom_name=name)
+    whole.export(tmp_path / "car.glb")
+    assert draft(tmp_path / "car.glb", *vehicle)[0] == 0
+    text = (tmp_path / "car.yaml").read_text()
+    assert "unit: cm  # GUESSED" in text and "up: y  #" in text and "front: z  # the wheel axles" in text
+
+
 def test_a_bird_whose_sides_size_or_kind_cannot_be_seen_is_asked_for(tmp_path, refused):
     path, axes = bird(tmp_path, 0.3, lean=0.07), ("--category", "Bird", "--up", "z", "--front", "y")
     assert "left and right of the bird cannot be seen, expected --up" in refused(path, "--category", "Bird")

@@ -147,12 +147,17 @@ def _of_mesh(asked: Asked, path: Path, file: str, category: str, show: Callable[
 
 
 def _refuse_size(asked: Asked, seen: Inspection) -> None:
-    """Refuse a mesh whose size is unusual for its category, unless the user states its unit or size, and then one that
-    is UNUSUAL. Raises: InputError naming the options, and the unit that fits."""
+    """Refuse a mesh whose size is unusual for its category.
+
+    A unit or size from the user may be unusual by UNUSUAL, and one from the file may be twice as large as usual: a real
+    helicopter is.
+    Raises: InputError naming the options, and the unit that fits.
+    """
     extent, (low, high) = seen.high - seen.low, USUAL_M[seen.category]
-    stated = asked.unit is not None or asked.size_m is not None
-    slack, size = UNUSUAL if stated else 1.0, float(extent.max())
-    if low / slack <= size <= high * slack:
+    given = asked.unit is not None or asked.size_m is not None
+    below = UNUSUAL if given else 1.0
+    above, size = 2.0 if seen.unit_from.startswith("stated") else below, float(extent.max())
+    if low / below <= size <= high * above:
         return
     unit = guessed_unit(extent / metres(seen.unit), seen.category)
     fitting = size / metres(seen.unit) * UNITS_M[unit]

@@ -55,7 +55,8 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
         if middle[2] > (below + above) / 2:
             return (f"centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
                     "high, expected the lower half: is `up` (--up) reversed?")  # fmt: skip
-        if width > ROUND * min(length, height):
+        # Twin wheels on one axle are wider than high, but round about it.
+        if width > ROUND * min(length, height) and max(length, height) > ROUND * min(length, height):
             return (f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m across, expected "
                     "a wheel that is thinnest along its axle")  # fmt: skip
     elif kind == "rotor":
