@@ -242,8 +242,12 @@ def test_blades_by_name_of_which_some_stand_alone_are_asked_for_by_number(tmp_pa
             shape = box((0.1, 0.01, 0.004), (side * 0.055, 0, 0))
             shapes[f"blade{index}{side}"] = turned(shape, np.pi / 4 * (index == 0), [0, 0, 1], (x, y, 0.06))
     path = saved(tmp_path / "craft.obj", shapes)
-    assert "5 rotors found, expected --rotors 5 where that is all" in refused(path, "--category", "UAV")
-    assert draft(path, "--category", "UAV", "--rotors", "4")[0] == 0
+    assert draft(path, "--category", "UAV")[0] == 0
+    assert path.with_suffix(".yaml").read_text().count("kind: rotor") == 4
+    del shapes["blade0-1"]
+    words = (saved(tmp_path / "seven.obj", shapes), "--category", "UAV")
+    assert "4 rotors found, expected --rotors 4 where that is all" in refused(*words)
+    assert draft(*words, "--rotors", "4")[0] == 0
 
 
 def bird(tmp_path: Path, long: float, lean: float = 0.0) -> Path:

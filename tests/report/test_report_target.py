@@ -126,4 +126,4 @@ def test_a_rotor_is_shown_at_four_instants_an_eighth_of_a_turn_apart_and_its_tip
         angles.append(np.arctan2(*(tip[0] - cloud.hinges[1, :2])[::-1]))
         assert len(offsets(panel)) == len(cloud.points)
     np.testing.assert_allclose(np.abs(np.diff(np.unwrap(angles))), 2 * np.pi / 8)
-    assert [panel.get_title().split(", ")[1] for panel in figure.axes[3:5]] == ["0 ms of 12.5 ms", "1.56 ms of 12.5 ms"]
+    assert [panel.get_title().split(", ")[1] for panel in figure.axes[3:5]] == ["0 of 12.5 ms", "1.562 of 12.5 ms"]

@@ -81,7 +81,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     example = "lowalt target show results/default/clouds/crow.npz --out crow.png"
     show = add_command(actions, "show", _show, meaning, example)
     show.add_argument("cloud", type=Path)
-    show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
+    show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png)")
 
 
 def _write(path: Path, data: bytes) -> Path:
@@ -165,10 +165,9 @@ def _make(options: argparse.Namespace) -> Answer:
 
 def _picture(cloud: Path, out: Path) -> str:
     """Draw a cloud's file and return the picture's path."""
-    from lowalt.report.figures.target_picture import target_animation, target_picture
+    from lowalt.report.figures.target_picture import target_picture
 
-    draw = target_animation if out.suffix == ".gif" else target_picture
-    return str(_write(out, draw(read(cloud))))
+    return str(_write(out, target_picture(read(cloud))))
 
 
 def _show(options: argparse.Namespace) -> Answer:

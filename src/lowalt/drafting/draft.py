@@ -10,7 +10,7 @@ import yaml
 from scipy.spatial import cKDTree
 
 from lowalt.config.classes import AIRBORNE
-from lowalt.drafting.guesses import TURNING, Group, alike
+from lowalt.drafting.guesses import TURNING, Group, alike, turning_axis
 from lowalt.drafting.inspection import Inspection
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
@@ -220,6 +220,9 @@ def drafted(
         slack = MARGIN * float(group.extent.max())
         box = f"[{numbers(group.low - slack, size)}, {numbers(group.high + slack, size)}]"
         turn = f", sense: {sense}" * (kind == "rotor")
+        axis = turning_axis(group, "xyz".index(inspection.up[-1]), inspection.low, inspection.high)
+        if kind == "rotor" and axis != int(group.extent.argmin()):
+            turn = f", axis: {np.eye(3)[axis].astype(int).tolist()}{turn}"
         parts.append(f"    {name}: {{kind: {kind}, region: {{box: {box}, whole: true}}{turn}}}{CONFIRM}")
     about = [f"Drafted from {file}. Lengths are in metres along the file's axes.",
              "Confirm each line that is marked, then remove the mark."]  # fmt: skip
@@ -228,5 +231,5 @@ def drafted(
         "up": f"{inspection.up}{up_mark}", "front": f"{inspection.front}{inspection.front_from.comment}",
         "size_is": size_word(category, extent, hubs),
         "licence": "unknown  # the licence of the mesh",
-    }  # fmt: skip
+    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})  # fmt: skip
     return record_text(about, subtype, row, settings, parts)

@@ -115,6 +115,10 @@ def _from_names(shape: Shape, level: list[int], middle: np.ndarray, size: float)
         if any(sides):
             ends = [np.mean([shape.named[name] for name in names], axis=0) if names else middle for names in sides]
             ways[word], examples[word] = ends[0] - ends[1], (sides[0] or sides[1])[0]
+    # Left and right may be the viewer's, so they count only where front and rear do not tell.
+    if "front" in ways and (clear := _clear(ways["front"], level, size)):
+        yield Evidence(f"names such as {examples['front']!r}", *clear)
+        return
     ahead = {(axis, sign): sign * np.eye(3)[axis] for axis in level for sign in (1, -1)}
     axes = {front: {"front": along, "right": np.cross(along, shape.up)} for front, along in ahead.items()}
     # Propellers at opposite corners lie neither ahead nor aside alone, but only one front suits both of their words.
@@ -122,10 +126,9 @@ def _from_names(shape: Shape, level: list[int], middle: np.ndarray, size: float)
     if len(ways) == 2 and len(fits) == 1:
         yield Evidence(f"names such as {examples['front']!r}", *fits[0])
         return
-    for word, way in ways.items():
-        if clear := _clear(way, level, size):
-            fitting = next(front for front in axes if axes[front][word] @ ahead[clear] > LEVEL)
-            yield Evidence(f"names such as {examples[word]!r}", *fitting)
+    if "right" in ways and (clear := _clear(ways["right"], level, size)):
+        fitting = next(front for front in axes if axes[front]["right"] @ ahead[clear] > LEVEL)
+        yield Evidence(f"names such as {examples['right']!r}", *fitting)
 
 
 def _from_wheels(shape: Shape, level: list[int], size: float) -> Iterator[Evidence]:

@@ -23,6 +23,9 @@ UNUSUAL = 20
 ALIKE = 0.1
 """Pieces whose extents differ by at most this share are of one kind, such as the four propellers of a craft."""
 
+WIDE_ROTOR = 0.5
+"""A rotor wider than this share of the craft is no propeller of a plane but lifts a helicopter."""
+
 FLAT = 0.35
 """Largest thickness of a propeller divided by its length."""
 
@@ -47,6 +50,9 @@ SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
 """An arm's spread across by that along (at most), the cosine of its angle to the line from the craft's middle (at
 least), and where its inner end lies on that line, by where its own middle lies (at most)."""
 
+IN_LINE = 0.9
+"""Cosine between the line through two blades and the length of one (at least), where they belong to one rotor."""
+
 LONG = 0.75
 """Width of a blade by its length, as its box has them; a blade at 30 degrees to the axes has 0.6, a disc 1."""
 
@@ -64,6 +70,7 @@ TURNING = {
 }
 """Words in the names of joints and links, and of pieces of meshes, that say what a part is."""
 
+TAIL = re.compile(r"(?<![a-z])tail", re.I)
 FIXED = re.compile(r"(?<![a-z])(motor|mount|arm(?![a-z])|leg|skid|land|frame|guard|duct)", re.I)
 """Words in the names of pieces that do not turn."""
 
@@ -202,6 +209,11 @@ def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bo
     slack = TOUCH * 2 * radius
     near = bool((np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack).all())
     long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (first, second))
+    # Two slender blades in one line, nearer than their length, whatever their angle to the axes of the file.
+    between, length = second.centre - first.centre, float(np.linalg.norm(first.extent))
+    in_line = abs(float(between @ first.along)) > IN_LINE * float(np.linalg.norm(between))
+    if same and in_line and max(first.slender, second.slender) < SLENDER and np.linalg.norm(between) < length:
+        return True
     away[up] = 0
     return near and (float(np.linalg.norm(away)) <= radius / 2 or (touching and same and long))
 
@@ -226,6 +238,22 @@ def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
         if flat and wide and not off > OFF_CENTRE * across / 2:  # a middle that is not known is no fault
             return True
     return False
+
+
+def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
+    """Return the axis of the file about which a rotor or wheel turns: the one along which it is thinnest.
+
+    Two blades may be thinner along their chord, which a helicopter tells: a rotor wider than half the craft, whose
+    corners are `low` and `high` (3,) m, turns about the axis `up`; a tail rotor's axis is level and across the tail.
+    """
+    order, extent = np.argsort(group.extent, kind="stable"), high - low
+    if up in order[:2] and group.extent.max() > WIDE_ROTOR * extent.max():
+        return up
+    if TAIL.search(group[0].piece):
+        away = np.abs(group.centre - (low + high) / 2)
+        across = min((axis for axis in range(3) if axis != up), key=lambda axis: away[axis])
+        return across if across in order[:2] else int(order[0])
+    return int(order[0])
 
 
 def rotors(

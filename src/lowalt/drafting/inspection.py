@@ -18,6 +18,7 @@ from lowalt.drafting.guesses import (
     guessed_unit,
     mirror_axis,
     rotors,
+    turning_axis,
     wheels,
 )
 from lowalt.files.atomic import existing
@@ -146,7 +147,8 @@ def inspect_mesh(
     if path.suffix.lower() == ".glb" and up == "y":
         usual = "z"
     upward = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
-    shape = Shape(category, upward, points, _places(parts, named), _turning(groups))
+    shape = Shape(category, upward, points, _places(parts, named),
+                  _turning(groups, "xyz".index(up[-1]), low, high))  # fmt: skip
     front = front_of(shape, axes[1], usual, guessed_axes(high - low, category, "xyz".index(up[-1]))[1])
     sides_seen = category != "Bird" or None not in axes or front.words != NOTHING_TELLS
     ends = [axis for axis, name in enumerate("xyz") if name not in (up[-1], axes[1] and axes[1][-1])]
@@ -171,9 +173,9 @@ def _places(parts: list[Component], named: list[Piece]) -> dict[str, np.ndarray]
             for name in names if any(part.piece == name for part in parts)}  # fmt: skip
 
 
-def _turning(groups: list[Group]) -> list[Turning]:
-    """The rotors or wheels of groups: each turns about the direction in which it is thinnest."""
-    return [Turning(group[0].piece, group.centre, np.eye(3)[int(group.extent.argmin())]) for group in groups]
+def _turning(groups: list[Group], up: int, low: np.ndarray, high: np.ndarray) -> list[Turning]:
+    """The rotors or wheels of groups, each with its axis; low, high: (3,) m, the corners of the target."""
+    return [Turning(group[0].piece, group.centre, np.eye(3)[turning_axis(group, up, low, high)]) for group in groups]
 
 
 def _upright(

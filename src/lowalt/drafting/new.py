@@ -13,7 +13,7 @@ from lowalt.drafting.draft import chosen, drafted, refuse_miscount
 from lowalt.drafting.guesses import UNUSUAL, USUAL_M, guessed_unit
 from lowalt.drafting.inspection import Inspection, inspect_mesh
 from lowalt.drafting.robot_files import is_description, read_robot
-from lowalt.drafting.robots import WHICH, category_of, drafted_robot, parts_of, write_parts
+from lowalt.drafting.robots import WHICH, category_of, drafted_robot, front_of_robot, parts_of, write_parts
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 from lowalt.targets.make import make
@@ -105,7 +105,11 @@ def _of_robot(asked: Asked, glb: Path, show: Callable[[Inspection], None]) -> st
     robot = read_robot(asked.file, asked.inputs)
     try:
         category = asked.row.get("category") or asked.category or category_of(robot)
-        joints, triangles = parts_of(robot, MOVING_KIND[category])
+        ahead = None
+        if category == "Bird":
+            front = front_of_robot(robot, {}, category, (asked.up, asked.front)).axis
+            ahead = np.eye(3)["xyz".index(front[-1])]
+        joints, triangles = parts_of(robot, MOVING_KIND[category], ahead)
         if joints:
             write_parts(glb, triangles)
             count, kind = asked.row.get("n_rotors_or_wings", len(joints)), MOVING_KIND[category]

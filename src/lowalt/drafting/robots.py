@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.drafting.draft import alternating, record_text, row_lines, size_word
-from lowalt.drafting.front import LEVEL, Shape, Turning, front_of
+from lowalt.drafting.front import LEVEL, Front, Shape, Turning, front_of
 from lowalt.drafting.guesses import TURNING
 from lowalt.drafting.robot_geometry import Joint, Robot
 from lowalt.files.atomic import replacing
@@ -41,12 +41,17 @@ def _called(joint: Joint, kind: str) -> bool:
     return any(TURNING[kind].search(name) for name in _names(joint)) and not (kind == "wheel" and _steers(joint))
 
 
-def turning(robot: Robot, kind: str) -> list[Joint]:
+def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Joint]:
     """Return the joints of a robot whose links are parts of a kind: those that its names call so, else all that turn
-    without end and are called nothing else."""
+    without end and are called nothing else.
+
+    ahead: (3,) where the front is known; wings beat about it, and joints that sweep or twist them are held.
+    """
     able = [joint for joint in robot.joints if (joint.endless or kind == "wing") and not _steers(joint)]
     able = [joint for joint in able if any(robot.surfaces.get(link) for link in robot.below(joint.child))]
     named = [joint for joint in able if _called(joint, kind)]
+    if kind == "wing":
+        return [joint for joint in named if ahead is None or abs(joint.axis @ ahead) > LEVEL]
     return named or [joint for joint in able if joint.endless and not any(_called(joint, word) for word in TURNING)]
 
 
@@ -69,13 +74,16 @@ def category_of(robot: Robot) -> str:
     raise InputError(f"its category cannot be seen, the names of its parts tell {seen}: {WHICH}")
 
 
-def parts_of(robot: Robot, kind: str) -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
+def parts_of(
+    robot: Robot, kind: str, ahead: np.ndarray | None = None
+) -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
     """Return the joints of the parts of a kind by name, and the triangles (K, 3, 3) m of "body" and of each part.
 
+    ahead: (3,) the direction to the front, of which wings need to know.
     Raises: InputError where nothing is left for the body.
     """
     joints, taken, triangles = {}, {}, {}
-    chosen = turning(robot, kind)
+    chosen = turning(robot, kind, ahead)
     ends = {joint.child for joint in chosen}
     for joint in chosen:
         name = joint.child.replace("::", " ")
@@ -109,6 +117,13 @@ def write_parts(path: Path, triangles: dict[str, np.ndarray]) -> None:
         temporary.write_bytes(scene.export(file_type="glb"))
 
 
+def _above(robot: Robot, joint: Joint, joints: dict[str, Joint]) -> str:
+    """The name of the part on which a joint hangs, "" for the body."""
+    ends = {other.child for other in joints.values()}
+    return next((name for name, other in joints.items()
+                 if other is not joint and joint.parent in robot.below(other.child, ends)), "")  # fmt: skip
+
+
 def part_lines(
     robot: Robot, joints: dict[str, Joint], kind: str, file: str, hubs: np.ndarray, up: np.ndarray
 ) -> list[str]:
@@ -124,7 +139,9 @@ def part_lines(
         if known and np.dot(axis, up) < 0:  # a record's sense is seen from above
             known = {"ccw": "cw", "cw": "ccw"}.get(known)
         turn = f", sense: {known or sense}" if kind == "rotor" else ""
-        mark = "  # GUESSED sense: neighbours turn in turn" if turn and not known else ""
+        if kind == "wing" and (above := _above(robot, joint, joints)):
+            turn = f", parent: {above!r}"
+        mark = "  # GUESSED sense: neighbours turn in turn" if kind == "rotor" and not known else ""
         lines.append(
             f"    {name!r}: {{kind: {kind}, meshes: [{{file: {file!r}, geometry: [{name!r}]}}], hinge: {hinge}, "
             f"axis: {axis}{turn}}}{mark}"
@@ -147,6 +164,13 @@ def shape_of(robot: Robot, joints: dict[str, Joint], category: str, up: np.ndarr
     return Shape(category, up, points, centres, turning_parts, steered)
 
 
+def front_of_robot(robot: Robot, joints: dict[str, Joint], category: str, axes: tuple[str | None, str | None]) -> Front:
+    """Return the front of a robot; axes: up and front where the user states them. Raises: InputError as `front_of`."""
+    up = axes[0] or "z"
+    upward = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
+    return front_of(shape_of(robot, joints, category, upward), axes[1], "x" if up[-1] != "x" else None, "y")
+
+
 def drafted_robot(
     robot: Robot, parts: tuple[dict[str, Joint], dict[str, np.ndarray]], category: str, table: dict[str, dict],
     names: tuple[str, str, str], axes: tuple[str | None, str | None] = (None, None),
@@ -160,20 +184,19 @@ def drafted_robot(
     """
     (joints, triangles), (subtype, source, file) = parts, names
     up = axes[0] or "z"
-    upward = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
-    usual = "x" if up[-1] != "x" else None
-    front = front_of(shape_of(robot, joints, category, upward), axes[1], usual, "y")
+    front = front_of_robot(robot, joints, category, axes)
     frame = body_axes(front.axis, up)
     corners = np.concatenate(list(triangles.values())).reshape(-1, 3)
     extent = np.ptp(corners @ frame.T, axis=0)
     hubs = np.array([frame[:2] @ joint.hinge for joint in joints.values()]).reshape(-1, 2)
-    across = [float(np.ptp(triangles[name].reshape(-1, 3), axis=0).max()) for name in joints]
+    across = [float(np.delete(np.ptp(triangles[name].reshape(-1, 3), axis=0), np.abs(joint.axis).argmax()).max())
+              for name, joint in joints.items()]  # fmt: skip
     row = row_lines(category, extent, hubs, max(across, default=None), table) if subtype not in table else []
     settings = {
         "unit": "m", "up": up, "front": front.axis + front.comment,
         "size_is": size_word(category, extent, hubs), "licence": "unknown  # the licence of the description",
-    }  # fmt: skip
+    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})  # fmt: skip
     about = [f"Drafted from {source}, whose surfaces {file} holds in metres along the axes of the description."]
     return record_text(
-        about, subtype, row, settings, part_lines(robot, joints, MOVING_KIND[category], file, hubs, upward)
+        about, subtype, row, settings, part_lines(robot, joints, MOVING_KIND[category], file, hubs, frame[2])
     )

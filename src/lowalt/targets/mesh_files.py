@@ -119,12 +119,15 @@ def _refuse_truncated(path: Path) -> None:
 def pieces(path: Path) -> list[Piece]:
     """Return the pieces of a mesh file that have triangles.
 
-    Raises: InputError naming the file and the reason where it cannot be read.
+    Raises: InputError naming the file and the reason: no such file, another format, or it cannot be read.
     """
-    if path.suffix.lower() == ".stl":
-        _refuse_truncated(path)
+    path = existing(path, "mesh")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
     read = {".obj": read_obj, ".glb": read_glb, ".ply": read_ply}.get(path.suffix.lower(), _scene)
     with reading(path, f"{path.suffix} mesh"):
+        if path.suffix.lower() == ".stl":
+            _refuse_truncated(path)
         return [piece for piece in read(path) if len(piece.faces)]
 
 
@@ -218,9 +221,7 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     triangles, no area, NaN or infinite vertices, too many triangles.
     Warns: InputWarning where the file states another unit than `unit`.
     """
-    path = existing(path, "mesh")
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
+    path = Path(path)
     pieces = selected(path, geometry)
     if not pieces:
         raise InputError(f"{path}: has no triangle, expected a surface")

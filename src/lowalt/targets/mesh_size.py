@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from lowalt.config.classes import like
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets import bird
@@ -33,6 +32,8 @@ OFF_HUB = 1.0
 """Largest distance from a rotor's hub to the middle of its surface, in parts of the rotor's own largest extent; a
 single blade without its hub may have up to 1."""
 FEWEST_WHEELS = 3
+OFF_MIDDLE = 0.1
+"""A part stands on one side where it is farther from the middle than this share of its own size."""
 SPANS = (0.7, 6.0)
 """Least and largest wing span of a bird in parts of its published length, which measures 1.2 to 5.5 in the table."""
 
@@ -80,8 +81,11 @@ def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) ->
     if category == "UAV" and count and rotors != count:
         yield f"{rotors} rotors, expected the {count} of its row"
     for kind in ("wheel", "wing"):
-        sides = {float(np.sign(pool.points[:, 0].mean())) for pool in of_kind[kind]}
-        if len(of_kind[kind]) > 1 and len(sides) < 2:
+        offsets = np.array([pool.points[:, 0].mean() for pool in of_kind[kind]])
+        width = max((float(np.ptp(pool.points, axis=0).max()) for pool in of_kind[kind]), default=0.0)
+        # The wheels of a bicycle stand in the middle.
+        aside = np.abs(offsets) > OFF_MIDDLE * width
+        if len(offsets) > 1 and aside.all() and len(set(np.sign(offsets))) < 2:
             yield f"every {kind} is on one side of the target, expected both sides"
 
 
@@ -198,8 +202,8 @@ def _turned_radius(pool: Pool) -> float:
     return float(portable.norm(away - along * pool.axis).max())
 
 
-def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[dict[str, Pool], dict]:
-    """Return the pools scaled and centred, and the facts that the cloud's record gets.
+def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str], category: str) -> tuple[dict[str, Pool], dict]:
+    """Return the pools scaled and centred, and the facts that the cloud's record gets; category: that it is like.
 
     Wheels stay round: they are scaled about their hinge to the published diameter (or by the car's mean factor) and
     set on the ground. The origin is the middle of the extents; in plan, a multirotor's is the middle of its hubs.
@@ -228,9 +232,9 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
     if hubs:
         middle[:2] = portable.mean(np.array(hubs), 0)
-    if like(record) == "Vehicle":
+    if category == "Vehicle":
         facts["origin_height_m"] = float(middle[2] - ground)
-    if like(record) == "Bird":
+    if category == "Bird":
         facts |= {"flap": bird.FLAP | record.get("flap", {}), "wing_span_m": float(high[0] - low[0])}
     return {name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle)
             for name, pool in result.items()}, facts  # fmt: skip

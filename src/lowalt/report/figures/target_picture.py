@@ -1,17 +1,13 @@
 """Pictures of one target: points by part with hinges, axes and normals, motion over a cycle, the three spectra."""
 
-import io
-import math
 from pathlib import Path
 
 import numpy as np
 from matplotlib import pyplot as plt
-from PIL import Image
 
 from lowalt.config.layers import load_yaml
 from lowalt.config.network import Network, masts_m
 from lowalt.echo import Rigid, echo_signal
-from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.motion import poses, positions
 from lowalt.motion.drawing import draw, region_polygon
@@ -27,7 +23,6 @@ DIRECTIONS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0,
 AXES = ("right x (m)", "front y (m)", "up z (m)")
 NORMALS = 150
 """Normals drawn at most: more would hide the points."""
-FRAMES, MOST_FRAMES = 24, 96
 STEPS = 48
 """Steps of a cycle at which the paths of tips are drawn; a multiple of eight."""
 FLOOR_DB = -40.0
@@ -37,10 +32,8 @@ CONFIG = SHIPPED / "config/default.yaml"
 def _colours(cloud: Cloud) -> np.ndarray:
     """RGBA colour of each point (L, 4), by its part."""
     table = plt.get_cmap("tab20")
-    parts = np.array(
-        [(0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20) for i, kind in enumerate(cloud.kinds)]
-    )
-    return parts[cloud.part]
+    parts = [(0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20) for i, kind in enumerate(cloud.kinds)]
+    return np.array(parts)[cloud.part]
 
 
 def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
@@ -93,11 +86,9 @@ def _motion_row(cloud: Cloud, config: dict, seed: int) -> dict:
 def _decibel(values: np.ndarray) -> np.ndarray:
     """Magnitudes relative to their largest, in dB, at least FLOOR_DB."""
     top = float(values.max())
-    return (
-        20 * np.log10(np.maximum(values, top * 10 ** (FLOOR_DB / 20)) / top)
-        if top > 0
-        else np.full(values.shape, FLOOR_DB)
-    )
+    if top == 0:
+        return np.full(values.shape, FLOOR_DB)
+    return 20 * np.log10(np.maximum(values, top * 10 ** (FLOOR_DB / 20)) / top)
 
 
 def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
@@ -156,7 +147,7 @@ def _instants(panels, cloud: Cloud, row: dict) -> None:
         _view(panel, cloud, frames[step], view, middle, half)
         panel.plot(frames[:, tips, across], frames[:, tips, up], color="tab:red", linewidth=0.7)
         panel.plot(frames[step, tips, across], frames[step, tips, up], "o", color="tab:red", markersize=4)
-        panel.set(title=f"{view[0]}, {1000 * step / STEPS * length:.3g} ms of {1000 * length:.3g} ms")
+        panel.set(title=f"{view[0]}, {1000 * step / STEPS * length:.4g} of {1000 * length:.4g} ms")
 
 
 def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:
@@ -168,12 +159,9 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     """
     config = load_yaml(config_path)
     row = _motion_row(cloud, config, seed)
-    figure = plt.figure(figsize=(14, 13))
-    grid = figure.add_gridspec(3, 12)
-    views, instants, spectra = (
-        [figure.add_subplot(grid[line, 12 // count * place : 12 // count * (place + 1)]) for place in range(count)]
-        for line, count in ((0, 3), (1, 4), (2, 3))
-    )
+    figure = plt.figure(figsize=(14, 13), layout="constrained")
+    views, instants, spectra = (row_of.subplots(1, count)
+                                for row_of, count in zip(figure.subfigures(3, 1), (3, 4, 3), strict=True))  # fmt: skip
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
     for panel, view in zip(views, DIRECTIONS, strict=True):
@@ -185,36 +173,4 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     doubts = "".join(f"\nwarning: {text}" for text in cloud.record.get("warnings", []))
     about = f"{cloud.subtype} ({cloud.category}, {cloud.record['source']})"
     figure.suptitle(f"{about}: {len(points)} points, {len(cloud.kinds)} parts, {size} m{doubts}", fontsize=11)
-    figure.tight_layout()
     return png(figure)
-
-
-def target_animation(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1, count: int = FRAMES) -> bytes:
-    """Return a GIF of `count` frames of one cycle of a target's own motion, from above, from the right and from behind.
-
-    Where a rotor turns at several times the target's rate there are as many times the frames, at most MOST_FRAMES.
-    Raises: as `target_picture`; also where nothing of the target moves.
-    """
-    row = _motion_row(cloud, load_yaml(config_path), seed)
-    if not len(cloud.track) and all(kind == "body" for kind in cloud.kinds):
-        raise InputError(f"{cloud.subtype}: no part moves, expected rotors, wings, wheels or a recording to animate")
-    length = cycle_s(cloud, row)
-    count = min(MOST_FRAMES, count * max(1, math.ceil(cloud.rate_factors.max())))
-    frames = positions(cloud, still_row(row), np.arange(count) / count * length)
-    middle, half = _limits(frames)
-    pictures = []
-    for number, points in enumerate(frames):
-        figure, panels = plt.subplots(1, 3, figsize=(10, 3.9))
-        for panel, view in zip(panels, DIRECTIONS, strict=True):
-            _view(panel, cloud, points, view, middle, half)
-        figure.suptitle(
-            f"{cloud.subtype}: {1000 * number / count * length:.4g} ms of a cycle of {1000 * length:.4g} ms"
-        )
-        figure.tight_layout()
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=70)
-        plt.close(figure)
-        pictures.append(Image.open(buffer).convert("RGB"))
-    result = io.BytesIO()
-    pictures[0].save(result, format="GIF", save_all=True, append_images=pictures[1:], duration=80, loop=0)
-    return result.getvalue()
