@@ -137,7 +137,10 @@ def _instants(panels, cloud: Cloud, row: dict) -> None:
     length = cycle_s(cloud, row)
     frames = positions(cloud, still_row(row), np.linspace(0, length, STEPS + 1))
     tips = most_moved(cloud, frames)
-    along = np.abs(np.nan_to_num(cloud.axes)).sum(axis=0) if not len(cloud.track) else np.array([1.0, 0, 0])
+    along = np.array([1.0, 0, 0])
+    if not len(cloud.track):  # the axes of larger parts count more
+        sizes = [np.ptp(cloud.points[cloud.part == part], axis=0).max() for part in range(len(cloud.kinds))]
+        along = np.array(sizes) @ np.abs(np.nan_to_num(cloud.axes))
     view = {2: DIRECTIONS[0], 0: DIRECTIONS[1], 1: DIRECTIONS[2]}[int(along.argmax())]
     _, across, up = view
     middle, half = _limits(frames)
