@@ -8,6 +8,8 @@ from pathlib import Path
 import yaml
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.commands.command_table import COMMANDS
+from lowalt.config.command import warn_in_one_line
 from lowalt.drafting.inspection import Inspection, described, inspect_mesh
 from lowalt.drafting.new import SEED, Asked, draft
 from lowalt.files.atomic import replacing, slug
@@ -37,12 +39,10 @@ def _unit(text: str) -> str | float:
     return value
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `target` and its four commands to a parser's commands."""
-    target = commands.add_parser(
-        "target", help="your own mesh or recording: look, draft a record, make its cloud",
-        epilog="example: lowalt target inspect inputs/mydrone.stl",
-    )  # fmt: skip
+    _, meaning, example = COMMANDS[name]
+    target = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     actions = target.add_subparsers(dest="action", required=True)
     meaning = "unit, sizes, pieces and possible moves of a mesh file, and a picture"
     inspect = add_command(actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl")
@@ -107,6 +107,7 @@ def _inspect(options: argparse.Namespace) -> Answer:
 
 def _new(options: argparse.Namespace) -> Answer:
     """Draft a record of a mesh file or a robot's description."""
+    warn_in_one_line()
     stem = (options.out or options.file).stem
     asked = Asked(
         options.file, options.inputs, load_table(options.table), options.subtype, options.category, options.unit,
@@ -139,6 +140,7 @@ def _new(options: argparse.Namespace) -> Answer:
 
 def _make(options: argparse.Namespace) -> Answer:
     """Make the cloud of a record and a picture of it."""
+    warn_in_one_line()
     from lowalt.targets.make import make
 
     records = read_records(options.record)

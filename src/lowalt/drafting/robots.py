@@ -22,6 +22,7 @@ WHICH = (
     "their number"
 )
 STEERING_WHEEL = re.compile(r"steering[ _-]?wheel", re.IGNORECASE)
+MOTOR = re.compile(r"(?<![a-z])mot(or)?(?![a-z])", re.IGNORECASE)
 STEERED = re.compile(r"steer", re.IGNORECASE)
 
 
@@ -42,8 +43,8 @@ def _called(joint: Joint, kind: str) -> bool:
 
 
 def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Joint]:
-    """Return the joints of a robot whose links are parts of a kind: those that its names call so, else all that turn
-    without end and are called nothing else.
+    """Return the joints of a robot whose links are parts of a kind: those that its names call so, else those called
+    motors, else all that turn without end and are called nothing else.
 
     ahead: (3,) where the front is known; wings beat about it, and joints that sweep or twist them are held.
     """
@@ -52,7 +53,8 @@ def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Jo
     named = [joint for joint in able if _called(joint, kind)]
     if kind == "wing":
         return [joint for joint in named if ahead is None or abs(joint.axis @ ahead) > LEVEL]
-    return named or [joint for joint in able if joint.endless and not any(_called(joint, word) for word in TURNING)]
+    others = [joint for joint in able if joint.endless and not any(_called(joint, word) for word in TURNING)]
+    return named or [joint for joint in others if any(map(MOTOR.search, _names(joint)))] or others
 
 
 def category_of(robot: Robot) -> str:
