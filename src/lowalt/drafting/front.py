@@ -147,8 +147,8 @@ def _from_propellers(shape: Shape, level: list[int], size: float) -> Iterator[Ev
     """What propellers with level axes say; the tail rotor of a helicopter points sideways, behind the main rotor."""
     upright = [part for part in shape.turning if abs(part.axis @ shape.up) > LEVEL]
     others = [part for part in shape.turning if abs(part.axis @ shape.up) <= LEVEL]
-    axes = {int(np.abs(part.axis).argmax()) for part in others if np.abs(part.axis).max() > ALONG}
-    if len(axes) != 1 or not axes <= set(level):
+    axes = {int(np.abs(part.axis).argmax()) for part in others}
+    if len(axes) != 1 or any(np.abs(part.axis).max() < ALONG for part in others):
         return
     axis = axes.pop()
     if len(upright) == len(others) == 1:
