@@ -12,7 +12,7 @@ from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.effects.channel import interference
-from lowalt.scene.effects.receiver.offsets import of_stations
+from lowalt.scene.laws.offsets import of_stations
 from lowalt.scene.observe import observe
 from lowalt.scene.response import response
 from scenes import A, B, network, scene, target, view_of

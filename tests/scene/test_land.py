@@ -10,7 +10,8 @@ from scipy.special import gamma, kv
 from lowalt.echo.radar import radar
 from lowalt.scene import land
 from lowalt.scene.antenna import Element, gain
-from lowalt.scene.effects.channel import clutter, windblown
+from lowalt.scene.effects.channel import clutter
+from lowalt.scene.laws import windblown
 from scenes import A, B, link, linked, network, view_of
 
 AIMS = np.array([[60.0, 30.0, 25.0], [62.0, 28.0, 24.0]])

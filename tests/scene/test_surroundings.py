@@ -7,8 +7,9 @@ import pytest
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.scene.antenna import gain
-from lowalt.scene.effects.channel import background_channel, fast_fading
-from lowalt.scene.effects.channel.fast_fading import Large, Link
+from lowalt.scene.effects.channel import background_channel
+from lowalt.scene.laws import fast_fading
+from lowalt.scene.laws.fast_fading import Large, Link
 from lowalt.scene.observe import observe
 from scenes import A, network, scene, target
 

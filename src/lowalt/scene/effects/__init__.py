@@ -95,9 +95,8 @@ def _every_effect() -> tuple[str, ...]:
     folder, result = Path(__file__).parent, []
     for place in PLACE_ORDER:
         listed = [entry for entry in LISTED if entry.startswith(f"{place}/")]
-        files = sorted(f"{place}/{path.stem}" for path in (folder / place).glob("*.py"))
-        new = [entry for entry in files if entry not in listed]
-        result += listed + [entry for entry in new if "\nDEFAULTS" in (folder / f"{entry}.py").read_text()]
+        files = sorted(f"{place}/{path.stem}" for path in (folder / place).glob("*.py") if path.stem != "__init__")
+        result += listed + [entry for entry in files if entry not in listed]
     return tuple(result)
 
 

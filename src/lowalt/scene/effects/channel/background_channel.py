@@ -12,8 +12,8 @@ from lowalt.echo.radar import radar
 from lowalt.scene.antenna import gain
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.crossing import toward
-from lowalt.scene.effects.channel import fast_fading
-from lowalt.scene.effects.channel.fast_fading import Link
+from lowalt.scene.laws import fast_fading
+from lowalt.scene.laws.fast_fading import Link
 from lowalt.scene.view import View
 
 SOURCE = (

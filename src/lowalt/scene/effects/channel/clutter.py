@@ -16,7 +16,7 @@ from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
 from lowalt.scene import land
 from lowalt.scene.checks import CheckedScene, above_ground
-from lowalt.scene.effects.channel.windblown import speckle, windblown
+from lowalt.scene.laws.windblown import speckle, windblown
 from lowalt.scene.view import View
 
 SOURCE = (

@@ -18,7 +18,7 @@ from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
-from lowalt.scene.effects.receiver.offsets import of_stations
+from lowalt.scene.laws.offsets import of_stations
 from lowalt.scene.set_noise import white
 from lowalt.scene.waveform import baseband_hz, windowed
 

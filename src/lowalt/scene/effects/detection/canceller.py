@@ -16,7 +16,7 @@ from scipy.linalg import eigh, toeplitz
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.channel.windblown import windblown
+from lowalt.scene.laws.windblown import windblown
 from lowalt.scene.waveform import Look
 
 SOURCE = (

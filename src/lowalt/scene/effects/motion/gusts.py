@@ -14,8 +14,8 @@ import numpy as np
 from lowalt.motion.poses import Perturbation
 from lowalt.motion.rotations import attitude
 from lowalt.numerics import portable
-from lowalt.scene.effects.motion import flight
-from lowalt.scene.effects.motion.markov import Steps, root_of, stationary, step_s, steps, walk
+from lowalt.scene.laws import flight
+from lowalt.scene.laws.markov import Steps, root_of, stationary, step_s, steps, walk
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (

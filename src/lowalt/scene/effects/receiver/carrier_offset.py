@@ -3,7 +3,7 @@
 import numpy as np
 
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.laws import offsets
 from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look, oscillator_hz
 

@@ -10,7 +10,7 @@ from scipy import fft
 
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.laws import offsets
 from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 

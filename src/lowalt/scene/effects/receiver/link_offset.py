@@ -9,7 +9,7 @@ import numpy as np
 from lowalt.config.network import Network, Station
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver.offsets import delayed, of_stations, risen
+from lowalt.scene.laws.offsets import delayed, of_stations, risen
 from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look, oscillator_hz
 

@@ -7,7 +7,7 @@ Past the prefix it would take in the neighbouring symbol, whose data no scene st
 import numpy as np
 
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.laws import offsets
 from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 
