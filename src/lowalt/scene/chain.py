@@ -18,14 +18,11 @@ from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.machine.progress import reported
 from lowalt.numerics.power import rms
 from lowalt.scene import truth, waveform
-from lowalt.scene.effects import PLACE_ORDER, NamedEffect, offered, placed
+from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.response import ImagePath, response
-from lowalt.scene.view import View
+from lowalt.scene.view import Still, View
 from lowalt.targets.cloud import Cloud, cloud_of
-
-BY_END = ("line_of_sight",)
-"""Effects that act on each way of a link as the station at its end draws them for its own look."""
 
 
 class Received(NamedTuple):
@@ -51,21 +48,20 @@ class SceneSample:
         """
         self.scene, self.view, self.clouds, self._power = scene, view, clouds or {}, power
         self.draws = partial(scene.drawn, view.row, view.station)
-        self.transmitter, self.channel, self.receiver, self.detection = (
-            placed(scene.effects, place) for place in PLACE_ORDER[1:]
-        )
-        self.settings = {effect.name: effect.settings for effect in scene.effects}
-        self._waves = {name: name in self.settings for name in ("squint", "wavefront")}
+        self.only, self.all = partial(only, scene.effects), partial(every, scene.effects)
+        self.detection = [effect for effect in scene.effects if effect.place == "detection"]
+        self._waves = {key: value for waves in self.all("waves").values() for key, value in waves().items()}
         self._factors: dict[tuple[View, str], np.ndarray] = {}
 
-    def weight(self, view: View, names: Collection[str] | None = None) -> np.ndarray:
-        """Return the product (N, L) of the factors of all effects, or those named, on the points of a view."""
+    def weight(self, view: View, names: Collection[str] | None = None, but: Collection[str] = ()) -> np.ndarray:
+        """Return the product (N, L) of the factors of all effects, or those named, but some, on a view's points."""
         result = np.ones(view.places.shape[:2])
-        for name, visible in offered(self.channel, "visible").items():
-            if names is not None and name not in names:
+        one_way = self.all("visible_one_way")
+        for name, visible in (self.all("visible") | one_way).items():
+            if name in but or (names is not None and name not in names):
                 continue
             if (view, name) not in self._factors:
-                ends = [(end, end.station) for end in view.ends()] if name in BY_END else [(view, self.view.station)]
+                ends = [(end, end.station) for end in view.ends()] if name in one_way else [(view, self.view.station)]
                 factors = [visible(end, self.scene.drawn(view.row, station, name)) for end, station in ends]
                 self._factors[view, name] = factors[0] if len(factors) == 1 else np.sqrt(factors[0] * factors[1])
             result *= self._factors[view, name]
@@ -73,7 +69,7 @@ class SceneSample:
 
     def paths(self, view: View) -> list[ImagePath]:
         """Return all paths but the direct one; on a link those of its receiver, each with its sender's."""
-        adding = offered(self.channel, "paths").values()
+        adding = self.all("paths").values()
         ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
         if len(ends) == 1:
             return ends[0]
@@ -81,15 +77,14 @@ class SceneSample:
 
     def routes(self, view: View, paths: list[ImagePath]) -> np.ndarray:
         """Return the factor on the points' amplitudes, (N, L), or (R, R, N, L) where the scene tells routes apart."""
-        for routes in offered(self.channel, "routes").values() if paths else ():
-            return routes(view, paths, self.weight)
-        return self.weight(view)
+        routes = self.only("routes")
+        return routes(view, paths, self.weight) if routes and paths else self.weight(view)
 
     @cached_property
     def targets(self) -> list[View]:
         """The view of the target and of every companion, under the same beams at the same instants."""
         view, result = self.view, [self.view]
-        for name, companions in offered(self.channel, "companions").items():
+        for name, companions in self.all("companions").items():
             cloud = self.clouds.get(view.cloud.subtype, view.cloud)
             for other, row in companions(cloud, view.row, self.clouds, self.scene.stream(name, view.row)):
                 occluders = view.occluders if other is cloud else None
@@ -117,20 +112,20 @@ class SceneSample:
         """Return the subcarriers (N, M) of a view's target on all paths, without what reaches into symbols."""
         # Most facades reflect nothing in a whole look.
         paths = [path for path in self.paths(view) if np.any(path.coefficient) and np.any(path.outward.coefficient)]
-        if view is self.view and not paths and not any(self._waves.values()):
+        if view is self.view and not paths and not self._waves:
             return self.direct
         return response(view, paths, self.routes(view, paths), **self._waves)
 
     def _samples(self, view: View) -> np.ndarray:
         """Time samples (N, M) of a view's target whose points move within symbols, or are later than the prefix."""
         delays_s, weights = np.zeros(1), np.ones((1, self.scene.network.subcarriers))
-        for instants in offered(self.channel, "instants").values():
+        if instants := self.only("instants"):
             delays_s, weights = instants(view)
         # The instants of a symbol stand together, as symbols of their own.
         moved = view.at((view.times_s[:, None] + delays_s).reshape(-1))
         factor, paths = self.routes(view, self.paths(view)), self.paths(moved)
         late, network = np.zeros(view.places.shape[:2], np.int64), self.scene.network
-        for late_samples in offered(self.channel, "late_samples").values():
+        if late_samples := self.only("late_samples"):
             late = late_samples(view)
 
         @cache
@@ -147,31 +142,28 @@ class SceneSample:
             samples += waveform.windowed(network, self.prefix_s, echo, lost, on_air)
         return np.einsum("nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), -1), weights)
 
-    def _standing(self, name: str, echo: np.ndarray) -> np.ndarray:
-        """Time samples (N, M) of an effect's echoes (N, M), which do not move within a symbol."""
-        for convolved in offered(self.channel, "convolved").values():
-            offset = offered(self.channel, "offset_cells").get(name, lambda view: 0.0)
-            return convolved(self.scene.network, echo, self.on_air, offset(self.view))
-        return waveform.transmit(echo, self.on_air("waveform"))
+    def _standing(self, still: Still) -> np.ndarray:
+        """Time samples (N, M) of echoes that do not move within a symbol."""
+        if convolved := self.only("convolved"):
+            return convolved(self.scene.network, still.response, self.on_air, still.offset_cells)
+        return waveform.transmit(still.response, self.on_air("waveform"))
 
     def arrived(self) -> np.ndarray:
         """Return the response (N, M) of all echoes as the receiver's own data reveal it, behind the receiver's effects.
 
         Where nothing acts on time samples there are none.
         """
-        scattering = offered(self.channel, "scatter").items()
-        still = {name: scatter(self.view, self.draws(name)) for name, scatter in scattering}
-        unknown = [heard(self) for heard in offered(self.channel, "heard").values()]
-        if offered(self.channel, "instants") or offered(self.channel, "late_samples"):
-            samples = sum(map(self._samples, self.targets))
-            samples = sum((self._standing(name, response) for name, response in still.items()), samples)
+        still = [scatter(self.view, self.draws(name)) for name, scatter in self.all("scatter").items()]
+        unknown = [heard(self) for heard in self.all("heard").values()]
+        if self.only("instants") or self.only("late_samples"):
+            samples = sum(map(self._standing, still), sum(map(self._samples, self.targets)))
         else:
-            total = sum(still.values(), sum(map(self.echo, self.targets)))
-            if not unknown and not self.receiver and not offered(self.transmitter, "aired"):
+            total = sum((each.response for each in still), sum(map(self.echo, self.targets)))
+            if not unknown and not self.all("receive") and not self.all("aired"):
                 return total
             samples = waveform.transmit(total, self.look.aired)
         samples = sum(unknown, samples)
-        for name, receive in offered(self.receiver, "receive").items():
+        for name, receive in self.all("receive").items():
             samples = receive(samples, self.look, self.draws(name))
         return waveform.demodulate(samples, self.look.data)
 
@@ -185,21 +177,20 @@ class SceneSample:
     @cached_property
     def cells(self) -> np.ndarray:
         """The range cells (N, M) of the received symbols behind the receiver, before detection."""
-        picking = offered(self.transmitter, "range_cells")
-        range_cells = next(iter(picking.values()), waveform.range_cells)
+        range_cells = self.only("range_cells") or waveform.range_cells
         return self._present(range_cells(self.arrived()))
 
     def filtered(self, detection: Sequence[NamedEffect]) -> np.ndarray:
         """Return the range cells (N, M) behind the filters of these detection effects."""
         cells = self.cells
-        for name, process in offered(detection, "process").items():
-            cells = process(cells, self.look, self.draws(name))
+        for filtered in every(detection, "filtered").values():
+            cells = filtered(cells)
         return cells
 
     def chosen(self, detection: Sequence[NamedEffect], cells: np.ndarray) -> np.ndarray:
         """Return the cells (N,) that these detection effects choose of range cells (N, M): else the strongest."""
         result = abs(cells).argmax(axis=1)
-        for name, choose in offered(detection, "choose").items():
+        for name, choose in every(detection, "choose").items():
             result = choose(result, cells, self.look, self.draws(name))
         return result
 
@@ -217,7 +208,7 @@ class SceneSample:
         chosen = self.chosen(self.detection, cells)
         signal = cells[np.arange(len(cells)), chosen]
         if sampling is not None:
-            for regridded in offered(self.transmitter, "regridded").values():
+            if regridded := self.only("regridded"):
                 signal = regridded(signal, sampling, self.scene.network)
             every = np.full(len(sampling.times_s), -1)
             every[sampling.present] = chosen
@@ -238,8 +229,7 @@ class SceneSample:
     def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
         """Return the range cell (K,), with its fraction, at each received symbol, and the folded speed (N,) m/s at each
         symbol, at which the echo of the middle of a view's target appears on the direct path."""
-        moving = offered(self.scene.effects, "displaced").items()
-        displacements = [displaced(view, self.draws(name)) for name, displaced in moving]
+        displacements = [displaced(view, self.draws(name)) for name, displaced in self.all("displaced").items()]
         cell, speed_mps = truth.observed(view, displacements, self.cells.shape[1])
         return self._present(cell), speed_mps
 
@@ -253,8 +243,9 @@ class SceneSample:
 
     @property
     def prefix_s(self) -> float:
-        """The cyclic prefix's length (s), that of `cyclic_prefix` or NR's."""
-        return waveform.prefix_length_s(self.settings.get("cyclic_prefix", {}).get("prefix_s"), self.scene.network)
+        """The cyclic prefix's length (s), NR's unless an effect states another."""
+        prefix_s = self.only("prefix_s") or partial(waveform.prefix_length_s, None)
+        return prefix_s(self.scene.network)
 
     @property
     def name(self) -> str:
@@ -267,7 +258,7 @@ class SceneSample:
         network = self.scene.network
         if network.waveform != "ofdm":
             return None
-        for draw in offered(self.transmitter, "data").values():
+        if draw := self.only("data"):
             return draw(network.symbols, network.subcarriers, self.draws(name))
         return waveform.qpsk(self.draws(name), network.symbols, network.subcarriers)
 
@@ -277,7 +268,7 @@ class SceneSample:
         They are the "waveform", the "previous waveform", the "next waveform", or those of another station.
         """
         data = self._data(name)
-        for aired in offered(self.transmitter, "aired").values():
+        for aired in self.all("aired").values():
             data = aired(data)
         return data
 

@@ -14,7 +14,7 @@ from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.crossing import toward
 from lowalt.scene.laws import fast_fading
 from lowalt.scene.laws.fast_fading import Link
-from lowalt.scene.view import View
+from lowalt.scene.view import Still, View
 
 SOURCE = (
     "3GPP TR 38.901 V19.4, clause 7.9.4.2 (TRP monostatic, Table 7.9.4.2-1, Eq. 7.9.4-15), steps 3 to 12 of clause 7.5 "
@@ -83,8 +83,8 @@ def _directions(azimuth: np.ndarray, zenith: np.ndarray) -> np.ndarray:
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(zenith)], axis=1)
 
 
-def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the frequency response (N, M) of the surroundings, the same in all symbols.
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
+    """Return the echoes of the surroundings, the same in all symbols.
 
     Each ray has both array sums and the element's gain in its direction; independent from sample to sample and station
     to station.
@@ -98,13 +98,13 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     sums = np.bincount(number, amplitude.real) + 1j * np.bincount(number, amplitude.imag)
     steps = np.arange(network.subcarriers) * network.subcarrier_spacing_hz
     turned = np.exp(-2j * np.pi * late[:, None] * steps)
-    return np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy()
+    return Still(np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy())
 
 
 def usual_power(settings: dict, view: View) -> float:
     """Return the mean power (W) of a subcarrier of the surroundings' echoes, the median of `USUAL` draws."""
     drawn = [scatter(settings, view.at(view.times_s[:1]), np.random.default_rng(number)) for number in range(USUAL)]
-    return float(np.median([np.mean(abs(response) ** 2) for response in drawn]))
+    return float(np.median([np.mean(abs(still.response) ** 2) for still in drawn]))
 
 
 def _antennas(view: View, direction: np.ndarray) -> np.ndarray:

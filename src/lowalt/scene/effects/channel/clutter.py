@@ -17,7 +17,7 @@ from lowalt.files.errors import InputError
 from lowalt.scene import land
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.laws.windblown import speckle, windblown
-from lowalt.scene.view import View
+from lowalt.scene.view import Still, View
 
 SOURCE = (
     "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "
@@ -38,11 +38,6 @@ def check(settings: dict, scene: CheckedScene) -> None:
     above_ground("clutter", scene.network)
     if settings["law"] == "weibull" and not settings["shape"] <= 2:
         raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
-
-
-def offset_cells(settings: dict, view: View) -> float:
-    """Return how far all echoes of the land stand beyond the centres of their range cells."""
-    return land.OFFSET
 
 
 def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
@@ -81,8 +76,8 @@ def mean_power(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
     return land.cell_power(settings, view.network, view.station, aims_m, view.element)
 
 
-def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
+    """Return the land's echoes, independent from sample to sample and station to station."""
     network, frequency = view.network, radar(view.network, view.station).centre_hz
     power, slow = mean_power(settings, view)
     correlation = np.exp(-network.cell_m / settings["correlation_m"]) if settings["correlation_m"] > 0 else 0.0
@@ -93,4 +88,4 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
         SPEED_OF_LIGHT / frequency, slow if view.station.transmitter else 1.0,
     )  # fmt: skip
     cells = land.folded(lit[:, None] * waves, network.subcarriers)
-    return fft.fft(cells, axis=0, overwrite_x=True).T * land.ramp(network.subcarriers)
+    return Still(fft.fft(cells, axis=0, overwrite_x=True).T * land.ramp(network.subcarriers), land.OFFSET)

@@ -27,6 +27,11 @@ def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.n
     return np.clip((delay_s - prefix_s) * network.subcarrier_spacing_hz, 0.0, 1.0)
 
 
+def prefix_s(settings: dict, network: Network) -> float:
+    """Return the prefix's length (s)."""
+    return prefix_length_s(settings["prefix_s"], network)
+
+
 def late_samples(settings: dict, view: View) -> np.ndarray:
     """Return the number (N, L) of each point's samples, at the window's start, that carry the previous symbol."""
     network = view.network

@@ -20,6 +20,7 @@ SOURCE = (
     "(reciprocity): estimates; birds take the small UAV's spread and loss: estimate"
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
+DRAWN = "pair"
 IDLE = [{"pattern": False, "spread_db": 0}]
 
 CUT = 3.0

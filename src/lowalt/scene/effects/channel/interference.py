@@ -57,7 +57,7 @@ def heard(settings: dict, sample: SceneSample) -> np.ndarray:
     """
     view, network = sample.view, sample.view.network
     total = np.zeros((network.symbols, network.subcarriers), np.complex128)
-    errors = of_stations(settings, network, sample.draws("link_offset"))
+    errors = of_stations(settings, network, sample.scene.stream("link_offset", view.row))
     step_hz, middle, count = network.subcarrier_spacing_hz, network.subcarriers // 2, network.subcarriers
     number, rate_hz = np.arange(count), count * step_hz
     for sends in network.stations:

@@ -49,7 +49,7 @@ def _falling(flat_m: float, near_m: float, decay_m: float) -> float:
     return near_m / flat_m + math.exp(-flat_m / decay_m) * (1 - near_m / flat_m)
 
 
-def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+def visible_one_way(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 10) for two blocked ways; one draw."""
     x, y, height = (view.row[f"{axis}_m"] for axis in "xyz")
     place = view.station.position_m

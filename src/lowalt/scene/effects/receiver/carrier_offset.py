@@ -12,6 +12,7 @@ SOURCE = (
     "IEEE Trans. Commun. 42(10), 1994, Eqs. 1 to 4; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017}
+STREAM = "oscillator"
 IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
 
 

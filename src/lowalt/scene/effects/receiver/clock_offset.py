@@ -19,6 +19,7 @@ SOURCE = (
     "IEEE GLOBECOM 1994; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
+STREAM = "oscillator"
 IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
 
 ROUNDING = 1e-14

@@ -19,6 +19,7 @@ SOURCE = (
     "satellites: estimate"
 )
 DEFAULTS = {"sigma_ppm": 0.017, "sigma_s": 2e-8}
+DRAWN = "look"
 IDLE = [{"sigma_ppm": 0, "sigma_s": 0}]
 
 
