@@ -28,7 +28,10 @@ class Scene:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
         # Noise at one SNR does not depend on noise at another.
         levels = [effect.settings["snr_db"] for effect in self.effects if effect.name == name == "cell_noise"]
-        return stream(self.seed, "effect", name, row["subtype"], row["model"], *ends, *filter(None, levels))
+        # The stream of a user's own effect has the name of its file, wherever that lies.
+        return stream(
+            self.seed, "effect", name.rpartition("/")[2], row["subtype"], row["model"], *ends, *filter(None, levels)
+        )
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
         """Return the random stream of an effect, or of another name, at a station, from its start.

@@ -10,8 +10,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from lowalt.files.errors import InputError
+from lowalt.config.named_code import own_effects
+from lowalt.files.errors import InputError, instead
 from lowalt.scene.contract import OFFERS, PLACE_ORDER
+from lowalt.scene.own_effect import checked, loaded, place_of
 
 LISTED = (
     "motion/rotor_spread",
@@ -86,13 +88,21 @@ class NamedEffect(NamedTuple):
 
 
 def dotted(name: str) -> str:
-    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc.
+    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc, or the path of the user's own.
 
     Raises: InputError for a name that belongs to no effect.
     """
+    if own_effects([name]):
+        return name
     if name not in PLACES:
-        raise InputError(f"effects: unknown effect {name!r}, expected some of {sorted(PLACES)}")
+        known = f"{instead([name], sorted(PLACES))}, or the path of an effect's Python file"
+        raise InputError(f"effects: unknown effect {name!r}, expected {known}")
     return f"{__name__}.{PLACES[name]}.{name}"
+
+
+def module_of(name: str) -> ModuleType:
+    """Return the module of an effect, loaded. Raises: InputError where there is none."""
+    return loaded(name) if own_effects([name]) else importlib.import_module(dotted(name))
 
 
 def called(block: dict[str, dict | None]) -> list[NamedEffect]:
@@ -101,16 +111,20 @@ def called(block: dict[str, dict | None]) -> list[NamedEffect]:
     Raises: InputError for an unknown effect or parameter, or two effects that offer a function of which a scene has
     one (`contract.OFFERS`).
     """
-    modules = {name: importlib.import_module(dotted(name)) for name in block}
-    result = []
-    for name in filter(block.__contains__, PLACES):
+    modules = {name: module_of(name) for name in block}
+    own, result = own_effects(block), []
+    if len({Path(name).name for name in own}) < len(own):
+        raise InputError(f"effects: {own}, expected files of different names, after which random streams are called")
+    for name in (*filter(block.__contains__, PLACES), *own):
         module, changed = modules[name], block[name] or {}
         unknown = sorted(set(changed) - set(module.DEFAULTS))
         if unknown:
             raise InputError(
                 f"effects.{name}: unknown parameter(s) {unknown}, expected some of {list(module.DEFAULTS)}"
             )
-        result.append(NamedEffect(name, PLACES[name], module, {**module.DEFAULTS, **changed}))
+        settings = checked(name, module, changed) if name in own else {**module.DEFAULTS, **changed}
+        result.append(NamedEffect(name, place_of(name, module) if name in own else PLACES[name], module, settings))
+    result.sort(key=lambda effect: PLACE_ORDER.index(effect.place))
     acting = [effect for effect in result if not effect.idle]
     for function in OFFERS:
         only(acting, function)
