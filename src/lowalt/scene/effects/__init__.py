@@ -15,60 +15,33 @@ from lowalt.files.errors import InputError, instead
 from lowalt.scene.contract import OFFERS, PLACE_ORDER
 from lowalt.scene.own_effect import checked, loaded, place_of
 
-LISTED = (
-    "motion/rotor_spread",
-    "motion/gusts",
-    "transmitter/slow_time",
-    "transmitter/data_symbols",
-    "transmitter/power_amplifier",
-    "transmitter/comb_pilots",
-    "channel/pointing_error",
-    "channel/element_pattern",
-    "channel/mean_cross_section",
-    "channel/fluctuation",
-    "channel/cross_sections",
-    "channel/occlusion",
-    "channel/line_of_sight",
-    "channel/ground_reflection",
-    "channel/walls",
-    "channel/reflected_aspect",
-    "channel/squint",
-    "channel/wavefront",
-    "channel/symbol_motion",
-    "channel/cyclic_prefix",
-    "channel/companions",
-    "channel/direct_path",
-    "channel/interference",
-    "channel/clutter",
-    "channel/background_channel",
-    "receiver/receiver_noise",
-    "receiver/cell_noise",
-    "receiver/link_offset",
-    "receiver/timing_offset",
-    "receiver/clock_offset",
-    "receiver/carrier_offset",
-    "receiver/phase_noise",
-    "receiver/transmit_leakage",
-    "receiver/iq_imbalance",
-    "receiver/adc",
-    "detection/canceller",
-    "detection/detector",
-    "detection/cell_error",
-)
-"""Place and name of the effects whose order within their place matters, in the order of the chain."""
+LISTED = {
+    "motion": "rotor_spread gusts",
+    "transmitter": "slow_time data_symbols power_amplifier comb_pilots",
+    "channel": (
+        "pointing_error element_pattern mean_cross_section fluctuation cross_sections occlusion line_of_sight "
+        "ground_reflection walls reflected_aspect squint wavefront symbol_motion cyclic_prefix companions direct_path "
+        "interference clutter background_channel"
+    ),
+    "receiver": (
+        "receiver_noise cell_noise link_offset timing_offset clock_offset carrier_offset phase_noise transmit_leakage "
+        "iq_imbalance adc"
+    ),
+    "detection": "canceller detector cell_error",
+}
+"""Names of the effects whose order within their place matters, in the order of the chain."""
 
 
-def _every_effect() -> tuple[str, ...]:
-    """LISTED, each place followed by the effects in its folder that are not listed, in alphabetical order."""
-    folder, result = Path(__file__).parent, []
+def _places() -> dict[str, str]:
+    """The place of every effect: in each place those LISTED, then the others of its folder in alphabetical order."""
+    folder, result = Path(__file__).parent, {}
     for place in PLACE_ORDER:
-        listed = [entry for entry in LISTED if entry.startswith(f"{place}/")]
-        files = sorted(f"{place}/{path.stem}" for path in (folder / place).glob("*.py") if path.stem != "__init__")
-        result += listed + [entry for entry in files if entry not in listed]
-    return tuple(result)
+        files = sorted(path.stem for path in (folder / place).glob("*.py") if path.stem != "__init__")
+        result |= dict.fromkeys((*LISTED[place].split(), *files), place)
+    return result
 
 
-PLACES = {name: place for place, _, name in (entry.partition("/") for entry in _every_effect())}
+PLACES = _places()
 """Place of every effect by its name, in the order of the chain."""
 
 
