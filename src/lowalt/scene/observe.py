@@ -1,4 +1,4 @@
-"""A scene, its random streams, and the motion of a target as one of its stations sees it."""
+"""A scene with its random streams, and the view of a moving target from one of its stations."""
 
 from dataclasses import dataclass, replace
 
@@ -26,7 +26,7 @@ class Scene:
 
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
-        # Noise at one SNR does not depend on noise at another.
+        # Each SNR has a stream of its own, so its noise does not depend on the other SNRs.
         levels = [effect.settings["snr_db"] for effect in self.effects if effect.name == name == "cell_noise"]
         # The stream of a user's own effect has the name of its file, wherever that lies.
         return stream(
@@ -66,10 +66,10 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
 def observe(
     scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None, beside: View | None = None
 ) -> View:
-    """Return the view of a sample with the scene's motion effects drawn; their draws do not depend on the station.
+    """Return the view of a sample from a station, with the motion effects of the scene, which all stations share.
 
-    The view's cloud has the cross sections of the scene. occluders: the target's surfaces; beside: the view of the
-    labelled target, whose instants and beams a companion shares.
+    The view's cloud has the cross sections that the scene gives its points. occluders: the target's surfaces; beside:
+    of a companion, the view of the labelled target, whose instants and beams it shares.
     """
     network, cloud = scene.network, with_cross_sections(scene, cloud)
     grid_s = np.append(network.times_s, len(network.times_s) * network.symbol_interval_s)

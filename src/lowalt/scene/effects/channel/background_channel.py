@@ -1,7 +1,8 @@
-"""Echoes of the surroundings, drawn as 3GPP's background channel of a station that hears itself.
+"""Echoes of the surroundings: the background channel of 3GPP for a monostatic station.
 
-Three points of reference stand round the station, a third of a turn apart. To each there is a link without line of
-sight, whose rays the station sends and receives in the same directions. Nothing moves, so a canceller removes it.
+Three reference points stand around the station, 120 degrees apart. Each has a link without line of sight to the
+station, which sends and receives the rays of the link in the same directions. Nothing moves, so a canceller removes
+these echoes.
 """
 
 import numpy as np
@@ -86,8 +87,8 @@ def _directions(azimuth: np.ndarray, zenith: np.ndarray) -> np.ndarray:
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
     """Return the echoes of the surroundings, the same in all symbols.
 
-    Each ray has both array sums and the element's gain in its direction; independent from sample to sample and station
-    to station.
+    Each ray is weighted by both array sums and the element's gain in its direction. Samples and stations have
+    independent draws.
     """
     network, station = view.network, view.station
     ghz = radar(network, station).centre_hz / 1e9

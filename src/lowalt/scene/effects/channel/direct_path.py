@@ -1,8 +1,8 @@
 """The direct path of a link between two stations: the sent signal reaches the receiving station without the target.
 
-It stands still, at the delay of the masts' distance, and enters by both arrays' side lobes, since their beams point at
-the target. Stations that receive their own signal have none; their leakage is `transmit_leakage`. A scene with links
-names this effect, without loss or with it; everything physical that is not modelled between two stations is refused.
+It has the delay of the distance between the masts and no Doppler shift, and it enters through the side lobes of both
+arrays, whose beams point at the target. A station that receives its own signal has `transmit_leakage` instead. A scene
+with links must name this effect; effects that are not modelled between two stations are refused (`checks`).
 """
 
 import numpy as np

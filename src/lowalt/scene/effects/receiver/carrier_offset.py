@@ -17,15 +17,15 @@ IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for an offset of an oscillator against itself."""
+    """Raise InputError where transmitter and receiver share one oscillator, which has no offset from itself."""
     offsets.check_oscillator("carrier_offset", scene)
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) turned by exp(j 2 pi F t) at their absolute times t = n T_r + i / (M df).
+    """Return the samples (N, M) times exp(j 2 pi F t) at their absolute times t = n T_r + i / (M df).
 
-    F > 0 if the receiver's oscillator is too low: lines rise by F and fold at half the symbol rate.
-    Source: Moose 1994; one draw a sample and station.
+    F is positive where the receiver's oscillator is too low: all lines rise by F, and fold at half the symbol rate.
+    Source: Moose 1994. One draw per sample and station.
     """
     return offsets.risen(samples, 1e-6 * _ppm(settings, rng) * look.oscillator_hz, look)
 

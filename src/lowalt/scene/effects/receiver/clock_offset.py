@@ -47,15 +47,15 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return samples (N, M) of the same band-limited signal, taken at t / (1 + e) instead of t.
 
-    Every sample is the exact sum of the symbol's M subcarriers at its own instant, in the symbol's cyclic extension. A
-    fast clock is early ever more, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994; one draw a sample and
-    station.
+    Each sample is the exact sum of the symbol's M subcarriers at its own instant, in the symbol's cyclic extension. A
+    fast clock samples earlier from symbol to symbol, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994. One
+    draw per sample and station.
     """
     rate = _rate(settings, rng)
     early = -rate / (1 + rate)
     middle = samples.shape[1] // 2
     shift_hz = early * fft.ifftshift(look.baseband_hz)
-    # The whole symbol moves with its middle sample, and a series in time about that stretches it.
+    # The shift of the middle sample moves the whole symbol; a Taylor series about that sample stretches it.
     instants = look.times_s + look.within_s[middle]
     term = offsets.turned(fft.fft(samples, axis=-1), np.outer(instants, shift_hz))
     result = fft.ifft(term, axis=-1)
