@@ -163,9 +163,9 @@ def test_every_instance_of_a_glb_is_placed_turned_and_scaled_in_its_node(tmp_pat
     head = {"nodes": [node], "extensionsUsed": ["EXT_mesh_gpu_instancing"]}
     arrays = {"POSITION": TETRAHEDRON.astype("<f4"), "indices": FACES.ravel().astype("<u4")}
     found = pieces(glb(tmp_path / "a.glb", head, **arrays, shifts=shifts, turns=turns, sizes=sizes))
-    np.testing.assert_allclose(found[0].vertices, TETRAHEDRON + [1, 0, 5])
+    np.testing.assert_allclose(found[0].vertices, TETRAHEDRON + np.array([1, 0, 5]))
     # Half a turn about z, and twice the size.
-    np.testing.assert_allclose(found[1].vertices, TETRAHEDRON * [-2, -2, 2] + [0, 2, 5], atol=1e-6)
+    np.testing.assert_allclose(found[1].vertices, TETRAHEDRON * [-2, -2, 2] + np.array([0, 2, 5]), atol=1e-6)
     assert len(found) == 2 and len({piece.names[0] for piece in found}) == 2
 
 
