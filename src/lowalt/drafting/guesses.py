@@ -44,8 +44,8 @@ ASYMMETRIC = 0.01
 
 IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
 """One half of a target ends in a plane. IN_PLANE is the largest distance of its end points from that plane, AT_ZERO
-that of the plane from the origin of the file, both as shares of the size. CUT and OPEN_CUT are the least area that the end
-spans, as a share of the bounding box: CUT for a plane at the origin, OPEN_CUT for an open end anywhere."""
+that of the plane from the origin of the file, both as shares of the size. CUT and OPEN_CUT are the least area that the
+end spans, as a share of the bounding box: CUT for a plane at the origin, OPEN_CUT for an open end anywhere."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
 """An arm is slender (its spread across is at most SLENDER times that along), points at the middle of the craft (cosine
