@@ -90,7 +90,8 @@ def row_lines(
     near = min((row for row in table.values() if row["category"] == category),
                key=lambda row: abs(np.log(row[key] / sizes[key])))  # fmt: skip
     cells = {"category": category} | {name: float(f"{value:.4g}") for name, value in sizes.items() if value}
-    cells["n_rotors_or_wings"] = max(1, len(hubs)) if category != "Bird" else 2
+    if count := 2 if category == "Bird" else len(hubs):
+        cells["n_rotors_or_wings"] = count
     speeds = ("vx_abs_max", "vy_abs_max", "vz_abs_max") if category in AIRBORNE else ("speed_lo", "speed_hi")
     cells |= {name: near[name] for name in ("wheel_diam_m", "freq_lo_hz", "freq_hi_hz", *speeds)
               if near[name] is not None and name not in cells}  # fmt: skip
