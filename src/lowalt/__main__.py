@@ -7,7 +7,7 @@ Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input. S
 import argparse
 import sys
 
-from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
+from lowalt.commands import compare, completion, data, explain, recording, report, sample, spectra, target, workflow
 from lowalt.commands.command_line import Answer, as_json
 from lowalt.config.command import refusal
 from lowalt.files.errors import InputError
@@ -19,7 +19,7 @@ def main(arguments: list[str] | None = None) -> int:
         prog="lowalt", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = line.add_subparsers(dest="command", required=True)
-    for part in (explain, workflow, sample, data, compare, report, target, spectra):
+    for part in (explain, workflow, sample, data, compare, report, target, recording, spectra):
         part.add_to(commands)
     completion.add_to(commands, line)
     options = line.parse_args(arguments)

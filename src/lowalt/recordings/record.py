@@ -18,8 +18,6 @@ class Record:
     file: Path
     carrier_hz: float
     channel: str
-    source: str
-    licence: str
     rate_hz: float | None = None
     columns: tuple[int | str, ...] | None = None
     variable: str | None = None
@@ -29,6 +27,11 @@ class Record:
     layout: str | None = None
     dtype: str | None = None
     trust: str | None = None
+    source: str | None = None
+    licence: str | None = None
+    capture: int | None = None
+    receiver: int = 0
+    chirps: dict | None = None
 
     @property
     def name(self) -> str:
@@ -45,7 +48,7 @@ def record(block: dict, folder: Path, where: str) -> Record:
     check_brought("recording", block, where)
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":
-        for key in ("moves", "layout"):
+        for key in ("moves", "layout", "chirps"):
             if key in block:
                 raise InputError(f"{where}: {key} is {block[key]!r}, expected channel 'complex' with it: a real "
                                  "channel has no sign of Doppler and no second part")  # fmt: skip
