@@ -37,11 +37,14 @@ def names(zoo: Path = ZOO) -> list[str]:
 def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Trained, dict]:
     """Return a trained model and how its images are made of signals ({network, spectra, images}; {} where unknown).
 
-    model: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo; trusted: the user's
+    model: model.pt of a training, a model file (.safetensors), with or without its
+    suffix, or the name of an entry of the zoo; trusted: the user's
     FILE.py:FUNCTION for a model whose backbone is such code.
     Raises: InputError naming the entries there are, or the fault of the file.
     """
     path = Path(model)
+    if path.suffix == "" and path.with_name(f"{path.name}.safetensors").is_file():
+        path = path.with_name(f"{path.name}.safetensors")
     if path.suffix == "" and not path.is_file():
         path = zoo / f"{model}.safetensors"
         if str(model) not in names(zoo):

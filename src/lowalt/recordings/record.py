@@ -32,6 +32,7 @@ class Record:
     capture: int | None = None
     receiver: int = 0
     chirps: dict | None = None
+    twin: dict | None = None
 
     @property
     def name(self) -> str:
