@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.commands.command_table import COMMANDS
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.recordings.inspection import Inspection, Seen, inspect_recording
@@ -16,15 +17,12 @@ WORDS = {"iqiq": "I and Q in turn", "iiqq": "all I, then all Q", "dca2": "DCA100
          "dca4": "DCA1000, four lanes", "polar": "magnitude and phase"}  # fmt: skip
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `recording` and its commands to a parser's commands."""
-    recording = commands.add_parser(
-        "recording", help="a recording of your own radar: look, draft its record",
-        epilog="example: lowalt recording inspect walk.bin --carrier 24e9 --rate 12000",
-    )  # fmt: skip
+    _, meaning, example = COMMANDS[name]
+    recording = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     actions = recording.add_subparsers(dest="action", required=True)
     meaning = "layouts that fit the file's bytes, the best first, a picture, and a draft of its record"
-    example = "lowalt recording inspect walk.bin --carrier 24e9 --rate 12000"
     inspect = add_command(actions, "inspect", _inspect, meaning, example)
     inspect.add_argument("file", type=Path, help="the samples: WAV, MAT, CSV, NPY, SigMF, or numbers without a header")
     inspect.add_argument("--carrier", type=_hertz, metavar="HZ", help="carrier, where the file does not say it")

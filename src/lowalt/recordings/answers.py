@@ -38,8 +38,8 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
         near = [name for name, other in known.items() if other.near(record.carrier_hz)]
         raise InputError(
             f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
-            + (f"expected a network of {near}" if near else "expected a network of a twin at this carrier, which "
-               "`studies/twin_networks.py --twins FILE` trains; the zoo has none")
+            + (f"expected a network of {near}" if near else "expected a network of your own radar, which "
+               "`lowalt recording train` makes; the zoo has none")
         )  # fmt: skip
     twin = radar.at_carrier(record.carrier_hz)
     intervals = windows(record, twin).astype(np.complex64)

@@ -6,7 +6,7 @@ Its keys stand in the definition `recording` of `lowalt/config/brought.schema.ya
 from dataclasses import dataclass
 from pathlib import Path
 
-from lowalt.config.schema import check_brought
+from lowalt.config.schema import check_brought, of_brought, with_numbers
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 
@@ -45,7 +45,7 @@ def record(block: dict, folder: Path, where: str) -> Record:
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
-    block = {key: value for key, value in block.items() if value is not None}
+    block = with_numbers({key: value for key, value in block.items() if value is not None}, of_brought("recording"))
     check_brought("recording", block, where)
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":
