@@ -3,6 +3,7 @@
 import argparse
 import math
 import os
+import shlex
 from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
@@ -105,14 +106,14 @@ def _next(inspection: Inspection, seen: Seen, out: Path) -> str:
         f"--{name.removesuffix('_hz')} HZ" for name in ("carrier_hz", "rate_hz") if not getattr(inspection, name)
     ]
     if missing:
-        return f"lowalt recording inspect {inspection.path} {' '.join(missing)}"
+        return f"lowalt recording inspect {shlex.quote(str(inspection.path))} {' '.join(missing)}"
     from lowalt.recordings.twin import radars
 
     names = [name for name, twin in radars().items() if twin.near(inspection.carrier_hz)
              and (twin.channel == "real" or seen.keys["channel"] == "complex")]  # fmt: skip
     if names:
-        return f"lowalt predict {names[0]} {out}"
-    return f"lowalt recording train {out} --out my_radar"
+        return f"lowalt predict {names[0]} {shlex.quote(str(out))}"
+    return f"lowalt recording train {shlex.quote(str(out))} --out my_radar"
 
 
 def _inspect(options: argparse.Namespace) -> Answer:

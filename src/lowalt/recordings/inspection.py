@@ -23,6 +23,7 @@ from lowalt.recordings.record import Record
 
 SHOWN = 8
 """Most readings that an inspection lists."""
+SLOW_SHARE = 5e-4
 LONGEST = 1 << 20
 """Samples from the start that spectra are made of."""
 RATE_NAMES = ("fs", "rate", "sample_rate", "samplerate", "sampling_rate", "prf")
@@ -177,10 +178,14 @@ def _record(path: Path, keys: dict, carrier_hz: float | None, rate_hz: float | N
 
 
 def _line(values: np.ndarray, rate_hz: float) -> float:
-    """Frequency (Hz) of the strongest line of samples (n,), its sign lost where they are real."""
+    """Frequency (Hz) of the strongest line of samples (n,), its sign lost where they are real.
+
+    Slow noise, which rises towards zero, is no line: what is below `SLOW_SHARE` of the rate does not count.
+    """
     part = values[:LONGEST]
     power = np.abs(np.fft.fft((part - part.mean()) * np.hanning(len(part)))) ** 2
-    power[[0, 1, -1]] = 0
+    slow = max(2, round(SLOW_SHARE * len(part)))
+    power[:slow] = power[1 - slow :] = 0
     if np.isrealobj(values):
         power[len(power) // 2 + 1 :] = 0
     return float(np.fft.fftfreq(len(power), 1 / rate_hz)[power.argmax()])

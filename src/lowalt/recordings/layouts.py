@@ -20,6 +20,8 @@ GROUPS = {"iqiq": 2, "iiqq": 2, "dca2": 4, "dca4": 8}
 TYPES = ("int16", "uint8", "int8", "float32", "int16_be", "uint16", "float64", "int32", "float32_be", "uint16_be",
          "int32_be")  # fmt: skip
 """Types that bytes without a header are tried as, the usual ones first."""
+HALVES = 0.01
+"""Bits a number by which I and Q in two halves must be better: few receivers write so, and many have a real channel."""
 LATER = 0.002
 """Bits a number by which a reading must be better than one that is more usual."""
 CONTRADICTED = 0.06
@@ -71,7 +73,8 @@ def readings(numbers: np.ndarray, dtype: str = "") -> list[Reading]:
     for layout in ("iqiq", "", "iiqq", *(("dca2", "dca4") if numbers.dtype.itemsize == 2 else ())):
         with np.errstate(all="ignore"):
             channels = parted(numbers, layout, "") if layout else [numbers]
-        found.append(Reading(dtype, layout, code_bits(channels, step) / numbers.dtype.itemsize))
+        bits = code_bits(channels, step) + HALVES * (layout == "iiqq")
+        found.append(Reading(dtype, layout, bits / numbers.dtype.itemsize))
     return _ranked(found)
 
 
