@@ -53,8 +53,8 @@ def step_bits(numbers: np.ndarray) -> float:
 def code_bits(channels: list[np.ndarray], step_log2: float) -> float:
     """Return the bits a real number that channels (samples,), real or complex, take in steps of 2^step_log2.
 
-    A complex channel is two real numbers with one variance and no correlation, or two real channels, whichever takes
-    fewer bits. Infinite where a value is not finite or spans 1e100 steps.
+    A complex channel is two real numbers with one variance and no correlation, or, where it is the only one, two real
+    channels, whichever takes fewer bits. Infinite where a value is not finite or spans 1e100 steps.
     """
     bits, count = 0.0, 0
     for values in channels:
@@ -64,10 +64,10 @@ def code_bits(channels: list[np.ndarray], step_log2: float) -> float:
             largest = np.abs(stretches).max()
         if not largest < 1e100:
             return np.inf
-        order = min(ORDER // (parts * len(channels)), stretches.shape[1] // 4)
+        order = min(ORDER // parts, stretches.shape[1] // 4)
         ways = [_coded(stretches, order)]
-        if parts == 2:
-            order = min(ORDER // len(channels), stretches.shape[1] // 4)
+        if parts == 2 and len(channels) == 1:
+            order = min(ORDER, stretches.shape[1] // 4)
             ways.append(0.5 * (_coded(stretches.real, order) + _coded(stretches.imag, order)))
         bits += parts * len(values) * min(ways)
         count += parts * len(values)

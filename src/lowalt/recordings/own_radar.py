@@ -34,6 +34,8 @@ FASTEST_MPS, WINDOW_S = 20.0, 0.4
 LEAST_SYMBOLS, MOST_SYMBOLS = 400, 1200
 """Symbols of a window: the spectra need 400; more than 1200 add time and no class."""
 SLOWEST_MPS, DETECT_DB = 0.4, 12.0
+WHOLE = 0.02
+"""How far the symbol rate may be moved for a whole number of samples a symbol."""
 ROOM_M = 2.5
 """Least distance between the ends of a walk."""
 SPREAD_DB = 5.0
@@ -58,6 +60,7 @@ def twin_of(record: Record, rate_hz: float) -> Twin:
     # Unambiguous are lambda / 4 T of a complex channel, twice that of a one-sided one.
     wanted_hz = (2 if one_sided else 4) * said.get("fastest_mps", FASTEST_MPS) * record.carrier_hz / SPEED_OF_LIGHT
     every = max(1.0, rate_hz / wanted_hz)
+    every = round(every) if abs(every - round(every)) < WHOLE * every else every
     symbol_hz = rate_hz / every
     usual = "one_sided" if one_sided else "anti_aliased"
     sampling = said.get("sampling", usual if every > 1 or one_sided else "bare")
