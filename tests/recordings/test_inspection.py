@@ -14,7 +14,7 @@ from lowalt.__main__ import main as lowalt
 from lowalt.files.errors import InputError
 from lowalt.recordings import read, read_record
 from lowalt.recordings.evidence import chirp_length
-from lowalt.recordings.inspection import inspect_recording
+from lowalt.recordings.file_inspection import inspect_recording
 from lowalt.recordings.record import record
 
 WRITTEN = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks/recording_layouts.py"))

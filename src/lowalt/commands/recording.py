@@ -10,7 +10,7 @@ from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.recordings.inspection import Inspection, Seen, inspect_recording
+from lowalt.recordings.file_inspection import FileInspection, Seen, inspect_recording
 
 DRAFTED = "# Drafted by `lowalt recording inspect`."
 """First line of a draft; only a file that begins with it is written over."""
@@ -71,7 +71,7 @@ def _described(seen: Seen) -> str:
     return ", ".join(words)
 
 
-def _line(inspection: Inspection, seen: Seen) -> str:
+def _line(inspection: FileInspection, seen: Seen) -> str:
     """A reading's strongest line in words."""
     speed = inspection.speed_mps(seen)
     if not inspection.rate_hz:
@@ -82,7 +82,7 @@ def _line(inspection: Inspection, seen: Seen) -> str:
     return f"{hertz} = {speed:+.2f} m/s" if seen.values.dtype.kind == "c" else f"{hertz} = {speed:.2f} m/s, sign lost"
 
 
-def drafted(inspection: Inspection, seen: Seen, folder: Path) -> str:
+def drafted(inspection: FileInspection, seen: Seen, folder: Path) -> str:
     """Return the text of a record of a reading, relative to the folder that it is written to; guesses are marked."""
     mark = "" if seen.said else f"  # GUESSED: fits its samples best, {seen.bits:.2f} bits a byte"
     path = Path(os.path.relpath(inspection.path.resolve(), folder.resolve())).as_posix()
@@ -100,7 +100,7 @@ def drafted(inspection: Inspection, seen: Seen, folder: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _next(inspection: Inspection, seen: Seen, out: Path) -> str:
+def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
     """The command to type next."""
     missing = [
         f"--{name.removesuffix('_hz')} HZ" for name in ("carrier_hz", "rate_hz") if not getattr(inspection, name)

@@ -5,14 +5,14 @@ from matplotlib import pyplot as plt
 from scipy.signal import spectrogram
 
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.recordings.inspection import Inspection
+from lowalt.recordings.file_inspection import FileInspection
 from lowalt.report.figures.style import png
 
 PANELS = 3
 RANGE_DB = 50.0
 
 
-def recording_picture(inspection: Inspection, words: list[str]) -> bytes:
+def recording_picture(inspection: FileInspection, words: list[str]) -> bytes:
     """Return a PNG of the spectrograms of the first readings, over radial speed (m/s) or, without a carrier, Hz.
 
     words: a title for each reading. Colours span `RANGE_DB` below the strongest line, without the constant part.

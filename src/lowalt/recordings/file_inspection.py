@@ -54,7 +54,7 @@ class Seen(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Inspection:
+class FileInspection:
     """What is seen in a file: rates and carrier (Hz, None where nothing says them), readings and faults of the first.
 
     said: names of those of carrier_hz and rate_hz that the file itself or its reader says.
@@ -206,7 +206,7 @@ def _seen(path: Path, one: Candidate, rate_hz: float, values: np.ndarray | None 
     return Seen(*one, values, rate_hz, _line(values, rate_hz))
 
 
-def inspect_recording(path: Path, carrier_hz: float | None = None, rate_hz: float | None = None) -> Inspection:
+def inspect_recording(path: Path, carrier_hz: float | None = None, rate_hz: float | None = None) -> FileInspection:
     """Return what a recording's file shows: its readings, the best first, and the faults of the best.
 
     carrier_hz, rate_hz: where they are known (of chirps, the number of chirps a second); what the file itself says
@@ -233,7 +233,7 @@ def inspect_recording(path: Path, carrier_hz: float | None = None, rate_hz: floa
     if not found:
         raise InputError(f"{path}: nothing in it reads as a signal, expected samples of one or two channels")
     notes = _notes(path, found[0], rate_hz, carrier_hz)
-    return Inspection(path, carrier_hz, rate_hz, said, found[:SHOWN], notes)
+    return FileInspection(path, carrier_hz, rate_hz, said, found[:SHOWN], notes)
 
 
 def _in_chirps(path: Path, one: Candidate, seen: Seen, rate_hz: float) -> list[Seen]:
