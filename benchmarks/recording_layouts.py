@@ -2,9 +2,9 @@
 
     python benchmarks/recording_layouts.py --out results/benchmarks/recording_layouts.csv
 
-Simulated echoes in noise (a point at one speed, a walker, a drone's body and rotors; a leak is always there) are written
-in the ways in which receivers write them. A reading is right where it gives back the samples that were written, up to a
-factor; of chirps, where the strongest line has the point's speed and sign. Rate and carrier are told, nothing else.
+Simulated echoes in noise (a point at one speed, a walker, a drone's body and rotors; a leak is always there) are
+written as receivers write them. A reading is right where it gives back the samples that were written, up to a factor,
+and of chirps the slow signal. Rate and carrier are told, nothing else.
 """
 
 import argparse
@@ -32,7 +32,8 @@ def echo(kind: str, snr_db: float, rng: np.random.Generator) -> np.ndarray:
     range_m = 20 - SPEED_MPS * times
     parts = {
         "point": [(1.0, range_m)],
-        "walker": [(1.0, range_m), *((0.4, range_m + 0.15 * np.sin(2 * np.pi * 1.8 * times + phase)) for phase in (0, 3))],
+        "walker": [(1.0, range_m), *((0.4, range_m + 0.15 * np.sin(2 * np.pi * 1.8 * times + phase))
+                                     for phase in (0, 3))],
         "drone": [(1.0, range_m), *((0.3, range_m + reach * np.cos(2 * np.pi * rate * times + rate))
                                     for rate in (80.0, 82.0, 79.0, 85.0) for reach in (0.04, 0.07, 0.1))],
     }  # fmt: skip
@@ -70,7 +71,7 @@ def mat73(path: Path, values: np.ndarray) -> Path:
 
 
 def chirped(values: np.ndarray, samples: int = 64, beat: float = 0.11) -> np.ndarray:
-    """Chirps (chirps * samples,) of a target whose slow signal is `values`: a beat note on each, its phase conjugated."""
+    """Chirps (512 * samples,) of a target with the slow signal `values`: a beat note of conjugate phase, and clutter."""
     fast = np.exp(2j * np.pi * beat * np.arange(samples))
     still = 2 * np.exp(2j * np.pi * 0.031 * np.arange(samples))
     return (values[:512, None].conj() * fast + still).ravel()
