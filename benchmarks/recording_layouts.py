@@ -71,7 +71,7 @@ def mat73(path: Path, values: np.ndarray) -> Path:
 
 
 def chirped(values: np.ndarray, samples: int = 64, beat: float = 0.11) -> np.ndarray:
-    """Chirps (512 * samples,) of a target with the slow signal `values`: a beat note of conjugate phase, and clutter."""
+    """Chirps (512 * samples,) of a target with the slow signal `values`: a beat note of conjugate phase, clutter."""
     fast = np.exp(2j * np.pi * beat * np.arange(samples))
     still = 2 * np.exp(2j * np.pi * 0.031 * np.arange(samples))
     return (values[:512, None].conj() * fast + still).ravel()
