@@ -5,19 +5,20 @@ Doppler is lost: towards and away look the same, and both sides of a rotor's spe
 
 The sampling is one of three, by name:
     anti_aliased   frequencies beyond half the symbol rate are filtered out first
-    one_sided      for a real channel, whose analytic signal has no negative frequencies: the band from 0 to the whole
-                   symbol rate is kept, so speeds up to twice the usual bound stay apart; those above the usual
-                   bound appear as negative speeds
+    one_sided      for a real channel, whose analytic signal has no negative frequencies: the band from 0 to 94 % of the
+                   symbol rate is kept, so speeds up to nearly twice the usual bound stay apart; those above the
+                   usual bound appear as negative speeds
     bare           every symbol takes the unfiltered value at its time, so faster lines fold, as in a radar that
                    measures once a symbol (the published network folds every rotor this way)
-All evaluate the recording between its samples by the same windowed sinc kernel, so any rate goes to any rate.
+All evaluate the recording between its samples by the same windowed sinc kernel, so any rate goes to any rate. The gain
+of each at every tone of its band is a table (`python benchmarks/sampling_gain.py`).
 """
 
 import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import hilbert
+from scipy.signal import firwin, hilbert, kaiserord, oaconvolve
 
 from lowalt.files.errors import InputError
 
@@ -28,6 +29,11 @@ BETA = 8.0
 """Kaiser window of the kernel: side lobes near -80 dB (Kaiser and Schafer 1980)."""
 EDGE = 0.9
 """Pass band of the anti-aliasing filter over half the symbol rate. In the last tenth the kernel falls off."""
+ONE_SIDED_EDGE = 0.94
+"""Pass band of one-sided sampling over the symbol rate. The filter falls off between here and the symbol rate itself,
+from which on a tone would fold onto a slow target."""
+STOP_DB = 80.0
+"""Attenuation of one-sided sampling from the symbol rate on."""
 PHASES = 1024
 """Number of places between two samples at which the kernel is tabulated. Linear interpolation between them is accurate
 to 1e-6."""
@@ -86,13 +92,30 @@ def symbol_rate(values: np.ndarray, rate_hz: float, symbol_interval_s: float, sa
         if np.iscomplexobj(values):
             raise InputError("sampling is 'one_sided' for a complex channel, which has negative frequencies; expected "
                              "anti_aliased or bare")  # fmt: skip
-        # Shift down by half a symbol rate, so that the band is symmetric about zero; filter; shift back by (-1)^n.
-        shifted = signal * np.exp(-1j * np.pi / step * np.arange(len(signal)))
-        moved = _resampled(shifted, step, EDGE / step)
-        return moved * (-1.0) ** np.arange(len(moved))
+        signal = _below(signal, rate_hz, 1 / symbol_interval_s)
     if sampling == "bare" and math.isclose(step, round(step), rel_tol=1e-12):
         return signal[:: round(step)].copy()
-    return _resampled(signal, step, EDGE / step if sampling == "anti_aliased" else 1.0)
+    if sampling == "anti_aliased":
+        return _resampled(signal, step, EDGE / step)
+    if np.iscomplexobj(values):
+        return _resampled(signal, step, 1.0)
+    # A real channel's spectrum lies between 0 and half its rate. About a quarter of the rate it is symmetric, so that
+    # the kernel, which falls off near half the rate, passes all of it.
+    turned = _resampled(signal * (-1j) ** (np.arange(len(signal)) % 4), step, 1.0)
+    return turned * np.exp(0.5j * np.pi * step * np.arange(len(turned)))
+
+
+def _below(signal: np.ndarray, rate_hz: float, symbol_rate_hz: float) -> np.ndarray:
+    """An analytic signal without what lies from the symbol rate (Hz) on; its side of negative frequencies is empty.
+
+    Source: the length of a Kaiser window's filter, Kaiser 1974 (`scipy.signal.kaiserord`).
+    """
+    if rate_hz <= 2 * symbol_rate_hz:
+        return signal
+    fall = (1 - ONE_SIDED_EDGE) * symbol_rate_hz
+    taps, beta = kaiserord(STOP_DB, fall / (rate_hz / 2))
+    kernel = firwin(taps | 1, symbol_rate_hz - fall / 2, window=("kaiser", beta), fs=rate_hz)
+    return oaconvolve(signal, kernel, mode="same")
 
 
 def _resampled(signal: np.ndarray, step: float, band: float) -> np.ndarray:

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from scipy.ndimage import maximum_filter, median_filter
 
-from lowalt.recordings.channel import EDGE
+from lowalt.recordings.channel import EDGE, ONE_SIDED_EDGE
 from lowalt.recordings.twin import Twin
 
 QUIET_SHARE = 0.1
@@ -60,7 +60,7 @@ def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndar
     speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * twin.edge_mps
     order, meant = speeds_shown(speeds, twin.edge_mps, twin.sides)
     # The sampling filter ends at `EDGE` of the band; beyond it there is no noise to compare with.
-    last = {"anti_aliased": EDGE, "one_sided": 1 + EDGE, "bare": 1.0}[twin.sampling] * twin.edge_mps
+    last = {"anti_aliased": EDGE, "one_sided": 2 * ONE_SIDED_EDGE, "bare": 1.0}[twin.sampling] * twin.edge_mps
     return np.fft.fftshift(power, axes=1)[:, order], (np.abs(meant) >= twin.slowest_mps) & (np.abs(meant) <= last)
 
 
