@@ -1,6 +1,7 @@
 """Recordings held against twins: which files count, what the figures read off, what tables and page say of them."""
 
 import hashlib
+import re
 import runpy
 from pathlib import Path
 
@@ -54,27 +55,43 @@ def test_the_files_are_whole_and_halves_share_no_recording(library):
     addresses = fetch.addresses(load_yaml(fetch.SOURCES))
     named = {f"{name}/{file}" for name, block in split.items() for half in block.values() for file in half}
     assert named == set(addresses) - {"vehicle_24ghz/LICENSE"}
-    for places, pinned in addresses.values():
-        assert len(pinned) == 64 and int(pinned, 16) and all(place.startswith("https://") for place in places)
+    further = fetch.addresses(load_yaml(HERE / "further.yaml"))
+    assert not set(further) & set(addresses)
+    # A file counts by its content, whatever its name is.
+    sums = [pinned for _, pinned in (addresses | further).values()]
+    assert len(set(sums)) == len(sums) and all(len(pinned) == 64 and int(pinned, 16) for pinned in sums)
+    for address, _ in (addresses | further).values():
+        assert re.fullmatch(r"https://raw.githubusercontent.com/[\w.-]+/[\w.-]+/[0-9a-f]{40}/[\w./%-]+", address)
 
 
-def test_what_is_fetched_comes_from_the_first_address_that_has_the_pinned_bytes(tmp_path, capsys):
-    here, gone = tmp_path / "here", tmp_path / "gone"
-    here.mkdir()
+def test_what_is_fetched_has_the_pinned_bytes_and_a_copy_is_checked_without_network(tmp_path, capsys, monkeypatch):
+    here = tmp_path / "owner/name/0a1b/some folder"
+    here.mkdir(parents=True)
     (here / "a b.wav").write_bytes(b"sound")
     sums = {name: hashlib.sha256(text).hexdigest() for name, text in (("a b.wav", b"sound"), ("c.wav", b"other"))}
-    block = {"set": [{"addresses": [gone.as_uri(), here.as_uri()], "files": sums}]}
-    (tmp_path / "sources.yaml").write_text(yaml.safe_dump(block))
+    block = {"repository": "owner/name", "commit": "0a1b", "folder": "some folder", "files": sums}
+    (tmp_path / "sources.yaml").write_text(yaml.safe_dump({"set": [block]}))
+    monkeypatch.setattr(fetch, "RAW", tmp_path.as_uri())
     arguments = ["--out", str(tmp_path / "out"), "--sources", str(tmp_path / "sources.yaml")]
     with pytest.raises(InputError, match="1 of 2 files could not be fetched"):
         fetch.main(arguments)
     assert (tmp_path / "out/set/a b.wav").read_bytes() == b"sound"
-    assert "set/c.wav" in capsys.readouterr().err
+    assert "c.wav" in capsys.readouterr().err
     (here / "c.wav").write_bytes(b"changed")
     with pytest.raises(InputError, match="1 of 2"):
         fetch.main(arguments)
     assert "SHA-256 is" in capsys.readouterr().err
     assert not (tmp_path / "out/set/c.wav").exists()
+    with pytest.raises(InputError, match=r"out: lacks 1 of 2 files of sources\.yaml"):
+        fetch.main([*arguments, "--check"])
+    assert "set/c.wav: missing, see file://" in capsys.readouterr().out
+    (tmp_path / "out/set/c.wav").write_bytes(b"changed")
+    with pytest.raises(InputError, match="lacks 1"):
+        fetch.main([*arguments, "--check"])
+    assert f"expected {sums['c.wav']}" in capsys.readouterr().out
+    (tmp_path / "out/set/c.wav").write_bytes(b"other")
+    fetch.main([*arguments, "--check"])
+    assert "all 2 files of sources.yaml are there" in capsys.readouterr().out
 
 
 def test_files_of_a_set_that_came_later_are_test_files_and_name_their_carrier(tmp_path):
