@@ -170,7 +170,7 @@ def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np
         both = []
         for target in (True, False) if twin.detect_db else (True,):
             values = samples(twin, receiver, signal, stream(*keys, redraw), target)
-            both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols))
+            both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow))
         if present(both[0], twin, both[-1]).all():
             break
     return both[0][0]

@@ -81,7 +81,7 @@ def test_hum_is_no_target_in_the_windows_of_a_recording_through_which_one_passes
     noise = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
     hum = noise + np.exp(2j * np.pi * 0.05 * time)
     passes = hum.copy()
-    passes[7:9] += np.exp(2j * np.pi * 0.3 * time)
+    passes[7:9] += 3 * np.exp(2j * np.pi * 0.3 * time)
     assert present(passes, twin).nonzero()[0].tolist() == [7, 8]
     # Nothing tells a line that stays in all windows from a target that hovers.
     assert present(hum, twin).all() and present(passes[: ENOUGH - 1], twin).all()

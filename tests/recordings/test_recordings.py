@@ -222,6 +222,27 @@ def test_intervals_do_not_overlap_and_lose_only_what_stands_still():
         coherent_intervals(signal[:399], 400, name="short")
 
 
+def test_what_is_slower_than_the_slowest_target_is_gone_and_all_else_keeps_its_level():
+    time, taper = np.arange(1200) / 3000, np.hanning(1200)
+    for hertz, wanted in (
+        (5.0, -50),
+        (20.0, -50),
+        (45.0, -50),
+        (64.0, 0),
+        (80.0, 0),
+        (150.0, 0),
+        (-64.0, 0),
+        (1400.0, 0),
+    ):
+        for phase in (0.0, 1.0, 2.0):
+            tone = np.exp(2j * np.pi * hertz * time + 1j * phase)
+            left = coherent_intervals(tone, 1200, slow=64 / 3000)[0] * taper
+            level = 20 * np.log10(np.linalg.norm(left) / np.linalg.norm(taper))
+            assert level < wanted if wanted else level == pytest.approx(0, abs=0.05), (hertz, phase, level)
+    still = coherent_intervals(np.full(1200, 3 + 4j), 1200, slow=64 / 3000)
+    assert not still.any()
+
+
 def test_a_recording_slower_than_the_symbols_is_refused():
     with pytest.raises(InputError, match=r"has less than one a symbol"):
         symbol_rate(np.zeros(10, complex), 500.0, 1e-3, "bare")

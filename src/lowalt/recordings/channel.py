@@ -19,6 +19,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.signal import firwin, hilbert, kaiserord, oaconvolve
+from scipy.signal.windows import dpss
 
 from lowalt.files.errors import InputError
 
@@ -34,6 +35,10 @@ ONE_SIDED_EDGE = 0.94
 from which on a tone would fold onto a slow target."""
 STOP_DB = 80.0
 """Attenuation of one-sided sampling from the symbol rate on."""
+FALL_CELLS = 6
+"""Doppler cells below the slowest speed over which the filter of what is slower falls off."""
+FURTHER = 7
+"""Sequences beyond the dimension of the slow band: with them the rest of its energy is below -60 dB."""
 PHASES = 1024
 """Number of places between two samples at which the kernel is tabulated. Linear interpolation between them is accurate
 to 1e-6."""
@@ -136,11 +141,23 @@ def _resampled(signal: np.ndarray, step: float, band: float) -> np.ndarray:
     return result
 
 
-def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording") -> np.ndarray:
+@lru_cache(maxsize=8)
+def _slow_sequences(symbols: int, slow: float) -> np.ndarray:
+    """Orthonormal sequences (n, symbols) that span what is slower than `slow` (cycles a symbol) less `FALL_CELLS`.
+
+    Source: Slepian 1978, Bell System Technical Journal 57(5): of length N and half-band W, some 2 N W sequences hold
+    all but a share of a band's energy that falls tenfold or more with each further one.
+    """
+    product = symbols * slow - FALL_CELLS
+    return dpss(symbols, product, int(2 * product) + FURTHER) if product >= 1 else np.empty((0, symbols))
+
+
+def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording", slow: float = 0.0) -> np.ndarray:
     """Return the coherent processing intervals (intervals, symbols) of a signal, each without its mean.
 
     No two share a symbol. The mean is the echo of everything that does not move, which is orders of magnitude above the
-    target's.
+    target's. slow: frequency, cycles a symbol, from which on a line keeps its level. More than 5 / symbols below it
+    what is slower is gone as well, by 50 dB or more.
     Raises: InputError naming the recording where it is shorter than one interval.
     """
     if len(signal) < symbols:
@@ -148,4 +165,6 @@ def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording"
     windows = signal[: len(signal) // symbols * symbols].reshape(-1, symbols)
     # Subtract the first symbol before the mean: a constant signal then becomes exactly zero.
     moved = windows - windows[:, :1]
-    return moved - moved.mean(axis=1, keepdims=True)
+    moved = moved - moved.mean(axis=1, keepdims=True)
+    sequences = _slow_sequences(symbols, slow)
+    return moved - (moved @ sequences.T) @ sequences if len(sequences) else moved

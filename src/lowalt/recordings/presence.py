@@ -23,6 +23,9 @@ BETWEEN_SHARE = 0.25
 """Share of the powers around a speed that is taken to lie between a target's lines."""
 AROUND = 0.25
 """Speeds to either side of a line with which it is compared, over the whole band."""
+PASSES = 10.0
+"""How many times more than a line must a target that passes stand above the recording's quiet time, while in half of
+the windows nothing does."""
 BEYOND_DB = 10.0
 """How far a line beyond the speeds that windows show must stand above all others there: rotors' lines do by less."""
 SLOW_CELLS = 4
@@ -92,24 +95,25 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
     `detect_db` above the recording's own noise floor.
 
     Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other windows, and the line
-    is at or above slowest_mps. Where they may hover it is the floor between lines. A recording of `ENOUGH` windows in
-    which lines come and go is judged by its quiet time as well, so that hum is no target beside one that passes.
+    is at or above slowest_mps. Where they may hover it is the floor between lines. A recording of `ENOUGH` windows
+    through which a target passes is judged by its quiet time as well, so that hum is no target beside it.
     noise: intervals (m, symbols) of the receiver's noise alone, where they are known, as in a simulation.
     """
     power, heard = heard_powers(intervals, twin)
     quiet = heard_powers(noise, twin)[0] if noise is not None else power
     level, step_mps = 10 ** (twin.detect_db / 10), 2 * twin.edge_mps / intervals.shape[1]
 
-    def above(floor: np.ndarray) -> np.ndarray:
-        """Which windows have a line above a floor (speeds,)."""
-        return (power[:, heard] / np.maximum(floor[heard], 1e-300)).max(axis=1) >= level
+    def over(floor: np.ndarray) -> np.ndarray:
+        """How far the strongest line of each window stands above a floor (speeds,), as a ratio."""
+        return (power[:, heard] / np.maximum(floor[heard], 1e-300)).max(axis=1)
 
     if twin.slowest_mps:
-        return above(noise_floor(quiet, step_mps))
-    found = above(floor_between(quiet))
+        return over(noise_floor(quiet, step_mps)) >= level
+    found = over(floor_between(quiet)) >= level
     if noise is None and len(power) >= ENOUGH:
-        moving = above(noise_floor(quiet, step_mps))
-        found &= moving | ~moving.any()
+        passing = over(noise_floor(quiet, step_mps))
+        if passing.max() >= PASSES * level and np.median(passing) < level:
+            found &= passing >= level
     return found
 
 

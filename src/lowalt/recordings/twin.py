@@ -24,7 +24,7 @@ class Twin:
     """A measured radar: `rate_hz` is the rate of its receiver, `symbol_interval_s` the interval of the images' symbols.
 
     A window holds a target where a line at or above `slowest_mps` (0: targets may hover) stands `detect_db` above the
-    recording's noise floor.
+    recording's noise floor. What is slower than `slowest_mps` is taken out of windows.
     The other fields are named as in a record.
     """
 
@@ -64,6 +64,11 @@ class Twin:
         """Largest speed that the sampling keeps (m/s): its filter ends there, and a bare line beyond it folds."""
         kept = {"anti_aliased": EDGE, "one_sided": 2 * ONE_SIDED_EDGE, "bare": 1.0}
         return kept[self.sampling] * self.edge_mps
+
+    @property
+    def slow(self) -> float:
+        """Doppler of `slowest_mps` in cycles a symbol."""
+        return self.slowest_mps / (2 * self.edge_mps)
 
     @property
     def sides(self) -> str:

@@ -63,7 +63,7 @@ def looks(record: Record, twin: Twin, baseband: Baseband | None = None) -> Looks
     """
     baseband = baseband or read(record)
     signal = at_symbol_rate(record, twin, baseband)
-    intervals = coherent_intervals(signal, twin.symbols, name=str(record.file))
+    intervals = coherent_intervals(signal, twin.symbols, str(record.file), twin.slow)
     edges = np.arange(len(intervals) + 1) * twin.symbols * twin.symbol_interval_s * baseband.rate_hz
     cuts = np.concatenate([[0], np.cumsum(clipped(baseband.values))])
     share = np.diff(cuts[np.minimum(np.rint(edges).astype(int), len(cuts) - 1)]) / np.diff(edges)
