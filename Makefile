@@ -105,7 +105,7 @@ test-slow: $(TESTING)  ## the slow checks
 fuzz: $(TESTING)  ## 2000 damaged files for every reader of files, 200 for one that starts a process each: results/benchmarks/fuzz.csv
 	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
-lint:  ## ruff, snakefmt, mypy, snakemake --lint
+lint:  ## ruff, snakefmt, mypy, snakemake --lint, no marks of an unfinished merge
 	@$(MAKE) --no-print-directory -j 2 ready
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target types style
 
@@ -114,6 +114,7 @@ types:
 	$(BIN)/python -m mypy
 
 style:
+	! git grep -nIE '^([<]{7}|[|]{7}|[>]{7}|={7}$$)'
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow

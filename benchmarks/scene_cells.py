@@ -3,8 +3,9 @@
     python benchmarks/scene_cells.py --models 5 --out results/reference/scene_cells.csv
 
 The samples are the first motion models of the first subtype of each class, at every station and link of the scene. A
-symbol is right where the chosen cell is within one of the target's; the level is the target in its cell over the mean
-power of the loudest cell of all else (land, noise, other stations), behind the canceller.
+symbol is right where the chosen cell is within one of that in which the target's echo appears (the observed truth); the
+level is the target in its cell over the mean power of the loudest cell of all else (land, noise, other stations),
+behind the canceller.
 """
 
 import argparse

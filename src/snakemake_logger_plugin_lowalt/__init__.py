@@ -198,6 +198,9 @@ class LogHandler(LogHandlerBase):
                 text = Path(log).read_text(errors="replace").splitlines()
             except OSError:
                 text = []
+            if text[-1:] == ["KeyboardInterrupt"]:
+                lines[0] = f"interrupted: {record.rule_name}, job {record.jobid}"
+                continue
             lines += [f"  its log: {log}" + ("; the last lines:" if text else ", which is empty or not there")]
             lines += [f"    {line}" for line in text[-LAST_LINES:]]
         self._say("\n".join(lines))

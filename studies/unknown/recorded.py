@@ -103,7 +103,7 @@ def foreign(entry: dict, folder: Path, twin: Twin) -> np.ndarray:
     path = folder / entry["file"]
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the recording that foreign.yaml names")
-    record = Record(path, entry["carrier_hz"], "real", "foreign.yaml", "none stated")
+    record = Record(path, entry["carrier_hz"], "real")
     signal = at_symbol_rate(record, twin, of_text(path) if path.suffix == ".txt" else read(record))
     return coherent_intervals(signal, twin.symbols, str(path), twin.slow)
 

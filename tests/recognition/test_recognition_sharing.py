@@ -14,7 +14,7 @@ from safetensors import safe_open
 
 from lowalt.__main__ import main
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, eight_bits, model_file, one_sample, runs, zoo
+from lowalt.recognition import checkpoint, eight_bits, model_file, one_sample, runs, zoo, zoo_files
 from lowalt.recognition.export import export
 from made_predictions import facts
 from pictures import IMAGES, NETWORK, SPECTRA
@@ -169,7 +169,7 @@ def test_an_entry_that_loses_accuracy_or_is_large_or_ill_named_is_not_written(fi
 @pytest.mark.parametrize("name", ["default-seen", "default-unseen"])
 def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    assert name in zoo.names()
+    assert name in zoo_files.names()
     path = zoo.ZOO / f"{name}.safetensors"
     assert path.stat().st_size < zoo.LARGEST_BYTES
     measured, card = model_file.read(path).measured, path.with_suffix(".md").read_text()

@@ -1,7 +1,7 @@
 """Recordings in: every format gives the same samples, bad files are refused by name, rates and tones come out right."""
 
 import struct
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings import coherent_intervals, read, read_record, symbol_rate
 from lowalt.recordings.channel import ONE_SIDED_EDGE, analytic
 from lowalt.recordings.record import Record, record
-from lowalt.recordings.twin import CHANNELS
+from lowalt.recordings.twin import CHANNELS, radars
 
 RATE = 8000.0
 BASE = {"carrier_hz": 24.0e9, "source": "made here", "licence": "MIT"}
@@ -148,6 +148,33 @@ def test_a_record_file_says_where_its_samples_are(tmp_path):
     )
     found = read_record(tmp_path / "r.yaml")
     assert (found.file, found.name, found.label) == (tmp_path / "a.wav", "a", "Vehicle")
+    assert (found.source, found.licence) == ("me", "MIT")
+
+
+def test_a_record_needs_three_keys_and_takes_numbers_in_any_writing(tmp_path):
+    path = tmp_path / "r.yaml"
+    for text in ("3.3e9", "3300000000", "3.3e+9", ".33e10", "+33E8"):
+        path.write_text(f"file: a.csv\ncarrier_hz: {text}\nchannel: real\nrate_hz: 8e3\ncolumns: [2.0]\n")
+        found = read_record(path)
+        assert (found.carrier_hz, found.rate_hz) == (3.3e9, 8e3) and repr(found.columns) == "(2,)"
+    for text in (".inf", ".nan", "1e400", "3.3 GHz", "'0x10'"):
+        path.write_text(f"file: a.csv\ncarrier_hz: {text}\nchannel: real\n")
+        with pytest.raises(InputError, match=r"r\.yaml: carrier_hz: value .*, expected type number"):
+            read_record(path)
+
+
+def test_a_radar_of_twins_takes_numbers_in_any_writing_and_is_refused_by_key(tmp_path):
+    path, known = tmp_path / "twins.yaml", asdict(radars()["uav_3ghz"])
+    path.write_text(f"twins: {{mine: {{radar: {known | {'carrier_hz': 3.3e9}}}}}}".replace("3300000000.0", "3.3e9"))
+    assert "3.3e9" in path.read_text() and asdict(radars(path)["mine"]) == known
+    for change, words in (({"carrier_hz": ".inf"}, "carrier_hz"), ({"sampling": [1]}, "sampling")):
+        path.write_text(f"twins: {{mine: {{radar: {known | change}}}}}".replace("'.inf'", ".inf"))
+        with pytest.raises(InputError, match=rf"twins\.yaml: mine: {words}: value "):
+            radars(path)
+    for text in ("twins: []", "twins: {mine: 1}"):
+        path.write_text(text)
+        with pytest.raises(InputError, match="expected under twins"):
+            radars(path)
 
 
 @pytest.mark.parametrize("sampling", ["anti_aliased", "bare"])

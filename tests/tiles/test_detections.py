@@ -26,7 +26,8 @@ def noise(network, seed=1):
 
 def held(network, cells, cell, speed_mps):
     truth = np.zeros((network.symbols, len(TRUTH)))
-    truth[:, TRUTH.index("cell")], truth[:, TRUTH.index("radial_mps")] = cell, speed_mps
+    truth[:, TRUTH.index("cell")] = truth[:, TRUTH.index("observed_cell")] = cell
+    truth[:, TRUTH.index("observed_mps")] = speed_mps
     return Cube(cells, np.full(network.symbols, 40), truth)
 
 
@@ -46,10 +47,10 @@ def test_an_echo_in_noise_is_found_at_its_range_and_folded_speed(dataset, speed_
     network = dataset.maker.network
     station = network.stations[0]
     cells = noise(network)
-    turns = 4 * np.pi * speed_mps * network.times_s * station.frequency_hz / SPEED_OF_LIGHT
+    turns = 4 * np.pi * speed_mps * network.times_s * network.effective_hz(station) / SPEED_OF_LIGHT
     cells[:, 51] += np.exp(-1j * turns)
     best = detections(held(network, cells, 51, speed_mps), network, station)[0]
-    fold = SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s)
+    fold = SPEED_OF_LIGHT / (4 * network.effective_hz(station) * network.symbol_interval_s)
     assert best["true"] and best["cell"] == 51 and best["range_m"] == pytest.approx(51 * network.cell_m)
     assert abs(best["radial_mps"] - ((speed_mps + fold) % (2 * fold) - fold)) <= 2 * fold / network.symbols
     # A Hann window spreads the noise of 2 over 400 symbols, 1.5 times as much as none: 21 dB below an echo of 1.

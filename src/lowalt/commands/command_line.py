@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.commands.command_table import COMMANDS
+
 
 class Answer(NamedTuple):
     """What a command has to say: `facts` for a program, `text` for a person, and the exit status."""
@@ -20,13 +22,15 @@ class Answer(NamedTuple):
 
 
 def add_command(
-    commands: argparse._SubParsersAction, name: str, act: Callable[[argparse.Namespace], Answer], meaning: str,
-    example: str,
+    commands: argparse._SubParsersAction, name: str, act: Callable[[argparse.Namespace], Answer], meaning: str = "",
+    example: str = "",
 ) -> argparse.ArgumentParser:  # fmt: skip
     """Add a command to a parser's and return its line, which has the option `--json` already.
 
-    act: what it does with its options; meaning: its help; example: a command line.
+    act: what it does with its options; meaning, example: its help, by default that of the catalogue of commands.
     """
+    if not meaning:
+        _, meaning, example = COMMANDS[name]
     line = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     line.add_argument("--json", action="store_true", help="print JSON for a program")
     line.set_defaults(act=act)

@@ -28,11 +28,9 @@ def _sample(text: str) -> tuple[str, int]:
     return name, int(model)
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `explain` to a parser's commands."""
-    meaning = "say whether a scene's receiver finds its targets, and what each effect changes"
-    example = "lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml"
-    line = add_command(commands, "explain", run, meaning, example)
+    line = add_command(commands, name, run)
     line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the default; more may follow it")
     line.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
     line.add_argument("--station", help="the station of the table of effects (default: the first)")

@@ -19,10 +19,9 @@ from lowalt.tiles.render import Renderer, normalised
 REPEATS = 5
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `spectra` to a parser's commands."""
-    meaning = "the spectra of a configuration, and the time an image of each takes"
-    line = add_command(commands, "spectra", run, meaning, "lowalt spectra config/tiny.yaml")
+    line = add_command(commands, name, run)
     line.add_argument("overlay", type=Path, nargs="*", help="overlays on the default")
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.commands.command_table import COMMANDS
 from lowalt.files.atomic import existing, replacing, slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
@@ -44,12 +45,10 @@ def _unit(text: str) -> str | float:
     return value
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `target` and its four commands to a parser's commands."""
-    target = commands.add_parser(
-        "target", help="your own mesh or recording: look, draft a record, make its cloud",
-        epilog="example: lowalt target inspect inputs/mydrone.stl",
-    )  # fmt: skip
+    _, meaning, example = COMMANDS[name]
+    target = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     actions = target.add_subparsers(dest="action", required=True)
     meaning = "unit, sizes, pieces and possible moves of a mesh file, and a picture"
     inspect = add_command(actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl")

@@ -20,17 +20,18 @@ from lowalt.workflow.status import PLANNED_JOBS
 SNAKEFILE = SHIPPED / "Snakefile"
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
-    """Add `run` and `status` to a parser's commands."""
-    meaning = "run the workflow: the default, or with overlays"
-    line = add_command(commands, "run", run, meaning, "lowalt run config/tiny.yaml --target data --cores 2")
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
+    """Add `run` or `status` to a parser's commands."""
+    if name == "status":
+        add_command(commands, name, states)
+        return
+    line = add_command(commands, name, run)
     line.add_argument("overlay", type=shipped, nargs="*", help="overlays on the default configuration")
     line.add_argument("--configfile", type=shipped, nargs="+", default=[], help="more overlays, as in snakemake")
     line.add_argument("--target", nargs="+", default=[], help="rules or files to make (default: everything)")
     line.add_argument("--cores", help="cores to use (default: all; with --profile what that says)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
-    add_command(commands, "status", states, "the state of a run in another terminal", "lowalt status")
 
 
 def command(options: argparse.Namespace) -> list[str]:

@@ -8,7 +8,6 @@ import argparse
 import contextlib
 import errno
 import functools
-import json
 import resource
 import sys
 import warnings
@@ -17,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, InputWarning, shortened
+from lowalt.files.json_objects import json_object
 from lowalt.machine.memory import keep_freed_memory
 
 
@@ -60,13 +60,7 @@ def settings(text: str) -> dict:
     source = text
     if text.startswith("@"):
         source = text_of(text[1:], "--settings")
-    try:
-        value = json.loads(source)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"--settings {text[:80]!r}: not JSON ({error})") from error
-    if not isinstance(value, dict):
-        raise InputError(f"--settings {text[:80]!r}: {type(value).__name__}, expected a JSON object")
-    return value
+    return json_object(source, f"--settings {text[:80]!r}", "settings")
 
 
 def pick(block: dict, *keys: str) -> list:
@@ -95,11 +89,17 @@ REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, 
 """Errors of the operating system that a path given by the user causes, such as a folder that may only be read."""
 
 
-def refusal(error: OSError) -> str:
-    """Return the sentence on a path that the operating system refuses. Raises: the error itself for any other one."""
+def refusal(error: InputError | OSError) -> str:
+    """Return the sentence of a refusal, of bounded length: of an InputError its own, of the operating system's that on
+    the path it refuses.
+
+    Raises: the error itself for any other one.
+    """
+    if isinstance(error, InputError):
+        return str(error)
     if error.errno not in REFUSED or error.filename is None:
         raise error
-    return f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
+    return shortened(f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write")
 
 
 @contextlib.contextmanager
@@ -108,7 +108,7 @@ def refusing() -> Iterator[None]:
     try:
         yield
     except (InputError, OSError) as error:
-        print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
+        print(f"error: {refusal(error)}", file=sys.stderr)
         raise SystemExit(2) from None
 
 

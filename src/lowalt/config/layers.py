@@ -4,7 +4,6 @@ This module does not depend on any stage. Faults are found before any job starts
 """
 
 import json
-import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,9 +12,9 @@ import yaml
 
 from lowalt.config.command import parser, run
 from lowalt.config.network import OFDM
-from lowalt.config.schema import faults, plain
+from lowalt.config.schema import check_brought, faults, plain, with_numbers
 from lowalt.files.atomic import replacing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 
@@ -36,36 +35,18 @@ def canonical(value: object) -> str:
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
 
 
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
-"""A number in the YAML of today; that of 2005, which the library reads, takes 28e9 for a text."""
+def _may_be_null(entry: dict) -> bool:
+    """Whether a schema's entry allows null, itself or as one of its choices."""
+    return "null" in entry.get("type", ()) or any(map(_may_be_null, entry.get("oneOf", ())))
 
 
-def _kinds(entry: dict) -> set[str]:
-    """The types that a schema's entry allows, those of its choices too."""
-    kinds = entry.get("type", [])
-    return (
-        {kinds}
-        if isinstance(kinds, str)
-        else {*kinds, *(kind for one in entry.get("oneOf", ()) for kind in _kinds(one))}
-    )
-
-
-def _as_meant(value: object, entry: dict) -> object:
-    """The value with texts such as 28e9 as numbers, and whole numbers as integers, where the entry wants these."""
-    kinds = _kinds(entry)
-    if isinstance(value, dict):
-        _settle(value, entry)
-    elif isinstance(value, list):
-        return [_as_meant(item, entry.get("items", {})) for item in value]
-    elif isinstance(value, str) and kinds & {"number", "integer"} and "string" not in kinds and NUMBER.fullmatch(value):
-        value = float(value)
-    if isinstance(value, float) and value.is_integer() and "integer" in kinds and "number" not in kinds:
-        return int(value)
-    return value
-
-
-def _settle(block: dict, schema: dict) -> None:
-    """Take the nulls out of a block whose keys may be left out and hold no null, and read its numbers (`_as_meant`)."""
+def _without_nulls(block: object, schema: dict) -> None:
+    """Take the nulls out of a block, and the blocks in it, whose keys may be left out and hold no null."""
+    if isinstance(block, list):
+        for item in block:
+            _without_nulls(item, schema.get("items", {}))
+    if not isinstance(block, dict):
+        return
     needed, known, further = (schema.get(key, {}) for key in ("required", "properties", "additionalProperties"))
     for key, value in list(block.items()):
         if not isinstance(key, str):
@@ -73,10 +54,20 @@ def _settle(block: dict, schema: dict) -> None:
         entry = known.get(key, further)
         if not isinstance(entry, dict):
             continue
-        if value is None and key not in needed and "null" not in _kinds(entry):
+        if value is None and key not in needed and not _may_be_null(entry):
             del block[key]
         else:
-            block[key] = _as_meant(value, entry)
+            _without_nulls(value, entry)
+
+
+def _listed(lines: list[str]) -> str:
+    """The first faults, as many as a message holds, and the number of the others."""
+    text = lines[0]
+    for number, line in enumerate(lines[1:], 1):
+        if len(text) + len(line) > LONGEST - 50:
+            return f"{text}\n  and {len(lines) - number} more"
+        text += f"\n  {line}"
+    return text
 
 
 def _without_ofdm(network: dict) -> None:
@@ -99,12 +90,13 @@ def check(config: dict, schema_path: str | Path) -> dict:
     The configuration is changed in place. Raises: InputError with one line a fault.
     """
     schema = load_yaml(schema_path)
-    _settle(config, schema)
+    _without_nulls(config, schema)
+    with_numbers(config, schema)
     if isinstance(config.get("network"), dict):
         _without_ofdm(config["network"])
     lines = faults(config, schema)
     if lines:
-        raise InputError("configuration refused: " + "\n  ".join(lines))
+        raise InputError(f"configuration refused: {_listed(lines)}")
     return config
 
 
@@ -122,6 +114,20 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     for path in paths:
         result = merge(result, load_yaml(shipped(path)))
     return located(check(result, shipped(schema_path)))
+
+
+def of_run(folder: str | Path) -> dict:
+    """Return the configuration in a run's folder, plain values only; it may be of an older schema.
+
+    The folder may be a stranger's, so that nothing in it may choose code (`named_code.allowed`).
+    Raises: InputError naming the folder that is no run's, or the file and the key that is wrong.
+    """
+    path = Path(folder) / "config.yaml"
+    if not path.is_file():
+        raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
+    config = load_yaml(path)
+    check_brought("settings", config, path)
+    return config
 
 
 def overlaid(overlays: Iterable[str | Path]) -> dict:

@@ -222,6 +222,30 @@ class Network:
         """Bandwidth (Hz) whose noise a value of Eq. 24 has: a subcarrier's, or the sample rate of an FMCW sweep."""
         return self.symbol_rate_hz * (1 if self.sweep_s is None else self.subcarriers)
 
+    def effective_hz(self, station: Station) -> float:
+        """Return the effective carrier f_k + (M - 1) df / 2 (Hz): phase and Doppler in a range cell are those of it.
+
+        Source: paper, Eq. 7, the inverse transform over subcarriers.
+        """
+        return station.frequency_hz + (self.subcarriers - 1) * self.subcarrier_spacing_hz / 2
+
+    def largest_mps(self, station: Station) -> float:
+        """Return c / (4 f T_r) (m/s), f the effective carrier: speeds beyond it fold, for the phase then turns by more
+        than half a circle from symbol to symbol."""
+        return SPEED_OF_LIGHT / (4 * self.effective_hz(station) * self.symbol_interval_s)
+
+    def folded_mps(self, speed_mps: np.ndarray, station: Station) -> np.ndarray:
+        """Return the speeds (m/s, any shape) at which a station sees radial speeds, above -largest to largest."""
+        largest = self.largest_mps(station)
+        return largest - (largest - speed_mps) % (2 * largest)
+
+    def bin_speeds_mps(self, points: int, station: Station) -> np.ndarray:
+        """Return the radial speeds (points,) m/s, ascending, positive receding, of a Fourier transform over symbols.
+
+        Bin k of `numpy.fft.fftfreq` is the speed -2 k / points times the largest: an echo that recedes turns backwards.
+        """
+        return -2 * self.largest_mps(station) * np.fft.fftshift(np.fft.fftfreq(points))[::-1]
+
     @property
     def cell_m(self) -> float:
         """Length of a range cell, c / (2 M df) (m)."""

@@ -28,8 +28,8 @@ PIXEL_BYTES = 0.5
 """Bytes that a shard holds for each pixel of a tile: at most so many were measured."""
 CELL_BYTES = {"complex64": 8, "int16": 4}
 """Bytes of a range cell of a cube, by the type that it is stored as."""
-TRUTH_BYTES = 47
-"""Bytes of the record for what is true of a cube at one symbol: the chosen cell and five numbers of six decimals."""
+TRUTH_BYTES = 65
+"""Bytes of the record for what is true of a cube at one symbol: the chosen cell and the numbers `cube.TRUTH`."""
 
 
 EVERY = 2**53

@@ -4,11 +4,12 @@ Lines end with a single newline on every system, and equal rows give equal bytes
 """
 
 import csv
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from lowalt.files.atomic import replacing, text_file
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, shown
 
 
 def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[str, str]]:
@@ -28,6 +29,17 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
                 raise InputError(f"{path} line {reader.line_num}: {len(cells)} cells, expected {len(columns)}")
             rows.append(dict(zip(columns, cells, strict=True)))
         return rows
+
+
+def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
+    """Return a cell of a table of texts as a finite number. Raises: InputError naming the file, column and cell."""
+    try:
+        value = float(row[column])
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{path}: {column} is {shown(row[column])}, expected a number")
+    return value
 
 
 def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:

@@ -13,8 +13,35 @@ def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = ""
     return f"perhaps {list(near)}" if near else otherwise or f"only {known}"
 
 
+LONGEST = 400
+"""Characters of a message at most: whatever a file holds, a refusal of it is read at a glance."""
+
+
+def shortened(text: str, longest: int = LONGEST) -> str:
+    """Return a text without its middle where it has more than `longest` characters: its start says where a fault is,
+    its end what was expected."""
+    start = 2 * longest // 3
+    return text if len(text) <= longest else f"{text[:start]} ... {text[start + 5 - longest :]}"
+
+
+def shown(value: object) -> str:
+    """Return a value of a file as text of at most 200 characters."""
+    try:
+        return shortened(repr(value), LONGEST // 2)
+    except (RecursionError, ValueError):
+        # Values stand in each other too deeply, or a number has more than 4300 digits.
+        return f"a {type(value).__name__} too large to show"
+
+
 class InputError(ValueError):
-    """Bad input from outside; the message names the file, key or value and what was expected instead."""
+    """Bad input from outside; the message names the file, key or value and what was expected instead.
+
+    It has at most LONGEST characters.
+    """
+
+    def __init__(self, message: str) -> None:
+        """Take the message, whose middle goes where it is too long."""
+        super().__init__(shortened(message))
 
 
 class BelowFloor(InputError):

@@ -13,7 +13,6 @@ import numpy as np
 
 from lowalt.config.classes import label
 from lowalt.files.errors import InputError
-from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import columns_in
@@ -42,7 +41,7 @@ def opened(config: str | Path) -> Dataset:
 
     folder = Path(config).parent
     surfaces = sorted((folder / "occluders").glob("*.npz"))
-    return Dataset(load_yaml(config), folder / "clouds", occluders=read_all(surfaces) if surfaces else None)
+    return Dataset(config, folder / "clouds", occluders=read_all(surfaces) if surfaces else None)
 
 
 def cloud_sha256(cloud: Cloud) -> str:

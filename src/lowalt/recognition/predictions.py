@@ -12,7 +12,6 @@ rest from the data set. Probabilities are not negative and sum to one within 1e-
 """
 
 import csv
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.config.classes import CATEGORIES, word
-from lowalt.files.atomic import existing, text_file, text_of
+from lowalt.files.atomic import existing, text_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
 from lowalt.recognition.protocols import FOLDS
 from lowalt.recognition.samples import Facts
 
@@ -99,13 +99,7 @@ def record(path: str | Path) -> dict:
     Raises: InputError where it is missing or no JSON object.
     """
     side = existing(Path(path).with_suffix(".json"), "run record")
-    try:
-        content = json.loads(text_of(side, "run record"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{side}: not a run record ({error})") from error
-    if not isinstance(content, dict):
-        raise InputError(f"{side}: not a run record, expected a JSON object")
-    return content
+    return read_object(side, "a run record")
 
 
 def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarray) -> Predictions:

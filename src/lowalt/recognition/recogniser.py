@@ -9,15 +9,16 @@ from pathlib import Path
 from pickle import UnpicklingError
 
 import numpy as np
-import timm
 import torch
 from safetensors import SafetensorError
 from torch import nn
 
 from lowalt.config.command import pick
+from lowalt.config.named_code import file_of
 from lowalt.files.errors import InputError
 from lowalt.recognition import own_backbone
 from lowalt.recognition.fusion import Fused
+from lowalt.recognition.light_timm import timm
 from lowalt.recognition.schemes import SPECTRA, Scheme
 from lowalt.tiles import colour_map
 
@@ -31,7 +32,7 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
     weights: "none", "hub" or a local file. Models with a fixed input size are built for `size` where timm can.
     Raises: InputError for an unknown name, a missing file, or weights that do not fit.
     """
-    if own_backbone.file_of(name) is not None:
+    if file_of(name) is not None:
         if weights != "none":
             raise InputError(f"network: backbone {name!r} has no weights {weights!r}, expected 'none'")
         return own_backbone.backbone(name, size)

@@ -12,19 +12,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import timm
 import torch
 from torch import nn
 
 from lowalt.config.classes import stated
 from lowalt.config.command import pick
+from lowalt.config.named_code import allowed, file_of
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import replacing, sha256
 from lowalt.files.errors import InputError, in_one_line
+from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
-from lowalt.recognition import checkpoint, inference, metrics, own_backbone, predictions, recipe, recogniser
+from lowalt.recognition import checkpoint, inference, metrics, predictions, recipe, recogniser
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.light_timm import timm
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
@@ -90,7 +92,7 @@ def train(
 
 def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine) -> str:
     """Return the JSON text of all that determines a training's weights."""
-    code = own_backbone.file_of(scheme.backbone_of(settings["network"]))
+    code = file_of(scheme.backbone_of(settings["network"]))
     # Leave out settings that change no weight, and name the precision that this machine computes with.
     replaced = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     return checkpoint.identity(
@@ -150,7 +152,7 @@ def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = bu
 def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, trusted: str, build: Build) -> nn.Module:
     """The network of a file with its weights; trusted, build: as in `of_state`."""
     named_backbone = scheme.backbone_of(state["network"])
-    name = own_backbone.allowed(named_backbone, trusted)
+    name = allowed(named_backbone, trusted)
     block, bare = {**state["network"], "backbone": name, "weights": "none"}, replace(scheme, backbone="")
     views, size = len(scheme.columns), state["size"]
 
@@ -159,8 +161,8 @@ def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, truste
         return build(bare, block, size, state["colour_map"], classes)
 
     if name == named_backbone and build is built:
-        return filled(fresh, lambda: torch.zeros(2, views, size, size, dtype=torch.uint8), state["weights"], path)
-    # The user's own code may not know of the device without memory.
+        return filled(fresh, lambda: torch.zeros(1, views, size, size, dtype=torch.uint8), state["weights"], path)
+    # Code that the user names is trusted, and only its author knows what it answers.
     model = fresh()
     refuse_unfit(state["weights"], model, path)
     model.load_state_dict(state["weights"])
@@ -194,7 +196,7 @@ def evaluate(
     table = predictions.from_facts(samples.facts, trained.scheme.stations, shares)
     predictions.write(out, table, trained.classes, trained.protocol)
     side = trained.path.with_name("run.json")
-    known = json.loads(side.read_text()) if side.exists() else {}
+    known = read_object(side, "a run record") if side.exists() else {}
     _record(Path(out).with_suffix(".json"), {
         **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
         "hardware": describe(), "evaluated_samples": len(shares), "evaluate_s": seconds,

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from timm.utils import ModelEmaV3
 from torch import nn
 
 from lowalt.files.csv_tables import write_csv
@@ -23,6 +22,7 @@ from lowalt.recognition import checkpoint, recogniser
 from lowalt.recognition.ahead import Augmented, ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.light_timm import timm
 from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.objective import descent
@@ -86,7 +86,7 @@ class Trainer:
         shared = as_products(shared) if plain else shared
         self.model = shared.to(machine.device, memory_format=layout)
         self.optimiser = optimiser(self.model, self.block)
-        self.average = ModelEmaV3(self.model)
+        self.average = timm.utils.ModelEmaV3(self.model)
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model).train()
         # Readers keep their workers over all epochs and validations.
         keys = (self.seed, *run.keys)

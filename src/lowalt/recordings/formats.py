@@ -3,7 +3,6 @@
 This module only reads. `lowalt.recordings.files` picks the channel, `lowalt.recordings.faults` judges it.
 """
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from lowalt.files.atomic import text_file
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
 from lowalt.recordings.mat_files import read_mat
 from lowalt.recordings.record import Record
 
@@ -124,9 +124,7 @@ def _sigmf(path: Path, record: Record) -> Table:
             f"{path}: the package sigmf is not installed ({error}), expected `pip install 'lowalt[sigmf]'`"
         ) from error
 
-    with text_file(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording") as file:
-        about = json.load(file)
-    fields = about.get("global") if isinstance(about, dict) else None
+    fields = read_object(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording").get("global")
     if not isinstance(fields, dict):
         raise InputError(f"{path}: its metadata has no block global, expected a SigMF recording")
     dataset = fields.get("core:dataset")

@@ -6,7 +6,7 @@ Its keys stand in the definition `recording` of `lowalt/config/brought.schema.ya
 from dataclasses import dataclass
 from pathlib import Path
 
-from lowalt.config.schema import check_brought
+from lowalt.config.schema import check_brought, of_brought, with_numbers
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 
@@ -18,8 +18,6 @@ class Record:
     file: Path
     carrier_hz: float
     channel: str
-    source: str
-    licence: str
     rate_hz: float | None = None
     columns: tuple[int | str, ...] | None = None
     variable: str | None = None
@@ -29,6 +27,8 @@ class Record:
     layout: str | None = None
     dtype: str | None = None
     trust: str | None = None
+    source: str | None = None
+    licence: str | None = None
 
     @property
     def name(self) -> str:
@@ -41,7 +41,7 @@ def record(block: dict, folder: Path, where: str) -> Record:
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
-    block = {key: value for key, value in block.items() if value is not None}
+    block = with_numbers({key: value for key, value in block.items() if value is not None}, of_brought("recording"))
     check_brought("recording", block, where)
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":

@@ -10,6 +10,7 @@ from pathlib import Path
 from lowalt.config.command import pick
 from lowalt.config.layers import load_yaml, merge
 from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.config.schema import check_brought, of_brought, with_numbers
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.recordings.channel import EDGE, ONE_SIDED_EDGE, SAMPLINGS
@@ -118,6 +119,11 @@ def radars(path: str | Path = TWINS) -> dict[str, Twin]:
     Raises: InputError naming the key that is missing or wrong.
     """
     try:
-        return {name: Twin.from_settings(twin["radar"]) for name, twin in settings_of(path)["twins"].items()}
+        blocks = {str(name): twin["radar"] for name, twin in settings_of(path)["twins"].items()}
     except KeyError as error:
         raise InputError(f"{path}: key {error} is missing") from None
+    except (TypeError, AttributeError):
+        raise InputError(f"{path}: expected under twins the name of each radar with a block radar") from None
+    for name, block in blocks.items():
+        check_brought("radar", with_numbers(block, of_brought("radar")), f"{path}: {name}")
+    return {name: Twin.from_settings(block) for name, block in blocks.items()}

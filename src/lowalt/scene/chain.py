@@ -17,7 +17,7 @@ from lowalt.echo import echo_signal
 from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.machine.progress import reported
 from lowalt.numerics.power import rms
-from lowalt.scene import waveform
+from lowalt.scene import truth, waveform
 from lowalt.scene.effects import PLACE_ORDER, NamedEffect, offered, placed
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.response import ImagePath, response
@@ -234,6 +234,18 @@ class SceneSample:
         ways_m = view.ways_m(view.places.mean(axis=1))
         cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
         return self._present(cells)
+
+    def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
+        """Return the range cell (K,), with its fraction, at each received symbol, and the folded speed (N,) m/s at each
+        symbol, at which the echo of the middle of a view's target appears on the direct path."""
+        moving = offered(self.scene.effects, "displaced").items()
+        displacements = [displaced(view, self.draws(name)) for name, displaced in moving]
+        cell, speed_mps = truth.observed(view, displacements, self.cells.shape[1])
+        return self._present(cell), speed_mps
+
+    def observed_cell(self, view: View) -> np.ndarray:
+        """Return the range cell (K,) nearest to where the echo of a view's target appears at each received symbol."""
+        return np.rint(self.observed(view)[0]).astype(np.int64) % self.cells.shape[1]
 
     def _present(self, symbols: np.ndarray) -> np.ndarray:
         """Those of the symbols (N, ...) that are received."""

@@ -144,7 +144,7 @@ def finding(
     """
     cloud, row, surfaces = explained
     sample = SceneSample(scene, observe(scene, station, cloud, row, surfaces), clouds)
-    target_cell, empty = sample.true_cell(sample.view), sample.without_target()
+    target_cell, empty = sample.observed_cell(sample.view), sample.without_target()
     received, background = sample.filtered(sample.detection), empty.filtered(sample.detection)
     at_target = (received - background)[np.arange(len(target_cell)), target_cell]
     loudest = float((abs(background) ** 2).mean(axis=0).max())

@@ -11,8 +11,9 @@ from pathlib import Path, PurePosixPath
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.schema import check_brought
-from lowalt.files.atomic import existing, replacing, sha256, text_of
+from lowalt.files.atomic import existing, replacing, sha256
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
 from lowalt.shards.sample_table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"
@@ -83,11 +84,11 @@ def load(path: str | Path) -> dict:
     Raises: InputError naming the file where it is missing or no index, or the setting in it that is wrong.
     """
     existing(path, "index")
+    index = read_object(path, "an index of shards")
     try:
-        index = json.loads(text_of(path, "index"))
         written, stated, computed = index["format"], index["sha256"], _checksum(index)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path}: not an index of shards ({error})") from error
+    except KeyError as error:
+        raise InputError(f"{path}: not an index of shards, it has no {error}") from None
     if written not in READABLE:
         raise InputError(f"{path}: format {written!r}, expected one of {READABLE}")
     if stated != computed:

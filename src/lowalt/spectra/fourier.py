@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.config.network import Network, Station
 from lowalt.spectra.known_times import line_sums, shares
 from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Fourier
@@ -17,13 +17,13 @@ def rows(settings: Fourier) -> int:
     return settings.points
 
 
-def speeds(settings: Fourier, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
+def speeds(settings: Fourier, network: Network, station: Station) -> tuple[float, float]:
     """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`, folded.
 
     A positive Doppler frequency approaches, so the speed falls along the rows.
     """
-    fastest = SPEED_OF_LIGHT / (4 * frequency_hz * symbol_interval_s)
-    return fastest, -fastest
+    bins = network.bin_speeds_mps(settings.points, station)
+    return float(bins[-1]), float(bins[0])
 
 
 def magnitudes(signals: np.ndarray, fourier: Fourier, name: str = "stft") -> np.ndarray:

@@ -9,8 +9,8 @@ bits on every machine that keeps IEEE 754. The kernels work in the precision of 
 """
 
 import numpy as np
-from numba import njit
 
+from lowalt.machine.jit import PLAIN
 from lowalt.numerics.portable import sine_cosine_turns
 
 
@@ -20,7 +20,7 @@ def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:
     return cosine.astype(dtype), sine.astype(dtype)
 
 
-@njit(cache=True)
+@PLAIN
 def _level(re, im, stride, cosine, sine, out_re, out_im):
     """One level of decimation in time: sub-spectra by start time become twice as many in out_re and out_im."""
     single, points = re.shape[0] == 1, cosine.size
@@ -40,7 +40,7 @@ def _level(re, im, stride, cosine, sine, out_re, out_im):
             out_im[q + rows, t] = a_im[t] - b_im
 
 
-@njit(cache=True)
+@PLAIN
 def _last(re, im, cosine, sine, out):
     """The last level (stride 1) straight to magnitudes."""
     single = re.shape[0] == 1
@@ -64,7 +64,7 @@ def _last(re, im, cosine, sine, out):
             minus[t] = np.sqrt(x * x + y * y)
 
 
-@njit(cache=True)
+@PLAIN
 def fourier_magnitudes(re, im, window, points, cosine, sine, out):
     """Fill out (points, count) with |FFT| of the windows that start at symbols 0 .. count - 1.
 
@@ -87,7 +87,7 @@ def fourier_magnitudes(re, im, window, points, cosine, sine, out):
     _last(a_re, a_im, cosine, sine, out)
 
 
-@njit(cache=True)
+@PLAIN
 def transfer(re, im, window, cosine, sine, share, out):
     """Fill out (speeds, count) with the velocity-transfer spectrum of windows starting at 0 .. count - 1.
 

@@ -30,6 +30,7 @@ from lowalt.files.archives import write_arrays
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError, reading
+from lowalt.files.json_objects import json_object
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
@@ -199,7 +200,7 @@ def read(path: str | Path) -> Cloud:
     try:
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
-        record = json.loads(str(arrays.pop("record")))
+        record = json_object(str(arrays.pop("record")), path, "a cloud")
         kinds, names = (tuple(map(str, arrays.pop(name))) for name in ("kinds", "names"))
         cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
     except UNREADABLE as error:

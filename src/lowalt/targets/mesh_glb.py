@@ -5,7 +5,6 @@ reader ends the process on a skin. Source: Khronos, glTF 2.0 (sections 3.6, 3.7,
 """
 
 import base64
-import json
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import json_object
 from lowalt.numerics import portable
 from lowalt.targets.mesh_polygons import Piece, stripped
 
@@ -30,7 +30,7 @@ class _Glb:
         magic, version, _, size, kind = struct.unpack_from("<4sII I4s", data)
         if magic != b"glTF" or version != 2 or kind != b"JSON":
             raise ValueError("expected a binary glTF of version 2")
-        self.json = json.loads(data[20 : 20 + size])
+        self.json = json_object(data[20 : 20 + size].decode(), "its JSON", "glTF")
         self.binary = data[28 + size :]
 
     def list(self, name: str) -> list:

@@ -15,7 +15,7 @@ from lowalt.scene.chain import SceneSample
 from lowalt.scene.effects import called
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.set_noise import in_all_cells
-from lowalt.scene.view import View
+from lowalt.scene.truth import geometric
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud, cloud_of
 
@@ -85,25 +85,13 @@ class Cubes:
         sample = SceneSample(scene, view, self.clouds)
         received, sampling = sample.received(), sample.view.sampling
         there = slice(None) if sampling is None else sampling.present
-        cells = np.zeros((len(received.cell), self.scene.network.subcarriers), np.complex128)
-        seen = sample.without_target() if self.empty else sample
-        cells[there] = seen.filtered(sample.detection)
+        seen = (sample.without_target() if self.empty else sample).filtered(sample.detection)
+        cells = np.zeros((len(received.cell), seen.shape[1]), np.complex128)
+        cells[there] = seen
         truths = []
         for target in sample.targets:
-            true_cell = np.full(len(cells), -1)
-            true_cell[there] = sample.true_cell(target)
-            truths.append(np.column_stack([truth(target), true_cell]))
+            place, speed_mps = sample.observed(target)
+            known = np.full((len(cells), 2), -1.0)
+            known[there] = np.column_stack([sample.true_cell(target), place])
+            truths.append(np.column_stack([geometric(target), known, speed_mps]))
         return cells, received.cell, tuple(truths), received.power
-
-
-def truth(view: View) -> np.ndarray:
-    """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each symbol, (N, 4)."""
-    station, middle = view.station, view.places.mean(axis=1)
-    moved = np.gradient(middle, view.times_s, axis=0, edge_order=2)
-    ends = [station] if station.transmitter is None else [station, station.transmitter]
-    ways = [middle - np.asarray(end.position_m) for end in ends]
-    ranges = [np.linalg.norm(way, axis=1) for way in ways]
-    speeds = [(way * moved).sum(axis=1) / length for way, length in zip(ways, ranges, strict=True)]
-    towards = ways[0] / ranges[0][:, None]
-    cosines = towards @ np.asarray(station.horizontal), towards[:, 2]
-    return np.column_stack([np.mean(ranges, axis=0), np.mean(speeds, axis=0), *cosines])

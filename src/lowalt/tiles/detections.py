@@ -20,8 +20,8 @@ def detections(
 
     A value of the range-Doppler map is detected where it is the largest of its neighbours and exceeds the mean of the
     `training` cells on either side, beyond `guard` cells, by the factor that noise passes with probability
-    `false_alarm`. It is the target's where it is within one cell and two speeds of what is true at some symbol; for a
-    companion give `cube._replace(truth=cube.others[0])`.
+    `false_alarm`. It is the target's where it is within one cell and two speeds of the observed truth at some symbol;
+    for a companion give `cube._replace(truth=cube.others[0])`.
     Source: Finn & Johnson 1968; Richards 2014, 6.5.
     """
     symbols, count = cube.cells.shape
@@ -32,13 +32,11 @@ def detections(
     result = np.zeros(len(rows), DETECTION)
     result["cell"] = (cube.chosen[symbols // 2] - settings.cells // 2 + rows) % count
     result["range_m"] = result["cell"] * network.cell_m
-    (_, first, last), _ = range_doppler.axes(settings, network, station)
-    step = (last - first) / symbols
-    # The most negative frequency, -1 / (2 T_r), is the last column.
-    result["radial_mps"] = last - step * (symbols - 1 - columns)
+    result["radial_mps"] = network.bin_speeds_mps(symbols, station)[columns]
     result["over_db"] = 10 * np.log10(power[rows, columns] / power.mean())
     true = dict(zip(TRUTH, cube.truth.T, strict=True))
-    aside = (result["cell"][:, None] - true["cell"] + count / 2) % count - count / 2
-    faster = (result["radial_mps"][:, None] - true["radial_mps"] + last) % (2 * last) - last
-    result["true"] = ((abs(aside) <= 1) & (abs(faster) <= 2 * step)).any(axis=1)
+    aside = (result["cell"][:, None] - true["observed_cell"] + count / 2) % count - count / 2
+    faster = network.folded_mps(result["radial_mps"][:, None] - true["observed_mps"], station)
+    step = 2 * network.largest_mps(station) / symbols
+    result["true"] = ((abs(aside) <= 1) & (abs(faster) <= 2 * step) & (true["cell"] >= 0)).any(axis=1)
     return result[np.argsort(-result["over_db"])]

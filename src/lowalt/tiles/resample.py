@@ -10,9 +10,9 @@ calls BILINEAR and what PyTorch computes with `antialias=True`.
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from lowalt.files.errors import InputError
+from lowalt.machine.jit import PLAIN
 from lowalt.numerics import portable
 
 
@@ -73,7 +73,7 @@ def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarr
     return np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(weights.T.astype(np.float32))
 
 
-@njit(cache=True)
+@PLAIN
 def along_rows(values, columns, shares, out):
     """The last axis: values (rows, n) -> out (rows, S).
 
@@ -89,7 +89,7 @@ def along_rows(values, columns, shares, out):
                 line[c] += shares[k, c] * row[columns[k, c]] + shares[k + 1, c] * row[columns[k + 1, c]]
 
 
-@njit(cache=True)
+@PLAIN
 def across_rows(values, source, weights, out):
     """The first axis: values (points, n) -> out (S, n); source, weights: (S, taps), summed in order."""
     for j in range(out.shape[0]):
@@ -104,7 +104,7 @@ def across_rows(values, source, weights, out):
                 line[t] += w * row[t]
 
 
-@njit(cache=True)
+@PLAIN
 def _resize(images, source, weights, columns, shares, out):
     """(n, S, S) uint8 -> out (n, size, size) uint8, rows first, rounded half up at the end."""
     between = np.empty((out.shape[1], images.shape[2]), np.float32)

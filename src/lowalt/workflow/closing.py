@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from lowalt.files.csv_tables import read_csv
+from lowalt.files.csv_tables import number, read_csv
 from lowalt.files.shipped import located
 from lowalt.files.yaml_files import load_yaml
 
@@ -14,7 +14,8 @@ def averages(path: str | Path) -> dict[tuple[str, str], float]:
     Raises: InputError where the file is missing or no such table.
     """
     rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent")
-    return {(row["scheme"], row["protocol"]): float(row["accuracy_percent"]) for row in rows if row["snr_db"] == "avg"}
+    means = [row for row in rows if row["snr_db"] == "avg"]
+    return {(row["scheme"], row["protocol"]): number(row, "accuracy_percent", path) for row in means}
 
 
 def lines(folder: Path) -> list[str]:

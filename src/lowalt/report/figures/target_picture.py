@@ -114,7 +114,7 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
         values = values if kind.SIGNED else _decibel(values)
         half = windows.window / 2
         times = network.symbol_interval_s * np.array([half, half + windows.hop * values.shape[1]])
-        speeds = kind.speeds(windows, *of_station)
+        speeds = kind.speeds(windows, network, station)
         scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
         if kind.SIGNED:
             top = float(abs(values).max()) or 1.0

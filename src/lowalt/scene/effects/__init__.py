@@ -26,6 +26,7 @@ settings contradict the rest of a scene (`checks.CheckedScene`).
 | | `scatter(settings, view, rng)` | response (N, M) of something other than a target, in sqrt(W) a subcarrier |
 | | `offset_cells(settings, view)` | how far those echoes stand beyond their range cells' centres, in cells |
 | | `heard(settings, sample)` | time samples (N, M) of signals that the receiver does not know |
+| any | `displaced(settings, view, rng)` | `Displacement` of a target's echo by this effect, in delay and frequency |
 | receiver | `receive(settings, samples, look, rng)` | time samples (N, M) after the effect |
 | detection | `process(settings, cells, look, rng)` | range cells (N, M) after the effect |
 | | `choose(settings, chosen, cells, look, rng)` | chosen cells (N,) of range cells (N, M) |
@@ -100,6 +101,12 @@ def _every_effect() -> tuple[str, ...]:
     return tuple(result)
 
 
+ONE = (
+    "sampling", "regridded", "data", "range_cells", "beams", "element", "routes", "instants", "late_samples",
+    "convolved",
+)  # fmt: skip
+"""Functions that at most one effect of a scene may offer; of the others, several act in order."""
+
 PLACES = {name: place for place, _, name in (entry.partition("/") for entry in _every_effect())}
 """Place of every effect by its name, in the order of the chain."""
 
@@ -132,7 +139,7 @@ def dotted(name: str) -> str:
 def called(block: dict[str, dict | None]) -> list[NamedEffect]:
     """Return the effects of a scene's `effects` block in the chain's order, without those that are idle.
 
-    Raises: InputError for an unknown effect or parameter.
+    Raises: InputError for an unknown effect or parameter, or two effects that offer the same one of ONE.
     """
     modules = {name: importlib.import_module(dotted(name)) for name in block}
     result = []
@@ -144,7 +151,12 @@ def called(block: dict[str, dict | None]) -> list[NamedEffect]:
                 f"effects.{name}: unknown parameter(s) {unknown}, expected some of {list(module.DEFAULTS)}"
             )
         result.append(NamedEffect(name, PLACES[name], module, {**module.DEFAULTS, **changed}))
-    return [effect for effect in result if not effect.idle]
+    acting = [effect for effect in result if not effect.idle]
+    for function in ONE:
+        owners = list(offered(acting, function))
+        if len(owners) > 1:
+            raise InputError(f"effects: {' and '.join(owners)} both offer {function}, expected one of them in a scene")
+    return acting
 
 
 def placed(effects: Iterable[NamedEffect], *places: str) -> list[NamedEffect]:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import fft
 from scipy.signal.windows import hann
 
-from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.files.errors import InputError
 from lowalt.spectra.cube import Cube
 from lowalt.spectra.settings import Doppler as Settings
@@ -37,11 +37,11 @@ def axes(settings: Settings, network: Network, station: Station) -> tuple[tuple[
     """Return name, first and last value of the columns (radial speed, m/s) and of the rows (range, m).
 
     Ranges count from the cell that the receiver chose in the middle of the look; speeds are positive away from the
-    station.
+    station, at the effective carrier.
     """
-    fold = SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s)
+    speeds = network.bin_speeds_mps(settings.points, station)
     reach = settings.cells // 2 * network.cell_m
-    return ("radial speed (m/s)", -fold, fold), ("range (m from the chosen cell)", -reach, reach)
+    return ("radial speed (m/s)", speeds[0], speeds[-1]), ("range (m from the chosen cell)", -reach, reach)
 
 
 def definition(cube: Cube, settings: Settings) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.numerics.portable import sine_cosine
 from lowalt.spectra.known_times import line_sums, shares
 from lowalt.spectra.segments import segments
@@ -22,9 +22,14 @@ def rows(settings: Transfer) -> int:
     return len(settings.speeds_mps)
 
 
-def speeds(settings: Transfer, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
-    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`."""
-    return settings.speeds_mps[0], settings.speeds_mps[-1]
+def speeds(settings: Transfer, network: Network, station: Station) -> tuple[float, float]:
+    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`.
+
+    The filters are matched at f_k, as in the paper's Eq. 32; the echo turns at the effective carrier, so a filter finds
+    a speed that is smaller in proportion.
+    """
+    ratio = station.frequency_hz / network.effective_hz(station)
+    return float(settings.speeds_mps[0] * ratio), float(settings.speeds_mps[-1] * ratio)
 
 
 def definition(

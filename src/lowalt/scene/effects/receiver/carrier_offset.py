@@ -4,7 +4,8 @@ import numpy as np
 
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver import offsets
-from lowalt.scene.waveform import Look
+from lowalt.scene.view import Displacement, View
+from lowalt.scene.waveform import Look, oscillator_hz
 
 SOURCE = (
     "P. H. Moose, A technique for orthogonal frequency division multiplexing frequency offset correction, "
@@ -25,5 +26,14 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
     F > 0 if the receiver's oscillator is too low: lines rise by F and fold at half the symbol rate.
     Source: Moose 1994; one draw a sample and station.
     """
-    ppm = settings["fixed_ppm"] + settings["sigma_ppm"] * offsets.drawn(rng)
-    return offsets.risen(samples, 1e-6 * ppm * look.oscillator_hz, look)
+    return offsets.risen(samples, 1e-6 * _ppm(settings, rng) * look.oscillator_hz, look)
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return by how much all lines rise."""
+    return Displacement(rise_hz=1e-6 * _ppm(settings, rng) * oscillator_hz(view.network, view.station))
+
+
+def _ppm(settings: dict, rng: np.random.Generator) -> float:
+    """The receiver's error (ppm), positive where its oscillator is too low."""
+    return settings["fixed_ppm"] + settings["sigma_ppm"] * offsets.drawn(rng)

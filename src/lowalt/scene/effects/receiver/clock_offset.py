@@ -11,6 +11,7 @@ from scipy import fft
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 
 SOURCE = (
@@ -49,7 +50,7 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
     fast clock is early ever more, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994; one draw a sample and
     station.
     """
-    rate = 1e-6 * (settings["fixed_ppm"] + settings["sigma_ppm"] * offsets.drawn(rng))
+    rate = _rate(settings, rng)
     early = -rate / (1 + rate)
     middle = samples.shape[1] // 2
     shift_hz = early * fft.ifftshift(look.baseband_hz)
@@ -68,3 +69,17 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
         order += 1
         size *= reach / order
     return result
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return how late all echoes appear at each symbol: ever later with a fast clock.
+
+    Lines move by at most e df / 2, a thousandth of a speed while the window stays in its prefix, which is left out.
+    """
+    rate = _rate(settings, rng)
+    return Displacement(delay_s=rate / (1 + rate) * view.times_s)
+
+
+def _rate(settings: dict, rng: np.random.Generator) -> float:
+    """The clock's relative error e, positive where it is fast."""
+    return 1e-6 * (settings["fixed_ppm"] + settings["sigma_ppm"] * offsets.drawn(rng))

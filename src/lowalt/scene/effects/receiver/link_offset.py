@@ -6,10 +6,12 @@ from B to A the opposite. A station that receives its own signal has no offset.
 
 import numpy as np
 
+from lowalt.config.network import Network, Station
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver.offsets import delayed, of_stations, risen
-from lowalt.scene.waveform import Look
+from lowalt.scene.view import Displacement, View
+from lowalt.scene.waveform import Look, oscillator_hz
 
 SOURCE = (
     "P. H. Moose, IEEE Trans. Commun. 42(10), 1994 (carrier); M. Speth et al., IEEE Trans. Commun. 47(11), 1999 "
@@ -32,9 +34,20 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
     A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late makes echoes late.
     rng: the look's stream, the same for all stations.
     """
-    sends, hears = look.station.transmitter, look.station.receiver
-    if sends is None:
-        return samples
-    errors = of_stations(settings, look.network, rng)
+    late_s, rise_hz = _of(settings, look.network, look.station, rng)
+    return samples if look.station.transmitter is None else risen(delayed(samples, late_s, look), rise_hz, look)
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return how late and how high all echoes of a link appear; rng as for `receive`."""
+    return _of(settings, view.network, view.station, rng)
+
+
+def _of(settings: dict, network: Network, station: Station, rng: np.random.Generator) -> Displacement:
+    """Sender's errors less receiver's, none for a station that receives its own signal."""
+    sends, hears = station.transmitter, station.receiver
+    if sends is None or hears is None:
+        return Displacement()
+    errors = of_stations(settings, network, rng)
     ppm, late_s = (theirs - ours for theirs, ours in zip(errors[sends.name], errors[hears.name], strict=True))
-    return risen(delayed(samples, late_s, look), 1e-6 * ppm * look.oscillator_hz, look)
+    return Displacement(late_s, 1e-6 * ppm * oscillator_hz(network, station))

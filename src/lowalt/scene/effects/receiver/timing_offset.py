@@ -8,6 +8,7 @@ import numpy as np
 
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 
 SOURCE = (
@@ -30,5 +31,14 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
     A late window makes all echoes seem nearer by c d / 2. The oscillator's own phase runs on and is not touched.
     Source: Speth et al. 1999; one draw a sample and station.
     """
-    late_s = settings["fixed_s"] + settings["sigma_s"] * offsets.drawn(rng)
-    return offsets.delayed(samples, -late_s, look)
+    return offsets.delayed(samples, -_late_s(settings, rng), look)
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return how early all echoes appear."""
+    return Displacement(delay_s=-_late_s(settings, rng))
+
+
+def _late_s(settings: dict, rng: np.random.Generator) -> float:
+    """How late the window starts (s)."""
+    return settings["fixed_s"] + settings["sigma_s"] * offsets.drawn(rng)

@@ -1,0 +1,28 @@
+"""Code that a setting names as FILE.py:FUNCTION: only the user may choose it, never a model, an index or a run."""
+
+from pathlib import Path
+
+from lowalt.files.errors import InputError
+
+
+def file_of(name: str) -> Path | None:
+    """Return the Python file of a backbone's name, None for a name of a library's model."""
+    path, colon, _ = name.rpartition(":")
+    return Path(path) if colon and path.endswith(".py") else None
+
+
+BY_NAME = "`--backbone FILE.py:FUNCTION` (in Python `backbone=`) with code that you trust"
+
+
+def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME) -> str:
+    """Return the backbone of a file that names `name`; trusted: the FILE.py:FUNCTION that the user names, or "".
+
+    where: the file or the run's folder; how: what the user may do instead.
+    Raises: InputError where the file names code and the user does not.
+    """
+    if file_of(name) is None:
+        return name
+    if file_of(trusted) is None:
+        place = f"{where}: " if where else ""
+        raise InputError(f"{place}its backbone {name!r} is code, which a file may not choose; expected {how}")
+    return trusted
