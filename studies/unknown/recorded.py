@@ -105,7 +105,7 @@ def foreign(entry: dict, folder: Path, twin: Twin) -> np.ndarray:
         raise InputError(f"{path}: no such file, expected the recording that foreign.yaml names")
     record = Record(path, entry["carrier_hz"], "real")
     signal = at_symbol_rate(record, twin, of_text(path) if path.suffix == ".txt" else read(record))
-    return coherent_intervals(signal, twin.symbols, name=str(path))
+    return coherent_intervals(signal, twin.symbols, str(path), twin.slow)
 
 
 def swung(times_s: np.ndarray, wavelength_m: float, rng: np.random.Generator) -> np.ndarray:
@@ -130,7 +130,7 @@ def empty(radar: Radar, library: Library, kind: str, count: int, fold: str) -> n
         rng = stream(library.seed, "unknown", radar.name, kind, fold, number)
         signal = swung(times, SPEED_OF_LIGHT / twin.carrier_hz, rng)
         values = samples(twin, receivers[number % len(receivers)], signal, rng, target=kind != "noise")
-        found.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols)[0])
+        found.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)[0])
     return np.array(found)
 
 
