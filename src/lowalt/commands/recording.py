@@ -97,6 +97,9 @@ def drafted(inspection: FileInspection, seen: Seen, folder: Path) -> str:
     for key, value in seen.keys.items():
         text = "{" + ", ".join(f"{name}: {item}" for name, item in value.items()) + "}" if key == "chirps" else value
         lines.append(f"{key}: {list(value) if key == 'columns' else text}{mark}")
+    waveform = "fmcw" if chirps else "cw"
+    lines += ["# For `lowalt recording train`, with your own figures (m, m, degrees):",
+              f"# twin: {{waveform: {waveform}, distance_m: [2, 10], height_m: [-1, 2], beam_deg: 60}}"]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 

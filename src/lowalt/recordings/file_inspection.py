@@ -270,7 +270,7 @@ def _notes(path: Path, seen: Seen, rate_hz: float | None, carrier_hz: float | No
         if image > IMAGE_DB:
             notes.append(f"the strongest line has an image at the opposite Doppler, {-image:.0f} dB below: a target "
                          "with equal sides, such as a rotor, or I and Q of unequal strength")  # fmt: skip
-        elif len(seen.keys.get("columns", ())) == 2 or seen.keys.get("layout"):
+        elif "chirps" not in seen.keys and (len(seen.keys.get("columns", ())) == 2 or seen.keys.get("layout")):
             notes.append("the sign holds if I comes before Q: exchanged, every speed changes its sign; `moves` in the "
                          "record checks it")  # fmt: skip
     try:
