@@ -23,9 +23,9 @@ import numpy as np
 from lowalt.config.layers import canonical
 from lowalt.config.network import Network
 from lowalt.echo import echo_signal
+from lowalt.echo.echo_input import Rigid
 from lowalt.echo.fast import driver
 from lowalt.echo.rounding import nearest
-from lowalt.echo.scene import Rigid
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.measure import echo_cost as cost

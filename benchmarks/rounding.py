@@ -15,8 +15,8 @@ import numpy as np
 
 from lowalt.config.layers import load
 from lowalt.echo import echo_signal
+from lowalt.echo.echo_input import Rigid, Target, target
 from lowalt.echo.rounding import nearest
-from lowalt.echo.scene import Rigid, Target, target
 from lowalt.files.csv_tables import write_csv
 from lowalt.machine.hardware import describe
 from lowalt.motion import poses

@@ -10,14 +10,14 @@ import pytest
 
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import orderings, predictions, samples, schemes, tables, transfer
+from lowalt.recognition import paper_claims, predictions, samples, schemes, tables, transfer
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
 from made_predictions import read_rows, run_files
 
 SNRS = (3.0, np.inf)
-PUBLISHED = orderings.read_published("config/published_accuracy.csv")
+PUBLISHED = paper_claims.read_published("config/published_accuracy.csv")
 
 
 def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
@@ -57,17 +57,17 @@ def test_an_ordering_holds_only_where_its_interval_lies_above_zero(low, high, or
     row = ["seen", "ABC:X", "A:X", "stations", "seeds, motion models"]
     published = {("seen", "ABC:X"): 99.0, ("seen", "A:X"): 97.5}
     for seeds, expected in ((3, ordering), (2, "not ranked")):
-        assert list(orderings.ordering_rows([[*row, seeds, "1.0", low, high]], published)) == [
+        assert list(paper_claims.ordering_rows([[*row, seeds, "1.0", low, high]], published)) == [
             ["seen", "ABC:X", "A:X", "stations", "1.50", seeds, "1.0", low, high, expected]
         ]
-    assert next(orderings.ordering_rows([[*row, 3, "1.0", low, high]], {}))[4] == ""
+    assert next(paper_claims.ordering_rows([[*row, 3, "1.0", low, high]], {}))[4] == ""
 
 
 def test_published_accuracies_are_read_as_averages_and_others_refused(tmp_path):
     assert PUBLISHED["seen", "ABC:VRP+TRP+VT"] == 99.88
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match=r"other\.csv: lacks the columns"):
-        orderings.read_published(tmp_path / "other.csv")
+        paper_claims.read_published(tmp_path / "other.csv")
 
 
 def test_macro_f1_by_hand_counts_every_class_alike():

@@ -103,7 +103,7 @@ def _shown(config: dict, stations: list[str], model: Path | None) -> Callable[[n
     seen = dataclasses.replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
     if model is not None:
-        from lowalt.recognition.one_sample import answer
+        from lowalt.recognition.predict_sample import answer
         from lowalt.recognition.zoo import opened
         from lowalt.tiles import split
 

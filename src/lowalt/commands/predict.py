@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> Answer:
     record = _record(options.input) if options.input.suffix == ".yaml" else None
     config = overlaid(options.overlay) if options.overlay else {}
     # What can be refused without torch has been refused: it takes seconds to import.
-    from lowalt.recognition.one_sample import predict
+    from lowalt.recognition.predict_sample import predict
     from lowalt.recognition.zoo import opened
 
     own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")

@@ -7,13 +7,13 @@ import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo import refine
+from lowalt.echo.echo_input import EchoInput, Rigid, Target, check, target
 from lowalt.echo.pointwise import results
 from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
 from lowalt.echo.refine import Method
 from lowalt.echo.rounding import nearest
-from lowalt.echo.scene import EchoScene, Rigid, Target, check, target
 from lowalt.files.errors import BelowFloor, InputError
 
 
@@ -197,7 +197,7 @@ def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) ->
     return results.Paths(*result)
 
 
-def check_fault(fault: int, scene: EchoScene, station: Station, sample: str) -> None:
+def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> None:
     """Raise InputError for a point in the station, which a kernel reports as `fault` = 1 + n L + l."""
     if fault:
         points = len(scene.part) or scene.translation.shape[1]

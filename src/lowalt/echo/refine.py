@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.echo.echo_input import EchoInput
 from lowalt.echo.fast import driver
 from lowalt.echo.fast.cell_kernel import CellPolynomials, cell_polynomials
 from lowalt.echo.fast.error_model import (
@@ -22,7 +23,6 @@ from lowalt.echo.fast.strongest_cell import CERTAIN
 from lowalt.echo.fast.workspace import Approximation, Found, Symbols, workspace
 from lowalt.echo.pointwise.reference_range import RANGE
 from lowalt.echo.radar import Radar
-from lowalt.echo.scene import EchoScene
 
 LONGEST = 100
 """Most symbols of a segment."""
@@ -53,7 +53,7 @@ class Method(NamedTuple):
 
 
 def compute(
-    scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
+    scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
 ) -> tuple[Found, np.ndarray, Method, EchoSample]:
     """Return (found, symbols left for the pointwise kernel, method, sample): the cheap plan, then the exact one.
 
@@ -94,7 +94,7 @@ def _least_largest(found: Found) -> float:
 class _Run:
     """The calls of the fast kernel on one sample, and its extents."""
 
-    def __init__(self, scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float]) -> None:
+    def __init__(self, scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float]) -> None:
         peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
         first = int(scene.part[0]) if len(scene.part) else 0
         self.sample = EchoSample(scene, layout(scene, peak), radar, first, aims)

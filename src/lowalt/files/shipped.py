@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lowalt.files.street import PACKAGE
+from lowalt.files.package_plan import PACKAGE
 
 SHIPPED = PACKAGE / "shipped" if (PACKAGE / "shipped/Snakefile").is_file() else PACKAGE.parents[1]
 """The folder that holds `Snakefile`, `config/`, `workflow/` and `profiles/`."""

@@ -7,7 +7,7 @@ included: the paper's closed form written down in NumPy, in either precision, an
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.echo.scene import Rigid
+from lowalt.echo.echo_input import Rigid
 
 
 def positions(motion: Rigid) -> np.ndarray:

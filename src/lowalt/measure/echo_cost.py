@@ -19,7 +19,7 @@ import numpy as np
 from lowalt.config.command import parser, pick, run
 from lowalt.config.network import Network
 from lowalt.echo.api import echo_signal
-from lowalt.echo.scene import Rigid
+from lowalt.echo.echo_input import Rigid
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import BelowFloor
 from lowalt.machine.hardware import processor

@@ -66,7 +66,7 @@ def _source(options: Namespace):
         raise InputError("expected one of --views, --index and --dataset")
     if options.dataset is None:
         return Source(options.views, options.index)
-    from lowalt.recognition.made import DatasetSamples, opened
+    from lowalt.recognition.dataset_samples import DatasetSamples, opened
 
     return Source(made=partial(DatasetSamples, opened(options.dataset)))
 
@@ -112,7 +112,7 @@ def _tables(arguments: list[str]) -> None:
     """Write accuracy.csv and its companions from prediction files. Settings: seed."""
     from lowalt.recognition import tables
     from lowalt.recognition.evaluated import Evaluated
-    from lowalt.recognition.orderings import read_published
+    from lowalt.recognition.paper_claims import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
     line.add_argument("--predictions", nargs="+", required=True, help="predictions (.csv), records next to them")

@@ -12,8 +12,8 @@ from torch import distributed, nn
 from lowalt.config.command import pick
 from lowalt.files.errors import InputError
 from lowalt.recognition import gpus
-from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.matrix_products import as_products
+from lowalt.recognition.prefetch import Prefetch, Unchanged
 from lowalt.recognition.samples import Samples
 
 
@@ -119,7 +119,7 @@ def probabilities(
     machine: Machine,
     batch: int,
     mirror: bool = False,
-    ahead: ReadAhead | None = None,
+    ahead: Prefetch | None = None,
 ) -> np.ndarray:
     """Return class probabilities (len(numbers), classes) float64 of the samples `numbers`.
 
@@ -130,7 +130,7 @@ def probabilities(
     model.eval()
     result = torch.zeros(len(numbers), model.classes, dtype=torch.float64)
     mine = list(range(0, len(numbers), batch))[machine.rank :: machine.ranks]
-    ahead = ahead or ReadAhead(Unchanged(samples), 0, pin=False)
+    ahead = ahead or Prefetch(Unchanged(samples), 0, pin=False)
     read = ahead([numbers[start : start + batch] for start in mine])
     for start, inputs in zip(mine, read, strict=True):
         images = inputs.to(machine.device, non_blocking=True)

@@ -24,9 +24,9 @@ from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
 from lowalt.recognition import checkpoint, inference, metrics, predictions, recipe, recogniser
-from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.light_timm import timm
+from lowalt.recognition.prefetch import Prefetch, Unchanged
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
@@ -173,7 +173,7 @@ def answers(trained: Trained, samples: Samples, settings: dict, machine: Machine
     """Return the class probabilities (n, classes) of all samples of a source; settings as in `evaluate`."""
     batch, threads, _, mirror, workers = inference.evaluation(settings)
     recipe.seeded(trained.seed, ("evaluate",), threads)
-    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.gpu)
+    ahead = Prefetch(Unchanged(samples), workers, pin=machine.gpu)
     every = np.arange(len(samples.facts))
     return probabilities(machine.placed(trained.model), samples, every, machine, batch, mirror, ahead)
 

@@ -31,7 +31,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition.evaluated import Evaluated, difference, whole_subtypes
 from lowalt.recognition.macro_f1 import f1_by_snr
-from lowalt.recognition.orderings import CLAIMS, ordering_rows
+from lowalt.recognition.paper_claims import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.statistics import (
     LOOKED_FOR,
@@ -193,7 +193,7 @@ def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
 def write(runs: list[Evaluated], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
     """Write all tables into `folder`; schemes stand in `order`, protocols seen first.
 
-    published: as `orderings.read_published` gives it; seed: of the bootstrap.
+    published: as `paper_claims.read_published` gives it; seed: of the bootstrap.
     Raises: InputError for a scheme outside `order`, the same run twice, or runs with different classes.
     """
     groups: dict[tuple[str, str], list[Evaluated]] = {}

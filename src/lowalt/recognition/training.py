@@ -19,15 +19,15 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import Reporter
 from lowalt.recognition import checkpoint, recogniser
-from lowalt.recognition.ahead import Augmented, ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.light_timm import timm
 from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.objective import descent
-from lowalt.recognition.order import batches, epoch_order
+from lowalt.recognition.prefetch import Augmented, Prefetch, Unchanged
 from lowalt.recognition.recipe import averaging, optimiser, random_state, schedule, set_random_state
+from lowalt.recognition.sampler import batches, epoch_order
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.statistics import cross_entropy
 
@@ -92,7 +92,7 @@ class Trainer:
         keys = (self.seed, *run.keys)
         augmented = Augmented(self.train, columns, settings["augmentation"], keys, machine.rank, machine.ranks)
         readers = (augmented, Unchanged(self.validation))
-        self.read, self.read_validation = (ReadAhead(read, self.block["workers"], pin=machine.gpu) for read in readers)
+        self.read, self.read_validation = (Prefetch(read, self.block["workers"], pin=machine.gpu) for read in readers)
         self.best_weights: dict = {}
         self.waited_s = 0.0
         self.metrics: Metrics | None = None

@@ -9,8 +9,8 @@ import yaml
 
 from lowalt.config.layers import plain
 from lowalt.files.atomic import sha256
+from lowalt.files.package_plan import PACKAGE
 from lowalt.files.shipped import SHIPPED
-from lowalt.files.street import PACKAGE
 
 COUNTED = (".py", ".smk", ".yaml")
 """Endings of the files of the package that decide a run's products."""

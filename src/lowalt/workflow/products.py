@@ -10,8 +10,8 @@ from typing import Any
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
+from lowalt.files.package_plan import PACKAGE
 from lowalt.files.shipped import shipped
-from lowalt.files.street import PACKAGE
 from lowalt.report.inputs import KEPT
 from lowalt.workflow.data_products import DataProducts
 from lowalt.workflow.sources import near

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.echo.echo_input import EchoInput
 from lowalt.echo.fast.strip import MULTIPLE, strip_size
 from lowalt.echo.radar import Radar
-from lowalt.echo.scene import EchoScene
 from lowalt.machine.jit import LEAN
 
 
@@ -50,7 +50,7 @@ class EchoSample(NamedTuple):
     first: part (or point, without rotations) whose translation is the reference; aims: the beams' direction cosines.
     """
 
-    scene: EchoScene
+    scene: EchoInput
     lay: Layout
     radar: Radar
     first: int
@@ -86,7 +86,7 @@ def _group(points, part, share, strip, coordinates, groups):
     return number
 
 
-def layout(scene: EchoScene, peak: float) -> Layout:
+def layout(scene: EchoInput, peak: float) -> Layout:
     """Return the points' layout; `peak` multiplies the square roots of their cross sections."""
     rigid = scene.rotation.shape[0] > 0
     count = len(scene.points) if rigid else scene.translation.shape[1]

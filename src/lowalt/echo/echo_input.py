@@ -38,7 +38,7 @@ class Target(NamedTuple):
     rcs_m2: np.ndarray
 
 
-class EchoScene(NamedTuple):
+class EchoInput(NamedTuple):
     """Checked input of the kernels: a `Target`'s fields, written out for type checkers, and where the beams point."""
 
     rotation: np.ndarray
@@ -106,7 +106,7 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
     return Target(rotation, translation, points, part, np.sqrt(rcs), rcs)
 
 
-def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoScene:
+def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoInput:
     """Return the checked scene of one motion seen by one station; rcs_m2 is None where a `Target` comes as motion.
 
     Raises: as `target`, and InputError for cross sections given twice or an aim at the station itself.
@@ -122,7 +122,7 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
     if aim.tolist() == list(station.position_m):
         raise InputError(f"{where}aim_m is {aim_m}, the place of station {station.name}: no direction to aim at")
     check_station(network, station)
-    return EchoScene(*seen, aim)
+    return EchoInput(*seen, aim)
 
 
 def check_station(network: Network, station: Station) -> None:

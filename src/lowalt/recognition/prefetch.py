@@ -50,7 +50,7 @@ class Augmented(Dataset):
         return tensors(changed), torch.from_numpy(self.source.facts.label[mine]).long()
 
 
-class ReadAhead:
+class Prefetch:
     """Calls a map for one item after the other, in worker processes where there are any, and keeps their order."""
 
     def __init__(self, read: Dataset, workers: int, pin: bool) -> None:

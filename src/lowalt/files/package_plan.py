@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
-STREET = (
+ROOMS = (
     "files", "machine", "numerics", "config", "targets", "motion", "echo", "scene", "noise", "spectra", "tiles",
     "shards", "recognition", "recordings", "measure", "report", "workflow", "commands",
 )  # fmt: skip
@@ -34,7 +34,7 @@ def rooms_imported(path: Path) -> frozenset[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.append(node.module)
     parts = [name.split(".") for name in names]
-    return frozenset(part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in STREET)
+    return frozenset(part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in ROOMS)
 
 
 def purpose(path: Path) -> str:
