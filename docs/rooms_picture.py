@@ -40,9 +40,9 @@ def _words(room: str) -> str:
 
 
 def draw() -> bytes:
-    """Return PNG bytes: a row a room in the order of the street; a dot says that it imports the room of the column.
+    """Return PNG bytes: one row per room, in the order in which data passes them, and one column per imported room.
 
-    The area of a dot grows with the number of files that import.
+    A dot means that the room of the row imports that of the column. Its area grows with the number of importing files.
     """
     rows, columns = imports()
     count = len(ROOMS)

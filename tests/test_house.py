@@ -1,4 +1,4 @@
-"""The house: one street in one direction, light entrances, and nothing in the repository that does not belong there."""
+"""The layout of the package: imports go one way, entry points stay light, and no stray file is in the repository."""
 
 import ast
 import functools
@@ -71,7 +71,7 @@ def test_a_run_without_effects_imports_nothing_of_them(said):
     assert said["plain"] == "False\n"
 
 
-def test_the_street_holds_every_room():
+def test_the_plan_of_the_package_names_every_room():
     assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} == set(ROOMS)
 
 
@@ -158,10 +158,10 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (13, 1090), "config": (9, 1125), "echo": (27, 2570), "files": (12, 750), "machine": (10, 515),
-    "measure": (6, 590), "motion": (10, 1010), "noise": (4, 175), "numerics": (13, 940), "recognition": (46, 4650),
-    "recordings": (13, 1140), "report": (32, 1795), "scene": (73, 6120), "shards": (22, 2672), "spectra": (16, 930),
-    "targets": (43, 6320), "tiles": (16, 1478), "workflow": (15, 1740),
+    "commands": (13, 1090), "config": (9, 1124), "echo": (27, 2570), "files": (12, 747), "machine": (10, 511),
+    "measure": (6, 588), "motion": (10, 1008), "noise": (3, 168), "numerics": (12, 932), "recognition": (45, 4645),
+    "recordings": (13, 1140), "report": (32, 1780), "scene": (73, 6120), "shards": (22, 2672), "spectra": (15, 923),
+    "targets": (43, 6320), "tiles": (15, 1460), "workflow": (15, 1740),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 

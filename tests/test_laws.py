@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from lowalt.config.splits import FOLDS, fold
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.recognition import statistics, tables
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import bootstrap, model_shares

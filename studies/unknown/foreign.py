@@ -7,7 +7,7 @@ import numpy as np
 
 import trainings
 from lowalt import Dataset
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.numerics.streams import stream
 from lowalt.recognition import samples
 from lowalt.recognition.dataset_samples import DatasetSamples

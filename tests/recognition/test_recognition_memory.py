@@ -9,7 +9,7 @@ import torch
 
 from lowalt.files.errors import InputError
 from lowalt.recognition import inference, objective, recipe, recogniser, runs
-from lowalt.recognition.prefetch import Prefetch, Unchanged
+from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.schemes import SPECTRA
 from lowalt.tiles import colour_map
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training

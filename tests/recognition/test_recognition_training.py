@@ -17,10 +17,9 @@ from torch.optim.optimizer import register_optimizer_step_pre_hook
 from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, inference, recipe, runs, samples
 from lowalt.recognition import training as loop
+from lowalt.recognition.batches import Augmented, batches, epoch_order
 from lowalt.recognition.matrix_products import MatrixProduct
 from lowalt.recognition.objective import objective
-from lowalt.recognition.prefetch import Augmented
-from lowalt.recognition.sampler import batches, epoch_order
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
 
 PATHS = os.pathsep.join(str(Path(__file__).parents[2] / folder) for folder in ("src", "tests/support"))

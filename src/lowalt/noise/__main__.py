@@ -10,7 +10,7 @@ from lowalt.files.array_files import array_of
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 
 
 def load_echoes(paths: list[str], stations: list[str], models: int, snrs: int | None = None) -> list[np.ndarray]:

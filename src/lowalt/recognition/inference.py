@@ -12,8 +12,8 @@ from torch import distributed, nn
 from lowalt.config.command import pick
 from lowalt.files.errors import InputError
 from lowalt.recognition import gpus
+from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.matrix_products import as_products
-from lowalt.recognition.prefetch import Prefetch, Unchanged
 from lowalt.recognition.samples import Samples
 
 

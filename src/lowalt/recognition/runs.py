@@ -24,9 +24,9 @@ from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
 from lowalt.recognition import checkpoint, inference, metrics, predictions, recipe, recogniser
+from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.light_timm import timm
-from lowalt.recognition.prefetch import Prefetch, Unchanged
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record

@@ -20,14 +20,13 @@ from lowalt.files.errors import InputError
 from lowalt.machine.progress import Reporter
 from lowalt.recognition import checkpoint, recogniser
 from lowalt.recognition.batch_norm import over_ranks
+from lowalt.recognition.batches import Augmented, Prefetch, Unchanged, batches, epoch_order
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.light_timm import timm
 from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.objective import descent
-from lowalt.recognition.prefetch import Augmented, Prefetch, Unchanged
 from lowalt.recognition.recipe import averaging, optimiser, random_state, schedule, set_random_state
-from lowalt.recognition.sampler import batches, epoch_order
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.statistics import cross_entropy
 

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.shards.sample_record import encoded, sample_key
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.config.network import Network
 from lowalt.echo.chunk import clean_signals
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.lateness import lateness
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.shards.sample_record import npy

@@ -4,8 +4,8 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.numerics.portable import sine_cosine
+from lowalt.spectra.fourier import segments
 from lowalt.spectra.known_times import line_sums, shares
-from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Transfer
 from lowalt.spectra.sliding import transfer
 
