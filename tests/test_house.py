@@ -158,7 +158,7 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (13, 1090), "config": (9, 1124), "echo": (27, 2570), "files": (12, 747), "machine": (10, 511),
+    "commands": (13, 1100), "config": (9, 1124), "echo": (27, 2570), "files": (12, 747), "machine": (10, 511),
     "measure": (6, 588), "motion": (10, 1008), "noise": (3, 168), "numerics": (12, 932), "recognition": (45, 4645),
     "recordings": (13, 1140), "report": (32, 1780), "scene": (73, 6120), "shards": (22, 2672), "spectra": (15, 923),
     "targets": (43, 6320), "tiles": (15, 1460), "workflow": (15, 1740),
