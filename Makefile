@@ -123,7 +123,7 @@ style:
 cost: $(SETUP)  ## error of the echo over its time: results/default/cost.csv and cost.svg
 	$(SNAKEMAKE) -- cost
 
-accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings a row: results/default/accuracy_cost.csv and .svg
+accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings per row: results/default/accuracy_cost.csv and .svg
 	$(MAKE) --no-print-directory study NAME=heights
 	$(SNAKEMAKE) --configfile config/cost/accuracy.yaml -- accuracy_cost
 

@@ -59,7 +59,7 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
 def stage(
     config: dict, paths: dict[str, str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path
 ) -> float:  # fmt: skip
-    """Seconds that the echo command takes for all rows, `processes` at a time: a job a chunk and list of stations.
+    """Seconds that the echo command takes for all rows, `processes` at a time: a job per chunk and list of stations.
 
     paths: the cloud file of each subtype; a job gets those of its chunk. A job has one thread, as Snakemake gives it:
     jobs side by side would otherwise fight for cores. Python may keep its bytecode, as it does unless forbidden to.

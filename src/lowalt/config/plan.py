@@ -102,7 +102,7 @@ class Plan:
     """Chunks and shards of a run; `groups` maps a group to its subtypes in the table's order.
 
     groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each step added to them;
-    models: rows of the motion table of each subtype, one a look; looks: at each motion model; largest: samples that a
+    models: rows of the motion table of each subtype, one per look; looks: at each motion model; largest: samples that a
     shard holds.
     """
 

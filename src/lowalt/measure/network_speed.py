@@ -43,14 +43,14 @@ def _clock(machine: Machine, threads: int) -> Callable[[], float]:
 
 
 def _inputs(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
-    """Random images of a scheme's views; size: pixels a side."""
+    """Random images of a scheme's views; size: pixels per side."""
     generator = torch.Generator().manual_seed(0)
     shape = (samples, len(scheme.columns), size, size)
     return torch.randint(0, 256, shape, dtype=torch.uint8, generator=generator)
 
 
 def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
-    """Return the times of a scheme's network on one machine, in ms a sample, and its size.
+    """Return the times of a scheme's network on one machine, in ms per sample, and its size.
 
     settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training; limit_s: seconds
     spent on one figure. A batch that one call cannot do within the limit is left out (None); the training step takes

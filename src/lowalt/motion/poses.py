@@ -105,7 +105,7 @@ def _series(
     """Functions of time (N, K) and matrices (K, P, 4, 4) whose sum over K of products is every part's motion.
 
     A turn by angle a about a hinge is A + cos(a) B + sin(a) C; the motion of a part on a moving part is a product of
-    such sums. The cost is a few cosines a symbol and one matrix product, however many parts there are. The body's own
+    such sums. The cost is a few cosines per symbol and one matrix product, however many parts there are. The body's own
     motion is not included.
     """
     angles, phases = _angles(cloud, row, times_s)

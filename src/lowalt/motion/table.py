@@ -1,4 +1,4 @@
-"""The motion table: one row a motion model, a CSV file a person can read and a computer reads back exactly."""
+"""The motion table: one row per motion model, a CSV file a person can read and a computer reads back exactly."""
 
 import csv
 import math

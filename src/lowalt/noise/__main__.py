@@ -1,4 +1,4 @@
-"""Command line of the noise stage: clean echoes of a chunk, a file a station -> noisy signals at all SNRs."""
+"""Command line of the noise stage: clean echoes of a chunk, a file per station -> noisy signals at all SNRs."""
 
 import functools
 import sys
@@ -47,8 +47,8 @@ def main(arguments: list[str]) -> None:
     """Add noise to one chunk's echoes and write one array file."""
     options = parser("lowalt.noise", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
-    options.add_argument("--echoes", nargs="+", required=True, help="clean echoes, one file a station")
-    options.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station")
+    options.add_argument("--echoes", nargs="+", required=True, help="clean echoes, one file per station")
+    options.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), one file per station")
     options.add_argument("--out", required=True, help="noisy signals to write (.npy)")
     given = options.parse_args(arguments)
     canceller, behind = given.settings.pop("canceller", None), None

@@ -22,7 +22,7 @@ def add_noise(
     returned unchanged. A signal of zeros has no power to refer to and stays zeros.
     Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, a negative power, or no generator
     where noise is to be drawn.
-    Source: paper, section V-A; unit-power circular noise has variance 1/2 a component.
+    Source: paper, section V-A; unit-power circular noise has variance 1/2 per component.
 
         >>> signal = np.exp(1j * np.arange(10_000))
         >>> noise = add_noise(signal, 13.0, np.random.default_rng(0)) - signal

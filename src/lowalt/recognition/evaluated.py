@@ -45,7 +45,7 @@ def difference(
 ) -> Interval:
     """Return the mean over seeds of first - second, with its 95 % interval; all in shares of correct samples.
 
-    first, second: trainings of the two schemes, one a seed; snr_db: the SNR whose samples count, None for all. The
+    first, second: trainings of the two schemes, one per seed; snr_db: the SNR whose samples count, None for all. The
     interval resamples seeds, in the unseen protocol subtypes, and motion models. A scheme differs from itself by 0.
     Raises: InputError where the trainings were tested on different samples. Source: `intervals.strict_difference`.
     """

@@ -110,7 +110,7 @@ def strict_difference(
 ) -> Interval:  # fmt: skip
     """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes and models.
 
-    first, second (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of
+    first, second (seeds, models): share of correct samples of each motion model, a row per training seed; the seeds of
     the two are drawn independently, since two schemes draw different numbers from equal seeds. count (models,): samples
     of each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of
     motion models, for results that are to hold for other subtypes. With one seed the interval holds for these trained

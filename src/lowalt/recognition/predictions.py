@@ -1,6 +1,6 @@
 """The prediction file: class probabilities of every sample, in a format that other people's models can write too.
 
-A CSV table, one row a sample, in any order. The command `score` needs only `key` and the probabilities, and takes the
+A CSV table, one row per sample, in any order. The command `score` needs only `key` and the probabilities, and takes the
 rest from the data set. Probabilities are not negative and sum to one within 1e-3.
 
     key            the sample's key in the shards
@@ -158,5 +158,5 @@ def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions
         raise InputError(f"{path}: no predictions")
     predictions = Predictions(*(np.array(column) for column in zip(*rows, strict=True)))
     if len(np.unique(predictions.key)) != len(predictions):
-        raise InputError(f"{path}: a key stands twice, expected one row a sample")
+        raise InputError(f"{path}: a key stands twice, expected one row per sample")
     return predictions

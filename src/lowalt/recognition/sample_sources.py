@@ -33,7 +33,7 @@ class Source:
     def samples(self, columns: list[int], pairs: set[tuple[str, str]], size: int, placed: bool = False) -> Samples:
         """Return the samples of some (group, fold) pairs.
 
-        columns: views of a scheme (`Scheme.columns`); size: pixels a side; placed: whether facts carry ranges and
+        columns: views of a scheme (`Scheme.columns`); size: pixels per side; placed: whether facts carry ranges and
         aspects, which those of a cache always do.
         Raises: InputError for cached images of another size, or what the source refuses.
         """

@@ -28,7 +28,7 @@ from lowalt.spectra.catalogue import LISTED
 
 @dataclass(frozen=True)
 class Facts:
-    """Known facts of each sample, one entry a sample; range_m and aspect_rad have a column a station."""
+    """Known facts of each sample, one entry per sample; range_m and aspect_rad have a column per station."""
 
     key: np.ndarray
     subtype: np.ndarray
@@ -50,7 +50,7 @@ class Facts:
 
 FACTS = tuple(entry.name for entry in fields(Facts))
 OF_STATIONS = ("range_m", "aspect_rad")
-"""Facts with a column a station."""
+"""Facts with a column per station."""
 KINDS = dict(zip(FACTS, ("U", "U", "iu", "fiu", "U", "U", "iu", "f", "f"), strict=True))
 """Kinds of numpy's types that the facts of a file may have."""
 
@@ -61,7 +61,7 @@ def joined(parts: list[Facts]) -> Facts:
 
 
 def first_models(facts: Facts, share: float) -> np.ndarray:
-    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one a subtype.
+    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one per subtype.
 
     Models are drawn independently of each other, so the first ones are a random sample; a smaller share lies inside a
     larger one.

@@ -11,7 +11,7 @@ The paper's rows stand in `config/schemes.csv`, one line a scheme:
 
 A table may have more columns, which a row leaves empty to take the configuration's own:
 
-    size, steps pixels a side the network sees; optimiser steps
+    size, steps pixels per side the network sees; optimiser steps
     share       share of the motion models of each subtype that train, 0..1 (empty: all)
 """
 

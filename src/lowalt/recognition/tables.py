@@ -5,7 +5,7 @@ Files written, each with the columns `protocol, scheme` first:
                      samples, hardware; several seeds averaged, seeds says how many and spread_points their standard
                      deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
-    seeds.csv        one row a training: accuracy_percent on average over the SNRs, its network, cost and hardware
+    seeds.csv        one row per training: accuracy_percent on average over the SNRs, its network, cost and hardware
     confusion.csv    category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
@@ -67,7 +67,7 @@ def snr_text(snr_db: float) -> str:
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
     """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one scheme's runs.
 
-    Values are means over the runs, one a training seed; seed: of the bootstrap. Intervals of macro F1 resample whole
+    Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of macro F1 resample whole
     subtypes where they were not trained on.
     """
     parts = [run.part(part) for run in runs]

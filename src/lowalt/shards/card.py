@@ -87,7 +87,7 @@ def _counts(shards: ShardSet) -> str:
     sizes = [entry["bytes"] / 1e6 for entry in shards.shards]
     parts.append(
         f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, {sum(sizes) / 1e3:.3f} GB in all, "
-        f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB a sample.\n"
+        f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB per sample.\n"
     )
     return "\n".join(parts)
 

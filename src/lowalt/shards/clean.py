@@ -20,7 +20,7 @@ from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.shards.sample_record import encoded, sample_key
 
 POWER = "power_w"
-"""Field of the record for the power (W) that SNRs refer to, a number a station; absent where it is the echoes' own."""
+"""Field of the record: the power (W) that SNRs refer to, one number per station. Without it, the echoes' own power."""
 CANCELLER = "canceller"
 """Field of the record for the settings, as JSON text, of the canceller that the noise passes; absent without one."""
 

@@ -251,7 +251,7 @@ class ShardSet:
     ) -> np.ndarray:
         """Return the images of a sample, (stations spectra, S, S) uint8, station by station.
 
-        size: pixels a side, by the project's one resampling kernel; stations, views: names to keep, in their own
+        size: pixels per side, by the project's one resampling kernel; stations, views: names to keep, in their own
         order (signal and recipe shards then compute nothing else).
         Raises: InputError naming an unknown station or view, or shard and sample where it is damaged.
         """

@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> None:
         nargs="*",
         default=[],
         metavar="SIZE=PATH",
-        help="also write the images at SIZE pixels a side (.npy)",
+        help="also write the images at SIZE pixels per side (.npy)",
     )
     line.add_argument("--motion", help="the chunk's motion table, for late symbols and range cells")
     line.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range cells")

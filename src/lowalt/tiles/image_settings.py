@@ -32,7 +32,7 @@ def paint(images: np.ndarray, palette: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Images:
-    """`size` pixels a side of each image; values are scaled by `scale`, then coloured by `colour_map`."""
+    """`size` pixels per side of each image; values are scaled by `scale`, then coloured by `colour_map`."""
 
     size: int = 256
     scale: Scale = field(default_factory=Scale)

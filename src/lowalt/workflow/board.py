@@ -1,4 +1,4 @@
-"""Progress of a run, a line a stage: jobs done and in all, rate, time left, running jobs. Counts and text only.
+"""Progress of a run, a line per stage: jobs done and in all, rate, time left, running jobs. Counts and text only.
 
 Times are seconds since the epoch, so that a board can be kept in a file and read by another process.
 """

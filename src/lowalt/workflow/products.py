@@ -68,7 +68,7 @@ class Products(DataProducts):
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
 
     def studied(self, wildcards: Any) -> list[str]:
-        """Predictions of the presets that a study trains on this run's data, one a training seed.
+        """Predictions of the presets that a study trains on this run's data, one per training seed.
 
         Raises: InputError naming the command that makes them, where one is missing.
         """

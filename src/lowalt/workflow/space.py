@@ -58,7 +58,7 @@ def cubes_sentence(size: dict) -> str:
     """Return `cubes_size` as one line."""
     sample_mb, total_gb = size["sample_bytes"] / 1e6, size["bytes"] / 1e9
     samples = f"{size['samples']} samples, {size['cells']}"
-    return f"cube shards: {sample_mb:.2f} MB a sample, {total_gb:.3f} GB in all ({samples})"
+    return f"cube shards: {sample_mb:.2f} MB per sample, {total_gb:.3f} GB in all ({samples})"
 
 
 def check(needed: float, folder: Path) -> None:

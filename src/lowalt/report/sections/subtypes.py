@@ -26,7 +26,7 @@ FEWEST, CHANCE = 5, 0.05
 
 
 def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
-    """Return (columns, rows) of accuracy by subtype: a column a protocol and scheme, a row a subtype."""
+    """Return (columns, rows) of accuracy by subtype: a column a protocol and scheme, a row per subtype."""
     columns: dict[str, None] = {}
     table: dict[tuple[str, str], dict[str, str]] = {}
     for row in rows:
