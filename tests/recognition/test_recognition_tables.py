@@ -185,7 +185,9 @@ def test_a_comparison_averages_all_seeds_and_not_the_first(tmp_path):
 
 def test_every_table_that_the_report_s_page_or_recognition_s_document_names_is_kept_or_made_by_a_rule():
     kept = {
-        path.name for folder in ("results/reference", "results/benchmarks", "config") for path in Path(folder).iterdir()
+        path.name
+        for folder in ("results", "results/reference", "results/benchmarks", "config")
+        for path in Path(folder).iterdir()
     }
     rules = "".join(path.read_text() for path in [*Path("workflow").rglob("*.smk"), *Path("src/lowalt").rglob("*.py")])
     made = set(re.findall(r"[\w-]+\.csv", rules))
