@@ -81,7 +81,7 @@ def test_a_gradient_that_overflows_is_left_out_and_ten_in_a_row_stop_the_run(vie
     monkeypatch.setattr(torch.nn.utils, "clip_grad_norm_", overflow)
     weights, _ = train(views, tmp_path / "survives", with_training(steps=12))
     assert all(value.isfinite().all() for value in weights.values() if value.is_floating_point())
-    assert "step left out" in capsys.readouterr().err
+    assert "step skipped" in capsys.readouterr().err
     limit[0] = 1
     with pytest.raises(InputError, match="ten gradients in a row were not finite, last at step 9"):
         train(views, tmp_path / "stops", with_training(steps=12))
