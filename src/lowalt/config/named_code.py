@@ -1,4 +1,4 @@
-"""Code that a setting names as FILE.py:FUNCTION: only the user may choose it, never a model, an index or a run."""
+"""User code that a setting names as FILE.py:FUNCTION. Only the user may choose it, not a model, index or run."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from lowalt.files.errors import InputError
 
 
 def file_of(name: str) -> Path | None:
-    """Return the Python file of a backbone's name, None for a name of a library's model."""
+    """Return the Python file in a backbone's name, None for the name of a library's model."""
     path, colon, _ = name.rpartition(":")
     return Path(path) if colon and path.endswith(".py") else None
 

@@ -14,9 +14,9 @@ from lowalt.noise.awgn import noisy_signals
 
 
 def load_echoes(paths: list[str], stations: list[str], models: int, snrs: int | None = None) -> list[np.ndarray]:
-    """Return the clean echoes of a chunk as memory maps, one (models, symbols) a station.
+    """Return the clean echoes of a chunk as memory maps, one (models, symbols) per station.
 
-    snrs: echoes may also be (models, snrs, symbols), which hold the noise of so many SNRs.
+    snrs: number of SNRs; echoes may also be (models, snrs, symbols), which already contain the noise.
 
     Raises: InputError naming the file that is missing, or that does not fit stations, models or the other files.
     """

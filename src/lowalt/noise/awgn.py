@@ -64,9 +64,9 @@ def noisy_signals(
 ) -> np.ndarray:
     """Return noisy signals (models, snrs, stations, N) complex64 of clean `echoes` (stations, models, N).
 
-    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by default; behind: returns
-    noise (N,) as the scene's canceller leaves it, where there is one. Echoes (stations, models, snrs, N) hold their
-    noise already. Each (subtype, model, station, SNR) has a noise stream of its own.
+    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by default; behind: filters
+    noise (N,) as the scene's canceller does, if there is one. Echoes (stations, models, snrs, N) already contain their
+    noise. Each (subtype, model, station, SNR) has its own noise stream.
     """
     if np.ndim(echoes) == 4:
         return np.ascontiguousarray(np.moveaxis(echoes, 0, 2), np.complex64)

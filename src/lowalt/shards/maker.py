@@ -79,8 +79,8 @@ class Maker:
     def received(
         self, row: dict, snr_db: float | None = None, stations: Sequence[int] | None = None
     ) -> tuple[np.ndarray, np.ndarray | None]:  # fmt: skip
-        """Return the clean echoes (stations, symbols) complex64 of a motion model and the reference powers (stations, 1)
-        W of SNRs, None if these are the powers of the echoes. With an SNR (dB), the echoes include the noise of all
+        """Return a motion model's clean echoes (stations, symbols) complex64 and the reference powers (stations, 1) W
+        of SNRs, None if these are the powers of the echoes. With an SNR (dB), the echoes include the noise of all
         range cells. stations: numbers of those to compute, all by default.
 
         Raises: InputError naming the sample that cannot be computed.
