@@ -19,7 +19,7 @@ from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
 GROUND = ("files", "machine", "numerics", "config")
-STAGES = [name for name in ROOMS if name not in (*GROUND, "measure", "workflow", "commands")]
+STAGES = [name for name in ROOMS if name not in (*GROUND, "drafting", "measure", "workflow", "commands")]
 
 
 @pytest.mark.parametrize("stage", ROOMS)
@@ -158,10 +158,10 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (13, 1100), "config": (9, 1124), "echo": (27, 2570), "files": (12, 747), "machine": (10, 511),
-    "measure": (6, 588), "motion": (10, 1008), "noise": (3, 168), "numerics": (12, 932), "recognition": (45, 4645),
-    "recordings": (13, 1140), "report": (32, 1780), "scene": (73, 6120), "shards": (22, 2672), "spectra": (15, 923),
-    "targets": (43, 6320), "tiles": (15, 1460), "workflow": (15, 1740),
+    "commands": (13, 1100), "config": (9, 1132), "drafting": (10, 2030), "echo": (27, 2570), "files": (12, 747),
+    "machine": (10, 521), "measure": (6, 588), "motion": (10, 1010), "noise": (3, 168), "numerics": (12, 932),
+    "recognition": (45, 4645), "recordings": (13, 1140), "report": (32, 1785), "scene": (73, 6120),
+    "shards": (22, 2702), "spectra": (15, 923), "targets": (36, 5105), "tiles": (15, 1465), "workflow": (15, 1740),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 
