@@ -161,7 +161,7 @@ CEILINGS = {
     "commands": (13, 1100), "config": (9, 1132), "drafting": (10, 2030), "echo": (27, 2570), "files": (12, 747),
     "machine": (10, 521), "measure": (6, 588), "motion": (10, 1010), "noise": (3, 168), "numerics": (12, 932),
     "recognition": (45, 4645), "recordings": (13, 1140), "report": (32, 1785), "scene": (73, 6120),
-    "shards": (22, 2702), "spectra": (15, 923), "targets": (36, 5105), "tiles": (15, 1465), "workflow": (15, 1740),
+    "shards": (22, 2702), "spectra": (15, 925), "targets": (36, 5105), "tiles": (15, 1465), "workflow": (15, 1740),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 
