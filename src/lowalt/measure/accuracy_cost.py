@@ -18,7 +18,7 @@ Settings: seed. accuracy_cost.csv, one row per scheme, accuracies averaged over 
     core_s_training      processor time of the whole training, validation included
     network_bytes        bytes of images per sample that the network takes in
     seeds, spread_points training seeds, and the standard deviation of unseen accuracy between them
-    front                Pareto front: no other row is better on unseen subtypes in equal or less time of data and training
+    front                Pareto front: no other row is more accurate on unseen subtypes in equal or less time
 """
 
 import json
