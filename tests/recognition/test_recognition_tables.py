@@ -1,5 +1,4 @@
-"""Tables made of prediction files: values by hand, macro F1 as scikit-learn computes it, orderings by intervals, and
-models of other runs compared sample by sample."""
+"""Tables from prediction files: values by hand, orderings by intervals, and models of other runs compared by sample."""
 
 import json
 import re
@@ -77,15 +76,6 @@ def test_macro_f1_by_hand_counts_every_class_alike():
     assert macro_f1(np.diag([5, 0, 3])) == 1.0
     # A class without samples that is guessed lowers the others' precision alone.
     assert macro_f1(np.array([[2, 2], [0, 0]])) == pytest.approx(2 * 2 / (2 * 2 + 0 + 2))
-
-
-def test_macro_f1_is_scikit_learns():
-    scores = pytest.importorskip("sklearn.metrics")
-    rng = stream(1, "f1")
-    labels, guesses = rng.integers(0, 4, 500), rng.integers(0, 4, 500)
-    counts = np.zeros((4, 4))
-    np.add.at(counts, (labels, guesses), 1)
-    assert macro_f1(counts) == pytest.approx(scores.f1_score(labels, guesses, average="macro"), abs=1e-12)
 
 
 def test_whole_subtypes_give_the_wider_interval_where_subtypes_differ(tmp_path):

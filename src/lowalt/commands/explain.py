@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def _size(config: dict, inputs: Path | None) -> dict:
-    """What the data set of a scene takes where its shards are cubes, else nothing."""
+    """The size of a scene's data set if its shards are cubes, else an empty text."""
     if config["shards"]["kind"] != "cube":
         return {}
     records = records_of(config["targets"], inputs)
