@@ -1,6 +1,6 @@
 """The commands of `lowalt`: the module of each, what it does in one line, and an example.
 
-A command line imports the module of its own command only, so `lowalt --help` needs none of them.
+Only the module of the given command is imported, so `lowalt --help` imports none.
 """
 
 from typing import NamedTuple

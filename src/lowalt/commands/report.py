@@ -1,4 +1,4 @@
-"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two of them."""
+"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two."""
 
 import argparse
 import tempfile
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def page(options: argparse.Namespace) -> Answer:
-    """Let the workflow make the page of a run, with all that it needs and that is not there or no longer current.
+    """Let the workflow make the page of a run, and all its inputs that are missing or outdated.
 
     Raises: InputError where the folder holds no run.
     """

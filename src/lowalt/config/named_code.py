@@ -1,4 +1,5 @@
-"""Code that a setting names, FILE.py:FUNCTION or an effect's FILE.py: only the user may choose it."""
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py. Only the user may choose it, not a model,
+index or run."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -7,7 +8,7 @@ from lowalt.files.errors import InputError
 
 
 def file_of(name: str) -> Path | None:
-    """Return the Python file of a backbone's name, None for a name of a library's model."""
+    """Return the Python file in a backbone's name, None for the name of a library's model."""
     path, colon, _ = name.rpartition(":")
     return Path(path) if colon and path.endswith(".py") else None
 

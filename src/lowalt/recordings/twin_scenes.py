@@ -26,7 +26,7 @@ import numpy as np
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
-from lowalt.numerics.power import rms
+from lowalt.numerics.portable import rms
 from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.presence import present

@@ -16,7 +16,7 @@ from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo import echo_signal
 from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.machine.progress import reported
-from lowalt.numerics.power import rms
+from lowalt.numerics.portable import rms
 from lowalt.scene import truth, waveform
 from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.observe import Scene, observe

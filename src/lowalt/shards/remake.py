@@ -1,4 +1,4 @@
-"""Making a stored sample again from its record, the index and the target's cloud, and comparing every byte."""
+"""Recomputes a stored sample from its record, the index and the target's cloud, and compares every byte."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -21,7 +21,7 @@ from lowalt.targets.occluders import read_all
 
 
 class CloudFolder(Mapping):
-    """The clouds of a run's folder by subtype, each read when it is asked for first."""
+    """The clouds of a run's folder by subtype, each read on first access."""
 
     def __init__(self, folder: str | Path) -> None:
         """Name the folder; nothing is read yet."""
@@ -45,10 +45,10 @@ class CloudFolder(Mapping):
 
 
 class Remaker:
-    """Makes the samples of one data set again."""
+    """Recomputes the samples of one data set."""
 
     def __init__(self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None) -> None:
-        """Take the data set and the clouds by subtype; occluders are each subtype's surfaces, where a scene has them.
+        """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, for scenes with occlusion.
 
         Raises: InputError where the index does not say how echoes were computed, or names code among the effects.
         """

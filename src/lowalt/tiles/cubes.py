@@ -1,6 +1,6 @@
 """The cubes of samples: the range cells of every symbol with noise, before the receiver chooses one of them.
 
-A scene's canceller has acted on it; a scene without one gives the cells as they were received.
+The scene's canceller, if any, has already been applied.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from lowalt.targets.cloud import Cloud, cloud_of
 
 
 class Cubes:
-    """Makes the cubes of samples; it keeps the clean ones of the last `kept` motion models and stations."""
+    """Makes the cubes of samples and caches the clean ones of the last `kept` motion models and stations."""
 
     def __init__(
         self, scene: Scene, clouds: Mapping[str, Cloud], occluders: Mapping[str, dict] | None = None,
