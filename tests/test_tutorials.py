@@ -116,6 +116,8 @@ def test_a_target(checkout, monkeypatch):
 
 # The quick suite adds an effect to a copy of the tree in tests/test_contributing.py.
 @pytest.mark.slow
+# `lowalt explain` leaves out and adds every effect of the catalogue, in looks of 2048 sweeps.
+@pytest.mark.slow
 def test_an_effect(checkout, capsys, monkeypatch):
     printed, names = followed("effect", checkout, monkeypatch)
     # Table 5 of ITU-R P.838-3, vertical polarisation.
