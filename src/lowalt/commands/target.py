@@ -101,6 +101,7 @@ def _inspect(options: argparse.Namespace) -> Answer:
         "components": [vars(part) | {"extent": part.extent, "centre": part.centre} for part in seen.components],
         "pieces": [{"name": name, "triangles": count, "extent": extent} for name, count, extent in seen.pieces],
         **({"wings_from_m": seen.shoulder_m} if seen.category == "Bird" else {}), "picture": out,
+        "front_from": seen.front_from.words,
     }  # fmt: skip
     return Answer(facts, f"{described(seen)}\n\npicture  {out}")
 
