@@ -69,7 +69,16 @@ def given(**changes):
     from types import SimpleNamespace
 
     return SimpleNamespace(
-        **{"overlay": [], "configfile": [], "target": [], "cores": None, "dry_run": False, "profile": None} | changes
+        **{
+            "overlay": [],
+            "configfile": [],
+            "target": [],
+            "cores": None,
+            "dry_run": False,
+            "printshellcmds": False,
+            "profile": None,
+        }
+        | changes
     )
 
 

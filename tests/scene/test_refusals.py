@@ -68,6 +68,7 @@ GAPS = {"slow_time": {"downlink": 0.75}}
         (ALONE, GAPS, NOISY, "slow_time: gaps hold no signal"),
         (ALONE, {"detector": {"gate_cells": 128}}, QUIET, "detector.gate_cells: 128, expected less than half"),
         (ALONE, {"detector": {"training": 200}}, QUIET, r"detector.guard \+ training: 202"),
+        (ALONE, {"detector": {"range_window": "hann", "guard": 1}}, QUIET, "detector.guard: 1, expected at least 2"),
         (ALONE, {"cell_error": {"spread_cells": 128}}, QUIET, "cell_error.spread_cells: 128, expected less than half"),
         (LINKED, {}, QUIET, r"network.stations: \['AB'\] are links .*expected effects.direct_path"),
         (LINKED, {"direct_path": {}, "transmit_leakage": {}}, QUIET, "not modelled between two stations"),

@@ -56,7 +56,13 @@ def page(options: argparse.Namespace) -> Answer:
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
         yaml.safe_dump({"run": name, **changes(load_yaml(shipped(BASE)), as_named(config))}, overlay)
         overlay.flush()
-        line = {"overlay": [Path(overlay.name)], "configfile": [], "target": [written], "profile": None}
+        line = {
+            "overlay": [Path(overlay.name)],
+            "configfile": [],
+            "target": [written],
+            "profile": None,
+            "printshellcmds": False,
+        }
         ran = workflow.ended(argparse.Namespace(**vars(options) | line))
     files = [] if options.dry_run or ran["status"] else [written]
     return Answer({"files": files, **ran}, "".join(files), ran["status"])

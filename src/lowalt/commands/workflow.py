@@ -31,6 +31,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     line.add_argument("--target", nargs="+", default=[], help="rules or files to make (default: everything)")
     line.add_argument("--cores", help="cores to use (default: all; with --profile what that says)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
+    line.add_argument(
+        "-p", "--printshellcmds", action="store_true", help="print files, reason and command of every job"
+    )
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
 
 
@@ -58,7 +61,7 @@ def command(options: argparse.Namespace) -> list[str]:
     profile = options.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))
     line += ["--workflow-profile", str(profile)] if profile else []
     line += ["--configfile", *map(str, [*base, *overlays])] if base or overlays else []
-    line += ["--dry-run"] if options.dry_run else []
+    line += [*(["--dry-run"] if options.dry_run else []), *(["--printshellcmds"] if options.printshellcmds else [])]
     return [*line, "--", *options.target] if options.target else line
 
 

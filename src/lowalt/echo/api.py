@@ -91,7 +91,8 @@ def echo_signal(
     if tolerance is None and paths is None:
         method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
     largest = float(abs(found.values).max())
-    bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
+    worst = float(found.bounds.max())
+    bound = worst / largest if largest > 0 else np.inf if worst > 0 else 0.0
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
             f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 promises {bound:.1e} "

@@ -8,6 +8,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import jinja2
@@ -139,7 +140,8 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
     """Write README.md, samples.csv and croissant.json next to an index, and the checksums of all of it.
 
-    facts: further properties of the Croissant description, such as `url` and `datePublished`.
+    facts: further properties of the Croissant description, such as `url`; `datePublished` is the day (UTC) on which the
+    index was written where they name none.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
     """
     if license_name not in LICENSES:
@@ -154,7 +156,8 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     table = {"path": samples.name, "bytes": samples.stat().st_size, "sha256": sha256(samples)}
     known = {
         "name": name, "description": description(shards), "version": __version__,
-        "license": LICENSES[license_name], "citeAs": PAPER, **facts,
+        "license": LICENSES[license_name], "citeAs": PAPER,
+        "datePublished": f"{datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC):%Y-%m-%d}", **facts,
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
@@ -168,7 +171,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
     line.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
     line.add_argument("--url", help="where the data set will be published")
-    line.add_argument("--date", help="day of publication, YYYY-MM-DD")
+    line.add_argument("--date", help="day of publication, YYYY-MM-DD (default: the index's own)")
     options = line.parse_args(arguments)
     facts = {"url": options.url, "datePublished": options.date}
     write(options.index, options.config, options.license, **{key: text for key, text in facts.items() if text})

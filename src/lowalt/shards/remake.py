@@ -61,7 +61,7 @@ class Remaker:
         self._makers: dict[int, Maker] = {}
 
     def _maker(self, seed: int) -> Maker:
-        """The maker of samples with a root seed."""
+        """The maker of samples with a random seed."""
         if seed not in self._makers:
             index = self.shards.index
             self._makers[seed] = Maker(index["render"], index["echo"], seed, self.clouds, self.occluders)

@@ -3,8 +3,9 @@
 `mean` and `pulse` cancel what stands still; land that the wind moves passes them. `clutter` is made for the spectrum of
 windblown land at one carrier and symbol interval: of the covariance that land has over the symbols, it removes every
 component that lies less than `depth_db` below the land's power, and leaves all else as it is. What it costs a target
-follows from the target's radial speed alone. All filters are scaled to unit noise gain, so that a set SNR means the
-same before and behind them.
+follows from the target's radial speed alone. `pulse` and `clutter` are scaled to unit noise gain, so that a set SNR
+means the same before and behind them. `mean` is not scaled: of N symbols it takes one part in N of the noise's power,
+0.01 dB of 400.
 """
 
 import math
