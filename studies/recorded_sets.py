@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from twin_scenes import Library
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.atomic import sha256
@@ -30,6 +29,7 @@ from lowalt.recordings.formats import READERS
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record, read_record, record
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_scenes import Library
 from lowalt.recordings.windows import windows
 
 HALVES = ("tuning", "test")

@@ -14,8 +14,6 @@ from pathlib import Path
 import numpy as np
 from recorded_sets import HALVES, Measured
 from torch import nn
-from twin_networks import simulated, train
-from twin_scenes import Library
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.atomic import replacing
@@ -23,6 +21,8 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, runs
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recordings.twin_scenes import Library
+from lowalt.recordings.twin_training import simulated, train
 from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.tiles import join
 from lowalt.tiles.image_settings import Images

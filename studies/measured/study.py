@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 from recorded_sets import Measured, recordings, usable
-from twin_scenes import Library
 
 from lowalt.config.command import dispatch, run
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
+from lowalt.recordings.twin_scenes import Library
 from lowalt.targets.records import load_records
 
 HERE = Path(__file__).parent
@@ -141,7 +141,8 @@ def recognise(arguments: list[str]) -> None:
     """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
     inputs = _inputs("recognise", recognise.__doc__, arguments, trains=True)
     from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
-    from twin_networks import settings
+
+    from lowalt.recordings.twin_training import settings
 
     options, block = inputs.options, settings(inputs.options.recognition)
     shared = inputs.recordings, inputs.library, block, options.models, options.out, options.reuse

@@ -6,10 +6,10 @@ import pytest
 from noise_floors import BANDS_HZ, NOISE, row
 from presence_rates import noise_rows, target_rows
 from recorded_sets import Measured
-from twin_receiver import shaped
-from twin_scenes import Library
 
 from lowalt.recordings.record import record
+from lowalt.recordings.twin_receiver import shaped
+from lowalt.recordings.twin_scenes import Library
 
 
 @pytest.fixture(scope="module")

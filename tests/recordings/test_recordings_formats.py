@@ -177,7 +177,8 @@ def test_a_clean_tone_is_not_clipped_and_a_cut_one_is(hertz, top):
 
 READ_AS = {
     "inter_cplx": "say `layout`", "inter_real": "mirrored about a quarter of the rate", "sig_freq": "a capture at",
-    "sig_two": "a capture at", "sig_start": None, "tone_44100_i2": None,
+    "sig_two": "a capture at", "sig_start": None, "tone_44100_i2": None, "e9": None, "N3": None, "N10": None,
+    "dca_iqiq": "layout 'dca2'", "dca_iiqq": "layout 'dca2'",
 }  # fmt: skip
 
 

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> Answer:
     config = overlaid(options.overlay) if options.overlay else {}
     # What can be refused without torch has been refused: it takes seconds to import.
     print("lowalt predict: loading the network", file=sys.stderr, flush=True)
-    from lowalt.recognition.one_sample import predict
+    from lowalt.recognition.predict_sample import predict
     from lowalt.recognition.zoo import opened
 
     own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")

@@ -15,9 +15,6 @@ from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.recordings.windows import looks
 from lowalt.tiles.image_settings import Images
 
-TRAINED_RATIO = 1.25
-"""Largest ratio of a recording's carrier and the radar's: speeds in a spectrum scale with it."""
-
 
 class Answers(NamedTuple):
     """Of n windows: their starts (n,) s, whether each holds a target (n,) bool, class probabilities (n, classes),
@@ -45,11 +42,6 @@ class Answers(NamedTuple):
         return f"{100 * self.probabilities[number, best]:6.2f} %  {classes[best]}"
 
 
-def _near(record: Record, twin: Twin) -> bool:
-    """Whether a network of this radar may be asked of a recording at its carrier."""
-    return 1 / TRAINED_RATIO <= record.carrier_hz / twin.carrier_hz <= TRAINED_RATIO
-
-
 def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
     """Return what a network says of every window of a recording.
 
@@ -61,12 +53,12 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     if "radar" not in settings:
         raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(known)}")
     radar = Twin.from_settings(settings["radar"])
-    if not _near(record, radar):
-        near = [name for name, other in known.items() if _near(record, other)]
+    if not radar.near(record.carrier_hz):
+        near = [name for name, other in known.items() if other.near(record.carrier_hz)]
         raise InputError(
             f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
-            + (f"expected a network of {near}" if near else "expected a network of a twin at this carrier, which "
-               "`studies/twin_networks.py --twins FILE` trains; the zoo has none")
+            + (f"expected a network of {near}" if near else "expected a network of your own radar, which "
+               "`lowalt recording train` makes; the zoo has none")
         )  # fmt: skip
     twin = radar.at_carrier(record.carrier_hz)
     baseband = read(record)

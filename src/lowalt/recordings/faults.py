@@ -129,10 +129,18 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
         if alike > SAME_SHARE:
             raise InputError(f"{path}: I and Q hold the same signal (squared correlation {alike:.6f}), expected "
                              "in-phase and quadrature, or channel 'real'")  # fmt: skip
-        if moves is not None:
-            towards, away = _sides(values)
-            right, wrong = (towards, away) if moves == "towards" else (away, towards)
-            if wrong > SIDE_RATIO * right:
-                raise InputError(f"{path}: channels swapped, the record says the target moves {moves}, but the other "
+        refuse_swapped(path, values, moves)
+
+
+def refuse_swapped(path: Path, values: np.ndarray, moves: str | None) -> None:
+    """Refuse a complex signal (samples,) whose energy lies on the other side of the Doppler axis than `moves` says.
+
+    Raises: InputError naming the file.
+    """
+    if moves is not None:
+        towards, away = _sides(values)
+        right, wrong = (towards, away) if moves == "towards" else (away, towards)
+        if wrong > SIDE_RATIO * right:
+            raise InputError(f"{path}: channels swapped, the record says the target moves {moves}, but the other "
                                  f"side of the Doppler axis holds {wrong / max(right, 1e-300):.3g} times the energy; "
                                  "expected the two columns in the order I, Q")  # fmt: skip

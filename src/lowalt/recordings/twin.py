@@ -18,6 +18,8 @@ from lowalt.spectra import Fourier, Spectra, Transfer
 
 CHANNELS = ("complex", "real")
 TWINS = "config/measured/twins.yaml"
+TRAINED_RATIO = 1.25
+"""Largest ratio of a recording's carrier and the radar's: speeds in a spectrum scale with it."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,10 @@ class Twin:
     def at_carrier(self, carrier_hz: float) -> "Twin":
         """Return the twin at a recording's own carrier; the symbol interval stays, so the speeds scale a little."""
         return replace(self, carrier_hz=carrier_hz)
+
+    def near(self, carrier_hz: float) -> bool:
+        """Whether a network of this radar may be asked of a recording at a carrier (Hz)."""
+        return 1 / TRAINED_RATIO <= carrier_hz / self.carrier_hz <= TRAINED_RATIO
 
     @property
     def edge_mps(self) -> float:

@@ -13,7 +13,7 @@ from scipy.signal import butter, sosfilt
 
 from lowalt.config.command import pick
 from lowalt.noise.awgn import add_noise
-from lowalt.numerics.power import rms
+from lowalt.numerics.portable import rms
 
 
 @dataclass(frozen=True)

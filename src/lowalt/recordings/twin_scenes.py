@@ -23,17 +23,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from twin_courses import Course, hover, straight, to_and_fro
-from twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
-from twin_receiver import Receiver, received
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
-from lowalt.numerics.power import rms
+from lowalt.numerics.portable import rms
 from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.presence import present
 from lowalt.recordings.twin import Twin, radars, settings_of
+from lowalt.recordings.twin_courses import Course, hover, straight, to_and_fro
+from lowalt.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
+from lowalt.recordings.twin_receiver import Receiver, received
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
