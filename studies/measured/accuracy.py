@@ -4,7 +4,8 @@ measured-recognition.csv: one row a radar, training seed and recording, with the
     seed "mean" stands for all networks together, by the mean of their probabilities.
 measured-accuracy.csv: share of right windows of each class in each half, mean over its files, and balanced accuracy
     over the twin's classes. low and high resample files within their class; devices_low and devices_high resample the
-    radars that recorded a class, then their files, where there are two or more. One row is for all twins together.
+    radars that recorded a class, then their files, where there are two or more; each of them has a row "CLASS by
+    RADAR" as well. One row is for all twins together.
 """
 
 import math
@@ -128,11 +129,9 @@ def _interval(classes: list[Right], rng: np.random.Generator, devices: bool) -> 
     for _ in range(REPEATS):
         by_class = []
         for files in classes:
-            names = list(files)
-            drawn = rng.choice(names, len(names)) if devices else names
-            values = np.concatenate([files[name] for name in drawn]) if not devices else np.concatenate(
-                [rng.choice(files[name], len(files[name])) for name in drawn])  # fmt: skip
-            by_class.append((values if devices else rng.choice(values, len(values))).mean())
+            groups = list(files.values()) if devices else [np.concatenate(list(files.values()))]
+            drawn = [groups[place] for place in rng.integers(0, len(groups), len(groups))]
+            by_class.append(np.concatenate([rng.choice(group, len(group)) for group in drawn]).mean())
         means.append(np.mean(by_class))
     low, high = np.quantile(means, [0.025, 0.975])
     return float(low), float(high)
@@ -144,34 +143,40 @@ def accuracy_rows(rows: list[list], seed: int) -> list[list]:
     Classes are counted for each twin: drones at 10 GHz and drones at 3.3 GHz are two classes.
     """
     files: dict[tuple[str, str, str], Right] = {}
-    windows: dict[tuple[str, str, str], int] = {}
+    windows: dict[tuple[str, str, str], dict[str, int]] = {}
     for name, kind, device, _, half, _, label, count, *_, right in rows:
         if kind == "mean":
             key = name, half, label
             files.setdefault(key, {}).setdefault(device, []).append(right)
-            windows[key] = windows.get(key, 0) + count
+            of_device = windows.setdefault(key, {})
+            of_device[device] = of_device.get(device, 0) + count
     result = []
 
-    def add(name: str, half: str, title: str, classes: list[tuple[str, str, str]]) -> None:
-        """Append the row of `classes`, (radar, half, class), under the name `title`."""
+    def add(name: str, half: str, title: str, shares: list[Right], windows: int) -> None:
+        """Append a row under the name `title`; shares: of each of its classes."""
         rng = stream(seed, "measured-accuracy", name, half, title)
-        shares = [files[key] for key in classes]
         middle = float(np.mean([np.mean(np.concatenate(list(of.values()))) for of in shares]))
         devices = {device for of in shares for device in of}
-        several = all(len(of) > 1 for of in shares)
-        over = _interval(shares, rng, True) if several else (math.nan, math.nan)
-        counts = sum(len(right) for of in shares for right in of.values()), sum(windows[key] for key in classes)
+        over = (math.nan, math.nan)
         interval = _interval(shares, rng, False)
-        result.append([name, half, title, len(devices), *counts, middle, *interval, *over, 100 / len(CATEGORIES)])
+        if all(len(of) > 1 for of in shares):
+            over = _interval(shares, rng, True)
+        count = sum(len(right) for of in shares for right in of.values())
+        result.append([name, half, title, len(devices), count, windows, middle, *interval, *over,
+                       100 / len(CATEGORIES)])  # fmt: skip
 
     for half in HALVES:
         for name in dict.fromkeys(name for name, _, _ in files):
             classes = [key for key in files if key[:2] == (name, half)]
             for key in classes:
-                add(name, half, key[2], [key])
+                add(name, half, key[2], [files[key]], sum(windows[key].values()))
+                for device, right in files[key].items() if len(files[key]) > 1 else ():
+                    add(name, half, f"{key[2]} by {device}", [{device: right}], windows[key][device])
             if len(classes) > 1:
-                add(name, half, "balanced", classes)
-        every_class = [key for key in files if key[1] == half]
-        if every_class:
-            add("all", half, "balanced", every_class)
+                every = sum(sum(windows[key].values()) for key in classes)
+                add(name, half, "balanced", [files[key] for key in classes], every)
+        of_half = [key for key in files if key[1] == half]
+        if of_half:
+            every = sum(sum(windows[key].values()) for key in of_half)
+            add("all", half, "balanced", [files[key] for key in of_half], every)
     return result

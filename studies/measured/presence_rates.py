@@ -14,13 +14,13 @@ UAVs and birds that may hover are in all windows of a recording, others in a qua
 import math
 
 import numpy as np
-from twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch, value
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals
 from lowalt.recordings.presence import present
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch, value
 
 PRESENCE = ("radar", "scene", "snr_db", "recordings", "windows", "taken_percent", "low", "high")
 HOVER = ("UAV", "Bird")

@@ -126,8 +126,8 @@ def presence(arguments: list[str]) -> None:
     line = argparse.ArgumentParser("study.py presence", description=presence.__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder to write")
     line.add_argument("--twins", type=Path, default=TWINS, help="radars and scenes")
-    line.add_argument("--noises", type=int, default=100, help="recordings of noise a row")
-    line.add_argument("--scenes", type=int, default=12, help="recordings of a category")
+    line.add_argument("--noises", type=int, default=40, help="recordings of noise a row")
+    line.add_argument("--scenes", type=int, default=5, help="recordings of a category")
     options = line.parse_args(arguments)
     from presence_rates import PRESENCE, noise_rows, target_rows
 

@@ -206,6 +206,7 @@ def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
     assert {key: line[:4] for key, line in found.items()} == {
         ("cw", "tuning", "UAV"): [1, 1, 3, 10.0], ("all", "tuning", "balanced"): [1, 1, 3, 10.0],
         ("cw", "test", "Bird"): [2, 2, 30, 60.0], ("cw", "test", "UAV"): [1, 1, 5, 90.0],
+        ("cw", "test", "Bird by one"): [1, 1, 10, 40.0], ("cw", "test", "Bird by two"): [1, 1, 20, 80.0],
         ("cw", "test", "balanced"): [2, 3, 35, 75.0], ("fm", "test", "UAV"): [1, 1, 7, 30.0],
         ("all", "test", "balanced"): [2, 4, 42, 60.0],
     }  # fmt: skip
@@ -218,7 +219,8 @@ def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
 def test_two_radars_that_differ_widen_the_interval_over_radars_and_not_that_over_files():
     rows = [["cw", "mean", device, "set", "test", f"{number}", "Vehicle", 5, 0, 0, 0, 0, right]
             for device, right in (("one", 90.0), ("two", 50.0)) for number in range(8)]  # fmt: skip
-    ((*_, low, high, devices_low, devices_high, _), _) = accuracy.accuracy_rows(rows, 1)
+    found = {row[2]: row[3:] for row in accuracy.accuracy_rows(rows, 1)}
+    *_, low, high, devices_low, devices_high, _ = found["Vehicle"]
     assert (devices_low, devices_high) == (50.0, 90.0) and 55 < low < 65 and 75 < high < 85
 
 

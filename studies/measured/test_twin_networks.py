@@ -28,4 +28,4 @@ def test_a_kept_network_names_every_window_of_a_recording(tmp_path, capsys):
     (tmp_path / "noise.yaml").write_text(said)
     capsys.readouterr()
     assert lowalt(["predict", str(tmp_path / "zoo/cw_24ghz.safetensors"), str(tmp_path / "noise.yaml")]) == 0
-    assert "of 2 windows hold a target" in capsys.readouterr().out
+    assert "nothing there: none of 2 windows" in capsys.readouterr().out

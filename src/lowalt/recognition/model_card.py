@@ -44,7 +44,7 @@ RADAR_USE = """\
 """
 RADAR_LIMITS = """\
 - It has seen simulated echoes of few kinds of targets only, and never a recording.
-- It always answers with one of its classes, also for a window that holds none of them.
+- A window that holds a line above the recording's noise gets one of its classes, whatever the line is of.
 """
 
 
