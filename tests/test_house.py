@@ -158,10 +158,10 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (13, 1030), "config": (9, 1132), "drafting": (10, 2030), "echo": (27, 2570), "files": (12, 747),
-    "machine": (10, 521), "measure": (6, 588), "motion": (10, 1010), "noise": (3, 168), "numerics": (12, 932),
-    "recognition": (45, 4645), "recordings": (13, 1140), "report": (32, 1785), "scene": (73, 6120),
-    "shards": (22, 2702), "spectra": (15, 925), "targets": (36, 5105), "tiles": (15, 1465), "workflow": (15, 1740),
+    "commands": (14, 1280), "config": (9, 1155), "drafting": (10, 2030), "echo": (27, 2570), "files": (12, 747),
+    "machine": (10, 525), "measure": (6, 588), "motion": (10, 1010), "noise": (3, 168), "numerics": (12, 932),
+    "recognition": (45, 4648), "recordings": (24, 2930), "report": (33, 1820), "scene": (76, 6260),
+    "shards": (22, 2710), "spectra": (15, 925), "targets": (36, 5105), "tiles": (15, 1465), "workflow": (15, 1750),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 

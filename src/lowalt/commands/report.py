@@ -10,7 +10,7 @@ from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
 from lowalt.config.layers import SCHEMA, check, of_run
-from lowalt.config.named_code import allowed
+from lowalt.config.named_code import allowed, refuse_effects
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
@@ -70,7 +70,8 @@ def page(options: argparse.Namespace) -> Answer:
 
 def _refuse_code(config: dict, folder: Path) -> None:
     """Refuse a run whose configuration, or whose table of schemes, names code that the workflow would run."""
-    block = located(check(config, shipped(SCHEMA)))["recognition"]
+    refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
+    block = located(config)["recognition"]
     how = f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
     for name in (block["network"]["backbone"], *(row["backbone"] for row in read_csv(block["table"], "backbone"))):
         allowed(name, "", folder, how)

@@ -4,6 +4,7 @@ This module does not depend on any stage. Errors are found before any job starts
 """
 
 import json
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -51,7 +52,8 @@ def _without_nulls(block: object, schema: dict) -> None:
     for key, value in list(block.items()):
         if not isinstance(key, str):
             raise InputError(f"configuration: key {key!r} among {list(block)}, expected text: put it in quotes")
-        entry = known.get(key, further)
+        patterns = (entry for pattern, entry in schema.get("patternProperties", {}).items() if re.search(pattern, key))
+        entry = known.get(key, next(patterns, further))
         if not isinstance(entry, dict):
             continue
         if value is None and key not in needed and not _may_be_null(entry):

@@ -1,5 +1,6 @@
-"""User code that a setting names as FILE.py:FUNCTION. Only the user may choose it, not a model, index or run."""
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py. Only the user may choose it."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from lowalt.files.errors import InputError
@@ -12,6 +13,23 @@ def file_of(name: str) -> Path | None:
 
 
 BY_NAME = "`--backbone FILE.py:FUNCTION` (in Python `backbone=`) with code that you trust"
+
+
+def own_effects(effects: Iterable[str]) -> list[str]:
+    """Return those of the names of effects that are paths of the user's own Python files, sorted."""
+    return sorted(name for name in effects if name.endswith(".py"))
+
+
+def refuse_effects(effects: Iterable[str], where: str | Path) -> None:
+    """Refuse effects of the user's own in a file or folder `where` that may be a stranger's.
+
+    Raises: InputError naming the effect.
+    """
+    for name in own_effects(effects):
+        raise InputError(
+            f"{where}: its effect {name!r} is code, which a file may not choose; expected an overlay of your own that "
+            "names it"
+        )
 
 
 def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME) -> str:

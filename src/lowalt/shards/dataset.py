@@ -15,6 +15,7 @@ import numpy as np
 
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
+from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
 from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
 from lowalt.config.splits import FOLDS, fold
@@ -126,7 +127,9 @@ class Dataset:
         published: every row of the table of targets by subtype, by default from the records; the classes follow.
         Raises: InputError naming the key, value or file that is wrong.
         """
-        config = check(load_yaml(config), shipped(SCHEMA)) if isinstance(config, (str, Path)) else config
+        if isinstance(config, (str, Path)):
+            path, config = config, check(load_yaml(config), shipped(SCHEMA))
+            refuse_effects(config["effects"], path)
         self.config, self.folds = config, tuple(folds)
         records = {}
         if published is None or clouds is None:

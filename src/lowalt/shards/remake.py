@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import Network
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, slug
@@ -49,13 +50,14 @@ class Remaker:
     def __init__(self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None) -> None:
         """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, for scenes with occlusion.
 
-        Raises: InputError where the index does not say how echoes were computed.
+        Raises: InputError where the index does not say how echoes were computed, or names code among the effects.
         """
         if not shards.index.get("echo"):
             raise InputError(
                 f"{shards.index_path}: does not say how echoes were computed, expected an index that lowalt 0.2 or "
                 f"later wrote, found format {shards.index['format']}"
             )
+        refuse_effects(shards.index["echo"]["effects"], shards.index_path)
         self.shards, self.clouds, self.occluders = shards, clouds, occluders
         self.network = Network.from_settings(shards.index["render"]["network"])
         self._makers: dict[int, Maker] = {}

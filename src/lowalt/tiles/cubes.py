@@ -12,7 +12,7 @@ from lowalt.config.network import Network, Station
 from lowalt.noise.awgn import add_noise
 from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.effects import called
+from lowalt.scene.effects import called, every
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.scene.truth import geometric
@@ -64,8 +64,8 @@ class Cubes:
         if not self.every_cell and not np.isposinf(snr_db):
             rng = stream(self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
             noise = add_noise(np.zeros(cells.shape), snr_db, rng, power_w)
-            for effect in self.scene.effects:
-                noise = effect.module.filtered(effect.settings, noise) if effect.name == "canceller" else noise
+            for filtered in every(self.scene.effects, "filtered").values():
+                noise = filtered(noise)
             cells = (clean + noise).astype(np.complex64)
         cells[chosen < 0] = 0
         if signal is not None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
+from lowalt.config.named_code import own_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -29,6 +30,7 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
     """Refuse paths with braces, which Snakemake would interpret as wildcards or format fields."""
     keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("motion", "track"))
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
+    paths |= {"effects": " ".join(own_effects(config["effects"]))}
     paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
     for name, path in paths.items():
         if path and {"{", "}"} & {*path}:
@@ -86,6 +88,9 @@ def refuse_input(config: dict) -> None:
     if config["shards"]["kind"] == "recipe":
         refuse(config["effects"])
     block = config["recognition"]
+    own = own_effects(config["effects"])
+    if block.get("input") == "dataset" and own:
+        raise InputError(f"recognition.input: 'dataset' together with the effects {own}, expected shards")
     if block.get("input") == "dataset" and block["cache"]:
         raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
 

@@ -57,12 +57,15 @@ def _imports(path: Path) -> tuple[str, ...]:
 def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     """Return the package's files that running `python -m` on these modules can import, sorted.
 
-    modules: as on the command line, then the modules that the subcommand in question imports by itself; spectra: those
-    that the configuration names, whose modules the catalogue of spectra imports by name.
+    modules: as on the command line, then the modules that the subcommand in question imports by itself, and paths of
+    the user's own effects; spectra: those that the configuration names, whose modules the catalogue of spectra imports
+    by name.
     Raises: ModuleNotFoundError where there is no such module.
     """
-    todo, seen = [], set()
-    for module in modules:
+    todo, seen, own = [], set(), [Path(name) for name in modules if name.endswith(".py")]
+    for path in own:
+        todo += _imports(path)
+    for module in filter(lambda name: not name.endswith(".py"), modules):
         if _file(module) is None:
             raise ModuleNotFoundError(module)
         todo += [module, *([f"{module}.__main__"] if _file(f"{module}.__main__") else [])]
@@ -74,7 +77,7 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
             todo += [*([parent] if parent else []), *_imports(_file(name))]
             if name == CATALOGUE:
                 todo += [f"lowalt.spectra.kinds.{spectrum}" for spectrum in spectra]
-    return tuple(sorted({_file(name) for name in seen}))
+    return tuple(sorted({*map(_file, seen), *(path.absolute() for path in own)}))
 
 
 def near(path: Path) -> str:
