@@ -1,5 +1,4 @@
-"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py. Only the user may choose it, not a model,
-index or run."""
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py. Only the user may choose it."""
 
 from collections.abc import Iterable
 from pathlib import Path

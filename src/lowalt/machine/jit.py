@@ -77,7 +77,7 @@ def digest(function: Callable, options: dict | None = None) -> str:
 
 
 _DEFAULTS: dict[str, Any] = {"fastmath": False, "error_model": "python", "_nrt": True}
-"""Options of every kernel: one that is not given, numba takes from the kernel that is the first to ask for this one."""
+"""Options of every kernel. numba would take missing ones from the first kernel that calls this one."""
 
 
 class Kernel:
@@ -114,7 +114,7 @@ def kernel(inner: bool = False, **options) -> Callable[[Callable], Kernel]:
 
     inner: only kernels call the function. Calling it from Python raises TypeError.
     """
-    # Entries for Python and for C take a fifth of all compilation. No kernel is ever handed to C.
+    # Entry points for Python and C take a fifth of the compilation time. No kernel is passed to C.
     options = _DEFAULTS | options | {"no_cfunc_wrapper": True, "no_cpython_wrapper": inner}
     return lambda function: Kernel(function, options, inner)
 
@@ -123,17 +123,17 @@ PLAIN = kernel()
 """Every operation is done as written."""
 _LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 LEAN = kernel(**_LEAN)
-"""As PLAIN, but without counted references, which took a quarter of the time. Such a function cannot allocate."""
+"""As PLAIN, but without reference counting, which took a quarter of the time. Such a function cannot allocate."""
 INNER = kernel(inner=True, **_LEAN)
 """As LEAN, for functions that only kernels call."""
 INLINED = kernel(inner=True, forceinline=True, **_LEAN)
 """As INNER, and copied into its callers, so that named tuples of arrays are not copied at each call."""
 _REORDERED = {"contract", "reassoc", "nsz"}
 VECTOR = kernel(fastmath=_REORDERED, **_LEAN)
-"""As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""
+"""As LEAN, and the compiler may reorder sums and fuse products, so that it can vectorise loops."""
 INNER_VECTOR = kernel(inner=True, fastmath=_REORDERED, **_LEAN)
 """As VECTOR, for functions that only kernels call."""
 ORDERED = kernel(fastmath={*_REORDERED, "nnan"}, **_LEAN)
-"""As VECTOR, and no number is expected to be none, so that least and largest values become vector instructions."""
+"""As VECTOR, and NaN is not expected, so that minima and maxima can be vectorised."""
 INNER_ORDERED = kernel(inner=True, fastmath={*_REORDERED, "nnan"}, **_LEAN)
 """As ORDERED, for functions that only kernels call."""

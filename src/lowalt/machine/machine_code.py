@@ -1,8 +1,8 @@
-"""Machine code of kernels by numba: compiled for the options of each, and kept by the digest of all that it runs.
+"""Machine code of kernels, compiled by numba with the options of each and cached by the digest of all code it runs.
 
-Whether products are fused and sums reordered is said for every kernel, and numba's own parts, such as the product of
-complex numbers, are compiled for each set of options by themselves: otherwise the first kernel of a process to call a
-function would decide how that function rounds in all others.
+Every kernel states whether products may be fused and sums reordered. numba's internal functions, such as the product
+of complex numbers, are compiled separately for each set of options. Otherwise the first kernel in a process to call a
+function would determine how that function rounds in all others.
 """
 
 import functools
@@ -59,8 +59,8 @@ class _DigestCache(FunctionCache):
 
     def load_overload(self, sig, target_context):
         """Return finished machine code for a signature, or None where none is kept."""
-        # numba's method first loads everything that a compilation may need, scipy.linalg included, which takes a third
-        # of a job's start. Finished machine code needs at most the runtime of counted references; compilation loads
+        # numba's method first loads everything that a compilation may need, including scipy.linalg, which takes a third
+        # of a job's start. Finished machine code needs at most the runtime of reference counting; a compilation loads
         # the rest.
         if self.options["_nrt"]:
             rtsys.initialize(target_context)
@@ -69,7 +69,7 @@ class _DigestCache(FunctionCache):
                 if (kept := self._load_overload(sig, target_context)) is not None:
                     return kept
             except (ImportError, AttributeError):
-                # The list of kept code names types of arguments; it is unreadable once one of them has moved.
+                # The index of cached code names argument types; it is unreadable if one of them has moved.
                 self.flush()
         say_once()
         return None
@@ -77,7 +77,7 @@ class _DigestCache(FunctionCache):
 
 @functools.cache
 def say_once() -> None:
-    """Say on the error stream that kernels are being compiled."""
+    """Print to standard error that kernels are being compiled."""
     print("lowalt: compiling for this machine; the machine code is kept for later calls", file=sys.stderr, flush=True)
 
 

@@ -1,7 +1,7 @@
-"""Memory of a process: what a block of code may take, and blocks that arrays have freed, which stay with the process.
+"""Memory of a process: a limit for a block of code, and reuse of freed arrays.
 
-By default the C library hands each large freed block back to the system, which then gives zeroed pages one by one: for
-a fifth of the time of a sample with many effects. With other C libraries than glibc nothing changes.
+By default glibc returns each large freed block to the system, which later provides zeroed pages one by one. That took a
+fifth of the time of a sample with many effects. With other C libraries nothing changes.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ def at_most(size: int) -> Iterator[None]:
 
 
 def keep_freed_memory() -> None:
-    """Let the C library keep freed blocks of any size, in a process that is the project's own.
+    """Let the C library keep freed blocks of any size; only for the project's own processes.
 
     A stage frees arrays of the same sizes for each sample, and training frees its activations in each step.
     Source: mallopt(3), M_MMAP_THRESHOLD and M_TRIM_THRESHOLD.

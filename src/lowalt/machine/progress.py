@@ -1,7 +1,7 @@
-"""The progress of a long command, as lines of its log that a person and the workflow's display can read.
+"""The progress of a long command, as lines in its log for users and the workflow's display.
 
-A line is `progress 340/2000 steps`; the last one counts. Commands write to their log (standard error) at most every two
-seconds, so short ones write none.
+A line is `progress 340/2000 steps`; the last one is current. Commands write to their log (standard error) at most every
+two seconds, so short ones write none.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Calls that do not depend on each other, several at a time, each in a process of its own."""
+"""Runs independent calls in parallel, each in its own process."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -12,8 +12,8 @@ from lowalt.files.errors import InputError, SpaceError
 def together(calls: Sequence[Callable[[], Any]], jobs: int, start: str = "fork") -> list[Any]:
     """Return what every call returns, in their order, `jobs` of them at a time.
 
-    Calls and results are pickled. One job makes the calls in this process, one after the other. start: how a process
-    begins; "fork" has this one's modules already, which take seconds to import, "spawn" is for calls that use torch.
+    Calls and results are pickled. One job makes the calls in this process, one after the other. start: "fork"
+    inherits the imported modules, which take seconds to import; "spawn" is for calls that use torch.
     Raises: what the first call that fails raises, after the calls that had begun; InputError for fewer than one job;
     SpaceError where a process was killed.
     """

@@ -1,4 +1,4 @@
-"""Timers of all measured times: the median of calls that take turns, and the least time of several calls."""
+"""Timers for all measured times: the median of alternating calls, and the minimum over several calls."""
 
 import statistics
 import time
@@ -10,7 +10,7 @@ def in_turn(
 ) -> list[tuple[float, object]]:
     """Return the median seconds and the last result of each call, given as (call, rounds, times a round).
 
-    Calls take turns, so that a second in which the machine is slow slows all of them and not one.
+    Calls alternate, so that a slow second of the machine affects all of them.
     """
     spent: list[list[float]] = [[] for _ in calls]
     results: list[object] = [None] * len(calls)

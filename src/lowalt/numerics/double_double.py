@@ -1,4 +1,4 @@
-"""Sums and products of doubles together with their rounding errors, from which double-double arithmetic is built.
+"""Sums and products of doubles with their rounding errors: the basis of double-double arithmetic.
 
 A double-double is the unevaluated sum of two doubles, about 32 digits. The functions here use additions, subtractions
 and multiplications alone, so they take numbers and arrays alike, and every processor returns the same bits. Where they

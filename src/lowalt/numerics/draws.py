@@ -1,7 +1,7 @@
 """Random numbers that are the same with every version of NumPy and on every processor.
 
-NumPy promises that its bit generators keep their streams, but not how a `Generator` turns bits into numbers. So only
-the raw 64-bit words are taken from it, and the transforms stand here, in operations that IEEE 754 fixes:
+NumPy guarantees the streams of its bit generators, but not how a `Generator` turns bits into numbers. Only the raw
+64-bit words are therefore taken from NumPy. The transforms are defined here, in operations that IEEE 754 specifies:
 
     random       the word's upper 53 bits times 2^-53
     uniform      low + (high - low) random
@@ -11,7 +11,7 @@ the raw 64-bit words are taken from it, and the transforms stand here, in operat
     normal       Box and Muller's method on two words: sqrt(-2 ln u) cos(2 pi v) and sqrt(-2 ln u) sin(2 pi v) follow
                  each other, u = (upper 53 bits of the first + 1) 2^-53, v = (upper 53 bits of the second) 2^-53
 
-Whatever is not named here is still NumPy's own and carries no such promise.
+All other methods are still NumPy's, without this guarantee.
 Sources: Lemire 2019, ACM TOMACS 29(1); Box and Muller 1958; NumPy NEP 19.
 """
 
@@ -27,7 +27,7 @@ from lowalt.numerics.portable import log, sine_cosine_turns
 Size = int | tuple[int, ...] | None
 _HALF = np.uint64(0xFFFFFFFF)
 COMPILED = 4096
-"""So many normal numbers are worth loading compiled code, which gives the same bits in less time."""
+"""From this number of normals on, loading compiled code pays; it gives the same bits in less time."""
 
 
 def _count(size: Size) -> int:
@@ -65,7 +65,7 @@ class Draws(np.random.Generator):
         """The next `count` 32-bit halves, as (count,) uint64; an upper half left over waits for the next call."""
         kept = [] if self._kept is None else [self._kept]
         fresh = self.words((count - len(kept) + 1) // 2)
-        # Seen as 32-bit numbers, the lower half of a word stands first.
+        # Viewed as 32-bit numbers, the lower half of a word comes first.
         halves = fresh.astype("<u8", copy=False).view("<u4").astype(np.uint64)
         if kept:
             halves = np.append(np.array(kept, np.uint64), halves)
@@ -158,7 +158,7 @@ class Draws(np.random.Generator):
             raise InputError(f"standard_normal: arguments {sorted(kwargs)}, expected none besides size")
         count = _count(size)
         if count >= COMPILED or "lowalt.numerics.normals" in sys.modules:
-            # Import here: most commands draw few numbers, and loading the compiler takes longer than these draws.
+            # Imported late: most commands draw few numbers, in less time than loading the compiler takes.
             from lowalt.numerics.normals import interleaved
 
             return _shaped(interleaved(self.words(count + count % 2))[:count], size)

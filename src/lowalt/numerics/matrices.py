@@ -1,4 +1,4 @@
-"""Matrices 3 x 3: the axis along which vectors spread least, and the nearest rotations, in portable operations."""
+"""3 x 3 matrices in portable operations: the axis of least variance of vectors, and the nearest rotations."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from lowalt.numerics.portable import dot, product, total
 
 
 def thinnest(vectors: np.ndarray) -> np.ndarray:
-    """Return the unit vector (3,) along which vectors (N, 3) of zero mean spread least; its largest part is positive.
+    """Return the unit vector (3,) along which vectors (N, 3) of zero mean vary least; its largest entry is positive.
 
     Source: Jacobi's rotations of the 3 x 3 matrix of second moments.
     """

@@ -1,7 +1,7 @@
 """Complex normal numbers from raw random words, compiled: the bits of `lowalt.numerics.draws` in less time.
 
-Only additions, products, divisions, square roots and comparisons of float64 in one written order, never fused. No
-divisor can be zero, and without a check for it these loops become vector instructions.
+Only additions, products, divisions, square roots and comparisons of float64 are used, in a fixed order and never fused.
+No divisor can be zero; without a check for zero the compiler vectorises these loops.
 """
 
 import numpy as np
@@ -15,24 +15,24 @@ _C1, _C2, _C3, _C4, _C5, _C6 = COSINE
 _LN2_HIGH, _LN2_LOW = LN2
 _MANTISSA, _ONE = np.int64(0x000FFFFFFFFFFFFF), np.int64(0x3FF0000000000000)
 _WHOLE, _EXPONENT = np.int64(0x4330000000000000), np.int64(52)
-"""Bits of 2^52, whose sum with a small whole number holds that number as its lowest bits."""
+"""Bits of 2^52; the lowest bits of its sum with a small integer are that integer."""
 _BIASED = 2.0**52 + 1022.0
 _LOWER, _UPPER, _HALF = np.uint64(11), np.uint64(43), np.uint64(0xFFFFFFFF)
 _LARGE, _SMALL, _BOTH = np.uint64(0x4530000000000000), np.uint64(0x4330000000000000), 2.0**84 + 2.0**52
-"""Bits of 2^84 and of 2^52, whose sums with 32-bit numbers hold these as their lowest bits; the sum of both."""
+"""Bits of 2^84 and 2^52, whose sums with 32-bit integers have these as lowest bits; the sum of both."""
 _STEP = 2.0**-53
 _TURN = 2 * np.pi
 _TWO, _NEXT = np.uint64(2), np.uint64(1)
 BLOCK = 256
-"""Complex numbers made together; all their steps stay in the nearest cache."""
+"""Complex numbers per block; all intermediate arrays fit into the first-level cache."""
 
 
 @INNER
 def _block(words, scale, real, imaginary, twos, lower):
     """Fill real and imaginary (K,) as `fill` does; twos, lower: (K,) work space."""
     count = np.uint64(len(real))
-    # A conversion of 64-bit whole numbers is a vector instruction on few processors. So bits are set, and both halves
-    # of a word's upper 53 bits are added as float64, without rounding.
+    # Few processors have a vector instruction that converts 64-bit integers. Set bits instead, and add both halves of
+    # a word's upper 53 bits as float64, without rounding.
     x, x_low, y, y_low = real.view(np.uint64), twos.view(np.uint64), imaginary.view(np.uint64), lower.view(np.uint64)
     for i in range(count):
         one, other = words[_TWO * i], words[_TWO * i + _NEXT]
@@ -103,7 +103,7 @@ def _fill_pairs(words, work, out):
 def interleaved(words: np.ndarray) -> np.ndarray:
     """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
     out = np.empty((len(words) // 2, 2))
-    # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
+    # The compiler vectorises loops over contiguous real parts, but not over alternating parts.
     _fill_pairs(words, np.empty((4, BLOCK)), out)
     return out.ravel()
 

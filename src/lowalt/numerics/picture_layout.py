@@ -1,4 +1,4 @@
-"""Places of a figure's parts, rounded so that equal figures become equal bytes in every process."""
+"""Rounds the positions of a figure's parts, so that equal figures give equal bytes in every process."""
 
 from typing import TYPE_CHECKING
 
@@ -6,7 +6,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DIGITS = 6
-"""Decimal places that a part keeps, in shares of its figure: a thousandth of a pixel for a figure of 1000 pixels."""
+"""Decimal places of a position relative to its figure: a thousandth of a pixel for a figure of 1000 pixels."""
 
 
 def settle(figure: "Figure", dpi: float) -> None:
@@ -30,6 +30,6 @@ def settle(figure: "Figure", dpi: float) -> None:
         part.bbox_relative.set_points(part.bbox_relative.get_points().round(DIGITS))
         parts += part.subfigs
     for axes in figure.axes:
-        # The place that is drawn, narrower where both axes have one scale, follows from this one.
+        # The drawn position, narrower if both axes have equal scales, follows from this one.
         axes.set_position(Bbox(axes.get_position(original=True).get_points().round(DIGITS)))
         axes.set_in_layout(True)

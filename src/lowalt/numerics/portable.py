@@ -1,8 +1,8 @@
 """Elementary functions, products and sums whose last bit is the same on every processor and with every library.
 
-A library may compute a sine by other polynomials with wider registers, a BLAS may add in another order, and a
-fused multiply-add rounds once instead of twice. Here everything is additions, products, divisions and square roots of
-float64 arrays in one written order, which IEEE 754 fixes: NumPy does each of them as an operation of its own. Results
+A library may use other polynomials for a sine with wider registers, a BLAS may add in another order, and a fused
+multiply-add rounds once instead of twice. This module uses only additions, products, divisions and square roots of
+float64 arrays in a fixed order, which IEEE 754 specifies; NumPy performs each as a separate operation. Results
 are within a few units in the last place of the true values. Arguments are arrays of float64 or numbers; shapes
 broadcast; NaN and infinity are not expected.
 Source of the polynomials and of the reductions: Sun's fdlibm (Ng 1993).
@@ -156,7 +156,7 @@ def arctan(x: np.ndarray | float) -> np.ndarray:
     size = np.abs(x)
     limits = (0.4375, 0.6875, 1.1875, 2.4375)
     place = sum((size >= limit).astype(np.int64) for limit in limits)
-    # Every branch is computed for all numbers, so a divisor of a branch that is not used may not be zero.
+    # Every branch is computed for all numbers, so divisors must not be zero in unused branches either.
     choices = [
         size, (2 * size - 1) / (2 + size), (size - 1) / (size + 1), (size - 1.5) / (1 + 1.5 * size),
         -1 / np.where(size > 0, size, 1.0),
@@ -182,7 +182,7 @@ def arctan2(y: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
 
 def total(values: np.ndarray, axis: int = -1) -> np.ndarray:
     """Return the sum along an axis that is not empty, added one by one from the first value on."""
-    # Each value of a running sum needs the one before it, so every library adds in this order.
+    # Each value of a cumulative sum depends on the previous one, so every library adds in this order.
     return np.add.accumulate(np.asarray(values, np.float64), axis=axis).take(-1, axis=axis)
 
 
@@ -222,7 +222,7 @@ def applied(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 def rms(signal: np.ndarray) -> float:
     """Return the root of the mean of |signal|^2 of a complex array of any shape, 0 for zeros.
 
-    Scaling by a power of two first keeps the mean square of very small or large signals out of under- and overflow.
+    Scaling by a power of two first prevents under- and overflow of the mean square.
     """
     signal = np.asarray(signal, dtype=np.complex128).ravel()
     parts = np.stack([signal.real, signal.imag])
@@ -231,5 +231,5 @@ def rms(signal: np.ndarray) -> float:
         return 0.0
     twos = math.frexp(peak)[1]
     parts = np.ldexp(parts, -twos)
-    # The parts' squares apart, since a library's |z| depends on the processor; added one by one, for the same reason.
+    # Square the parts separately and add one by one, because a library's |z| and sum depend on the processor.
     return math.ldexp(math.sqrt(float(total(parts[0] * parts[0] + parts[1] * parts[1])) / signal.size), twos)

@@ -1,7 +1,7 @@
-"""Random streams: one independent generator for each named purpose; no stream is named by its number in a list.
+"""Random streams: an independent generator for each named purpose.
 
-A stream is keyed by its purpose (random seed, name, subtype, model, ...), so adding a subtype, an
-SNR or an effect moves no other stream, and no result depends on shards, jobs or workers.
+A stream is keyed by its purpose (random seed, name, subtype, model, ...) and not by a position in a list. Adding a
+subtype, an SNR or an effect therefore changes no other stream, and results do not depend on shards, jobs or workers.
 """
 
 import hashlib
@@ -43,7 +43,6 @@ def stream(seed: int, purpose: str, *keys: Key) -> Draws:
     Source: NumPy's SeedSequence takes entropy of any size; with 256 bits, two equal streams do not occur.
     """
     words = np.frombuffer(digest(seed, purpose, *keys), "<u4")
-    # SeedSequence takes the digest as one integer, and that integer's words without zeros at its upper end. Given the
-    # words, it saves a third of its time.
+    # SeedSequence splits an integer into words without leading zeros. Passing these words saves a third of its time.
     entropy = words.astype(np.uint32) if words[-1] else int.from_bytes(words.tobytes(), "little")
     return Draws(np.random.PCG64(np.random.SeedSequence(entropy)))

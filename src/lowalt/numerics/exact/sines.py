@@ -1,6 +1,6 @@
 """Sines and cosines of double-doubles by Taylor series, for arguments in turns or half turns.
 
-Terms below 10^-6 of the sum need no more than a double; the series stop below 10^-22. So errors are below 2^-71.
+Terms below 10^-6 of the sum are computed in double; the series stop below 10^-22, so errors are below 2^-71.
 """
 
 import numpy as np
