@@ -8,7 +8,6 @@ comma := ,
 BASE := .venv/set-up-data
 SETUP := .venv/set-up
 TESTING := .venv/set-up-tests
-KERNELS := .venv/set-up-kernels
 BYTECODE := .venv/set-up-bytecode
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
@@ -42,22 +41,19 @@ $(BASE): pyproject.toml envs/constraints.txt
 	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check -c envs/constraints.txt uv \
 		2>/dev/null || { $(PIP) -c envs/constraints.txt uv || true; }
 	$(call install,-e '.[workflow$(comma)cost]' pip)
-	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) $(BYTECODE)
+	rm -f $(SETUP) $(TESTING) $(DOCS) $(BYTECODE)
 	touch $@
 
+# Machine code of the data stages is compiled while packages come, so that no first call waits for it, nor many tests at
+# the same time. A sample needs nearly all of it.
+SAMPLE = $(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1
 $(SETUP): $(BASE)
-	$(call install,$(call of_extra,recognition))
+	$(SAMPLE) & sampling=$$!; { $(call install,$(call of_extra,recognition)); } && \
+		{ wait $$sampling || { cat .venv/kernels.log >&2; exit 1; }; }
 	touch $@
 
 $(TESTING): $(SETUP)
 	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
-	touch $@
-
-# Machine code of the data stages: compiled once, while packages come, and not by many tests at the same time. A sample
-# needs nearly all of it.
-SAMPLE = $(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1
-$(KERNELS): $(BASE)
-	$(SAMPLE) || { cat .venv/kernels.log >&2; exit 1; }
 	touch $@
 
 # Bytecode of the tests and of what they import: written once, not by both processes of the tests at the same time. Where a
@@ -70,10 +66,10 @@ $(DOCS): $(BASE)
 	$(call install,$(call of_extra,docs))
 	touch $@
 
-# Where the packages of training are not there yet, they come while the data are made; so does the machine code. Bytecode
-# of torch takes ten seconds: written once here, not by two trainings at a time.
+# Where the packages of training are not there yet, they come while the data are made. Bytecode of torch takes ten
+# seconds: written once here, not by two trainings at a time.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
-	@test -e $(SETUP) || { $(SAMPLE) & \
+	@test -e $(SETUP) || { \
 		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile && \
 		{ $(BIN)/python -c 'import lowalt.recognition.runs, lowalt.report.__main__' 2>.venv/bytecode.log & } }
 	$(SNAKEMAKE)
@@ -92,7 +88,7 @@ real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 measured:  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
 	$(MAKE) --no-print-directory study NAME=measured
 
-ready: $(BYTECODE) $(KERNELS)
+ready: $(BYTECODE)
 
 test:  ## the test suite
 	@$(MAKE) --no-print-directory -j 2 ready

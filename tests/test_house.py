@@ -19,7 +19,7 @@ from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
 GROUND = ("files", "machine", "numerics", "config")
-STAGES = [name for name in STREET if name not in (*GROUND, "measure", "workflow", "commands")]
+STAGES = [name for name in STREET if name not in (*GROUND, "drafting", "measure", "workflow", "commands")]
 
 
 @pytest.mark.parametrize("stage", STREET)
@@ -158,10 +158,10 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (13, 1090), "config": (9, 1125), "echo": (27, 2570), "files": (12, 750), "machine": (10, 515),
-    "measure": (6, 590), "motion": (10, 1010), "noise": (4, 175), "numerics": (13, 940), "recognition": (46, 4650),
-    "recordings": (13, 1140), "report": (32, 1795), "scene": (73, 6120), "shards": (22, 2672), "spectra": (16, 930),
-    "targets": (43, 6320), "tiles": (16, 1478), "workflow": (15, 1740),
+    "commands": (13, 1100), "config": (9, 1135), "drafting": (10, 2030), "echo": (27, 2570), "files": (12, 750),
+    "machine": (10, 525), "measure": (6, 590), "motion": (10, 1010), "noise": (4, 175), "numerics": (13, 940),
+    "recognition": (46, 4650), "recordings": (13, 1140), "report": (32, 1795), "scene": (73, 6120),
+    "shards": (22, 2702), "spectra": (16, 930), "targets": (36, 5105), "tiles": (16, 1478), "workflow": (15, 1740),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 

@@ -116,7 +116,7 @@ def _meshes() -> list[Reader]:
 
 def _robots() -> list[Reader]:
     """Readers of robots' descriptions, each with a good file."""
-    from lowalt.targets.robot_files import read_robot
+    from lowalt.drafting.robot_files import read_robot
     from made_robots import MJCF, SDF, urdf
 
     files = {".urdf": urdf(blade="").replace('<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'),

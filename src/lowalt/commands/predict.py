@@ -1,6 +1,7 @@
 """The command `lowalt predict`: what a trained model says of a tile, of signals or of a recording."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,7 @@ def run(options: argparse.Namespace) -> Answer:
     record = _record(options.input) if options.input.suffix == ".yaml" else None
     config = overlaid(options.overlay) if options.overlay else {}
     # What can be refused without torch has been refused: it takes seconds to import.
+    print("lowalt predict: loading the network", file=sys.stderr, flush=True)
     from lowalt.recognition.one_sample import predict
     from lowalt.recognition.zoo import opened
 

@@ -134,13 +134,22 @@ class Refusing:
         return asked
 
 
+USUAL_FORMAT = warnings.formatwarning
+
+
+def warn_in_one_line() -> None:
+    """Print each InputWarning as one line without its place in the source."""
+    warnings.formatwarning = lambda message, category, *place, **more: (
+        f"warning: {message}\n"
+        if issubclass(category, InputWarning)
+        else USUAL_FORMAT(message, category, *place, **more)
+    )
+
+
 def run(main: Callable[[list[str]], None]) -> None:
     """Run a stage's `main` on the process's arguments, as `refusing` says; an InputWarning becomes one line."""
     keep_freed_memory()
-    usual = warnings.formatwarning
-    warnings.formatwarning = lambda message, category, *place, **more: (
-        f"warning: {message}\n" if issubclass(category, InputWarning) else usual(message, category, *place, **more)
-    )
+    warn_in_one_line()
     with refusing():
         main(sys.argv[1:])
     # ru_maxrss includes short peaks that sampling misses; it is in KiB on Linux.

@@ -9,8 +9,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 STREET = (
-    "files", "machine", "numerics", "config", "targets", "motion", "echo", "scene", "noise", "spectra", "tiles",
-    "shards", "recognition", "recordings", "measure", "report", "workflow", "commands",
+    "files", "machine", "numerics", "config", "targets", "drafting", "motion", "echo", "scene", "noise", "spectra",
+    "tiles", "shards", "recognition", "recordings", "measure", "report", "workflow", "commands",
 )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ calls no kernel does not import it.
 import functools
 import hashlib
 from collections.abc import Callable, Iterator
-from types import CodeType, FunctionType, ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ def _text_of(value) -> str:
     return repr(value)
 
 
-def _used(function: FunctionType) -> Iterator[tuple[str, object]]:
+def _used(function: Any) -> Iterator[tuple[str, object]]:
     """Yield the names and values of globals, of attributes of modules, and of outer variables that a function uses."""
     code = function.__code__
     for name in code.co_names:
@@ -46,7 +46,7 @@ def _options_of(options: dict) -> str:
     return f"{[(option, _text_of(options[option])) for option in sorted(options)]}"
 
 
-def _parts(function: FunctionType, seen: set[str]) -> Iterator[str]:
+def _parts(function: Any, seen: set[str]) -> Iterator[str]:
     """Yield as text everything that determines the machine code of `function`; each kernel that it calls comes once."""
     name = f"{function.__module__}.{function.__qualname__}"
     if name in seen:
@@ -69,7 +69,7 @@ def _parts(function: FunctionType, seen: set[str]) -> Iterator[str]:
             yield f"{label} {_text_of(value)}"
 
 
-def digest(function: FunctionType, options: dict | None = None) -> str:
+def digest(function: Callable, options: dict | None = None) -> str:
     """Return the SHA-256 of a kernel's bytecode and options, and of all kernels and constants that it uses."""
     total = hashlib.sha256(_options_of(options or {}).encode())
     for part in _parts(function, set()):

@@ -5,6 +5,8 @@ complex numbers, are compiled for each set of options by themselves: otherwise t
 function would decide how that function rounds in all others.
 """
 
+import functools
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -64,11 +66,19 @@ class _DigestCache(FunctionCache):
             rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             try:
-                return self._load_overload(sig, target_context)
+                if (kept := self._load_overload(sig, target_context)) is not None:
+                    return kept
             except (ImportError, AttributeError):
                 # The list of kept code names types of arguments; it is unreadable once one of them has moved.
                 self.flush()
+        say_once()
         return None
+
+
+@functools.cache
+def say_once() -> None:
+    """Say on the error stream that kernels are being compiled."""
+    print("lowalt: compiling for this machine; the machine code is kept for later calls", file=sys.stderr, flush=True)
 
 
 def dispatcher(function: Callable, options: dict[str, Any]) -> Dispatcher:

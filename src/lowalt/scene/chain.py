@@ -284,7 +284,7 @@ class SceneSample:
 
 @one_blas_thread()
 def received_signal(
-    scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None,
+    scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: Mapping[str, dict] | None = None,
     clouds: Mapping[str, Cloud] | None = None,
 ) -> Received:  # fmt: skip
     """Return the signal at `station` of the motion model `row` (motion table) under the scene's effects.
@@ -296,7 +296,7 @@ def received_signal(
 
 
 def scene_signals(
-    scene: Scene, name: str, clouds: Mapping[str, Cloud], rows: list[dict], occluders: dict[str, dict] | None = None,
+    scene: Scene, name: str, clouds: Mapping[str, Cloud], rows: list[dict], occluders: Mapping[str, dict] | None = None,
     snrs: list[float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.

@@ -33,7 +33,12 @@ class Maker:
     """Makes samples of one configuration; it keeps the clean echoes of the last motion models."""
 
     def __init__(
-        self, render: dict, echo: dict, seed: int, clouds: Mapping[str, Cloud], occluders: dict | None = None
+        self,
+        render: dict,
+        echo: dict,
+        seed: int,
+        clouds: Mapping[str, Cloud],
+        occluders: Mapping[str, dict] | None = None,
     ) -> None:
         """Take the settings {network, spectra, images} and {tolerance, effects}, the random seed and clouds by subtype.
 

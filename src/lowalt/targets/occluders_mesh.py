@@ -12,8 +12,7 @@ from lowalt.targets.mesh import cloud_and_pools
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut_parts, inside
 from lowalt.targets.mesh_record import body_axes, ordered_parts
-from lowalt.targets.occluders import GRAIN, longest_edge, quartered
-from lowalt.targets.surfaces import Surface, face_normals, merged
+from lowalt.targets.surfaces import GRAIN, Surface, face_normals, longest_edge, merged, quartered
 
 TRIANGLES = 1500
 """Most triangles a part keeps."""

@@ -25,8 +25,8 @@ class Cubes:
     """Makes the cubes of samples; it keeps the clean ones of the last `kept` motion models and stations."""
 
     def __init__(
-        self, scene: Scene, clouds: Mapping[str, Cloud], occluders: dict | None = None, every_cell: bool = False,
-        empty: bool = False, kept: int = 3,
+        self, scene: Scene, clouds: Mapping[str, Cloud], occluders: Mapping[str, dict] | None = None,
+        every_cell: bool = False, empty: bool = False, kept: int = 3,
     ) -> None:  # fmt: skip
         """Take the scene, clouds by subtype and each subtype's surfaces, where the scene hides points behind them.
 
@@ -39,7 +39,11 @@ class Cubes:
 
     @classmethod
     def from_settings(
-        cls, settings: dict, clouds: Mapping[str, Cloud], occluders: dict | None = None, empty: bool = False
+        cls,
+        settings: dict,
+        clouds: Mapping[str, Cloud],
+        occluders: Mapping[str, dict] | None = None,
+        empty: bool = False,
     ) -> "Cubes":
         """Build from a settings object with exactly seed, network, tolerance and effects.
 

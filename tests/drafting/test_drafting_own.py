@@ -9,10 +9,10 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
+from lowalt.drafting.guesses import guessed_axes, guessed_unit
+from lowalt.drafting.inspection import described, inspect_mesh
 from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import read
-from lowalt.targets.guesses import guessed_axes, guessed_unit
-from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.make import make
 from lowalt.targets.records import load_table, merge, read_records
 from meshes import box, quadrotor
@@ -51,12 +51,13 @@ def test_an_alike_plate_at_another_height_is_no_rotor(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("size", "category", "unit"),
-    [(0.3, "UAV", "m"), (300, "UAV", "mm"), (180, "Vehicle", "in"), (460, "Vehicle", "cm"), (4.6, "Vehicle", "m"),
-     (0.16, "Bird", "m"), (32.0, "Bird", "cm")],
+    ("sizes", "category", "unit"),
+    [([0.3, 0.3, 0.1], "UAV", "m"), ([300, 200, 80], "UAV", "mm"), ([70, 180, 55], "Vehicle", "in"),
+     ([180, 460, 150], "Vehicle", "cm"), ([1.8, 4.6, 1.5], "Vehicle", "m"), ([0.16, 0.1, 0.05], "Bird", "m"),
+     ([21.0, 32.0, 9], "Bird", "cm"), ([0.9, 2.1, 0.7], "Vehicle", "m"), ([250, 90, 320], "Vehicle", "cm")],
 )  # fmt: skip
-def test_units_are_guessed_from_the_usual_sizes(size, category, unit):
-    assert guessed_unit(size, category) == unit
+def test_units_are_guessed_from_the_usual_proportions(sizes, category, unit):
+    assert guessed_unit(np.array(sizes), category) == unit
 
 
 def bird(scale: float = 1.0) -> trimesh.Trimesh:

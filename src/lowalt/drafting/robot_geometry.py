@@ -1,19 +1,27 @@
 """What descriptions of robots share: links and joints, files inside the folder of inputs, surfaces, places, numbers."""
 
 import math
+import os
+import re
+import warnings
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
 from lowalt.targets.mesh_files import SUFFIXES, selected
 
 LARGEST_BYTES, MOST_FILES = 16 << 20, 200
+MOST_SEARCHED = 100_000
+"""Most files and folders below the folder of inputs that are searched for a package of another name."""
+OPTIONAL = re.compile(r"\$\(optenv\s+\w+\s*([^()]*)\)")
+"""ROS: the value of an environment variable, or a default where it is not set; the default is always taken."""
 DEEPEST = 50
 """Most links, frames or models that hang on one another."""
 MOST_TURN = 4 * math.pi
@@ -81,6 +89,7 @@ class Files:
 
     def __init__(self, inputs: Path) -> None:
         self.inputs, self.opened = inputs.resolve(), 0
+        self.listed: list[tuple[str, ...]] | None = None  # parts of every path below `inputs`, once they are needed
 
     def find(self, name: str, base: Path) -> Path:
         """Return the file that a description in the folder `base` names: relative, package://, model://."""
@@ -99,15 +108,46 @@ class Files:
         for place in inside:
             if place.exists():
                 return place
+        if scheme in ("package", "model") and (place := self.elsewhere(name, location)):
+            return place
         problem = "is not there" if inside else f"lies outside the folder of inputs {self.inputs}"
         raise InputError(f"{name!r} {problem}, expected it inside, by the name that the description has")
 
+    def elsewhere(self, name: str, location: str) -> Path | None:
+        """Return the one file or folder below the folder of inputs whose path ends as a package's `location` does, with
+        or without the package's own name: a clone often has another name. Return None where there is none.
+
+        Raises: InputError where several fit. Warns: InputWarning naming the file that is taken.
+        """
+        if self.listed is None:
+            found = (Path(folder, entry) for folder, folders, files in os.walk(self.inputs)
+                     for entry in (*folders, *files))  # fmt: skip
+            self.listed = [path.relative_to(self.inputs).parts for path in islice(found, MOST_SEARCHED)]
+        parts = Path(location).parts
+        for tail in (parts, parts[1:]):
+            fits = [path for path in self.listed if tail and path[-len(tail) :] == tail]
+            fits = [path for path in fits if self.inputs.joinpath(*path).resolve().is_relative_to(self.inputs)]
+            if len(fits) > 1:
+                shown = ", ".join(str(Path(*path)) for path in fits[:3])
+                raise InputError(f"{name!r}: {len(fits)} files below the folder of inputs fit ({shown}), expected one")
+            if fits:
+                warnings.warn(f"{name!r} is taken from {Path(*fits[0])}, the only file that fits", InputWarning,
+                              stacklevel=2)  # fmt: skip
+                return self.inputs.joinpath(*fits[0]).resolve()
+        return None
+
     def parsed(self, path: Path) -> Element:
-        """Return the root of an XML file, bounded in size and count."""
+        """Return the root of an XML file, bounded in size and count. Namespaces are dropped, except that of xacro, and
+        `$(optenv NAME DEFAULT)` becomes its default."""
         self.opened += 1
         if self.opened > MOST_FILES or path.stat().st_size > LARGEST_BYTES:
             raise InputError(f"{path}: expected at most {MOST_FILES} files of {LARGEST_BYTES >> 20} MiB")
-        return parsed(path)
+        root = parsed(path)
+        for element in root.iter():
+            element.tag = element.tag if "xacro" in element.tag else element.tag.rsplit("}", 1)[-1]
+            element.text = OPTIONAL.sub(r"\1", element.text or "")
+            element.attrib.update({key: OPTIONAL.sub(r"\1", value) for key, value in element.attrib.items()})
+        return root
 
     def mesh(self, name: str, base: Path, scale: np.ndarray, part: str | None = None) -> np.ndarray:
         """Return the triangles (K, 3, 3) m of a mesh file, scaled; a COLLADA file's own unit counts."""
@@ -116,7 +156,9 @@ class Files:
             raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
         unit = (stated_metres(path) or 1.0) if path.suffix.lower() == ".dae" else 1.0
         pieces = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
-        triangles = np.concatenate(pieces or [np.zeros((0, 3, 3))]) * unit * scale
+        if not pieces:
+            raise InputError(f"{name!r} has no triangle, expected a surface")
+        triangles = np.concatenate(pieces) * unit * scale
         return triangles[:, ::-1] if np.prod(scale) < 0 else triangles
 
 

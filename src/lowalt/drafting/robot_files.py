@@ -5,6 +5,7 @@ Sources: ROS, urdf/XML (link, joint); SDFormat 1.4 to 1.11 and its proposal on p
 """
 
 import re
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -12,10 +13,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from lowalt.drafting.robot_geometry import DEEPEST, Files, Robot, numbers, place_of, primitive, shown
+from lowalt.drafting.robot_mjcf import mjcf
 from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
-from lowalt.targets.robot_geometry import DEEPEST, Files, Robot, numbers, place_of, primitive, shown
-from lowalt.targets.robot_mjcf import mjcf
 
 KINDS = (".urdf", ".sdf", ".xml", ".mjcf", ".world")
 TEMPLATES = {
@@ -23,6 +24,8 @@ TEMPLATES = {
     ".erb": "erb FILE > robot.sdf",
 }  # fmt: skip
 """Templates of descriptions by suffix, and what expands them."""
+UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
+"""Elements inside a description that say nothing about shapes and joints; macros in them do no harm."""
 
 
 def _geometry(element: Element | None, base: Path, files: Files) -> np.ndarray:
@@ -59,9 +62,23 @@ def _pose(element: Element) -> np.ndarray:
     return place_of(values[:3], turn)
 
 
-def _before_1_5(root: Element) -> bool:
-    """Whether a file is of an SDF whose axes are in the model's frame."""
-    return float(root.get("version", "1.5")) < 1.45
+def _version(root: Element) -> tuple[int, ...]:
+    """Return the version of an SDF file as integers, since 1.10 comes after 1.9."""
+    return tuple(int(number) for number in root.get("version", "1.5").split("."))
+
+
+def _axis_frame(joint: Element, version: tuple[int, ...], own: str, model: str, scope: str) -> str:
+    """Return the frame in which the axis of an SDF joint is given: the joint's `own`, the model's or a named one.
+
+    Before version 1.5 it is the model's, from 1.5 to 1.6 where `use_parent_model_frame` says so, from 1.7 on the one
+    that `expressed_in` names.
+    """
+    along = joint.find("axis/xyz")
+    within = along.get("expressed_in") if along is not None else None
+    in_model = version < (1, 7) and joint.findtext("axis/use_parent_model_frame") in ("1", "true")
+    if version < (1, 5) or in_model or within == "__model__":
+        return model
+    return scope + within if within else own
 
 
 class _Links:
@@ -107,10 +124,13 @@ class _Links:
         models = [*root.findall("model"), *root.findall("world/model")]
         if len(models) != 1:
             raise ValueError(f"{len(models)} models, expected one")
-        self.add(models[0], base, "", ("", np.eye(4)), _before_1_5(root), 0)
+        self.add(models[0], base, "", ("", np.eye(4)), _version(root), 0)
         return self.done()
 
-    def add(self, model: Element, base: Path, scope: str, place: tuple[str, np.ndarray], old: bool, depth: int) -> None:
+    def add(
+        self, model: Element, base: Path, scope: str, place: tuple[str, np.ndarray], version: tuple[int, ...],
+        depth: int,
+    ) -> None:  # fmt: skip
         """Add the links, frames, joints and inner models of an SDF; `scope` ends in :: where it has a name."""
         if depth > DEEPEST:
             raise ValueError("models in a circle")
@@ -138,18 +158,14 @@ class _Links:
                 self.frames.setdefault(name, (frame, np.eye(4)))
                 along = child.find("axis/xyz")
                 axis = numbers(along.text if along is not None else None, 3, (0, 0, 1))
-                within = along.get("expressed_in") if along is not None else None
-                if old or within == "__model__" or child.findtext("axis/use_parent_model_frame") in ("1", "true"):
-                    frame = inner
-                elif within:
-                    frame = scope + within
+                frame = _axis_frame(child, version, frame, inner, scope)
                 limits = (child.findtext("axis/limit/lower"), child.findtext("axis/limit/upper"))
                 self.joints.append((name, scope, ends, child, axis, frame, limits))
             elif child.tag == "plugin" and child.findtext("jointName") and child.findtext("turningDirection"):
                 joint, turn = (child.findtext(word, "").strip() for word in ("jointName", "turningDirection"))
                 self.robot.senses[scope + joint] = turn
             elif child.tag == "model":
-                self.add(child, base, f"{name}::", placed(child, inner), old, depth + 1)
+                self.add(child, base, f"{name}::", placed(child, inner), version, depth + 1)
             elif child.tag == "include":
                 self.include(child, base, scope, placed(child, inner)[0], depth)
 
@@ -169,7 +185,7 @@ class _Links:
         merged = element.get("merge") == "true"
         name = scope if merged else f"{scope}{element.findtext('name') or model.get('name')}::"
         place = _pose(element if element.find("pose") is not None else model)
-        self.add(model, path.parent, name, (above, place), _before_1_5(root), depth + 1)
+        self.add(model, path.parent, name, (above, place), _version(root), depth + 1)
 
     def done(self) -> Robot:
         """The robot of all that was taken; of links without any `visual` the collision surfaces."""
@@ -189,6 +205,14 @@ class _Links:
             limits = (None, None) if joint.get("type") == "continuous" else limits
             self.robot.turns(name, (parent, child), hinge, turned, limits)
         return self.robot
+
+
+def _used(element: Element) -> Iterator[Element]:
+    """Yield an element and the elements below it, except those that say nothing about shapes and joints."""
+    yield element
+    for child in element:
+        if child.tag not in UNUSED:
+            yield from _used(child)
 
 
 def is_description(path: Path) -> bool:
@@ -212,7 +236,7 @@ def read_robot(path: Path, inputs: Path) -> Robot:
         root = files.parsed(path)
         if root.tag not in readers:
             raise ValueError(f"<{root.tag}>, expected one of {sorted(readers)}")
-        if any("xacro" in str(item.tag) or re.search(r"\$[{(]|\{\{", str(item.attrib)) for item in root.iter()):
+        if any("xacro" in item.tag or re.search(r"\$[{(]|\{\{", str(item.attrib)) for item in _used(root)):
             raise ValueError(f"it holds macros, expected what they expand to: {TEMPLATES['.xacro']}")
         robot = readers[root.tag](root, path.resolve().parent)
     surfaces = [triangles for of_link in robot.surfaces.values() for triangles in of_link]

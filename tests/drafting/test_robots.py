@@ -8,10 +8,10 @@ import trimesh
 import yaml
 
 from lowalt.__main__ import main
-from lowalt.files.errors import InputError
+from lowalt.drafting.robot_files import read_robot
+from lowalt.drafting.robots import Joint, parts_of
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets.cloud import Cloud, read
-from lowalt.targets.robot_files import read_robot
-from lowalt.targets.robots import Joint, parts_of
 from made_robots import HUBS, MJCF, SDF, urdf
 
 
@@ -96,6 +96,8 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     np.testing.assert_allclose(triangles["pusher"].mean(axis=(0, 1))[:2], [-0.3, 0], atol=1e-9)
     np.testing.assert_allclose(np.ptp(triangles["pusher"].reshape(-1, 3), axis=0), [0.01, 0.2, 0.2], atol=1e-3)
     assert triangles["body"].reshape(-1, 3)[:, 1].max() == pytest.approx(0.3)  # the aileron is held
+    at_its_hinge = top.replace('"pusher">0 0 0 0 0 0', '"hull">0.1 0 0.2 0 0 0').replace("0 0 5 0", "0 0 1.2 0")
+    (tmp_path / "top/top.sdf").write_text(at_its_hinge)
     words = [str(tmp_path / "top/top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
     assert main(["target", "new", *words]) == 0
     parts = yaml.safe_load((tmp_path / "a").read_text())["top"]["parts"]
@@ -118,6 +120,79 @@ def test_an_mjcf_s_classes_angles_and_hinges_are_followed(tmp_path):
     assert np.ptp(body, axis=0)[0] == pytest.approx(0.3) and body[:, 1].max() == pytest.approx(0.21, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("version", "flag", "in_model"),
+    [("1.4", 0, True), ("1.6", 0, False), ("1.6", 1, True), ("1.7", 1, False), ("1.9", 0, False), ("1.10", 0, False),
+     ("1.11", 0, False)],
+)  # fmt: skip
+def test_an_sdf_s_axis_is_in_the_frame_that_its_version_says(version, flag, in_model, tmp_path):
+    text = SDF.replace('version="1.9"', f'version="{version}"')
+    text = text.replace("<xyz>0 0 1</xyz>", f"<xyz>0 0 1</xyz><use_parent_model_frame>{flag}</use_parent_model_frame>")
+    (tmp_path / "a.sdf").write_text(text)
+    found, _ = joints(tmp_path / "a.sdf", tmp_path)
+    np.testing.assert_allclose(found["pusher"].axis, [0, 0, 1] if in_model else [1, 0, 0], atol=1e-9)
+
+
+def test_a_namespace_an_optional_variable_and_macros_of_sensors_change_nothing(tmp_path):
+    inputs = folder(tmp_path)
+    plain, other = inputs / "craft/craft.urdf", inputs / "craft/other.urdf"
+    plain.write_text(urdf())
+    more = '<gazebo reference="base"><a b="${c}"/></gazebo><link name="imu"/><joint name="imu" type="fixed"><origin '
+    more += 'xyz="$(optenv IMU_XYZ 0.19 0 0.149)"/><parent link="base"/><child link="imu"/></joint>'
+    other.write_text(urdf(more).replace("<robot ", '<robot xmlns="http://drake.mit.edu" '))
+    expected, found = joints(plain, inputs)[0], joints(other, inputs)[0]
+    assert list(found) == list(expected) == list(HUBS)
+    for name in HUBS:
+        np.testing.assert_array_equal(found[name].hinge, expected[name].hinge)
+    other.write_text(urdf('<link name="a"><visual><origin xyz="${x} 0 0"/></visual></link>'))
+    with pytest.raises(InputError, match="it holds macros"):
+        joints(other, inputs)
+
+
+def test_a_package_of_another_folder_s_name_is_found_where_one_file_fits(tmp_path):
+    inputs = folder(tmp_path)
+    (inputs / "craft").rename(inputs / "clone-of-craft")
+    path = inputs / "craft.urdf"
+    path.write_text(urdf())
+    with pytest.warns(InputWarning, match=r"prop.stl' is taken from clone-of-craft/meshes/prop"):
+        found, triangles = joints(path, inputs)
+    assert list(found) == list(HUBS) and len(triangles["rotor_0"]) == 12
+    (inputs / "second/meshes").mkdir(parents=True)
+    (inputs / "second/meshes/prop.stl").write_bytes((inputs / "clone-of-craft/meshes/prop.stl").read_bytes())
+    with pytest.raises(InputError, match=r"2 files below the folder of inputs fit \(.*\), expected one"):
+        joints(path, inputs)
+
+
+def test_geoms_of_an_mjcf_that_are_named_rotors_are_rotors(tmp_path):
+    geoms = "".join(f'<geom name="rotor{n}" type="ellipsoid" size=".13 .13 .01" pos="{x} {y} .08"/>'
+                    for n, (x, y) in enumerate(HUBS.values()))  # fmt: skip
+    body = f'<body name="q"><freejoint/><geom type="box" size=".16 .04 .02"/>{geoms}</body>'
+    (tmp_path / "x2.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    _, cloud = made(tmp_path / "x2.xml", tmp_path)
+    assert cloud.kinds == ("body", *("rotor",) * 4)
+    hubs = np.sort(np.abs(cloud.hinges[1:, :2]), axis=1)
+    np.testing.assert_allclose(hubs, np.tile([0.15, 0.2], (4, 1)), atol=0.01)
+
+
+def test_a_plane_with_one_wheel_and_a_motor_is_asked_for_its_category_and_a_surface_must_have_triangles(tmp_path):
+    turning = "".join(f'<link name="{name}"><visual><geometry><box size="{size}"/></geometry></visual></link><joint '
+                      f'name="{name}_joint" type="continuous"><origin xyz="{at}"/><parent link="base"/><child '
+                      f'link="{name}"/><axis xyz="{axis}"/></joint>'
+                      for name, size, at, axis in (("main_wheel", "0.1 0.03 0.1", "0 0 -0.1", "0 1 0"),
+                                                   ("motor", "0.01 0.2 0.02", "0.4 0 0", "1 0 0")))  # fmt: skip
+    base = '<link name="base"><visual><geometry><box size="0.6 1.2 0.08"/></geometry></visual></link>'
+    path = tmp_path / "plane.urdf"
+    path.write_text(f'<robot name="p">{base}{turning}</robot>')
+    words = ["target", "new", str(path), "--inputs", str(tmp_path), "--out", str(tmp_path / "a.yaml")]
+    assert main(words) == 2
+    assert main([*words, "--category", "UAV"]) == 0
+    assert list(yaml.safe_load((tmp_path / "a.yaml").read_text())["plane"]["parts"]) == ["body", "motor"]
+    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
+    path.write_text(path.read_text().replace('<box size="0.6 1.2 0.08"/>', '<mesh filename="empty.obj"/>'))
+    with pytest.raises(InputError, match=r"'empty\.obj' has no triangle, expected a surface"):
+        read_robot(path, tmp_path)
+
+
 def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, capsys):
     wheels = "".join(
         f'<link name="wheel_{index}"><visual><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.1" length="0.06"/>'
@@ -136,7 +211,7 @@ def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, caps
     path.write_text((tmp_path / "rover.urdf").read_text().replace("continuous", "fixed", 2))
     before = sorted(tmp_path.rglob("*"))
     assert main(["target", "new", str(path), "--inputs", str(tmp_path), "--subtype", "AITO M9 2024"]) == 2
-    assert "2 wheels turn, AITO M9 2024 has 4: leave --subtype out" in capsys.readouterr().err
+    assert "2 wheels turn, expected 4 for AITO M9 2024: leave --subtype" in capsys.readouterr().err
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -161,10 +236,10 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
     command = ["target", "new", str(path), "--inputs", str(inputs), "--out"]
     assert main([*command, "named.yaml"]) == 0  # the links' names tell their number
     path.write_text(urdf().replace("continuous", "fixed").replace("rotor_", "disc_"))
-    command.insert(2, "--category=UAV")
     assert main([*command, "a.yaml"]) == 2
-    assert f"error: {path}: 4 rotors found, expected --rotors 4 where that is all" in capsys.readouterr().err
-    assert main([*command, "a.yaml", "--rotors", "4"]) == 0
+    error = capsys.readouterr().err
+    assert "its category cannot be seen" in error and "--category UAV" in error and "with --rotors N" in error
+    assert main([*command, "a.yaml", "--category=UAV"]) == 0
     for name in ("named", "a"):
         parts = yaml.safe_load((inputs / f"{name}.yaml").read_text())["craft"]["parts"]
         assert len(parts) == 5 and (inputs / f"{name}.glb").exists()

@@ -7,16 +7,20 @@ from collections.abc import Sequence
 
 import numpy as np
 import yaml
+from scipy.spatial import cKDTree
 
 from lowalt.config.classes import AIRBORNE
+from lowalt.drafting.guesses import TURNING, Group, alike, turning_axis
+from lowalt.drafting.inspection import Inspection
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
-from lowalt.targets.guesses import TURNING, Group
-from lowalt.targets.inspection import Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND, body_axes
 
 MARGIN = 0.02
 """A region reaches this share of its largest extent beyond the components that it shall take."""
+
+WINGS_ALIKE = 0.05
+"""Largest mean distance of a bird's wings from their mirror image, in parts of its size."""
 
 CONFIRM = "  # GUESSED, please confirm"
 
@@ -29,9 +33,23 @@ def record_text(about: list[str], subtype: str, row: list[str], settings: dict[s
     return "\n".join(lines) + "\n"
 
 
-def _numbers(values: np.ndarray) -> str:
-    """Numbers as a YAML list with five digits."""
-    return "[" + ", ".join(f"{value:.5g}" for value in values) + "]"
+DIGITS = 5
+"""Lengths in a draft are exact to this many digits of the target's size, wherever the file's origin lies."""
+
+
+def _places(size: float) -> int:
+    """How many decimal places of a length (m) a target of a size (m) needs."""
+    return max(0, DIGITS - 1 - int(np.floor(np.log10(size))))
+
+
+def _number(value: float, places: int) -> str:
+    """A length as text; georeferenced coordinates keep all their digits."""
+    return f"{round(float(value), places) + 0.0:.15g}"
+
+
+def numbers(values: np.ndarray, size: float) -> str:
+    """Return lengths (m) as a YAML list, exact enough for a target of a size (m)."""
+    return "[" + ", ".join(_number(value, _places(size)) for value in values) + "]"
 
 
 def _place(group: Group, inspection: Inspection) -> str:
@@ -83,27 +101,34 @@ def row_lines(
 def _wings(inspection: Inspection) -> list[str]:
     """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle.
 
-    Raises: InputError where one side has no surface.
+    Raises: InputError where the two sides do not mirror one another.
     """
+    size = float((inspection.high - inspection.low).max())
     front, up = "xyz".index(inspection.front[-1]), "xyz".index(inspection.up[-1])
     right = 3 - front - up
     sign = body_axes(inspection.front, inspection.up)[0, right]
     middle, lines = (inspection.low + inspection.high)[right] / 2, []
+    mirrored_points = inspection.points.copy()
+    mirrored_points[:, right] = 2 * middle - mirrored_points[:, right]
+    outer = np.abs(inspection.points[:, right] - middle) > inspection.shoulder_m
+    off = cKDTree(mirrored_points).query(inspection.points[outer])[0]
+    if not outer.any() or off.mean() > WINGS_ALIKE * size:
+        raise InputError(f"{inspection.path}: its sides along {'xyz'[right]} do not mirror one another, expected two "
+                         "wings: is one missing, or is --up or --front another axis?")  # fmt: skip
     for name, side in (("left wing", -sign), ("right wing", sign)):
         out = side * (inspection.points[:, right] - middle)
-        if out.max() <= 0:
-            raise InputError(f"{inspection.path}: its surface has no {name}, expected one on each side of its middle")
         root = inspection.points[(out > inspection.shoulder_m) & (out < 1.3 * inspection.shoulder_m)]
         hinge = np.median(root, axis=0) if len(root) else (inspection.low + inspection.high) / 2
         hinge[right] = middle + side * inspection.shoulder_m
         corners = [["null"] * 3, ["null"] * 3]
-        corners[0 if side > 0 else 1][right] = f"{hinge[right]:.5g}"
+        corners[0 if side > 0 else 1][right] = _number(hinge[right], _places(size))
         # Tail feathers may spread as wide as the wing's root, behind it.
         along = inspection.points[out > 0.4 * out.max(), front]
         slack = 0.25 * np.ptp(along)
-        corners[0][front], corners[1][front] = f"{along.min() - slack:.5g}", f"{along.max() + slack:.5g}"
+        reach = (along.min() - slack, along.max() + slack)
+        corners[0][front], corners[1][front] = (_number(end, _places(size)) for end in reach)
         box = ", ".join("[" + ", ".join(corner) + "]" for corner in corners)
-        lines.append(f"    {name}: {{kind: wing, region: {{box: [{box}]}}, hinge: {_numbers(hinge)}}}{CONFIRM}")
+        lines.append(f"    {name}: {{kind: wing, region: {{box: [{box}]}}, hinge: {numbers(hinge, size)}}}{CONFIRM}")
     return lines
 
 
@@ -115,6 +140,21 @@ def alternating(hubs: np.ndarray) -> list[str]:
     return [("ccw", "cw")[int(place) % 2] for place in np.argsort(order, kind="stable")]
 
 
+def mirrored(groups: list[Group]) -> bool:
+    """Return whether groups are three or more alike pieces whose places mirror one another, none near their middle:
+    the propellers of a multirotor, the wheels of a car."""
+    places = np.array([group.centre for group in groups]).reshape(-1, 3)
+    if len(groups) < 3 or any(not alike(groups[0], group) for group in groups):
+        return False
+    away = places - (places.min(axis=0) + places.max(axis=0)) / 2
+    reach = np.linalg.norm(away, axis=1)
+    images = [away * np.where(np.arange(3) == axis, -1, 1) for axis in range(3)]
+    off = [np.linalg.norm(away[:, None] - image[None], axis=2).min(axis=1).max() for image in images]
+    # Places mirror one another along an axis in which they are spread, not along the one in which they are level.
+    spread = np.ptp(places, axis=0) > 0.3 * reach.max()
+    return bool(reach.min() > 0.3 * reach.max() and (np.array(off)[spread] < 0.05 * reach.max()).any())
+
+
 def refuse_miscount(inspection: Inspection, groups: list[Group], count: int | None, picture: str) -> None:
     """Refuse a target whose rotors or wheels are not as many as they should be; where that is not known, names must
     tell them.
@@ -124,7 +164,7 @@ def refuse_miscount(inspection: Inspection, groups: list[Group], count: int | No
     kind = MOVING_KIND[inspection.category]
     named = len({len(group) for group in groups}) == 1  # else some blades may be taken for rotors
     named &= all(TURNING[kind].search(part.piece) for group in groups for part in group)
-    if kind == "wing" or (named if count is None else len(groups) == count):
+    if kind == "wing" or (named or mirrored(groups) if count is None else len(groups) == count):
         return
     unknown = f"--{kind}s {len(groups)} where that is all" if groups else f"at least one, or --{kind}s 0"
     raise InputError(
@@ -156,7 +196,7 @@ def drafted(
     own. `groups` are the components that move, `stated_axes` those of "up" and "front" that the user stated. Lines that
     end in CONFIRM hold guesses. Boxes take moving parts out of the body; a bird's wings are the surface farther out
     than `shoulder_m`.
-    Raises: InputError where a bird has no surface on one side.
+    Raises: InputError where the two sides of a bird do not mirror one another.
     """
     category, kind = inspection.category, MOVING_KIND[inspection.category]
     groups = sorted(groups, key=lambda group: group[0].centre.tolist())
@@ -165,8 +205,9 @@ def drafted(
     extent = np.abs(frame @ (inspection.high - inspection.low))
     wheel_m = max((float(group.extent.max()) for group in groups), default=None)
     row = row_lines(category, extent, hubs, wheel_m, table) if subtype not in table else []
-    marks = {name: "" if name in stated_axes else f"{CONFIRM}: {axis[-1]} or -{axis[-1]}"
-             for name, axis in (("up", inspection.up), ("front", inspection.front))}  # fmt: skip
+    size, sure = float((inspection.high - inspection.low).max()), inspection.up_from.startswith("as ")
+    up_mark = f"  # {inspection.up_from}" if sure else f"{CONFIRM}: {inspection.up[-1]} or -{inspection.up[-1]}"
+    up_mark = "" if "up" in stated_axes else up_mark
     parts = [
         f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
         *(_wings(inspection) if category == "Bird" else []),
@@ -177,15 +218,18 @@ def drafted(
         names[place] = names.get(place, 0) + 1
         name = place if names[place] == 1 else f"{place} {names[place]}"
         slack = MARGIN * float(group.extent.max())
-        box = f"[{_numbers(group.low - slack)}, {_numbers(group.high + slack)}]"
+        box = f"[{numbers(group.low - slack, size)}, {numbers(group.high + slack, size)}]"
         turn = f", sense: {sense}" * (kind == "rotor")
+        axis = turning_axis(group, "xyz".index(inspection.up[-1]), inspection.low, inspection.high)
+        if kind == "rotor" and axis != int(group.extent.argmin()):
+            turn = f", axis: {np.eye(3)[axis].astype(int).tolist()}{turn}"
         parts.append(f"    {name}: {{kind: {kind}, region: {{box: {box}, whole: true}}{turn}}}{CONFIRM}")
     about = [f"Drafted from {file}. Lengths are in metres along the file's axes.",
              "Confirm each line that is marked, then remove the mark."]  # fmt: skip
     settings = {
-        "unit": f"{inspection.unit}{CONFIRM * (inspection.unit_from == 'guessed from the size')}",
-        "up": f"{inspection.up}{marks['up']}", "front": f"{inspection.front}{marks['front']}",
+        "unit": f"{inspection.unit}{CONFIRM * inspection.unit_from.startswith('guessed')}",
+        "up": f"{inspection.up}{up_mark}", "front": f"{inspection.front}{inspection.front_from.comment}",
         "size_is": size_word(category, extent, hubs),
         "licence": "unknown  # the licence of the mesh",
-    }  # fmt: skip
+    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})  # fmt: skip
     return record_text(about, subtype, row, settings, parts)

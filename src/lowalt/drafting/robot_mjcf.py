@@ -7,8 +7,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from lowalt.drafting.guesses import TURNING
+from lowalt.drafting.robot_geometry import DEEPEST, Files, Robot, direction, numbers, place_of, primitive, shown
 from lowalt.numerics import portable
-from lowalt.targets.robot_geometry import DEEPEST, Files, Robot, direction, numbers, place_of, primitive, shown
 
 
 def _clear(values: dict[str, str]) -> bool:
@@ -99,7 +100,13 @@ class _Mjcf:
         childclass = element.get("childclass", childclass)
         here = portable.product(above, self.place(element.attrib))
         geoms = [self.values(geom, childclass) for geom in element.findall("geom")]
-        self.robot.surfaces[name] = [self.geom(values, here) for values in geoms]
+        self.robot.surfaces[name] = []
+        for values in geoms:
+            part = values.get("name", "")
+            owner = part if TURNING["rotor"].search(part) or TURNING["wheel"].search(part) else name
+            self.robot.surfaces.setdefault(owner, []).append(self.geom(values, here))
+            if owner != name:  # a geom that its name calls a rotor or a wheel is a link of its own, fixed to its body
+                self.robot.fixed.append((name, owner))
         joints = [self.values(joint, childclass) for joint in element.findall("joint")] if parent else []
         hinges = [values for values in joints if values.get("type", "hinge") == "hinge"]
         for values in hinges[-1:]:

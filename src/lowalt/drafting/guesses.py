@@ -14,11 +14,17 @@ from lowalt.targets.mesh_files import UNITS_M, Mesh, edges_of
 USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
 """Usual range (m) of the largest extent of a whole target, by category."""
 
+OTHER_SIZES_M = {"Vehicle": ((1.4, 2.7), (1.0, 4.0))}
+"""Usual ranges (m) of the two other extents, the larger first, where they have such ranges."""
+
 UNUSUAL = 20
-"""A target of a row of its own is at most so many times smaller or larger than that."""
+"""A target with its own table row may differ from USUAL_M by at most this factor."""
 
 ALIKE = 0.1
 """Pieces whose extents differ by at most this share are of one kind, such as the four propellers of a craft."""
+
+WIDE_ROTOR = 0.5
+"""A rotor wider than this share of the craft is no propeller of a plane but lifts a helicopter."""
 
 FLAT = 0.35
 """Largest thickness of a propeller divided by its length."""
@@ -33,6 +39,9 @@ blades have a quarter."""
 SYMMETRIC = 0.02
 """Mean distance of a mirrored body from itself, in parts of its size, up to which it is symmetric."""
 
+ASYMMETRIC = 0.01
+"""The same distance along the other level axis from which on a body has one mirror plane alone."""
+
 IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
 """A half ends in a plane: distances from it and from the file's zero in parts of the size (at most), and the rectangle
 that its edges there span in parts of that of the extents (at least), in the file's zero and where all are open."""
@@ -40,6 +49,9 @@ that its edges there span in parts of that of the extents (at least), in the fil
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
 """An arm's spread across by that along (at most), the cosine of its angle to the line from the craft's middle (at
 least), and where its inner end lies on that line, by where its own middle lies (at most)."""
+
+IN_LINE = 0.9
+"""Cosine between the line through two blades and the length of one (at least), where they belong to one rotor."""
 
 LONG = 0.75
 """Width of a blade by its length, as its box has them; a blade at 30 degrees to the axes has 0.6, a disc 1."""
@@ -58,6 +70,7 @@ TURNING = {
 }
 """Words in the names of joints and links, and of pieces of meshes, that say what a part is."""
 
+TAIL = re.compile(r"(?<![a-z])tail", re.I)
 FIXED = re.compile(r"(?<![a-z])(motor|mount|arm(?![a-z])|leg|skid|land|frame|guard|duct)", re.I)
 """Words in the names of pieces that do not turn."""
 
@@ -104,17 +117,26 @@ class Group(tuple[Component, ...]):
     middle = property(lambda self: sum(part.area * part.middle for part in self) / self.area)
 
 
-def guessed_unit(size: float, category: str, wanted_m: float | None = None) -> str:
-    """Return the unit of UNITS_M in which a largest extent of `size` (file units) is nearest to the target's.
+def guessed_unit(extents: np.ndarray, category: str, wanted_m: float | None = None) -> str:
+    """Return the unit of UNITS_M in which the extents (3,) of a file fit a target best.
 
-    wanted_m: the target's largest extent where it is known; by default the geometric mean of the category's USUAL_M.
-    The nearest unit u has the least |log(size u / m)|.
+    wanted_m: the target's largest extent where it is known. Otherwise the unit is chosen in which the extents exceed
+    the category's usual ranges least (sum of the logarithms of the factors), and of several such units the one whose
+    largest extent is nearest to the geometric mean of USUAL_M.
     """
-    usual = wanted_m or float(np.sqrt(np.prod(USUAL_M[category])))
-    return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
+    sizes, usual = np.sort(extents)[::-1], (USUAL_M[category], *OTHER_SIZES_M.get(category, ()))
+    middle = wanted_m or float(np.sqrt(np.prod(USUAL_M[category])))
+
+    def misfit(unit: str) -> tuple[float, float]:
+        """How far the extents lie outside their ranges, and the largest one from the middle."""
+        lengths = sizes * UNITS_M[unit]
+        outside = [max(low / size, size / high, 1.0) for size, (low, high) in zip(lengths, usual, strict=False)]
+        return 0.0 if wanted_m else float(np.log(outside).sum().round(6)), abs(np.log(lengths[0] / middle))
+
+    return min(UNITS_M, key=misfit)
 
 
-def _off_mirror(points: np.ndarray) -> np.ndarray:
+def off_mirror(points: np.ndarray) -> np.ndarray:
     """Mean distance (3,) of a body of points (N, 3) from its mirror image along each axis, in parts of its size."""
     tree, off = cKDTree(points), []
     for axis in range(3):
@@ -127,7 +149,7 @@ def _off_mirror(points: np.ndarray) -> np.ndarray:
 def mirror_axis(points: np.ndarray) -> int | None:
     """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
     cannot be seen: left and right of a bird."""
-    off = _off_mirror(points)
+    off = off_mirror(points)
     best, second = np.sort(off)[:2]
     return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
 
@@ -140,7 +162,7 @@ def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
     """
     edges, _, uses = edges_of(mesh.faces)
     ends, extent = mesh.vertices[edges], np.ptp(mesh.vertices, axis=0)
-    off, size = _off_mirror(points), extent.max()
+    off, size = off_mirror(points), extent.max()
     for axis in axes:
         for limit in (mesh.vertices[:, axis].min(), mesh.vertices[:, axis].max()):
             there = (np.abs(ends[:, :, axis] - limit) < IN_PLANE * size).all(axis=1)
@@ -169,7 +191,7 @@ def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right
     return "xyz"[order[0]], "xyz"[front]
 
 
-def _alike(first: Component | Group, second: Component | Group) -> bool:
+def alike(first: Component | Group, second: Component | Group) -> bool:
     """Return whether two have the same three sizes in any order, to within ALIKE, or as many triangles and as large a
     surface: propellers at other angles have other boxes."""
     a, b, areas = np.sort(first.extent), np.sort(second.extent), (first.area, second.area)
@@ -181,12 +203,17 @@ def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bo
     """Return whether two components turn about one hub: one lies about the middle of the other, as a spinner does, and
     they are no pair of coaxial rotors. `touching`: whether long blades that touch, not discs, are of one rotor too."""
     away, radius = np.abs(first.centre - second.centre), max(first.extent.max(), second.extent.max()) / 2
-    same = _alike(first, second)
+    same = alike(first, second)
     if same and away[up] > 2 * max(first.extent[up], second.extent[up]):
         return False
     slack = TOUCH * 2 * radius
     near = bool((np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack).all())
     long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (first, second))
+    # Two slender blades in one line, nearer than their length, whatever their angle to the axes of the file.
+    between, length = second.centre - first.centre, float(np.linalg.norm(first.extent))
+    in_line = abs(float(between @ first.along)) > IN_LINE * float(np.linalg.norm(between))
+    if same and in_line and max(first.slender, second.slender) < SLENDER and np.linalg.norm(between) < length:
+        return True
     away[up] = 0
     return near and (float(np.linalg.norm(away)) <= radius / 2 or (touching and same and long))
 
@@ -213,6 +240,22 @@ def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
     return False
 
 
+def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
+    """Return the axis of the file about which a rotor or wheel turns: the one along which it is thinnest.
+
+    Two blades may be thinner along their chord, which a helicopter tells: a rotor wider than half the craft, whose
+    corners are `low` and `high` (3,) m, turns about the axis `up`; a tail rotor's axis is level and across the tail.
+    """
+    order, extent = np.argsort(group.extent, kind="stable"), high - low
+    if up in order[:2] and group.extent.max() > WIDE_ROTOR * extent.max():
+        return up
+    if TAIL.search(group[0].piece):
+        away = np.abs(group.centre - (low + high) / 2)
+        across = min((axis for axis in range(3) if axis != up), key=lambda axis: away[axis])
+        return across if across in order[:2] else int(order[0])
+    return int(order[0])
+
+
 def rotors(
     parts: Sequence[Component], ups: Sequence[int], whole: np.ndarray, count: int | None
 ) -> tuple[int, list[Group]]:
@@ -234,9 +277,9 @@ def rotors(
         flat = [part for part, width in zip(able, across, strict=True)
                 if part.extent[up] < FLAT * width and width > 0.04 * whole.max()]  # fmt: skip
         sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in _grouped(flat, up, count)]
-        alike = _alike_set(sets, up, whole, count)
-        if len(alike) > 2:
-            return up, alike
+        best = _alike_set(sets, up, whole, count)
+        if len(best) > 2:
+            return up, best
     return ups[0], []
 
 
@@ -246,7 +289,7 @@ def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[lis
     # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
     ways = [clusters(parts, up, touching=not count)]
     for index, part in enumerate(parts if count else ()):
-        same = [other for other in parts if _alike(part, other)]
+        same = [other for other in parts if alike(part, other)]
         blades, odd = divmod(len(same), count)
         if odd or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
             continue
@@ -263,14 +306,14 @@ def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: in
     best: tuple[float, list[Group]] = (0.0, [])
     for groups in choices:
         for group in groups:
-            same = [other for other in groups if _alike(group, other)]
+            same = [other for other in groups if alike(group, other)]
             level = [other for other in same if abs(other.centre[up] - group.centre[up]) < 0.1 * whole.max()]
-            for alike in (level, same) if count else (level,):
-                away = np.delete(np.array([member.centre for member in alike]), up, axis=1)
+            for able in (level, same) if count else (level,):
+                away = np.delete(np.array([member.centre for member in able]), up, axis=1)
                 reach = np.linalg.norm(away - away.mean(axis=0), axis=1)
-                enough = len(alike) == count if count else len(alike) >= 2
-                if enough and reach.mean() > best[0] and not _are_arms(alike, up):
-                    best = float(reach.mean()), alike
+                enough = len(able) == count if count else len(able) >= 2
+                if enough and reach.mean() > best[0] and not _are_arms(able, up):
+                    best = float(reach.mean()), able
     return best[1]
 
 
@@ -294,7 +337,7 @@ def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
     if len(groups) >= 2:
         return groups
     able = [Group([part]) for part in parts if _round(part.extent, whole)]
-    best = max(([other for other in able if _alike(group, other)] for group in able), key=len, default=[])
+    best = max(([other for other in able if alike(group, other)] for group in able), key=len, default=[])
     return best if len(best) >= 2 else []
 
 
