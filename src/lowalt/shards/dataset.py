@@ -19,7 +19,7 @@ from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
 from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
 from lowalt.config.splits import FOLDS, fold
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.drawing import region_polygon
@@ -158,7 +158,7 @@ class Dataset:
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
         chosen = [self.published[name] for group in self.groups for name in self.plan.groups[group]]
         if folds := self.maker.network.folding(chosen):
-            warnings.warn(folds, stacklevel=2)
+            warnings.warn(folds, InputWarning, stacklevel=2)
 
     @functools.cached_property
     def _numbers(self) -> np.ndarray | None:
