@@ -21,7 +21,7 @@ def orders_of(argument: float, error: float) -> int:
     From an order above the argument on, each Bessel function is below half the one before it.
     """
     order = int(argument) + 1
-    while 4.0 * abs(jv(order, argument)) > error:
+    while 4.0 * abs(float(jv(order, argument))) > error:
         order += 1
     return order
 
@@ -87,7 +87,7 @@ def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.n
     """
     middle, half = 0.5 * (places.max() + places.min()), max(0.5 * float(np.ptp(places)), 1e-12)
     for count in (8, 16, 32, 64) if places.size > 256 else ():
-        terms = chebyshev.chebinterpolate(lambda x: function(middle + half * x).astype(np.complex128), count - 1)
+        terms = chebyshev.chebinterpolate(lambda x: function(middle + half * x).astype(np.complex128), count - 1)  # type: ignore[type-var]
         if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
             out = np.empty(places.shape, np.complex128)
             _summed(((places - middle) / half).ravel(), terms, np.empty((4, STRIP)), out.reshape(-1))

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,7 @@ class RawEcho:
     snr_db: float
     unit: str = "sqrt(W)"
 
-    def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.values, dtype, copy=copy)
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -176,7 +177,7 @@ def write(echo: RawEcho, path: Path) -> list[Path]:
     """Write an echo's arrays by name as `path`.npz and, where h5py is installed, as `path`.h5; return the files."""
     written = [path.with_name(f"{path.name}.npz")]
     with replacing(written[0]) as temporary:
-        np.savez(temporary, **echo.arrays())
+        np.savez(temporary, **echo.arrays())  # type: ignore[arg-type]
     try:
         import h5py
     except ImportError:
