@@ -192,6 +192,19 @@ def test_confusion_counts_samples_over_the_seeds(run):
                 )
 
 
+def test_confusion_by_snr_counts_the_samples_of_each_snr_alone(run):
+    found = by_key(run.table("confusion_by_snr"), "snr_db", "category", "predicted")
+    assert len(found) == 4 * 16 * len(SNRS)
+    for protocol, scheme in run.rows:
+        rows = [row for rows in part(run, protocol, scheme) for row in rows]
+        for snr in SNRS:
+            for true, category in enumerate(CATEGORIES):
+                for guess, predicted in enumerate(CATEGORIES):
+                    counted = sum((row["label"], row["guess"], row["snr"]) == (true, guess, snr) for row in rows)
+                    level = found[protocol, scheme, f"{float(snr):g}", category, predicted]
+                    assert int(level["samples"]) == counted
+
+
 def test_subtypes_have_their_class_and_accuracy_the_worst_of_a_class_first(run):
     found = by_key(run.table("subtypes"), "category", "subtype")
     wanted = {}
