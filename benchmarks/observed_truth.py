@@ -29,7 +29,8 @@ from lowalt.tiles.cubes import Cubes
 
 COLUMNS = ("scene", "waveform", "symbols", "looks", "cells", "bins", "geometric_cells", "geometric_bins")
 OTHERS = (
-    "scatter", "heard", "companions", "paths", "routes", "visible", "cross_sections", "process", "choose",
+    "scatter", "heard", "companions", "paths", "routes", "visible", "visible_one_way", "cross_sections", "filtered",
+    "choose",
 )  # fmt: skip
 """Functions of the effects that add other echoes, change the target's amplitude, or act behind the receiver."""
 NOISE = ("receiver_noise", "cell_noise", "phase_noise", "transmit_leakage")
@@ -74,7 +75,7 @@ def point() -> Cloud:
     return Cloud(
         points=np.zeros((1, 3)), part=np.zeros(1, int), kinds=("body",), names=("body",), parents=np.array([-1]),
         hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(1),
-        record={"subtype": "Point", "category": "UAV", "source": "", "checksum": ""},
+        record={"subtype": "Point", "category": "UAV", "source": "", "checksum": "", "published": {"size_m": 0.4}},
     )  # fmt: skip
 
 

@@ -44,7 +44,7 @@ def findings(root: Path, path: Path, models: int, category: str | None = None) -
 
 
 def rows(name: str, found: list[Finding]) -> list[list]:
-    """Return the table's rows of one scene, one a class."""
+    """Return the table's rows of one scene, one per class."""
     result = []
     for category in dict.fromkeys(each.category for each in found):
         mine = [each for each in found if each.category == category]

@@ -15,7 +15,7 @@ from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.table import COLUMNS, read_table
 from lowalt.recognition import checkpoint, freeze, schemes
-from lowalt.recognition.one_sample import images_of
+from lowalt.recognition.predict_sample import images_of
 from lowalt.recordings.files import read
 from lowalt.recordings.record import Record
 from lowalt.shards.sample_table import SAMPLE, map_samples

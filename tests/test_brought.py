@@ -17,7 +17,7 @@ from lowalt.__main__ import main
 from lowalt.config.layers import merge, overlaid
 from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import checkpoint, model_file, one_call, runs, samples, zoo
+from lowalt.recognition import checkpoint, model_file, runs, samples, train_evaluate, zoo
 from lowalt.recognition.__main__ import main as recognition
 from lowalt.shards import ShardSet, index
 from lowalt.shards.build import write_run
@@ -77,7 +77,7 @@ def line_of(call, *given):
 
 @pytest.mark.parametrize("part", ["model", "input"])
 def test_a_model_file_with_a_damaged_setting_is_refused_in_one_line_or_answers_the_same(part, signals, tmp_path):
-    from lowalt.recognition.one_sample import predict
+    from lowalt.recognition.predict_sample import predict
 
     content, path = model_file.read(zoo.ZOO / "default-seen.safetensors"), tmp_path / "a.safetensors"
 
@@ -179,7 +179,7 @@ def test_an_identity_that_is_no_json_object_is_refused(identity, trained, tmp_pa
 
 
 def test_a_run_names_no_code_and_its_caller_may(tmp_path, monkeypatch):
-    from test_recognition_one_call import CHANGES
+    from test_recognition_train_evaluate import CHANGES
 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "code.py").write_text(RUNS)
@@ -188,7 +188,7 @@ def test_a_run_names_no_code_and_its_caller_may(tmp_path, monkeypatch):
     (tmp_path / "run/shards").mkdir(parents=True)
     (tmp_path / "run/config.yaml").write_text(yaml.safe_dump(config))
     (tmp_path / "run/shards/index.json").write_text("{}")
-    monkeypatch.setattr(one_call, "ShardSet", lambda index: SimpleNamespace(classes=("UAV", "Bird")))
+    monkeypatch.setattr(train_evaluate, "ShardSet", lambda index: SimpleNamespace(classes=("UAV", "Bird")))
     with pytest.raises(InputError, match=r"^run: its backbone 'code\.py:run' is code, which a file may not choose"):
         lowalt.train("run", "A:VT", "seen")
     del config["recognition"]

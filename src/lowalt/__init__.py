@@ -10,7 +10,7 @@ __version__ = "0.2.0"
 
 _HOMES = {
     "Dataset": "shards.dataset", "Endless": "shards.dataset", "RawEcho": "shards.receive",
-    "evaluate": "recognition.one_call", "receive": "shards.receive", "train": "recognition.one_call",
+    "evaluate": "recognition.train_evaluate", "receive": "shards.receive", "train": "recognition.train_evaluate",
 }  # fmt: skip
 __all__ = sorted(_HOMES)
 

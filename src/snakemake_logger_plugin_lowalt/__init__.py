@@ -1,4 +1,4 @@
-"""Snakemake's log as one line a stage: `snakemake --logger lowalt`, as the profiles of this project ask.
+"""Snakemake's log as one line per stage: `snakemake --logger lowalt`, as the profiles of this project ask.
 
 On a terminal the lines of the stages that run are drawn anew in place; in a log each stage has a line when it starts,
 every half minute and when it ends. Everything else is in files: Snakemake's own log, whose path it prints at the end,

@@ -19,7 +19,7 @@ from lowalt.commands.command_table import COMMANDS
 from lowalt.config.layers import load, load_yaml, plain
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.shipped import located
-from lowalt.recognition import one_sample, runs
+from lowalt.recognition import predict_sample, runs
 from lowalt.report.figures.tile_axes import axes_of
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
@@ -211,7 +211,7 @@ def test_predict_names_the_classes_by_their_probability(tmp_path, capsys):
     assert main([*line, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     settings = {key: CONFIG[key] for key in ("network", "spectra", "images")}
-    assert found == one_sample.predict(runs.load(trained / "model.pt"), tmp_path / "a.npy", settings)
+    assert found == predict_sample.predict(runs.load(trained / "model.pt"), tmp_path / "a.npy", settings)
     assert main(line) == 0
     shown = [text.split()[-1] for text in capsys.readouterr().out.splitlines()]
     assert shown == sorted(found, key=found.get, reverse=True)

@@ -73,6 +73,7 @@ def test_a_mirror_plane_and_long_sides_are_guesses_and_without_any_evidence_the_
     assert (bus.axis, bus.sure, bus.words) == ("y", False, "the long axis")
     wing = front_of(shape(points=BOX * [1, 3, 2]), None, None, "z")
     assert (wing.axis, wing.sure, wing.words) == ("x", False, "the span")
+    assert front_of(shape(points=BOX * [3, 1, 2]), None, "x", "y").axis == "x"  # the convention outweighs a span
     none = front_of(shape(), None, "x", "y")
     assert (none.axis, none.sure) == ("x", False) and "no part tells" in none.comment
     assert front_of(shape(), "-y", "x", "x").comment == ""

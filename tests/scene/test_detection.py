@@ -7,8 +7,8 @@ from scipy.stats import beta
 
 from lowalt.numerics.streams import stream
 from lowalt.scene import set_noise
-from lowalt.scene.effects.channel.windblown import windblown
 from lowalt.scene.effects.detection import canceller, cell_error, detector
+from lowalt.scene.laws.windblown import windblown
 from lowalt.scene.waveform import Look
 from scenes import A, network
 

@@ -17,7 +17,7 @@ from lowalt.scene.effects.receiver import (
     timing_offset,
     transmit_leakage,
 )
-from lowalt.scene.effects.receiver.offsets import of_stations
+from lowalt.scene.laws.offsets import of_stations
 from scenes import A, B, link, linked, network
 
 

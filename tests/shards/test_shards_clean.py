@@ -12,7 +12,7 @@ from test_shards_card import CONFIG
 from dataset import SEED, SNRS, build
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
 from lowalt.shards.card import main as card

@@ -133,7 +133,7 @@ def _texts() -> list[Reader]:
     from lowalt.files.csv_tables import read_csv
     from lowalt.files.yaml_files import load_yaml
     from lowalt.motion import read_table, write_table
-    from lowalt.recognition import freeze, orderings, schemes
+    from lowalt.recognition import freeze, paper_claims, schemes
     from lowalt.recordings.record import read_record
     from lowalt.recordings.twin import radars
     from lowalt.shards import manifest
@@ -165,7 +165,7 @@ def _texts() -> list[Reader]:
         Reader("table of targets", "a.csv", table, load_table),
         Reader("schemes", "a.csv", Path("config/schemes.csv").read_bytes(), lambda p: schemes.read(p, "ABC")),
         Reader("published accuracies", "a.csv", Path("config/published_accuracy.csv").read_bytes(),
-               orderings.read_published),
+               paper_claims.read_published),
         Reader("table", "a.csv", Path("config/cost/accuracy.csv").read_bytes(), read_csv),
         Reader("motion table", "a.csv", _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
                read_table),
@@ -204,7 +204,7 @@ def _arrays() -> list[Reader]:
 
     from lowalt.files.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
-    from lowalt.recognition.one_sample import images_of
+    from lowalt.recognition.predict_sample import images_of
     from lowalt.shards import sample_table
     from lowalt.shards.index import load as load_index
     from lowalt.shards.sample_table import map_samples, read_header

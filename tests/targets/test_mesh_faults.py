@@ -33,6 +33,7 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
         ("bytes.dae", bytes(range(256)) * 4, "no triangle|not a readable"),
         ("mesh.fbx", b"Kaydara FBX", "format '.fbx', expected one of"),
         ("gone.stl", None, "no file"),
+        ("cut.stl", bytes(80) + (60).to_bytes(4, "little") + bytes(50 * 10), "states 60 triangles .* ends after 10"),
     ],
 )
 def test_bad_files_are_refused_by_name_and_reason(name, text, reason, tmp_path):

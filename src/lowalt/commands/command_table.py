@@ -1,6 +1,6 @@
 """The commands of `lowalt`: the module of each, what it does in one line, and an example.
 
-A command line imports the module of its own command only, so `lowalt --help` needs none of them.
+Only the module of the given command is imported, so `lowalt --help` imports none.
 """
 
 from typing import NamedTuple
@@ -25,8 +25,10 @@ COMMANDS = {
                      "lowalt predict default-seen sample.npy"),
     "explain": Entry("explain", "say whether a scene's receiver finds its targets, and what each effect changes",
                      "lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml"),
-    "target": Entry("target", "your own mesh or recording: look, draft a record, make its cloud",
+    "target": Entry("target", "your own mesh or robot: look, draft a record, make its cloud",
                     "lowalt target inspect inputs/mydrone.stl"),
+    "recording": Entry("recording", "a recording of your own radar: look, draft its record, train a recogniser",
+                       "lowalt recording inspect walk.bin --carrier 24e9 --rate 12000"),
     "spectra": Entry("spectra", "the spectra of a configuration, and the time an image of each takes",
                      "lowalt spectra config/tiny.yaml"),
     "verify": Entry("data", "check every byte of a data set", f"lowalt verify {_INDEX}"),

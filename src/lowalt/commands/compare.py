@@ -21,7 +21,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
-    """Yield (dotted key, value) of everything in nested mappings that is no mapping, or is an empty one."""
+    """Yield (dotted key, value) for all values in nested mappings that are not mappings or are empty."""
     for key, value in block.items():
         if isinstance(value, dict) and value:
             yield from leaves(value, f"{where}{key}.")
@@ -52,8 +52,8 @@ def facts(folder: Path) -> dict[str, dict]:
 
 
 def compared(*folders: Path) -> dict[str, dict[str, tuple]]:
-    """Return {part: {name: (value of the first run, value of the second)}}: of the configuration only what differs, of
-    the parts MEASURED everything. None stands where a run has none.
+    """Return {part: {name: (value of the first run, value of the second)}}: only differences of the configuration, and
+    everything in the parts MEASURED. A missing value is None.
 
     Raises: InputError naming the folder that is no run's.
     """
@@ -72,7 +72,7 @@ def _cell(value: object) -> str:
 
 
 def _change(part: str, first: object, second: object) -> str:
-    """The difference of two measured numbers; of times and sizes as a share of the first too."""
+    """The difference of two measured numbers; for times and sizes also relative to the first."""
     if part not in MEASURED or None in (first, second):
         return ""
     share = f" ({second / first - 1:+.1%})" if part != "accuracy_percent" and first else ""

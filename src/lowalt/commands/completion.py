@@ -1,4 +1,4 @@
-"""The command `lowalt completion`: a script by which a shell completes commands, options and files."""
+"""The command `lowalt completion`: a shell script for tab completion of commands, options and files."""
 
 import argparse
 from collections.abc import Iterator

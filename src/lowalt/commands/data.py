@@ -20,17 +20,17 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 
 def _checked(lines: list[str], good: str) -> Answer:
-    """The faults that were found, one a line, or that all is good."""
+    """The faults, one per line, or a line that there is none."""
     return Answer({"good": not lines, "faults": lines}, "\n".join(lines) or good, int(bool(lines)))
 
 
 def _index(text: str) -> Path:
-    """The index that a command line names; behind a link to it alone, the one whose shards stand next to it."""
+    """The index that a command line names; a link to the index alone is resolved, to find the shards next to it."""
     return Path(text).resolve() if Path(text).is_symlink() else Path(text)
 
 
 def verified(options: argparse.Namespace) -> Answer:
-    """Check a data set, and make samples again where it has no fault. Raises: InputError where there is no index."""
+    """Check a data set and, if it has no fault, remake samples. Raises: InputError where there is no index."""
     from lowalt.shards.remake import opened, some
 
     lines = list(faults(options.index))

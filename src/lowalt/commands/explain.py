@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def _size(config: dict, inputs: Path | None) -> dict:
-    """What the data set of a scene takes where its shards are cubes, else nothing."""
+    """The size of a scene's data set if its shards are cubes, else an empty text."""
     if config["shards"]["kind"] != "cube":
         return {}
     records = records_of(config["targets"], inputs)
@@ -103,7 +103,7 @@ def _shown(config: dict, stations: list[str], model: Path | None) -> Callable[[n
     seen = dataclasses.replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
     if model is not None:
-        from lowalt.recognition.one_sample import answer
+        from lowalt.recognition.predict_sample import answer
         from lowalt.recognition.zoo import opened
         from lowalt.tiles import split
 

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> Answer:
     config = overlaid(options.overlay) if options.overlay else {}
     # What can be refused without torch has been refused: it takes seconds to import.
     print("lowalt predict: loading the network", file=sys.stderr, flush=True)
-    from lowalt.recognition.one_sample import predict
+    from lowalt.recognition.predict_sample import predict
     from lowalt.recognition.zoo import opened
 
     own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")
@@ -75,15 +75,16 @@ def _recording(model: "Trained", settings: dict, record: "Record", options: argp
 
     heard = answers(model, settings, record, str(options.input))
     names = np.array(model.classes)[heard.probabilities.argmax(1)]
-    rows = list(zip(heard.starts_s.tolist(), heard.present.tolist(), names, heard.probabilities.tolist(), strict=True))
+    facts = zip(heard.starts_s.tolist(), heard.present.tolist(), heard.clipped.tolist(), heard.beyond_mps.tolist(),
+                names, heard.probabilities.tolist(), strict=True)  # fmt: skip
     windows = [
-        {"start_s": start, "target": target, "class": str(name), **dict(zip(model.classes, shares, strict=True))}
-        for start, target, name, shares in rows
-    ]
-    lines = [
-        f"{start:8.2f} s  " + (f"{100 * max(shares):6.2f} %  {name}" if target else "no target")
-        for start, target, name, shares in rows
-    ]
+        {"start_s": start, "target": target, "clipped": clipped, "beyond_mps": None if beyond != beyond else beyond,
+         "class": str(name), **dict(zip(model.classes, shares, strict=True))}
+        for start, target, clipped, beyond, name, shares in facts
+    ]  # fmt: skip
+    lines = [f"{start:8.2f} s  {heard.words(number, model.classes)}" for number, start in enumerate(heard.starts_s)]
     counts = [f"{category} {int((names[heard.present] == category).sum())}" for category in model.classes]
     last = f"{heard.present.sum()} of {len(names)} windows hold a target: {', '.join(counts)}"
+    if not heard.present.any():
+        last = f"nothing there: none of {len(names)} windows holds a target that this network could know"
     return Answer(windows, "\n".join([*lines, last]))

@@ -1,4 +1,4 @@
-"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two of them."""
+"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two."""
 
 import argparse
 import tempfile
@@ -10,7 +10,7 @@ from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
 from lowalt.config.layers import SCHEMA, check, of_run
-from lowalt.config.named_code import allowed
+from lowalt.config.named_code import allowed, refuse_effects
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def page(options: argparse.Namespace) -> Answer:
-    """Let the workflow make the page of a run, with all that it needs and that is not there or no longer current.
+    """Let the workflow make the page of a run, and all its inputs that are missing or outdated.
 
     Raises: InputError where the folder holds no run.
     """
@@ -70,7 +70,8 @@ def page(options: argparse.Namespace) -> Answer:
 
 def _refuse_code(config: dict, folder: Path) -> None:
     """Refuse a run whose configuration, or whose table of schemes, names code that the workflow would run."""
-    block = located(check(config, shipped(SCHEMA)))["recognition"]
+    refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
+    block = located(config)["recognition"]
     how = f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
     for name in (block["network"]["backbone"], *(row["backbone"] for row in read_csv(block["table"], "backbone"))):
         allowed(name, "", folder, how)

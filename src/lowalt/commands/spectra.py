@@ -1,4 +1,4 @@
-"""The action `lowalt spectra`: a configuration's spectra, their settings and sources, and the time of an image."""
+"""The command `lowalt spectra`: a configuration's spectra, their settings and sources, and the time per image."""
 
 import argparse
 import functools
@@ -31,7 +31,7 @@ def facts(config: dict) -> list[dict]:
     symbols = renderer.network.symbols
     signal = normalised(np.exp(0.1j * np.arange(symbols) ** 1.5).astype(np.complex64))
     if renderer.spectra.times == "known":
-        # A look without gaps would take the time of even symbols.
+        # Use a look with gaps: without gaps the kernels for evenly spaced symbols would be timed.
         signal[3::4] = 0
     image = np.empty((renderer.images.size, renderer.images.size), np.uint8)
     still, no_truth = np.zeros(symbols, np.int64), np.zeros((symbols, 0))

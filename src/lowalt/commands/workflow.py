@@ -1,4 +1,4 @@
-"""The commands `lowalt run` and `lowalt status`: Snakemake underneath, in the same folders and files."""
+"""The commands `lowalt run` and `lowalt status`, which call Snakemake in the same folders and files."""
 
 import argparse
 import json
@@ -53,7 +53,7 @@ def command(options: argparse.Namespace) -> list[str]:
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
     if options.cores not in (None, "all") and not (options.cores.isdecimal() and int(options.cores)):
         raise InputError(f"--cores {options.cores!r}, expected a whole number of at least 1, or all")
-    # A profile that is not there is no error to Snakemake: the run would go on without it.
+    # Snakemake would silently ignore a missing profile.
     if options.profile and not any(options.profile.glob("config*.yaml")):
         raise InputError(f"--profile {options.profile}: no config.yaml there, expected a folder such as profiles/slurm")
     cores = options.cores or (None if options.profile else "all")

@@ -1,7 +1,7 @@
-"""Parts of all stages' command lines: the argument with the settings, errors in one line, the peak memory.
+"""Common parts of the stages' command lines: the settings argument, one-line errors, and peak memory.
 
 A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings @file.json`.
-The workflow passes the object itself, so that Snakemake sees every change in it; a person passes a file.
+The workflow passes the object itself, so that Snakemake notices every change; users usually pass a file.
 """
 
 import argparse
@@ -22,9 +22,9 @@ from lowalt.machine.memory import keep_freed_memory
 
 
 def exit_status(code: int) -> int:
-    """Return the status of an ended process as shells give it: 128 and the signal's number where a signal ended it.
+    """Return the exit status of a process as a shell reports it: 128 + signal number if a signal ended it.
 
-    code: as `subprocess` gives it, a signal's number negative.
+    code: return code of `subprocess`, negative for a signal.
     """
     return code if code >= 0 else 128 - code
 
@@ -44,7 +44,7 @@ def name_backbone(line: argparse.ArgumentParser) -> None:
 
 
 def _argument(text: str) -> dict:
-    """Return `settings` of the text and keep its error message: argparse replaces the message of any ValueError."""
+    """Return `settings` of the text but keep its error message, which argparse would replace for a ValueError."""
     try:
         return settings(text)
     except InputError as error:
@@ -86,14 +86,14 @@ def dispatch(module: str, commands: Mapping[str, Callable[[list[str]], None]], a
 
 
 REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
-"""Errors of the operating system that a path given by the user causes, such as a folder that may only be read."""
+"""Operating system errors caused by a path of the user, such as a read-only folder."""
 
 
 def refusal(error: InputError | OSError) -> str:
-    """Return the sentence of a refusal, of bounded length: of an InputError its own, of the operating system's that on
-    the path it refuses.
+    """Return the message of a refusal, of bounded length: that of an InputError, or one about the path in an error of
+    the operating system.
 
-    Raises: the error itself for any other one.
+    Raises: any other error unchanged.
     """
     if isinstance(error, InputError):
         return str(error)
@@ -104,7 +104,7 @@ def refusal(error: InputError | OSError) -> str:
 
 @contextlib.contextmanager
 def refusing() -> Iterator[None]:
-    """Turn an InputError, or a path that the operating system refuses, into one line and exit status 2."""
+    """Turn an InputError, or an operating system error about a path, into one line and exit status 2."""
     try:
         yield
     except (InputError, OSError) as error:
@@ -113,8 +113,7 @@ def refusing() -> Iterator[None]:
 
 
 class Refusing:
-    """An object whose methods answer as `refusing` says: Snakemake would show what a rule's function raises as a
-    traceback."""
+    """Wraps an object so that its methods handle errors as `refusing` does; Snakemake would print tracebacks."""
 
     def __init__(self, held: object) -> None:
         """Take the object."""
@@ -127,7 +126,7 @@ class Refusing:
 
         @functools.wraps(held)
         def asked(*given: Any, **named: Any) -> Any:
-            """Answer, or end the process after one line."""
+            """Return the method's result, or exit after one line."""
             with refusing():
                 return held(*given, **named)
 

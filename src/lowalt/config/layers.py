@@ -1,9 +1,10 @@
-"""The configuration: merged from files, checked against the schema, cut into the stages' settings.
+"""The configuration: merges files and checks the result against the schema.
 
-This module does not depend on any stage. Faults are found before any job starts and named by key and value.
+This module does not depend on any stage. Errors are found before any job starts and name key and value.
 """
 
 import json
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -32,7 +33,7 @@ def merge(base: dict, overlay: dict) -> dict:
 
 
 def canonical(value: object) -> str:
-    """Return the one JSON text of a settings block: sorted keys, so equal settings are equal texts."""
+    """Return the canonical JSON text of a settings block: keys are sorted, so equal settings give equal texts."""
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
 
 
@@ -42,7 +43,7 @@ def _may_be_null(entry: dict) -> bool:
 
 
 def _without_nulls(block: object, schema: dict) -> None:
-    """Take the nulls out of a block, and the blocks in it, whose keys may be left out and hold no null."""
+    """Remove nulls from a block and its inner blocks, for optional keys whose schema does not allow null."""
     if isinstance(block, list):
         for item in block:
             _without_nulls(item, schema.get("items", {}))
@@ -52,7 +53,8 @@ def _without_nulls(block: object, schema: dict) -> None:
     for key, value in list(block.items()):
         if not isinstance(key, str):
             raise InputError(f"configuration: key {key!r} among {list(block)}, expected text: put it in quotes")
-        entry = known.get(key, further)
+        patterns = (entry for pattern, entry in schema.get("patternProperties", {}).items() if re.search(pattern, key))
+        entry = known.get(key, next(patterns, further))
         if not isinstance(entry, dict):
             continue
         if value is None and key not in needed and not _may_be_null(entry):
@@ -62,7 +64,7 @@ def _without_nulls(block: object, schema: dict) -> None:
 
 
 def _listed(lines: list[str]) -> str:
-    """The first faults, as many as a message holds, and the number of the others."""
+    """The first faults, as many as fit into a message, and the number of the others."""
     text = lines[0]
     for number, line in enumerate(lines[1:], 1):
         if len(text) + len(line) > LONGEST - 50:
@@ -72,7 +74,7 @@ def _listed(lines: list[str]) -> str:
 
 
 def _without_ofdm(network: dict) -> None:
-    """Take the embedded default's subcarriers out of a network whose waveform has none, and a waveform that is OFDM."""
+    """Remove the default's subcarriers from a network whose waveform has none, and a waveform block that says OFDM."""
     if network.get("waveform") == {"kind": "ofdm"}:
         del network["waveform"]
     elif "waveform" in network:
@@ -100,12 +102,12 @@ def _with_subcarriers(network: dict) -> None:
 
 
 def check(config: dict, schema_path: str | Path) -> dict:
-    """Return the configuration if it fits the schema, without nulls that take out what a lower layer has.
+    """Return the configuration if it fits the schema, without the nulls that remove keys of a lower layer.
 
-    A layer of configuration can only add keys to a mapping, so a null removes one that may be left out, such as a
-    station, a spectrum, a start or an effect. A number may be written 28e9. Where the waveform has no subcarriers,
-    those of the embedded default go; a bandwidth becomes a number of subcarriers.
-    The configuration is changed in place. Raises: InputError with one line a fault.
+    A layer can only add keys to a mapping. A null therefore removes an optional key, such as a station, a spectrum or
+    an effect. A number may be written 28e9. If the waveform has no subcarriers, those of the embedded default are
+    removed; a bandwidth becomes a number of subcarriers. The configuration is changed in place.
+    Raises: InputError with one line per fault.
     """
     schema = load_yaml(schema_path)
     _without_nulls(config, schema)
@@ -122,7 +124,7 @@ def check(config: dict, schema_path: str | Path) -> dict:
 def load(layers: Iterable[str | Path | dict], schema_path: str | Path) -> dict:
     """Return the checked configuration of a base file and its overlays, in order, each a path or a dict.
 
-    A file that the working directory lacks is taken from those that came with the package.
+    A file that is not in the working directory is taken from the package.
     Raises: InputError naming file, key and value.
 
         >>> config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
@@ -138,8 +140,8 @@ def load(layers: Iterable[str | Path | dict], schema_path: str | Path) -> dict:
 def of_run(folder: str | Path) -> dict:
     """Return the configuration in a run's folder, plain values only; it may be of an older schema.
 
-    The folder may be a stranger's, so that nothing in it may choose code (`named_code.allowed`).
-    Raises: InputError naming the folder that is no run's, or the file and the key that is wrong.
+    The folder is untrusted, so nothing in it may choose code (`named_code.allowed`).
+    Raises: InputError naming a folder that is not a run's, or the file and the wrong key.
     """
     path = Path(folder) / "config.yaml"
     if not path.is_file():

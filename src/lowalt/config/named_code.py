@@ -1,17 +1,36 @@
-"""Code that a setting names as FILE.py:FUNCTION: only the user may choose it, never a model, an index or a run."""
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py. Only the user may choose it, not a model,
+index or run."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from lowalt.files.errors import InputError
 
 
 def file_of(name: str) -> Path | None:
-    """Return the Python file of a backbone's name, None for a name of a library's model."""
+    """Return the Python file in a backbone's name, None for the name of a library's model."""
     path, colon, _ = name.rpartition(":")
     return Path(path) if colon and path.endswith(".py") else None
 
 
 BY_NAME = "`--backbone FILE.py:FUNCTION` (in Python `backbone=`) with code that you trust"
+
+
+def own_effects(effects: Iterable[str]) -> list[str]:
+    """Return those of the names of effects that are paths of the user's own Python files, sorted."""
+    return sorted(name for name in effects if name.endswith(".py"))
+
+
+def refuse_effects(effects: Iterable[str], where: str | Path) -> None:
+    """Refuse effects of the user's own in a file or folder `where` that may be a stranger's.
+
+    Raises: InputError naming the effect.
+    """
+    for name in own_effects(effects):
+        raise InputError(
+            f"{where}: its effect {name!r} is code, which a file may not choose; expected an overlay of your own that "
+            "names it"
+        )
 
 
 def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME) -> str:

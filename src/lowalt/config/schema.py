@@ -1,6 +1,6 @@
-"""Settings against a JSON schema, one sentence a fault; and the schema of all settings that a file brings.
+"""Checks settings against a JSON schema, with one sentence per fault; also settings in untrusted files.
 
-Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; `const: inf` takes an infinity as well;
+Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; `const: inf` also accepts an infinity;
 text that a pattern describes has no control characters, so that it can be printed.
 """
 
@@ -20,7 +20,7 @@ from lowalt.files.yaml_files import load_yaml
 
 BROUGHT = Path(__file__).with_name("brought.schema.yaml")
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
-"""A number in YAML 1.2; YAML 1.1, which the library and Snakemake read, takes 28e9 for a text."""
+"""A number in YAML 1.2. PyYAML and Snakemake read YAML 1.1, in which 28e9 is a text."""
 
 
 def _whole(checker: Any, value: object) -> bool:
@@ -34,7 +34,7 @@ def _number(checker: Any, value: object) -> bool:
 
 
 def _pattern(validator: Any, pattern: str, value: object, schema: dict) -> Iterator[jsonschema.ValidationError]:
-    """Refuse text that has control characters or is not as the pattern says."""
+    """Refuse text with control characters or that does not match the pattern."""
     if isinstance(value, str) and any(ord(sign) < 32 or ord(sign) == 127 for sign in value):
         yield jsonschema.ValidationError("control characters")
     yield from jsonschema.Draft202012Validator.VALIDATORS["pattern"](validator, pattern, value, schema)
@@ -74,7 +74,7 @@ def plain(value: object) -> object:
 
 
 def _innermost(errors: Iterable[Any]) -> Iterator[Any]:
-    """The errors that have no other ones behind them, such as those of each of several choices."""
+    """The innermost errors, such as those within each of several choices."""
     for error in errors:
         yield from _innermost(error.context) if error.context else (error,)
 
@@ -104,7 +104,7 @@ def _expected(error: Any) -> str:
     """Return the schema's expectation in words."""
     rule, wanted = error.validator, error.validator_value
     if rule == "oneOf":
-        # A number out of its range is told that; anything else, which types there are.
+        # For a number out of range state the range, otherwise the expected types.
         ranges = [choice for choice in error.context if choice.validator not in ("type", "const")]
         return _expected(ranges[0]) if ranges else " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
     if rule == "dependentRequired":
@@ -140,15 +140,15 @@ def _fault(error: Any) -> str:
 
 
 def faults(settings: object, schema: dict, whole: str = "configuration") -> list[str]:
-    """Return one line a fault of settings against a JSON schema: key, value and what was expected.
+    """Return one line per fault of settings against a JSON schema: key, value and what was expected.
 
-    whole: the word for all that is checked. Of the items of a list with the same fault, the first is named.
+    whole: name of the checked settings. If several items of a list have the same fault, the first is named.
     """
     lines: dict[tuple, str] = {}
     errors = Validator(schema).iter_errors(settings)
     for error in sorted(errors, key=lambda error: ([*map(str, error.absolute_path)], error.validator in COUNTS)):
         block = tuple(part for part in error.absolute_path if isinstance(part, str))
-        # Of a block with another fault, the number of its keys says nothing more.
+        # If a block has another fault, do not report its number of keys.
         if error.validator not in COUNTS or not any(other[:-1] == block for other in lines):
             key = ".".join(map(str, error.absolute_path)) or whole
             lines.setdefault((*block, error.validator), f"{key}: {_fault(error)}")
@@ -157,7 +157,7 @@ def faults(settings: object, schema: dict, whole: str = "configuration") -> list
 
 @functools.cache
 def _brought() -> dict:
-    """The schema of what files bring, with the configuration's own, from which it takes the blocks they share."""
+    """The schema of settings in files, together with the configuration's schema, with which it shares blocks."""
     return {**load_yaml(BROUGHT)["$defs"], "config": load_yaml(SHIPPED / "workflow/schemas/config.schema.yaml")}
 
 
@@ -167,7 +167,7 @@ def of_brought(part: str) -> dict:
 
 
 def check_brought(part: str, settings: object, where: str | Path) -> None:
-    """Refuse settings that a file brings, before anything is made of them.
+    """Refuse wrong settings of a file before they are used.
 
     part: a definition of `brought.schema.yaml`; where: the file.
     Raises: InputError naming the file, the first key that is wrong, its value and what was expected.

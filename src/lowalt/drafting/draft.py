@@ -17,7 +17,7 @@ from lowalt.numerics import portable
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND, body_axes
 
 MARGIN = 0.02
-"""A region reaches this share of its largest extent beyond the components that it shall take."""
+"""A region extends beyond its components by this share of their largest extent."""
 
 WINGS_ALIKE = 0.05
 """Largest mean distance of a bird's wings from their mirror image, in parts of its size."""
@@ -65,7 +65,7 @@ def _diagonal(hubs: np.ndarray) -> float:
 
 
 def size_word(category: str, extent: np.ndarray, hubs: np.ndarray) -> str:
-    """Return what the size of a target measures, as a record's `size_is` says it: a plane with motors has its span."""
+    """Return what the size of a target measures, as a word of the record's `size_is`: of a plane, its span."""
     if category == "UAV":
         return "motor diagonal" if 2 * _diagonal(hubs) > extent.max() else "largest extent"
     return ALL_AXES if category == "Vehicle" else "length"
@@ -90,7 +90,8 @@ def row_lines(
     near = min((row for row in table.values() if row["category"] == category),
                key=lambda row: abs(np.log(row[key] / sizes[key])))  # fmt: skip
     cells = {"category": category} | {name: float(f"{value:.4g}") for name, value in sizes.items() if value}
-    cells["n_rotors_or_wings"] = max(1, len(hubs)) if category != "Bird" else 2
+    if count := 2 if category == "Bird" else len(hubs):
+        cells["n_rotors_or_wings"] = count
     speeds = ("vx_abs_max", "vy_abs_max", "vz_abs_max") if category in AIRBORNE else ("speed_lo", "speed_hi")
     cells |= {name: near[name] for name in ("wheel_diam_m", "freq_lo_hz", "freq_hi_hz", *speeds)
               if near[name] is not None and name not in cells}  # fmt: skip
@@ -99,7 +100,7 @@ def row_lines(
 
 
 def _wings(inspection: Inspection) -> list[str]:
-    """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle.
+    """Return the lines of two wings without elbows. Each begins at `shoulder_m`; its hinge is the middle of its root.
 
     Raises: InputError where the two sides do not mirror one another.
     """
@@ -156,8 +157,8 @@ def mirrored(groups: list[Group]) -> bool:
 
 
 def refuse_miscount(inspection: Inspection, groups: list[Group], count: int | None, picture: str) -> None:
-    """Refuse a target whose rotors or wheels are not as many as they should be; where that is not known, names must
-    tell them.
+    """Refuse a target whose number of rotors or wheels is wrong. Where the number is not known, names must tell it, or
+    the parts must mirror one another.
 
     Raises: InputError naming what was found, the numbered picture and the option to write.
     """

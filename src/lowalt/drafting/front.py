@@ -24,6 +24,7 @@ LONG_CAR, LONG_WING = 1.2, 1.5
 """Least ratio of the level extents that tells the length of a vehicle, and the span of a plane without lift rotors."""
 
 NOTHING_TELLS = "no part tells"
+SPAN = "the span"
 MOST_POINTS = 4000
 """Most points whose mirror image is searched for."""
 
@@ -182,7 +183,7 @@ def evidence(shape: Shape) -> list[Evidence]:
         found.append(Evidence("the long axis", long, strong=False))
     lifting = any(abs(part.axis @ shape.up) > LEVEL for part in shape.turning)
     if shape.category == "UAV" and not lifting and ratio > LONG_WING:
-        found.append(Evidence("the span", short, strong=False))
+        found.append(Evidence(SPAN, short, strong=False))
     return sorted(found, key=lambda item: not item.strong)
 
 
@@ -207,6 +208,8 @@ def front_of(shape: Shape, given: str | None, usual: str | None, otherwise: str)
     if given:
         _refuse_given(given, found)
         return Front(given, "", True)
+    if usual:  # long sides alone do not outweigh the convention
+        found = [item for item in found if item.words != SPAN or "xyz"[item.axis] == usual[-1]]
     strong = [item for item in found if item.strong]
     ways = {_axis(item.axis, item.sign): item for item in strong if item.sign}
     axes = {item.axis: item for item in strong}

@@ -21,7 +21,7 @@ UNUSUAL = 20
 """A target with its own table row may differ from USUAL_M by at most this factor."""
 
 ALIKE = 0.1
-"""Pieces whose extents differ by at most this share are of one kind, such as the four propellers of a craft."""
+"""Two pieces are alike if their extents differ by at most this share, as the four propellers of a craft do."""
 
 WIDE_ROTOR = 0.5
 """A rotor wider than this share of the craft is no propeller of a plane but lifts a helicopter."""
@@ -30,34 +30,35 @@ FLAT = 0.35
 """Largest thickness of a propeller divided by its length."""
 
 SMALLEST_ROTOR = 0.15
-"""A rotor is at least so wide across, in parts of the craft's largest extent: screws and motor caps are not."""
+"""Least width of a rotor as a share of the craft's largest extent; screws and motor caps are smaller."""
 
 OFF_CENTRE = 0.3
-"""A rotor's surface lies about its hub: its middle is at most this share of its radius from that of its box; three
-blades have a quarter."""
+"""Largest distance between the centroid of a rotor's surface and the centre of its bounding box, as a share of its
+radius. Three blades have 0.25."""
 
 SYMMETRIC = 0.02
-"""Mean distance of a mirrored body from itself, in parts of its size, up to which it is symmetric."""
+"""A body is symmetric if the mean distance from its mirror image is at most this share of its size."""
 
 ASYMMETRIC = 0.01
-"""The same distance along the other level axis from which on a body has one mirror plane alone."""
+"""A body has only one mirror plane if this distance is at least this share along the other level axis."""
 
 IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
-"""A half ends in a plane: distances from it and from the file's zero in parts of the size (at most), and the rectangle
-that its edges there span in parts of that of the extents (at least), in the file's zero and where all are open."""
+"""One half of a target ends in a plane. IN_PLANE is the largest distance of its end points from that plane, AT_ZERO
+that of the plane from the origin of the file, both as shares of the size. CUT and OPEN_CUT are the least area that the
+end spans, as a share of the bounding box: CUT for a plane at the origin, OPEN_CUT for an open end anywhere."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
-"""An arm's spread across by that along (at most), the cosine of its angle to the line from the craft's middle (at
-least), and where its inner end lies on that line, by where its own middle lies (at most)."""
+"""An arm is slender (its spread across is at most SLENDER times that along), points at the middle of the craft (cosine
+at least RADIAL) and reaches near it (its inner end is at most INWARD times as far out as its own middle)."""
 
 IN_LINE = 0.9
-"""Cosine between the line through two blades and the length of one (at least), where they belong to one rotor."""
+"""Least cosine of the angle between a blade and the line to the other blade of the same rotor."""
 
 LONG = 0.75
-"""Width of a blade by its length, as its box has them; a blade at 30 degrees to the axes has 0.6, a disc 1."""
+"""Largest ratio of width to length of a blade's bounding box. A blade at 30 degrees to the axes has 0.6, a disc 1."""
 
 TOUCH = 0.1
-"""Boxes nearer than twice this share of the larger one's length belong together: the hub lies between two blades."""
+"""Two blades may be apart by at most twice this share of the longer one, since the hub lies between them."""
 
 ROUND = 0.12
 """The two extents of a wheel across its axis differ by at most this share."""
@@ -147,8 +148,9 @@ def off_mirror(points: np.ndarray) -> np.ndarray:
 
 
 def mirror_axis(points: np.ndarray) -> int | None:
-    """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
-    cannot be seen: left and right of a bird."""
+    """Return the only axis along which a body of points (N, 3) is its own mirror image: left and right of a bird.
+
+    Return None where there is no such axis or more than one."""
     off = off_mirror(points)
     best, second = np.sort(off)[:2]
     return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
@@ -157,8 +159,8 @@ def mirror_axis(points: np.ndarray) -> int | None:
 def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
     """Return which of the axes a half of a target is cut along, None where it seems whole.
 
-    points: (N, 3) m on its surface. A half ends flat in one plane, open or in the file's zero, and is not its own
-    mirror image along that axis.
+    points: (N, 3) m on its surface. One half of a target ends flat in one plane, which is open or passes through the
+    origin of the file, and is not its own mirror image along that axis.
     """
     edges, _, uses = edges_of(mesh.faces)
     ends, extent = mesh.vertices[edges], np.ptp(mesh.vertices, axis=0)
@@ -175,10 +177,10 @@ def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
 
 
 def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
-    """Return the axes of the file that may point up and to the front. Only the extents (3,) are known, so no signs are.
+    """Return the axes of the file that may point up and to the front, without signs, from the extents (3,) alone.
 
     A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
-    across. `up` and `right` are the numbers of axes that something else tells.
+    across. `up` and `right` are the numbers of axes that are known otherwise.
     """
     order = [axis for axis in np.argsort(extent, kind="stable") if axis not in (up, right)]
     order = order if up is None else [up, *order]
@@ -228,7 +230,7 @@ def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list
 
 
 def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
-    """Whether a group is flat along one of the axes, wide enough, and lies about one hub."""
+    """Return whether a group is flat along one of the axes, wide enough, and lies about one hub."""
     # By their names a helicopter's main rotor may be as wide as all of it, and its tail rotor small.
     least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
     for axis in axes:

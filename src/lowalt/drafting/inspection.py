@@ -1,6 +1,6 @@
 """A first look at a user's mesh: its unit, extents, named pieces, connected components, and guesses on their kinds.
 
-The text calls everything a guess that the file does not state (`guesses`); nothing here changes a record.
+Whatever the file does not state is called a guess (`guesses`). Nothing here changes a record.
 """
 
 from dataclasses import dataclass, field, replace
@@ -26,11 +26,11 @@ from lowalt.targets.mesh_files import UNITS_M, Mesh, metres, pieces, read_mesh, 
 from lowalt.targets.mesh_polygons import Piece
 
 SLICES = 40
-"""Number of slices of a bird from its middle to a wing tip; the height of each is measured."""
+"""Number of slices between the middle of a bird and its wing tip; each slice is measured on its own."""
 BELIEVED = 5.0
 """A glTF file's metres are believed while its size is at most this factor outside USUAL_M."""
 MOST_POINTS = 20_000
-"""Most triangles whose middles an inspection keeps."""
+"""Largest number of triangles whose centres an inspection keeps."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,11 @@ class Inspection:
 
     @property
     def shoulder_m(self) -> float:
-        """Distance (m) from the middle to the wing: farther out, no slice is both at least half as high as the highest
-        and half as long as the longest, as a body is and neither a drooping wing nor a tail."""
+        """Distance (m) from the middle of a bird to its wings.
+
+        The body ends at the last slice that is at least half as high as the highest slice and half as long as the
+        longest one. A drooping wing is high but short, a tail long but low.
+        """
         up, front = "xyz".index(self.up[-1]), "xyz".index(self.front[-1])
         right = 3 - up - front
         across = np.abs(self.points[:, right] - (self.low + self.high)[right] / 2)

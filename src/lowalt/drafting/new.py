@@ -151,11 +151,9 @@ def _of_mesh(asked: Asked, path: Path, file: str, category: str, show: Callable[
 
 
 def _refuse_size(asked: Asked, seen: Inspection) -> None:
-    """Refuse a mesh whose size is unusual for its category.
+    """Refuse a mesh of unusual size for its category. Raises: InputError naming the options and the unit that fits.
 
-    A unit or size from the user may be unusual by UNUSUAL, and one from the file may be twice as large as usual: a real
-    helicopter is.
-    Raises: InputError naming the options, and the unit that fits.
+    A size from the user may be UNUSUAL, and one from the file may be twice as large as usual: a real helicopter is.
     """
     extent, (low, high) = seen.high - seen.low, USUAL_M[seen.category]
     given = asked.unit is not None or asked.size_m is not None

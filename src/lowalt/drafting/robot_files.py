@@ -29,7 +29,7 @@ UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
 
 
 def _geometry(element: Element | None, base: Path, files: Files) -> np.ndarray:
-    """Triangles (K, 3, 3) of a `geometry` of URDF or SDF; planes and what is unknown have none."""
+    """Return the triangles (K, 3, 3) of a `geometry` of URDF or SDF. Planes and unknown shapes have none."""
     for shape in element if element is not None else ():
         values = {**shape.attrib, **{child.tag: child.text or "" for child in shape}}
         if shape.tag == "mesh":
@@ -188,7 +188,7 @@ class _Links:
         self.add(model, path.parent, name, (above, place), _version(root), depth + 1)
 
     def done(self) -> Robot:
-        """The robot of all that was taken; of links without any `visual` the collision surfaces."""
+        """Return the robot. Where no link has a `visual`, its collision surfaces are taken."""
         visual = "visual" if any(link.find("visual") is not None for _, link, _ in self.links) else "collision"
         for name, link, base in self.links:
             self.robot.surfaces[name] = [
@@ -216,7 +216,7 @@ def _used(element: Element) -> Iterator[Element]:
 
 
 def is_description(path: Path) -> bool:
-    """Whether a file's name is that of a robot's description or of a template of one."""
+    """Return whether a file's name is that of a robot's description or of a template of one."""
     return path.suffix.lower() in (*KINDS, *TEMPLATES)
 
 

@@ -23,9 +23,9 @@ MOST_SEARCHED = 100_000
 OPTIONAL = re.compile(r"\$\(optenv\s+\w+\s*([^()]*)\)")
 """ROS: the value of an environment variable, or a default where it is not set; the default is always taken."""
 DEEPEST = 50
-"""Most links, frames or models that hang on one another."""
+"""Largest depth of a chain of links, frames or models."""
 MOST_TURN = 4 * math.pi
-"""A joint whose range is larger turns without end: a rotor or a wheel."""
+"""A joint with a larger range turns without end, as a rotor or a wheel does."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Robot:
     senses: dict[str, str] = field(default_factory=dict)
 
     def below(self, link: str, others: set[str] = frozenset()) -> list[str]:
-        """A link and all that hang on it, except those in `others` and what hangs on them."""
+        """Return a link and all links below it, without those in `others` and the links below them."""
         pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
         links = [link]
         for name in links:

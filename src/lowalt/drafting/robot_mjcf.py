@@ -13,7 +13,7 @@ from lowalt.numerics import portable
 
 
 def _clear(values: dict[str, str]) -> bool:
-    """Whether a colour lets all light through."""
+    """Return whether a colour is fully transparent."""
     return values.get("rgba", "1").split()[3:] == ["0"]
 
 
@@ -70,7 +70,7 @@ class _Mjcf:
         return place_of(numbers(values.get("pos"), 3, (0, 0, 0)), turn)
 
     def geom(self, values: dict[str, str], above: np.ndarray) -> np.ndarray:
-        """Triangles (K, 3, 3) of a geom that viewers show: groups 0 to 2, not transparent, no plane."""
+        """Return the triangles (K, 3, 3) of a geom that viewers show: not transparent, no plane, groups 0 to 2."""
         kind = values.get("type", "mesh" if "mesh" in values else "sphere")
         clear = _clear(values) or values.get("material") in self.hidden
         if int(values.get("group", "0")) > 2 or clear or kind in ("plane", "hfield", "sdf"):

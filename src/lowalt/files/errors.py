@@ -7,19 +7,19 @@ from pathlib import Path
 
 
 def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = "") -> str:
-    """Return what was expected instead of unknown names: the known ones like them, else `otherwise` or all."""
+    """Return what was expected instead of unknown names: similar known names, else `otherwise` or all."""
     known = list(known)
     near = dict.fromkeys(other for name in unknown for other in difflib.get_close_matches(str(name), known, 1))
     return f"perhaps {list(near)}" if near else otherwise or f"only {known}"
 
 
 LONGEST = 400
-"""Characters of a message at most: whatever a file holds, a refusal of it is read at a glance."""
+"""Largest number of characters in an error message, whatever a file contains."""
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """Return a text without its middle where it has more than `longest` characters: its start says where a fault is,
-    its end what was expected."""
+    """Return a text of at most `longest` characters, with its middle cut out: the start tells where a fault is, the
+    end what was expected."""
     start = 2 * longest // 3
     return text if len(text) <= longest else f"{text[:start]} ... {text[start + 5 - longest :]}"
 
@@ -29,7 +29,7 @@ def shown(value: object) -> str:
     try:
         return shortened(repr(value), LONGEST // 2)
     except (RecursionError, ValueError):
-        # Values stand in each other too deeply, or a number has more than 4300 digits.
+        # Values are nested too deeply, or a number has more than 4300 digits.
         return f"a {type(value).__name__} too large to show"
 
 
@@ -40,7 +40,7 @@ class InputError(ValueError):
     """
 
     def __init__(self, message: str) -> None:
-        """Take the message, whose middle goes where it is too long."""
+        """Take the message; its middle is cut out if it is too long."""
         super().__init__(shortened(message))
 
 
@@ -49,14 +49,14 @@ class BelowFloor(InputError):
 
 
 class SpaceError(InputError):
-    """A disk or memory is too small; the message names the file or run, what it needs, and what is free."""
+    """A disk or memory is too small; the message names the file or run, the required and the free space."""
 
 
 @contextmanager
 def reading(path: str | Path, kind: str) -> Iterator[None]:
-    """Name the file in whatever its reader raises; libraries meet damaged files with exceptions of many types.
+    """Turn any exception of a reader into an InputError that names the file, since libraries raise many types.
 
-    Raises: InputError, the reader's own one, or that the file is not a readable `kind`.
+    Raises: InputError, the reader's own, or that the file is not a readable `kind`.
     """
     try:
         yield
@@ -72,4 +72,4 @@ def in_one_line(error: Exception) -> str:
 
 
 class InputWarning(UserWarning):
-    """The user's input is used as it is, although something in it looks wrong; the message says what and where."""
+    """Warning: the user's input looks wrong but is used unchanged; the message says what and where."""

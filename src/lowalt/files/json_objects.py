@@ -1,4 +1,4 @@
-"""JSON that comes from elsewhere: an object as RFC 8259 has it, of a few levels, or one sentence."""
+"""Strict reader of untrusted JSON objects (RFC 8259, limited nesting); anything else is refused in one sentence."""
 
 import json
 import math
@@ -10,12 +10,12 @@ from lowalt.files.errors import InputError, in_one_line
 
 
 def _no_number(text: str) -> NoReturn:
-    """Refuse NaN and Infinity, which Python's reader takes and JSON has not."""
+    """Refuse NaN and Infinity, which Python's reader accepts but JSON does not allow."""
     raise ValueError(f"{text} is no number of JSON")
 
 
 def _finite(text: str) -> float:
-    """The number of a text. Raises: ValueError for one beyond float64, such as 1e400."""
+    """Return the number in a text. Raises: ValueError for one beyond float64, such as 1e400."""
     value = float(text)
     return value if math.isfinite(value) else _no_number(text)
 
@@ -23,8 +23,8 @@ def _finite(text: str) -> float:
 def json_object(text: str, where: str | Path, what: str) -> dict:
     """Return the object in a JSON text; what: the text in words, for messages.
 
-    Raises: InputError naming `where` for another text or value, a number that is not finite, or values that stand in
-    each other too deeply.
+    Raises: InputError naming `where` for another text or value, a number that is not finite, or values that are
+    nested too deeply.
     """
     try:
         value = json.loads(text, parse_constant=_no_number, parse_float=_finite)

@@ -1,10 +1,9 @@
-"""How kernels are compiled: at the first call, once on each machine, and again if the code that a kernel runs changes.
+"""Compilation of kernels: at the first call, once per machine, and again if the code that a kernel runs changes.
 
-numba's own cache looks at the file of a function only. It does not look at the functions that it calls in other
-files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
-kernel's bytecode and options, of all kernels and constants that it uses, of those that these use, and so on. Code that
-is not compiled has no part in it. `machine_code.py` compiles; numba takes half a second to import, so a command that
-calls no kernel does not import it.
+numba's own cache only checks the file of a function, not the functions that it calls in other files, so after an edit
+there old machine code would stay in use. Here the key of a cache entry contains a digest of the kernel's bytecode and
+options and, recursively, of all kernels and constants that it uses. Code that is not compiled is not part of the key.
+`machine_code.py` compiles. numba takes half a second to import, so a command without kernels does not import it.
 """
 
 import functools

@@ -1,13 +1,13 @@
-"""Other methods for the same signal, for comparison: none of them is used to make data.
+"""Other methods for the same signal, only for comparison.
 
-Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and does the same work, geometry and gains
-included: the paper's closed form written down in NumPy, in either precision, and one non-uniform FFT a symbol.
+Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and computes everything, including geometry and
+gains: the paper's closed form in NumPy, in single or double precision, and a non-uniform FFT per symbol.
 """
 
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.echo.scene import Rigid
+from lowalt.echo.echo_input import Rigid
 
 
 def positions(motion: Rigid) -> np.ndarray:

@@ -1,7 +1,7 @@
-"""Checkpoints: written atomically; one that is damaged or of another run is refused with an error that names it.
+"""Checkpoints: written atomically. A damaged checkpoint, or one of another run, is refused with an error.
 
 A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity holds everything that
-determines the weights (settings, scheme, protocol, samples); a file of another identity is never resumed.
+determines the weights (settings, scheme, protocol, samples). A training resumes only from a file of its own identity.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ def _digest(state: object) -> str:
     def walk(value: object) -> None:
         """Feed a value, and all values inside it, to the hasher."""
         if isinstance(value, torch.Tensor):
-            # A tensor may state a size that its bytes do not hold, by repeating them.
+            # A tensor with stride 0 can claim more elements than its storage has; refuse it.
             if value.numel() * value.element_size() > value.untyped_storage().nbytes():
                 raise ValueError(f"a tensor of shape {tuple(value.shape)} in fewer bytes")
             raw = value.detach().cpu().contiguous()
@@ -56,7 +56,7 @@ def save(path: str | Path, name: str, state: dict) -> None:
 
 
 def _facts(identity: str) -> dict:
-    """The facts that an identity states in JSON, none where it is another text."""
+    """The parts of an identity (JSON text); empty where it is not JSON."""
     try:
         return json_object(identity, "checkpoint", "an identity")
     except InputError:
@@ -76,7 +76,7 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
         stored, digest, state = content["identity"], content["digest"], content["state"]
         computed, named = _digest(state), isinstance(stored, str)
     except Exception as error:
-        # torch's reader meets damaged bytes with nearly any exception.
+        # For damaged bytes torch's reader raises almost any exception.
         raise InputError(f"{path}: not a checkpoint ({in_one_line(error)})") from error
     if not named:
         raise InputError(f"{path}: not a checkpoint (its identity is {type(stored).__name__}, expected text)")

@@ -1,6 +1,6 @@
 """A backbone of the user's own: a function of a Python file, which the configuration names as FILE.py:FUNCTION.
 
-The function takes the pixels a side of an image and returns a torch module, RGB images (B, 3, size, size) float32 to
+The function takes the pixels per side of an image and returns a torch module, RGB images (B, 3, size, size) float32 to
 features (B, features). The file runs with the rights of the user, so it is to be trusted like any program: its name
 comes from the user's configuration or command line. A model keeps the name, which is never followed.
 """

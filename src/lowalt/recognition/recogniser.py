@@ -56,7 +56,7 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
 
 
 class Palettes(nn.Module):
-    """Turns index images into normalised RGB by one table a spectrum, so that colours are never stored.
+    """Turns index images into normalised RGB by one table per spectrum, so that colours are never stored.
 
     table (spectra, 256, 3) float32: (colour - mean) / deviation, colours in 0..1, both of the backbone's channels.
     """
@@ -115,7 +115,7 @@ class Recogniser(Fused):
 def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) -> nn.Module:
     """Return a network with fresh weights.
 
-    block: `recognition.network`; size: pixels a side; colours: name of the colour map; classes: their number.
+    block: `recognition.network`; size: pixels per side; colours: name of the colour map; classes: their number.
     Raises: InputError for a setting that does not fit.
     """
     return Recogniser(scheme, block, size, np.stack([colour_map(colours)] * len(SPECTRA)), classes)

@@ -1,7 +1,7 @@
-"""From settings to files: build a network and train it, read it back, evaluate it.
+"""Build and train a network from settings, load a trained one, and evaluate it.
 
-`model.pt` carries everything a model needs to be used again: scheme, protocol, network settings, image size and
-palettes and the weights.
+`model.pt` holds everything needed to use the model: scheme, protocol, network settings, image size, palettes and
+weights.
 """
 
 import json
@@ -24,7 +24,7 @@ from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
 from lowalt.recognition import checkpoint, inference, metrics, predictions, recipe, recogniser
-from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.light_timm import timm
 from lowalt.recognition.recogniser import built
@@ -34,19 +34,19 @@ from lowalt.recognition.training import Trainer, TrainingRun
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
 
 Build = Callable[[Scheme, dict, int, str, int], nn.Module]
-"""Makes a network of a scheme, the settings of networks, a size, a colour map and a number of classes."""
+"""Makes a network from: scheme, block `recognition.network`, image size, colour map, number of classes."""
 
 
 def train(
     samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False,
     build: Build = built,
 ) -> None:  # fmt: skip
-    """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
+    """Train a scheme, from its checkpoint if there is one; write `model.pt`, `history.csv`, `run.json` into `folder`.
 
     samples: the sources "train", of which the scheme's share is kept, and "validation"; settings: {seed, size,
     colour_map, network, training, augmentation, classes}, the classes by label; events: whether to write the metrics
     for TensorBoard too, into `events/` of the folder; build: makes the network.
-    Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
+    Raises: InputError for a wrong setting, a checkpoint of another run, or a loss that becomes NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block, classes = recipe.check(settings["training"]), settings["classes"]
@@ -111,7 +111,7 @@ def _record(path: Path, content: dict) -> None:
 
 @dataclass(frozen=True)
 class Trained:
-    """A trained model read back: the network with its weights, what it sees, and where it came from."""
+    """A loaded trained model: the network with its weights, the views it uses, and its origin."""
 
     model: nn.Module
     scheme: Scheme
@@ -144,7 +144,7 @@ def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = bu
     except InputError as error:
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from error
     except Exception as error:
-        # torch and timm meet settings that do not fit together with nearly any exception.
+        # For settings that do not fit together, torch and timm raise almost any exception.
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
     return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), classes)
 
@@ -162,7 +162,7 @@ def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, truste
 
     if name == named_backbone and build is built:
         return filled(fresh, lambda: torch.zeros(1, views, size, size, dtype=torch.uint8), state["weights"], path)
-    # Code that the user names is trusted, and only its author knows what it answers.
+    # The user named this code, so it is trusted; its output cannot be checked here.
     model = fresh()
     refuse_unfit(state["weights"], model, path)
     model.load_state_dict(state["weights"])
@@ -173,7 +173,7 @@ def answers(trained: Trained, samples: Samples, settings: dict, machine: Machine
     """Return the class probabilities (n, classes) of all samples of a source; settings as in `evaluate`."""
     batch, threads, _, mirror, workers = inference.evaluation(settings)
     recipe.seeded(trained.seed, ("evaluate",), threads)
-    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.gpu)
+    ahead = Prefetch(Unchanged(samples), workers, pin=machine.gpu)
     every = np.arange(len(samples.facts))
     return probabilities(machine.placed(trained.model), samples, every, machine, batch, mirror, ahead)
 

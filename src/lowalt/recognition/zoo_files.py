@@ -14,13 +14,15 @@ def names(zoo: Path = ZOO) -> list[str]:
 
 
 def path_of(model: str | Path, zoo: Path = ZOO) -> Path:
-    """Return the file of a model: a path as it is, or that of the entry of the zoo that has this name.
+    """Return the file of a model: a path, with or without .safetensors, or that of the entry of the zoo.
 
     Raises: InputError naming the entries there are.
     """
     path = Path(model)
     if path.suffix or path.is_file():
         return path
+    if path.with_name(f"{path.name}.safetensors").is_file():
+        return path.with_name(f"{path.name}.safetensors")
     if str(model) not in names(zoo):
         raise InputError(f"model {str(model)!r}: not a file, and {zoo} has {names(zoo)}")
     return zoo / f"{model}.safetensors"

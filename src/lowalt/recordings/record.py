@@ -29,6 +29,10 @@ class Record:
     trust: str | None = None
     source: str | None = None
     licence: str | None = None
+    capture: int | None = None
+    receiver: int = 0
+    chirps: dict | None = None
+    twin: dict | None = None
 
     @property
     def name(self) -> str:
@@ -45,7 +49,7 @@ def record(block: dict, folder: Path, where: str) -> Record:
     check_brought("recording", block, where)
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":
-        for key in ("moves", "layout"):
+        for key in ("moves", "layout", "chirps"):
             if key in block:
                 raise InputError(f"{where}: {key} is {block[key]!r}, expected channel 'complex' with it: a real "
                                  "channel has no sign of Doppler and no second part")  # fmt: skip

@@ -1,6 +1,6 @@
 """The echoes of the viewer's samples: power and phase of each station over slow time, and the speed that is shown.
 
-Both curves are kept as bytes, 0.8 kB a station: the eye sees no finer step in a panel 70 pixels high.
+Both curves are kept as bytes, 0.8 kB per station: the eye sees no finer step in a panel 70 pixels high.
 """
 
 import base64

@@ -5,7 +5,6 @@ An effect is priced by leaving it out of the scene, or by adding it with its def
 those rooms come later.
 """
 
-import importlib
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -24,7 +23,7 @@ from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.checks import check
-from lowalt.scene.effects import PLACES, NamedEffect, called, dotted
+from lowalt.scene.effects import PLACES, NamedEffect, called, module_of
 from lowalt.scene.levels import Level, levels, table
 from lowalt.scene.observe import Scene, observe
 from lowalt.targets import occluders
@@ -190,13 +189,14 @@ def changes(
     shown: returns what becomes of the signals (K, stations, N) of all samples by name: pixels of images, answers of a
     network.
     """
-    named = [effect.name for effect in scene_of(config).effects]
+    places = {effect.name: effect.place for effect in scene_of(config).effects}
+    named = list(places)
     # A kernel's first call compiles it: the scene itself is heard twice, and a lone sample, which no median helps.
     passes = 2 if len(chosen) * len(station_names) == 1 else 1
     signals, cells, times_ms = _received(config, station_names, chosen, 2)
     before, result = shown(signals), []
     for name in [*named, *(name for name in PLACES if name not in config["effects"])]:
-        place, inside = PLACES[name], name in named
+        place, inside = places.get(name) or PLACES[name], name in named
         try:
             changed, also = _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
@@ -298,7 +298,7 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
         "<: a time that the measurement cannot tell from zero."
     )
     if sources:
-        lines += [f"{change.effect}: {importlib.import_module(dotted(change.effect)).SOURCE}" for change in changes]
+        lines += [f"{change.effect}: {module_of(change.effect).SOURCE}" for change in changes]
     return lines
 
 

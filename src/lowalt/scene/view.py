@@ -36,6 +36,17 @@ class Displacement(NamedTuple):
     rise_hz: np.ndarray | float = 0.0
 
 
+class Still(NamedTuple):
+    """Echoes of something other than a target, which do not move within a symbol.
+
+    response: (N, M) complex128, in sqrt(W) a subcarrier; offset_cells: how far the echoes stand beyond the centres of
+    their range cells, in cells.
+    """
+
+    response: np.ndarray
+    offset_cells: float = 0.0
+
+
 class Perturbations(NamedTuple):
     """Changes of a target's motion by several effects, each given at grid_s (G,) s."""
 

@@ -1,6 +1,6 @@
-"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index: the folder can be published.
+"""The data card, which makes the folder of the index publishable: README.md, samples.csv, croissant.json, SHA256SUMS.
 
-A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
+`python -m lowalt.shards.card` is a separate command, so that a change of wording does not re-pack shards.
 """
 
 import argparse
@@ -38,7 +38,7 @@ WHAT = {
     "cube": "all range cells of every symbol, complex, with noise",
     "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
 }
-"""Name of the data in the description, by kind of shards."""
+"""Description of the data, by kind of shards."""
 
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
@@ -87,7 +87,7 @@ def _counts(shards: ShardSet) -> str:
     sizes = [entry["bytes"] / 1e6 for entry in shards.shards]
     parts.append(
         f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, {sum(sizes) / 1e3:.3f} GB in all, "
-        f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB a sample.\n"
+        f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB per sample.\n"
     )
     return "\n".join(parts)
 
@@ -124,7 +124,7 @@ def description(shards: ShardSet) -> str:
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
     versions = shards.record(0)["versions"] if len(shards) else {"lowalt": __version__}
-    # Blocks of the template leave no lines of their own.
+    # Template blocks must not leave empty lines.
     templates = jinja2.Environment(
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined
     )

@@ -1,6 +1,6 @@
 """Croissant metadata of a data set: its shards with checksums, and the table of its samples as records.
 
-No record set holds images: tools unpack every shard before they return the first such record.
+There is no record set with images, because tools would unpack every shard before returning the first record.
 Source: Croissant format specification 1.1 (MLCommons).
 """
 
@@ -14,7 +14,7 @@ TERMS = """
     personalSensitiveInformation recordSet references regex repeated replace samplingRate separator source subField
     transform
 """
-"""Words of the format that stand for themselves."""
+"""Terms of the format whose prefixed name is cr:TERM."""
 CONTEXT = {
     "@language": "en",
     "@vocab": "https://schema.org/",
@@ -54,7 +54,7 @@ MEDIA = {
 }  # fmt: skip
 """Media type and meaning of the member next to the record, by kind of shards."""
 OF = {"image": "sample", "signal": "sample", "cube": "sample", "recipe": "motion model"}
-"""The set of records that one member of a shard belongs to; the SNRs of a motion model share one in recipe shards."""
+"""What one member of a shard describes; in recipe shards all SNRs of a motion model share one member."""
 RESPONSIBLE = {
     "dataCollection": "All samples are simulated from the configuration in README.md. No radar recorded them.",
     "dataCollectionType": ["Software Collection"],
@@ -90,7 +90,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
               f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold.")
         for entry in index["shards"]
     ]  # fmt: skip
-    files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
+    files.append(_file({**table, "name": table["path"]}, "text/csv", "One row per sample: key, class, SNR, shard."))
     mime, meaning = MEDIA[kind]
     size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])
     spectra = [name.upper() for name in named(index["render"]["spectra"])]

@@ -1,7 +1,7 @@
-"""A data set that makes each sample when it is asked for, with the same bytes as in the shards.
+"""A data set that simulates each sample on access, with the same bytes as in the shards.
 
-Torch is not imported: `Dataset` has a length and numbered samples, as `torch.utils.data.DataLoader` expects, and
-`Endless` is an iterable; both can be pickled, so workers of any framework make samples of their own.
+Torch is not imported: `Dataset` has a length and indexed samples, as `torch.utils.data.DataLoader` expects, and
+`Endless` is an iterable. Both can be pickled, so the workers of any framework can make samples.
 """
 
 import functools
@@ -16,6 +16,7 @@ import numpy as np
 
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
+from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
 from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
 from lowalt.config.splits import FOLDS, fold
@@ -44,7 +45,7 @@ class Sample(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The sample of a number: its group, subtype, motion model and SNR."""
+    """Identification of a sample: its group, subtype, motion model and SNR."""
 
     group: str
     subtype: str
@@ -127,7 +128,9 @@ class Dataset:
         published: every row of the table of targets by subtype, by default from the records; the classes follow.
         Raises: InputError naming the key, value or file that is wrong.
         """
-        config = check(load_yaml(config), shipped(SCHEMA)) if isinstance(config, (str, Path)) else config
+        if isinstance(config, (str, Path)):
+            path, config = config, check(load_yaml(config), shipped(SCHEMA))
+            refuse_effects(config["effects"], path)
         self.config, self.folds = config, tuple(folds)
         records = {}
         if published is None or clouds is None:
@@ -214,7 +217,7 @@ class Dataset:
         """Return the motion table's row of a sample; models beyond the configuration's count are drawn too."""
         track, look = divmod(place.model, self.plan.looks)
         name = place.subtype, track
-        # The looks of a track are drawn together, and most often asked for one after the other.
+        # All looks of a track are drawn together and usually accessed in sequence, so keep the last track.
         if self._drawn[0] != name:
             sources = self.clouds[place.subtype], self.published[place.subtype], self._masts, self._corners
             self._drawn = name, model_rows(self.plan.seed, *sources, self._motion, track, self._path)
@@ -226,7 +229,7 @@ class Dataset:
         return self.maker.signal(self.row(place), place.snr_db)
 
     def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
-        """Return the JSON record of a sample; cubes: what it says of each station's cube."""
+        """Return the JSON record of a sample; cubes: its part about each station's cube."""
         facts = place.snr_db, self._fold(place), self.plan.seed, self.maker.network, self.classes
         return record(self.row(place), *facts, cubes)
 
@@ -280,9 +283,9 @@ class Dataset:
 
 
 class Endless:
-    """An endless sequence of samples: from a first motion model on, each model number of every subtype at all SNRs.
+    """An endless sequence of samples: all subtypes at all SNRs, for increasing numbers of the motion model.
 
-    `part` of `parts` (a worker, a rank) takes every `parts`-th motion model, so no two parts make the same sample.
+    With `parts` workers or ranks, number `part` takes every `parts`-th motion model, so that no sample is made twice.
     """
 
     def __init__(self, dataset: Dataset, first: int | None = None, part: int = 0, parts: int = 1) -> None:

@@ -163,7 +163,7 @@ def _described(values: np.ndarray, sample: SceneSample, network: Network, at: st
     of_part = of_parts(view)
     truth = dict(zip(TRUTH, columns.T, strict=True))
     truth |= dict(zip(("part_range_m", "part_low_mps", "part_high_mps"), of_part, strict=True))
-    even = at == "signal" and sample.settings.get("slow_time", {}).get("regrid") != "zero"
+    even = at == "signal" and not any(effect.settings.get("regrid") == "zero" for effect in sample.scene.effects)
     return RawEcho(
         values, network.times_s if even else view.times_s,
         frequencies_hz if at in ("subcarriers", "receiver") else none,

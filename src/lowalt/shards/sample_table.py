@@ -1,4 +1,4 @@
-"""The sample table of a shard: `{shard}.npz` next to `{shard}.tar`, one row a sample, and the shard's own header.
+"""The sample table of a shard: `{shard}.npz` next to `{shard}.tar`, one row per sample, and the shard's own header.
 
     header    str, JSON: name, kind, group, fold, samples, bytes, sha256
     samples   (n,) structured, in the order of the tar (offsets and sizes in bytes)

@@ -1,4 +1,4 @@
-"""The cube of a sample at one station: the range cells of all symbols, and what is true of the target."""
+"""The cube of a sample at one station: the range cells of all symbols, and the ground truth."""
 
 from typing import NamedTuple
 

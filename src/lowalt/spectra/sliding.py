@@ -1,11 +1,11 @@
 """Compiled kernels of the three spectra for windows that slide by one symbol.
 
-The transform of one window shares its sub-transforms with the windows after it: of a window of L = 2^a symbols,
-every level of the decimation in time needs one new sub-transform a start,
+Overlapping windows share sub-transforms. For a window of L = 2^a symbols, every level of the decimation in time needs
+only one new sub-transform per start,
     A_0[q, t] = y[t],   A_{s+1}[q, t] = A_s[q, t] + exp(-j 2 pi q d / P) A_s[q, t + d],   d = L / 2^(s+1),
 so a window costs about 2 P butterflies, not P log2 L, and every loop runs over contiguous start times.
-Only additions, products and square roots in one fixed order, never fused: float32 and float64 give the same
-bits on every machine that keeps IEEE 754. The kernels work in the precision of their arguments.
+Only additions, products and square roots are used, in a fixed order and never fused: results have the same bits on
+every machine with IEEE 754. The kernels work in the precision of their arguments.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:
 
 @PLAIN
 def _level(re, im, stride, cosine, sine, out_re, out_im):
-    """One level of decimation in time: sub-spectra by start time become twice as many in out_re and out_im."""
+    """One level of decimation in time: out_re and out_im get twice as many sub-spectra, by start time."""
     single, points = re.shape[0] == 1, cosine.size
     rows, count = out_re.shape[0] // 2, out_re.shape[1]
     for q in range(rows):

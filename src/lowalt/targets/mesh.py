@@ -1,4 +1,4 @@
-"""A user's mesh to a calibration point cloud: load, repair, cut into parts, scale to the published size, thin.
+"""Turn a user's mesh into a calibration point cloud: load, repair, cut into parts, scale to the published size, thin.
 
 These are the steps of the paper's Fig. 4. `mesh_files` reads files, `mesh_parts` cuts parts, `mesh_record` checks
 records and `mesh_size` scales; this module calls them in order and thins each part to its number of points. Body axes:
@@ -30,13 +30,13 @@ from lowalt.targets.surfaces import thin
 __all__ = ["check_record", "mesh_cloud"]
 
 DENSE = 200
-"""Dense samples of a part's surface for each point of the cloud, before regions are cut and the rest is thinned."""
+"""Number of dense surface samples per point of the cloud, before regions are cut out and the rest is thinned."""
 
 THINNED = 25
-"""Most samples for each point of the cloud that go into the thinning; its time grows with samples x points."""
+"""Largest number of samples per point of the cloud that are thinned; the time grows with samples x points."""
 
 FEWEST_SAMPLES = 100
-"""Least number of samples of a wheel that the record asks to be made."""
+"""Least number of samples of a wheel that the record describes by its diameter and width."""
 
 
 def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dict[str, Pool], float]:

@@ -1,4 +1,5 @@
-"""What trimesh's reader of COLLADA leaves out: the stated unit, polygons with a dent, and skins, which are refused.
+"""Prepare COLLADA files for trimesh's reader, which leaves out the stated unit, dented polygons, skins and whatever has
+a missing texture. Skins are refused.
 
 Source: Khronos, COLLADA 1.4.1, elements unit, polylist, polygons and instance_controller.
 """

@@ -27,10 +27,10 @@ from lowalt.targets.surfaces import Surface, merged
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 LARGEST_TRIANGLES = 20_000_000
-"""Above this a file is refused: its arrays alone would take over two gigabytes."""
+"""A file with more triangles is refused, since its arrays alone would take over two gigabytes."""
 
 SAME_UNIT = 1e-6
-"""Relative difference up to which two units are the same."""
+"""Two units are the same if their relative difference is at most this."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
     vertices, faces = _merged(vertices, faces)
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertices, faces.astype(np.int32)))
-    # Equal to a millionth of the diagonal: what single precision leaves of vertices that were one.
+    # Single precision separates equal vertices by up to a millionth of the diagonal.
     meshes.meshing_merge_close_vertices(threshold=pymeshlab.PercentageValue(1e-4))
     meshes.meshing_remove_duplicate_faces()
     meshes.meshing_remove_null_faces()
@@ -233,7 +233,7 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
         warnings.warn(text, InputWarning, stacklevel=2)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
-    # By a mark a vertex, not a copy of every corner: millions of corners would double the memory.
+    # One mark per vertex: a copy of millions of corners would double the memory.
     finite = np.isfinite(vertices).all(axis=1)
     if faces.min() < 0 or faces.max() >= len(vertices) or not finite[faces].all():
         raise InputError(f"{path}: a triangle has a NaN, infinite or missing vertex, expected finite ones")

@@ -1,7 +1,7 @@
 """The shape and size of a user's mesh: whether its parts fit their kinds and its unit the published size, and scaling.
 
-A wrong direction, unit or hinge still gives a cloud; the geometry of the parts shows it: wheels below a car, a hub in
-the middle of its blades. Body axes: x right, y front, z up, metres.
+A wrong direction, unit or hinge still gives a cloud, but the geometry of the parts shows the mistake: wheels lie below
+a car, and a hub lies in the middle of its blades. Body axes: x right, y front, z up, metres.
 """
 
 import warnings
@@ -18,18 +18,18 @@ from lowalt.targets.mesh_parts import Pool
 from lowalt.targets.mesh_record import ALL_AXES
 
 SMALLEST_PART = 25
-"""A moving part that is more than so many times smaller than the whole mesh is refused: its unit must be wrong."""
+"""A moving part that is smaller than the whole mesh by more than this factor is refused; its unit must be wrong."""
 
 SMALLEST_ROTOR_M = 0.01
-"""Least diameter of a rotor at the target's final size: the smallest craft sold have propellers of 25 mm."""
+"""Least diameter (m) of a rotor at the final size of the target. The smallest craft sold have propellers of 25 mm."""
 
 
 ACROSS = np.cos(np.radians(20.0))
-"""Least cosine between a wheel's axis and the car's width; models have their front wheels straight."""
+"""Least cosine of the angle between a wheel's axle and the car's width. Models have their front wheels straight."""
 ROUND = 1.1
 """Largest ratio of a wheel's width to the smaller of its two extents across the axis."""
 OFF_HUB = 1.0
-"""Largest distance from a rotor's hub to the middle of its surface, in parts of the rotor's own largest extent; a
+"""Largest distance between a rotor's hub and the middle of its surface, as a share of the rotor's largest extent. A
 single blade without its hub may have up to 1."""
 FEWEST_WHEELS = 3
 OFF_MIDDLE = 0.1
@@ -74,7 +74,7 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
 
 
 def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) -> Iterator[str]:
-    """What is unusual but possible about the parts of each kind; wings are those on the body."""
+    """Yield what is unusual but possible about the parts of each kind. Wings are those that hang on the body."""
     wheels, rotors = len(of_kind["wheel"]), len(of_kind["rotor"])
     if category == "Vehicle" and wheels < FEWEST_WHEELS:
         yield f"{wheels} wheels, expected at least {FEWEST_WHEELS}"

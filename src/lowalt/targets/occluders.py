@@ -1,8 +1,8 @@
 """Command line of an extra product of the stage: a target's opaque surfaces, for scenes with self-occlusion.
 
-A target with a surface has triangles; each vertex moves with the part that it belongs to. A recording has nodes without
-surfaces, so it gets capsules along its bones. Built-in shapes keep all their triangles, so that points lie exactly on
-them. A user's mesh is simplified, and the file holds each point's distance from the simplified surface.
+A target with a surface is stored as triangles, whose vertices move with their part. A recording has nodes without
+surfaces, so it is stored as capsules along its bones. Built-in shapes keep all their triangles, so that points lie
+exactly on them. A user's mesh is simplified, and the file holds each point's distance from the simplified surface.
 """
 
 import json

@@ -1,6 +1,6 @@
 """The cubes of samples: the range cells of every symbol with noise, before the receiver chooses one of them.
 
-A scene's canceller has acted on it; a scene without one gives the cells as they were received.
+The scene's canceller, if any, has already been applied.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from lowalt.config.network import Network, Station
 from lowalt.noise.awgn import add_noise
 from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.effects import called
+from lowalt.scene.effects import called, every
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.scene.truth import geometric
@@ -22,7 +22,7 @@ from lowalt.targets.cloud import Cloud, cloud_of
 
 
 class Cubes:
-    """Makes the cubes of samples; it keeps the clean ones of the last `kept` motion models and stations."""
+    """Makes the cubes of samples and caches the clean ones of the last `kept` motion models and stations."""
 
     def __init__(
         self, scene: Scene, clouds: Mapping[str, Cloud], occluders: Mapping[str, dict] | None = None,
@@ -65,8 +65,8 @@ class Cubes:
         if not self.every_cell and not np.isposinf(snr_db):
             rng = stream(self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
             noise = add_noise(np.zeros(cells.shape), snr_db, rng, power_w)
-            for effect in self.scene.effects:
-                noise = effect.module.filtered(effect.settings, noise) if effect.name == "canceller" else noise
+            for filtered in every(self.scene.effects, "filtered").values():
+                noise = filtered(noise)
             cells = (clean + noise).astype(np.complex64)
         cells[chosen < 0] = 0
         if signal is not None:

@@ -1,6 +1,6 @@
-"""The one resampling kernel of the project: a triangle, defined by a formula for shrinking and for enlarging.
+"""The resampling kernel of the project: a triangle, with one formula for shrinking and for enlarging.
 
-A sample i of n stands at i + 1/2, an output j of m at (j + 1/2) n / m; its weight on sample i is
+Sample i of n is at i + 1/2, output j of m at (j + 1/2) n / m. The weight of sample i in output j is
     max(0, 1 - |i + 1/2 - (j + 1/2) n / m| / max(1, n / m)),
 divided by the sum over the samples there are. It interpolates linearly where it enlarges, averages over the
 whole output pixel where it shrinks, and is the identity for n = m; constants stay constants. It is what Pillow
@@ -69,7 +69,7 @@ def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarr
     first, weights = taps(size, out)
     weights = np.pad(weights, ((0, 0), (0, weights.shape[1] % 2)))
     columns = np.minimum(first[:, None] + np.arange(weights.shape[1]), size - 1) * hop
-    # Unsigned indices spare the compiled loop the test for negative ones.
+    # Unsigned indices, so that the compiled loop does not test for negative ones.
     return np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(weights.T.astype(np.float32))
 
 
@@ -111,7 +111,7 @@ def _resize(images, source, weights, columns, shares, out):
     values = np.empty(out.shape[1:], np.float32)
     plain = np.empty(images.shape[1:], np.float32)
     for n in range(len(images)):
-        # In loops: assigning a whole array takes as long to compile as all the rest of the stage.
+        # Loops, because an array assignment would take as long to compile as the rest of the stage.
         for j in range(plain.shape[0]):
             for c in range(plain.shape[1]):
                 plain[j, c] = images[n, j, c]

@@ -1,4 +1,4 @@
-"""The last lines of a finished run: its accuracies beside the paper's, where its page lies, what to try next."""
+"""The last lines of a finished run: its accuracies next to the paper's, the path of its report, and next steps."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ from lowalt.files.yaml_files import load_yaml
 def averages(path: str | Path) -> dict[tuple[str, str], float]:
     """Return accuracies over all SNRs (%) by scheme and protocol, in the order of a table of accuracies.
 
-    Raises: InputError where the file is missing or no such table.
+    Raises: InputError if the file is missing or is not such a table.
     """
     rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent")
     means = [row for row in rows if row["snr_db"] == "avg"]

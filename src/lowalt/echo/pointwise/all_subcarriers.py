@@ -6,10 +6,10 @@ Over the few range cells of a target the response is a smooth function of freque
 
 import numpy as np
 
+from lowalt.echo.echo_input import EchoInput
 from lowalt.echo.pointwise.reference_range import CELL
 from lowalt.echo.pointwise.results import Paths, amplitudes
 from lowalt.echo.radar import Radar
-from lowalt.echo.scene import EchoScene
 from lowalt.machine.jit import VECTOR
 from lowalt.numerics.chebyshev_series import band_tables
 
@@ -65,7 +65,7 @@ def _banded(z: np.ndarray, u: np.ndarray, count: int) -> np.ndarray:
 
 
 def found(
-    scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float], paths: Paths
+    scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float], paths: Paths
 ) -> tuple[int, np.ndarray]:
     """Return 0 and all subcarriers (N, M) complex128, known symbol removed (Eq. 24), or the fault of `results.signal`.
 

@@ -13,6 +13,11 @@ SOURCE = "Mailloux, Phased Array Antenna Handbook, 3rd ed., 2018, section 1.3.4 
 DEFAULTS: dict[str, float] = {}
 
 
+def waves(settings: dict) -> dict[str, bool]:
+    """Return how arrays are summed."""
+    return {"squint": True}
+
+
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
     """Return how early the arrays' middles hear an echo; without squint they turn all subcarriers alike."""
     return Displacement(delay_s=-array_turns(view) / view.station.frequency_hz)

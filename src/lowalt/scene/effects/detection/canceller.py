@@ -17,8 +17,7 @@ from scipy.linalg import eigh, toeplitz
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.channel.windblown import windblown
-from lowalt.scene.waveform import Look
+from lowalt.scene.laws.windblown import windblown
 
 SOURCE = (
     "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, their response and "
@@ -48,11 +47,6 @@ def check(settings: dict, scene: CheckedScene) -> None:
                 f"effects.canceller.{key}: {settings[key]:g}, expected the network's {getattr(scene.network, key):g}, "
                 "for which kind 'clutter' is made"
             )
-
-
-def process(settings: dict, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return the range cells (N, M) behind the filter; nothing is drawn."""
-    return filtered(settings, cells)
 
 
 def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:

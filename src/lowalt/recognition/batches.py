@@ -1,5 +1,8 @@
-"""Batches of a training and an evaluation, read ahead by workers that live as long as their reader: they start once,
-not once an epoch."""
+"""The batches of a training and an evaluation: the order of samples in an epoch, and worker processes that read ahead.
+
+The order depends only on seed and epoch, so an interrupted training resumes at any step. Workers start once and live as
+long as their reader, not once per epoch.
+"""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -9,7 +12,35 @@ import torch
 from torch.utils.data import DataLoader, Dataset
 
 from lowalt.numerics.streams import stream
-from lowalt.recognition.samples import Samples
+from lowalt.recognition.samples import Facts, Samples
+
+
+def epoch_order(facts: Facts, seed: int, keys: tuple, epoch: int, snrs_per_model: int) -> np.ndarray:
+    """Return the sample numbers of one epoch, shuffled.
+
+    snrs_per_model: how many randomly chosen SNRs of each motion model the epoch visits; 0 visits all. Fewer give
+    more epochs of distinct motion for the same time, since SNRs of one motion model are nearly the same image.
+    """
+    generator = stream(seed, "recognition-order", *keys, epoch)
+    draw = generator.random(len(facts))
+    order = np.argsort(draw, kind="stable")
+    if not snrs_per_model:
+        return order
+    _, motion = np.unique(np.char.add(np.char.add(facts.subtype, "\n"), facts.model.astype(str)), return_inverse=True)
+    # Rank the samples within each motion model by their draw; keep the first `snrs_per_model`.
+    grouped = order[np.argsort(motion[order], kind="stable")]
+    starts = np.concatenate([[0], np.cumsum(np.bincount(motion))[:-1]])
+    rank = np.empty(len(facts), dtype=np.int64)
+    rank[grouped] = np.arange(len(facts)) - starts[motion[grouped]]
+    return order[rank[order] < snrs_per_model]
+
+
+def batches(order: np.ndarray, size: int) -> list[np.ndarray]:
+    """Cut an epoch's order into full batches; a shorter last one is left out unless it is the only one."""
+    full = len(order) // size
+    if full == 0:
+        return [order]
+    return [order[start * size : (start + 1) * size] for start in range(full)]
 
 
 def tensors(arrays: Any) -> Any:
@@ -50,7 +81,7 @@ class Augmented(Dataset):
         return tensors(changed), torch.from_numpy(self.source.facts.label[mine]).long()
 
 
-class ReadAhead:
+class Prefetch:
     """Calls a map for one item after the other, in worker processes where there are any, and keeps their order."""
 
     def __init__(self, read: Dataset, workers: int, pin: bool) -> None:

@@ -14,7 +14,7 @@ from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, samples, schemes
 from lowalt.recognition.__main__ import main
-from lowalt.recognition.made import DatasetSamples, opened, stations_of
+from lowalt.recognition.dataset_samples import DatasetSamples, opened, stations_of
 from lowalt.recognition.views import ShardSamples
 from lowalt.scene import chain
 from lowalt.shards import maker
@@ -69,7 +69,7 @@ def test_clean_echoes_are_computed_once_a_motion_model(run, pair, monkeypatch):
     made.views(np.arange(len(made.facts)))
     assert calls == [] and maker.kept >= len({place for place, _ in made.chosen}) == 26
     monkeypatch.undo()
-    monkeypatch.setattr("lowalt.recognition.made.CLEAN_BYTES", 9600)
+    monkeypatch.setattr("lowalt.recognition.dataset_samples.CLEAN_BYTES", 9600)
     small = DatasetSamples(opened(run / "config.yaml"), COLUMNS, {("unseen", "val")}, SIZE, placed=False)
     assert not small.dataset.maker._received and np.isnan(small.facts.range_m).all()
 

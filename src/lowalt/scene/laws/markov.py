@@ -1,8 +1,11 @@
-"""Linear Gaussian processes driven by white noise, discretised exactly; the motion effects are made of them.
+"""Linear Gaussian processes driven by white noise, discretised exactly; the motion effects use them.
 
-A process x' = F x + g n with white noise n of unit intensity moves over a step h by x <- exp(F h) x + w, and the
-covariance of w is known in closed form; no step is too long for it, and none adds an error. All operations are ones
-that IEEE 754 fixes, in one written order, so every processor draws the same walks.
+A process x' = F x + g n with white noise n of unit intensity changes over a step h to
+
+    x <- exp(F h) x + w,
+
+where the covariance of w is known in closed form. This is exact for steps of any length. Only operations that IEEE 754
+defines are used, in a fixed order, so every processor draws the same walks.
 """
 
 from typing import NamedTuple
@@ -85,7 +88,7 @@ def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
 
 
 def stationary(process: Steps) -> np.ndarray:
-    """Return the covariance (K, K) at which a stable process stays: what so many steps add that none is remembered."""
+    """Return the stationary covariance (K, K) of a stable process: after so many steps, its start is forgotten."""
     while abs(process.transition).max() > _FORGOTTEN:
         process = _twice(process)
     return 0.5 * (process.added + process.added.T)

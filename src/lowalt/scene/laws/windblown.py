@@ -1,4 +1,4 @@
-"""The wind in the land's echoes: how much of them moves, and unit-power speckle with the moving part's spectrum."""
+"""Windblown land: the ratio of still to moving echoes, and speckle of unit power with both parts."""
 
 import numpy as np
 from scipy import fft
@@ -16,7 +16,7 @@ FAINT = 1e-11
 def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
     """Return the ratio of still to moving power and the exponential spectrum's slope beta (s/m).
 
-    The formula for the slope ends at a wind of one mile an hour; below, the slope keeps its value there.
+    Below a wind of one mile per hour, where the formula ends, the slope keeps its value at that wind.
     Source: Billingsley 2002, chapter 6 (wind in miles per hour, frequency in GHz).
     """
     miles = wind_mps / MPH

@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from twin_courses import Course
 
 from lowalt.echo import Rigid, echo_signals
 from lowalt.files.errors import InputError
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.table import NUMBERS, PHASES
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_courses import Course
 from lowalt.scene.effects.motion import rotor_spread
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import NODES

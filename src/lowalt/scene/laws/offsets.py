@@ -1,7 +1,7 @@
-"""Offsets of stations' clocks, and what they do to time samples.
+"""Offsets of clocks and oscillators, and what they do to time samples.
 
-An offset has a fixed part and a drawn part. That is normal, cut at three standard deviations, so that a scene's largest
-offset is known beforehand.
+An offset has a fixed part and a drawn part. The drawn part is normal and truncated at three standard deviations, so
+that the largest offset of a scene is known before it is drawn.
 """
 
 from statistics import NormalDist
@@ -15,11 +15,11 @@ from lowalt.scene.checks import CheckedScene
 from lowalt.scene.waveform import Look
 
 CUT = 3.0
-"""Standard deviations at which draws are cut."""
+"""Standard deviations at which draws are truncated."""
 
 
 def drawn(rng: np.random.Generator) -> float:
-    """Return a standard normal number cut at +-3, by one uniform draw through the inverse distribution."""
+    """Return a standard normal number truncated at +-3, from one uniform draw by the inverse distribution."""
     tail = NormalDist().cdf(-CUT)
     return NormalDist().inv_cdf(tail + (1 - 2 * tail) * rng.random())
 
@@ -39,9 +39,9 @@ def check_slip(effect: str, slip_s: float, slack_s: float) -> None:
 
 
 def of_stations(settings: dict, network: Network, rng: np.random.Generator) -> dict[str, tuple[float, float]]:
-    """Return each station's frequency error (ppm) and clock error (s) in a look, by name; two draws a station.
+    """Return each station's frequency error (ppm) and clock error (s) in a look, by name; two draws per station.
 
-    rng: the look's stream of `link_offset`. Links and other stations' signals see these errors.
+    rng: the stream of `link_offset`, which the whole look shares with `interference`.
     """
     names = [station.name for station in network.stations if station.transmitter is None]
     drawn = rng.standard_normal((len(names), 2)) * [settings["sigma_ppm"], settings["sigma_s"]]
@@ -64,11 +64,11 @@ def turned(samples: np.ndarray, turns: np.ndarray) -> np.ndarray:
 
 
 def risen(samples: np.ndarray, rise_hz: float, look: Look) -> np.ndarray:
-    """Return samples (N, M) all of whose frequencies are higher by `rise_hz`: turned at their absolute times."""
+    """Return samples (N, M) with all frequencies raised by `rise_hz`, counted from the absolute time 0."""
     return turned(samples, rise_hz * look.sample_times_s)
 
 
 def delayed(samples: np.ndarray, delay_s: float, look: Look) -> np.ndarray:
-    """Return samples (N, M) later by `delay_s` in the symbols' cyclic extension: a phase linear over subcarriers."""
+    """Return samples (N, M) delayed by `delay_s` in each symbol's cyclic extension: a phase linear over subcarriers."""
     turn = np.exp(-2j * np.pi * delay_s * fft.ifftshift(look.baseband_hz))
     return fft.ifft(fft.fft(samples, axis=-1) * turn, axis=-1, overwrite_x=True)

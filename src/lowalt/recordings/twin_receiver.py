@@ -13,7 +13,7 @@ from scipy.signal import butter, sosfilt
 
 from lowalt.config.command import pick
 from lowalt.noise.awgn import add_noise
-from lowalt.numerics.power import rms
+from lowalt.numerics.portable import rms
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ def received(
 def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float) -> np.ndarray:
     """Return samples (N,) behind a Butterworth high pass of order 2, 0 Hz for none.
 
-    The noise floors of all tuning recordings at 24 GHz fall off below 100 to 150 Hz (0.6 to 0.9 m/s), as audio
-    amplifiers and sound cards with coupling capacitors do (Horowitz and Hill 2015, section 1.7).
+    Audio amplifiers and sound cards with coupling capacitors have one (Horowitz and Hill 2015, section 1.7). In the
+    recordings at 24 GHz it lies below 12 Hz (0.08 m/s), where it shows at all.
     """
     if not corner_hz:
         return values

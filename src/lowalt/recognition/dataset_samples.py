@@ -1,6 +1,6 @@
-"""Samples for the network made on the spot (`lowalt.Dataset`): no shard is read, and none need be written.
+"""Samples for the network, simulated on access (`lowalt.Dataset`), so that no shards are needed.
 
-Order, facts and pixels are those of the shards of the same configuration, so a training sees the same batches.
+Order, metadata and pixels equal those of the shards of the same configuration, so a training sees the same batches.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ from lowalt.targets.cloud import Cloud
 from lowalt.tiles.resample import resize
 
 CLEAN_BYTES = 2**30
-"""Memory limit for kept clean echoes (bytes); where a training's motion models need more, only the last are kept."""
+"""Memory limit for cached clean echoes (bytes); if a training's motion models need more, only recent ones are kept."""
 
 
 def opened(config: str | Path) -> Dataset:
@@ -53,7 +53,7 @@ def cloud_sha256(cloud: Cloud) -> str:
 
 
 def stations_of(maker: Maker, columns: list[int]) -> list[int] | None:
-    """Return the numbers of the stations that images show, None where range cells are shown, which need all of them."""
+    """Return the numbers of the stations that the images show; None (all) where they show range cells."""
     spectra = Spectra.from_settings(maker.render["spectra"])
     shown = sorted({number // len(spectra) for number in columns})
     return None if of_cells(spectra) else shown
@@ -64,7 +64,7 @@ def views_of(
 ) -> np.ndarray:  # fmt: skip
     """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row at an SNR (dB).
 
-    stations: those that the images show (`stations_of`), the only ones that are computed; all by default.
+    stations: the stations to compute, as `stations_of` returns them; all by default.
     """
     signal = maker.signal(row, snr_db, stations)
     images = maker.renderer.some(signal, columns, maker.late(row), maker.shown(row, snr_db, signal))
@@ -72,14 +72,14 @@ def views_of(
 
 
 class DatasetSamples(samples.Samples):
-    """Samples made as they are asked for; the same calls, order and pixels as `ShardSamples`."""
+    """Samples simulated on access; same methods, order and pixels as `ShardSamples`."""
 
     def __init__(self, dataset: Dataset, columns: list[int], folds: set, size: int, placed: bool) -> None:
         """columns: views to keep; folds: (group, fold) pairs; size: pixels; placed: whether facts carry ranges and
         aspects.
 
-        Every motion model's clean echoes are computed here, once, where they fit into CLEAN_BYTES: workers that are
-        forked inherit them, and only noise and images are left for the steps.
+        The clean echoes of all motion models are computed here, once, if they fit into CLEAN_BYTES. Forked workers
+        inherit them, so that a training step only adds noise and renders images.
         Raises: InputError where nothing is left, or a station or spectrum is missing.
         """
         self.dataset, self.size = dataset, size
@@ -125,7 +125,7 @@ class DatasetSamples(samples.Samples):
         )
 
     def _prepare(self) -> None:
-        """Compute the clean echoes of all motion models where they can be kept."""
+        """Compute the clean echoes of all motion models if they fit into memory."""
         maker = self.dataset.maker
         if in_all_cells(maker.echo["effects"]):
             # The echoes of such a scene hold the noise of one SNR, so other SNRs cannot use them.
@@ -150,7 +150,7 @@ class DatasetSamples(samples.Samples):
         return np.stack(images)
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training sees of these samples; clouds, rows and settings stand for images.
+        """Return the SHA-256 of all that a training uses of these samples: clouds, rows and settings instead of images.
 
         The same samples from shards or a cache have another sum.
         """

@@ -1,4 +1,4 @@
-"""How fast flying targets answer the air, by class and size: their masses, their drag and their control of attitude."""
+"""The response of flying targets to wind by class and size: mass, drag and lag of the attitude."""
 
 import math
 

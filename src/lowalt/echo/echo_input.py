@@ -1,6 +1,6 @@
-"""The motions that the echo takes, and their checks: rigid parts with their poses, or plain positions.
+"""The input of the echo kernels and its checks: a motion, as rigid parts with poses or as plain positions.
 
-Rigid parts are the better form: no array of symbols x points ever exists.
+Rigid parts need less memory, because no array of symbols x points is made.
 """
 
 import math
@@ -25,9 +25,9 @@ class Rigid(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A checked motion and its points' cross sections with their square roots, which all stations share.
+    """A checked motion with the points' cross sections and their square roots, for use by all stations.
 
-    Where `rotation` has shape (0, 0, 3, 3), `translation` (N, L, 3) holds positions.
+    For plain positions, `rotation` has shape (0, 0, 3, 3) and `translation` (N, L, 3) holds the positions.
     """
 
     rotation: np.ndarray
@@ -38,8 +38,8 @@ class Target(NamedTuple):
     rcs_m2: np.ndarray
 
 
-class EchoScene(NamedTuple):
-    """Checked input of the kernels: a `Target`'s fields, written out for type checkers, and where the beams point."""
+class EchoInput(NamedTuple):
+    """Checked input of the kernels: the fields of `Target`, repeated for type checkers, and the beams' aim point."""
 
     rotation: np.ndarray
     translation: np.ndarray
@@ -62,11 +62,11 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     if not fits:
         expected = str(shape).replace("'", "")
         raise InputError(f"{sample}{name} has shape {array.shape}, expected {expected}")
-    # The sum of finite numbers is finite unless it overflows: only where it is not are all numbers tested.
+    # Fast path: a finite sum means that all numbers are finite. Test each number only if the sum is not.
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number")
-    # Kernels would be compiled once more for an array that is read-only.
+    # Copy a read-only array, because numba would compile the kernels a second time for it.
     return array if array.flags.writeable else array.copy()
 
 
@@ -74,7 +74,7 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
     """Return the checked target of a motion, `Rigid` or positions (N, L, 3) m, and of its cross sections, (L,) m2 or
     one number for all points.
 
-    Checking takes a twentieth of a signal's time: a caller with several stations calls this once, and passes the result
+    The check takes 5 % of the time of a signal, so a caller with several stations calls this once and passes the result
     to each `echo_signal`.
     Raises: InputError naming the argument, its value and the sample for NaN, infinite, empty or wrongly shaped input,
     and for a negative cross section.
@@ -106,8 +106,8 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
     return Target(rotation, translation, points, part, np.sqrt(rcs), rcs)
 
 
-def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoScene:
-    """Return the checked scene of one motion seen by one station; rcs_m2 is None where a `Target` comes as motion.
+def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoInput:
+    """Return the checked input for one motion and one station; rcs_m2 is None if `motion` is a `Target`.
 
     Raises: as `target`, and InputError for cross sections given twice or an aim at the station itself.
     """
@@ -122,7 +122,7 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
     if aim.tolist() == list(station.position_m):
         raise InputError(f"{where}aim_m is {aim_m}, the place of station {station.name}: no direction to aim at")
     check_station(network, station)
-    return EchoScene(*seen, aim)
+    return EchoInput(*seen, aim)
 
 
 def check_station(network: Network, station: Station) -> None:
@@ -135,5 +135,5 @@ def check_station(network: Network, station: Station) -> None:
 
 
 def _no_rotation() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Empty rotations, points and parts: the points are given by their places alone."""
+    """Return empty rotations, points and parts, for points given by positions alone."""
     return np.zeros((0, 0, 3, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)

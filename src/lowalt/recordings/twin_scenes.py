@@ -23,17 +23,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from twin_courses import Course, hover, straight, to_and_fro
-from twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
-from twin_receiver import Receiver, received
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
-from lowalt.numerics.power import rms
+from lowalt.numerics.portable import rms
 from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.presence import present
 from lowalt.recordings.twin import Twin, radars, settings_of
+from lowalt.recordings.twin_courses import Course, hover, straight, to_and_fro
+from lowalt.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
+from lowalt.recordings.twin_receiver import Receiver, received
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
@@ -163,15 +163,15 @@ REDRAWS = 8
 
 
 def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np.ndarray:
-    """Return the coherent interval (symbols,) of an echo at a receiver, which is drawn again while no target is
-    present."""
+    """Return the coherent interval (symbols,) of an echo at a receiver. Where targets move, so that they are not heard
+    all the time, it is drawn again while no target is present."""
     seconds = twin.symbols * twin.symbol_interval_s
     for redraw in range(REDRAWS):
         both = []
-        for target in (True, False) if twin.detect_db else (True,):
+        for target in (True, False) if twin.slowest_mps else (True,):
             values = samples(twin, receiver, signal, stream(*keys, redraw), target)
-            both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols))
-        if present(both[0], twin, both[-1]).all():
+            both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow))
+        if not twin.slowest_mps or present(both[0], twin, both[-1]).all():
             break
     return both[0][0]
 
@@ -182,7 +182,8 @@ def intervals(
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
 
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from the scene's ranges.
-    As with recordings, a window counts where its target stands above the noise (`presence.present`).
+    As with recordings, a window counts where its target stands above the noise (`presence.present`); one that hovers is
+    heard at any SNR that its receiver has.
     """
     seconds = twin.symbols * twin.symbol_interval_s
     result, names = np.empty((count, receivers, twin.symbols), np.complex128), []

@@ -1,6 +1,6 @@
 """The plan of the package: its rooms in the order in which data passes them, and which room imports which.
 
-A room imports only rooms that stand before it: `tests/test_house.py` checks this, and `docs/rooms_picture.py` draws it.
+A room imports only earlier rooms: `tests/test_house.py` checks this, and `docs/rooms_picture.py` draws it.
 """
 
 import ast
@@ -8,22 +8,22 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
-STREET = (
+ROOMS = (
     "files", "machine", "numerics", "config", "targets", "drafting", "motion", "echo", "scene", "noise", "spectra",
     "tiles", "shards", "recognition", "recordings", "measure", "report", "workflow", "commands",
 )  # fmt: skip
 
 
 def modules(room: str) -> list[Path]:
-    """Return the Python files of a room, those of its inner rooms included, sorted."""
+    """Return the Python files of a room, including those in its subfolders, sorted."""
     return sorted((PACKAGE / room).rglob("*.py"))
 
 
 @cache
 def rooms_imported(path: Path) -> frozenset[str]:
-    """Return the rooms that the imports of one file name; its own room is one of them if it imports from there.
+    """Return the rooms from which a file imports, including its own room if it imports from there.
 
-    A file is read once in a process.
+    The result is cached per process.
     """
     names = []
     for node in ast.walk(ast.parse(path.read_text())):
@@ -34,7 +34,7 @@ def rooms_imported(path: Path) -> frozenset[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.append(node.module)
     parts = [name.split(".") for name in names]
-    return frozenset(part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in STREET)
+    return frozenset(part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in ROOMS)
 
 
 def purpose(path: Path) -> str:
