@@ -187,6 +187,8 @@ def test_the_first_hour(checkout, capsys, monkeypatch):
         line = spectrum[:, cell - 1 : cell + 3].max(axis=1)
         place = np.interp(echo.truth["observed_mps"].mean(), echo.speeds_mps, np.arange(400))
         assert line[max(0, int(place) - 25) : int(place) + 25].max() == line.max()
+    # 12 dB/km, there and back.
+    assert names["lost_db"] == pytest.approx(0.012 * 2 * names["dry"].truth["range_m"].mean(), rel=1e-3)
     assert names["fourth"].station == "D" and len(names["hexacopter"].parts) == 7
     assert "m600.yaml: 'm600'" in printed and "of 5 windows hold a target" in printed
 
