@@ -24,7 +24,7 @@ include: "workflow/rules/report.smk"
 
 
 onstart:
-    print(RUN.sources, file=sys.stderr)
+    print(*filter(None, (RUN.sources, RUN.folding)), sep="\n", file=sys.stderr)
     with refusing():
         RUN.launch.before(workflow)
         space.before(workflow, RUN.plan, config)

@@ -165,6 +165,36 @@ def test_the_loop_works_with_spawned_workers(checkout, shards):
     assert run.stdout == LOOP, run.stderr
 
 
+def test_the_first_hour_has_no_block_beyond_ten_lines():
+    blocks = [block for _, _, block in FENCE.findall((ROOT / "docs/first_hour.md").read_text())]
+    assert len(blocks) > 10 and max(len(block.splitlines()) for block in blocks) <= 10
+
+
+# A town at two bands, a target from its data sheet, two seconds of a walker and its answer.
+@pytest.mark.slow
+def test_the_first_hour(checkout, capsys, monkeypatch):
+    (checkout / "results/tiny").mkdir(parents=True)
+    (checkout / "results/zoo").symlink_to(ROOT / "results/zoo")
+    # The run itself: tests/test_notebooks.py.
+    table = checkout / "results/tiny/confusion_by_snr.csv"
+    table.write_text("protocol,scheme,snr_db,category,predicted,samples\nseen,A,3,Bird,UAV,7\nseen,A,inf,Bird,UAV,9\n")
+    printed, names = followed("../first_hour", checkout, monkeypatch)
+    said = capsys.readouterr().out
+    assert "(400, 256) sqrt(W) ('body', 'right inner wing'" in said and "Bird taken for UAV           7" in said
+    for name, echo in {"town": names["echo"], "fourth": names["fourth"], "hexacopter": names["hexacopter"]}.items():
+        assert (checkout / f"{name}.png").is_file()
+        # In the cells around the target, the strongest line of the map is at the folded speed of the target.
+        spectrum = abs(np.fft.fftshift(np.fft.fft(np.hanning(400)[:, None] * echo.values, axis=0), axes=0)[::-1])
+        cell = int(echo.truth["observed_cell"].mean())
+        line = spectrum[:, cell - 1 : cell + 3].max(axis=1)
+        place = np.interp(echo.truth["observed_mps"].mean(), echo.speeds_mps, np.arange(400))
+        assert line[max(0, int(place) - 25) : int(place) + 25].max() == line.max()
+    # 12 dB/km, there and back.
+    assert names["lost_db"] == pytest.approx(0.012 * 2 * names["dry"].truth["range_m"].mean(), rel=1e-3)
+    assert names["fourth"].station == "D" and len(names["hexacopter"].parts) == 7
+    assert "m600.yaml: 'm600'" in printed and "of 5 windows hold a target" in printed
+
+
 def test_a_recording(checkout, monkeypatch):
     (checkout / "results").mkdir()
     (checkout / "results/zoo").symlink_to(ROOT / "results/zoo")

@@ -3,23 +3,23 @@
 One folder a stage, in pipeline order: targets, motion, echo, noise, spectra, tiles, shards, recognition, report.
 """
 
+import importlib
+
 __version__ = "0.2.0"
 
 
-__all__ = ["Dataset", "Endless", "evaluate", "train"]
+_HOMES = {
+    "Dataset": "shards.dataset", "Endless": "shards.dataset", "RawEcho": "shards.receive",
+    "evaluate": "recognition.train_evaluate", "receive": "shards.receive", "train": "recognition.train_evaluate",
+}  # fmt: skip
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str):
-    """Import `Dataset`, `Endless`, `train` or `evaluate` when it is first asked for."""
+    """Import a name of `__all__` when it is first asked for."""
     # A stage's command line must not wait for the import of all other stages.
-    if name in ("Dataset", "Endless"):
-        from lowalt.shards import dataset
-
-        return getattr(dataset, name)
-    if name in ("train", "evaluate"):
-        from lowalt.recognition import train_evaluate
-
-        return getattr(train_evaluate, name)
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"lowalt.{_HOMES[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -172,6 +172,7 @@ def test_scores_count_every_snr_alike():
     found = score.scores(facts, np.array([[0.9, 0.1], [0.6, 0.4], [0.2, 0.8]]))
     assert found["accuracy_percent"] == 75 and found["by_snr_percent"] == {"3": 50.0, "inf": 100.0}
     assert found["by_subtype_percent"] == {"Crow": 100.0, "Owl": 50.0} and found["confusion"] == [[1, 0], [1, 1]]
+    assert found["confusion_by_snr"] == {"3": [[1, 0], [1, 0]], "inf": [[0, 0], [0, 1]]}
     assert found["brier"] == pytest.approx((0.02 + 0.72 + 0.08) / 3)
 
 

@@ -179,17 +179,16 @@ def test_each_seed_has_its_accuracy_and_what_its_training_took(run):
                  hardware=f"bench of {protocol}", **{**ABOUT, "steps": 70 + seed})  # fmt: skip
 
 
-def test_confusion_counts_samples_over_the_seeds(run):
-    found = by_key(run.table("confusion"), "category", "predicted")
-    assert len(found) == 4 * 16
-    for protocol, scheme in run.rows:
+@pytest.mark.parametrize("table, levels", [("confusion", []), ("confusion_by_snr", ["snr_db"])])
+def test_confusion_counts_samples_over_the_seeds(run, table, levels):
+    found = by_key(run.table(table), *levels, "category", "predicted")
+    assert len(found) == 4 * 16 * (len(SNRS) if levels else 1)
+    for (protocol, scheme, *snr, true, guess), level in found.items():
         rows = [row for rows in part(run, protocol, scheme) for row in rows]
-        for true, category in enumerate(CATEGORIES):
-            for guess, predicted in enumerate(CATEGORIES):
-                count = sum((row["label"], row["guess"]) == (true, guess) for row in rows)
-                same(
-                    found[protocol, scheme, category, predicted], category=category, predicted=predicted, samples=count
-                )
+        rows = [row for row in rows if not snr or float(row["snr"]) == float(snr[0])]
+        pair = CATEGORIES.index(true), CATEGORIES.index(guess)
+        same(level, category=true, predicted=guess, **dict(zip(levels, snr, strict=True)),
+             samples=sum((row["label"], row["guess"]) == pair for row in rows))  # fmt: skip
 
 
 def test_subtypes_have_their_class_and_accuracy_the_worst_of_a_class_first(run):

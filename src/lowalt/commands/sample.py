@@ -1,17 +1,18 @@
-"""The command `lowalt sample`: one sample of a configuration as files and as a picture with axes."""
+"""The command `lowalt sample`: one sample of a configuration as files and as a picture with axes, or its raw echo."""
 
 import argparse
 import math
-import os
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.config.command import warn_in_one_line
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.shards.dataset import Dataset, Place
+from lowalt.shards.dataset import Dataset
+from lowalt.shards.receive import AT, alone, receive, write
 from lowalt.shards.sample_record import sample_key
 from lowalt.tiles.png import encode
 
@@ -23,6 +24,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     line.add_argument("model", type=int, help="number of the motion model; any number, also beyond the configuration's")
     line.add_argument("--snr", type=float, default=math.inf, help="signal-to-noise ratio in dB (default: no noise)")
     line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the default")
+    line.add_argument("--raw", nargs="?", const="cells", choices=AT, help="write the raw echo at this place of the "
+                      "chain instead (default: cells), as .npz and, where h5py is installed, .h5")  # fmt: skip
+    line.add_argument("--station", help="of a raw echo (default: each station)")
     line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
 
 
@@ -31,17 +35,17 @@ def run(options: argparse.Namespace) -> Answer:
 
     Raises: InputError for a wrong configuration, subtype or model.
     """
+    warn_in_one_line()
+    config = overlaid(options.overlay)
+    selected = config["targets"]["select"]
+    if options.model < 0 or (selected and options.subtype not in selected):
+        raise InputError(f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number from 0")
+    dataset = alone(config, options.subtype)
+    if options.raw:
+        return _raw(options, dataset)
     from lowalt.report.figures.tile_axes import figure
 
-    config = overlaid(options.overlay)
-    everything = config["targets"]["select"]
-    # Only the target's own cloud is made.
-    config["targets"]["select"] = [options.subtype]
-    dataset = Dataset(config, inputs=config["inputs"] or os.environ.get("LOWALT_INPUTS"))
-    if options.model < 0 or (everything and options.subtype not in everything):
-        raise InputError(f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number from 0")
-    (group,) = dataset.plan.groups
-    place = Place(group, options.subtype, options.model, options.snr)
+    place = dataset.place_of(options.subtype, options.model, options.snr)
     image, signal, _ = dataset.made(place)
     key, renderer = sample_key(options.subtype, options.model, options.snr), dataset.maker.renderer
     noise = "no noise" if math.isinf(options.snr) else f"SNR {options.snr:g} dB"
@@ -57,3 +61,13 @@ def run(options: argparse.Namespace) -> Answer:
         np.save(temporary, signal)
     paths = [str(options.out / name) for name in (*written, f"{key}.npy")]
     return Answer({"key": key, "files": paths}, "\n".join(paths))
+
+
+def _raw(options: argparse.Namespace, dataset: Dataset) -> Answer:
+    """Write {key}-{station}-{place}.npz, and .h5 where h5py is installed, of each station asked for."""
+    key, files = sample_key(options.subtype, options.model, options.snr), []
+    names = [options.station] if options.station else [station.name for station in dataset.maker.network.stations]
+    for name in names:
+        echo = receive(dataset, options.subtype, options.model, name, options.raw, options.snr)
+        files += write(echo, options.out / f"{key}-{name}-{options.raw}")
+    return Answer({"key": key, "files": files}, "\n".join(map(str, files)))

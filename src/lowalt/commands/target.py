@@ -1,4 +1,4 @@
-"""`lowalt target inspect | new | make | show`: from a user's mesh to a cloud and a picture of it."""
+"""`lowalt target inspect | new | make | show`: from a user's mesh to a cloud and a picture."""
 
 import argparse
 import os
@@ -9,6 +9,7 @@ import yaml
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
+from lowalt.commands.data_sheet import add_sheets
 from lowalt.config.command import warn_in_one_line
 from lowalt.drafting.inspection import Inspection, described, inspect_mesh
 from lowalt.drafting.new import SEED, Asked, draft
@@ -77,6 +78,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         line.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
         line.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
                           help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
+    add_sheets(actions)
     meaning = "picture of a cloud with axes, hinges, normals, its motion and its spectra"
     example = "lowalt target show results/default/clouds/crow.npz --out crow.png"
     show = add_command(actions, "show", _show, meaning, example)

@@ -19,6 +19,7 @@ from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 
+MOST_SUBCARRIERS = 100_000
 DEFAULT, SCHEMA = "config/default.yaml", "workflow/schemas/config.schema.yaml"
 
 
@@ -83,12 +84,30 @@ def _without_ofdm(network: dict) -> None:
                 del network[key]
 
 
+def _with_subcarriers(network: dict) -> None:
+    """Replace a network's bandwidth by the number of subcarriers that comes nearest to it."""
+    bandwidth_hz = network.pop("bandwidth_hz", None)
+    if bandwidth_hz is None:
+        return
+    if "waveform" in network:
+        raise InputError(
+            f"network.bandwidth_hz: {bandwidth_hz:g}, expected of OFDM only; the band of a sweep is sweep_hz"
+        )
+    count = round(bandwidth_hz / network["subcarrier_spacing_hz"])
+    if not 1 <= count <= MOST_SUBCARRIERS:
+        raise InputError(
+            f"network.bandwidth_hz: {bandwidth_hz:g} is {count} subcarriers, expected 1 to {MOST_SUBCARRIERS}"
+        )
+    network["subcarriers"] = count
+
+
 def check(config: dict, schema_path: str | Path) -> dict:
     """Return the configuration if it fits the schema, without the nulls that remove keys of a lower layer.
 
     A layer can only add keys to a mapping. A null therefore removes an optional key, such as a station, a spectrum or
     an effect. A number may be written 28e9. If the waveform has no subcarriers, those of the embedded default are
-    removed. The configuration is changed in place. Raises: InputError with one line per fault.
+    removed; a bandwidth becomes a number of subcarriers. The configuration is changed in place.
+    Raises: InputError with one line per fault.
     """
     schema = load_yaml(schema_path)
     _without_nulls(config, schema)
@@ -98,11 +117,12 @@ def check(config: dict, schema_path: str | Path) -> dict:
     lines = faults(config, schema)
     if lines:
         raise InputError(f"configuration refused: {_listed(lines)}")
+    _with_subcarriers(config["network"])
     return config
 
 
-def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
-    """Return the checked configuration of a base file and its overlays, in order.
+def load(layers: Iterable[str | Path | dict], schema_path: str | Path) -> dict:
+    """Return the checked configuration of a base file and its overlays, in order, each a path or a dict.
 
     A file that is not in the working directory is taken from the package.
     Raises: InputError naming file, key and value.
@@ -112,8 +132,8 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
         ('tiny', [3, inf])
     """
     result: dict = {}
-    for path in paths:
-        result = merge(result, load_yaml(shipped(path)))
+    for layer in layers:
+        result = merge(result, layer if isinstance(layer, dict) else load_yaml(shipped(layer)))
     return located(check(result, shipped(schema_path)))
 
 
@@ -131,7 +151,7 @@ def of_run(folder: str | Path) -> dict:
     return config
 
 
-def overlaid(overlays: Iterable[str | Path]) -> dict:
+def overlaid(overlays: Iterable[str | Path | dict]) -> dict:
     """Return the embedded default with overlays laid over it, in order, as `load` does."""
     return load([DEFAULT, *overlays], SCHEMA)
 

@@ -5,6 +5,7 @@ Axes: x and y horizontal, z up, metres, global frame. Angles in degrees only in 
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -233,6 +234,20 @@ class Network:
         """Return c / (4 f T_r) (m/s), f the effective carrier: faster targets fold, because their phase turns by
         more than half a circle per symbol."""
         return SPEED_OF_LIGHT / (4 * self.effective_hz(station) * self.symbol_interval_s)
+
+    def folding(self, published: Iterable[dict]) -> str:
+        """Return a sentence where targets with these rows of the table of targets move faster than speeds that fold
+        here, with a symbol interval at which none does; else an empty text."""
+        columns = ("vx_abs_max", "vy_abs_max", "vz_abs_max", "speed_hi")
+        fastest = max(math.hypot(*(row[column] or 0.0 for column in columns)) for row in published)
+        largest, interval_s = min(map(self.largest_mps, self.stations)), self.symbol_interval_s
+        if fastest <= largest:
+            return ""
+        none_s = 0.95 * interval_s * largest / fastest
+        return (
+            f"radial speeds beyond {largest:.3g} m/s fold, targets move at up to {fastest:.3g} m/s: "
+            f"network.symbol_interval_s is {interval_s:g}, at {none_s:.2g} none would fold"
+        )
 
     def folded_mps(self, speed_mps: np.ndarray, station: Station) -> np.ndarray:
         """Return the speeds (m/s, any shape) at which a station sees radial speeds, above -largest to largest."""

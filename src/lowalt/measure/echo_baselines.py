@@ -65,8 +65,10 @@ def closed(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dty
     return best
 
 
-def finufft(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9) -> np.ndarray:
-    """Signal (N,): one non-uniform FFT (type 1, FINUFFT) per symbol, from points to subcarriers, one plan for all."""
+def finufft_cells(
+    network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9
+) -> np.ndarray:  # fmt: skip
+    """Range cells (N, M): one non-uniform FFT (type 1, FINUFFT) a symbol from points to subcarriers, with one plan."""
     from finufft import Plan
 
     r, amplitude = amplitudes(network, station, motion, rcs_m2, aim_m)
@@ -77,9 +79,14 @@ def finufft(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, to
     angle = -4 * np.pi / SPEED_OF_LIGHT * network.subcarrier_spacing_hz * r
     angle -= 2 * np.pi * np.rint(angle / (2 * np.pi))
     plan = Plan(1, (count,), eps=tolerance, isign=1, nthreads=1)
-    result = np.empty(len(r), np.complex128)
+    result = np.empty((len(r), count), np.complex128)
     for n in range(len(r)):
         plan.setpts(angle[n])
-        cells = np.fft.ifft(plan.execute(strength[n]))
-        result[n] = cells[abs(cells).argmax()]
+        result[n] = np.fft.ifft(plan.execute(strength[n]))
     return result
+
+
+def finufft(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9) -> np.ndarray:
+    """Signal (N,): the strongest of `finufft_cells`."""
+    cells = finufft_cells(network, station, motion, rcs_m2, aim_m, tolerance)
+    return np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0]

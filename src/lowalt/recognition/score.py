@@ -47,13 +47,19 @@ def scores(facts: Facts, probabilities: np.ndarray) -> dict:
 
     probabilities: (samples, classes), in the order of `facts`.
     """
-    correct = probabilities.argmax(1) == facts.label
+    guesses, classes = probabilities.argmax(1), probabilities.shape[1]
+    correct = guesses == facts.label
     by_snr = accuracy_by(facts.snr_db, correct)
     return {
         "samples": len(facts),
         "accuracy_percent": 100 * float(np.mean([share for share, _ in by_snr.values()])),
         "by_snr_percent": {f"{snr:g}": 100 * share for snr, (share, _) in by_snr.items()},
         "by_subtype_percent": {name: 100 * share for name, (share, _) in accuracy_by(facts.subtype, correct).items()},
-        "confusion": confusion(facts.label, probabilities.argmax(1), probabilities.shape[1]).tolist(),
+        "confusion": confusion(facts.label, guesses, classes).tolist(),
+        "confusion_by_snr": {
+            f"{snr:g}": confusion(facts.label[some], guesses[some], classes).tolist()
+            for snr in by_snr
+            for some in [facts.snr_db == snr]
+        },
         **calibration(probabilities, facts.label),
     }

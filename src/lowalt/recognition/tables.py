@@ -7,6 +7,7 @@ The first columns of each file are `protocol, scheme`:
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
     seeds.csv        one row per training: accuracy_percent on average over the SNRs, its network, cost and hardware
     confusion.csv    category, predicted, samples
+    confusion_by_snr.csv  snr_db, category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
@@ -99,13 +100,21 @@ def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
         yield [run.seed, percent(np.mean(shares)), *took, run.hardware]
 
 
-def confusion_rows(runs: list[Evaluated]) -> Iterable[list]:
-    """Yield rows [category, predicted, samples], summed over the seeds."""
-    classes = runs[0].classes
-    counts = sum(confusion(run.test.label, run.test.guesses, len(classes)) for run in runs)
+def confusion_rows(runs: list[Evaluated], snr_db: float | None = None) -> Iterable[list]:
+    """Yield rows [category, predicted, samples], summed over the seeds, at one SNR (dB) or over all."""
+    classes, counts = runs[0].classes, 0
+    for test in (run.test for run in runs):
+        some = slice(None) if snr_db is None else test.snr_db == snr_db
+        counts = counts + confusion(test.label[some], test.guesses[some], len(classes))
     for true, name in enumerate(classes):
         for guess, other in enumerate(classes):
             yield [name, other, counts[true, guess]]
+
+
+def confusion_by_snr_rows(runs: list[Evaluated]) -> Iterable[list]:
+    """Yield rows [snr_db, category, predicted, samples], summed over the seeds."""
+    for snr in np.unique(runs[0].test.snr_db):
+        yield from ([snr_text(snr), *row] for row in confusion_rows(runs, snr))
 
 
 def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
@@ -215,6 +224,7 @@ def write(runs: list[Evaluated], order: list[str], published: dict, folder: str 
         "accuracy": (measured, lambda group: accuracy_rows(group, "test", seed)),
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
         "confusion": (["category", "predicted", "samples"], confusion_rows),
+        "confusion_by_snr": (["snr_db", "category", "predicted", "samples"], confusion_by_snr_rows),
         "subtypes": (["category", "subtype", *share], subtype_rows),
         "ranges": (bands, lambda group: band_rows(group, lambda test: test.range_m, 50)),
         "aspects": (bands, lambda group: band_rows(group, lambda test: test.aspect_deg, 30)),

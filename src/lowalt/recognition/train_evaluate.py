@@ -49,8 +49,9 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = 
 
     model: of `train`, a file (model.pt or .safetensors), or a name of the zoo; run: a folder such as results/default;
     backbone: the FILE.py:FUNCTION of a model file that names code.
-    The result has `accuracy_percent`, the mean over the SNRs, `by_snr_percent`, `by_subtype_percent`, `confusion` and
-    the calibration. Raises: InputError for a run that is not finished, or a model that does not fit its images.
+    The result has `accuracy_percent`, the mean over the SNRs, `by_snr_percent`, `by_subtype_percent`, `confusion`
+    (samples by true class and answer, in the order of the classes), `confusion_by_snr` and the calibration.
+    Raises: InputError for a run that is not finished, or a model that does not fit its images.
     """
     trained = model if isinstance(model, runs.Trained) else zoo.opened(model, trusted=backbone)[0]
     config, index = _opened(run)

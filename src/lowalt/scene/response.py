@@ -7,17 +7,15 @@ eps_p (-j)^p J_p(B x) T_p(u), |u| <= 1. No array of symbols x points x subcarrie
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import jv
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
+from lowalt.numerics.chebyshev_series import band_tables, chebyshev_points, orders_of
 from lowalt.scene import response_loops, spherical
-from lowalt.scene.series import chebyshev_points, interpolation, orders_of
 from lowalt.scene.view import View
 
 ERROR = 1e-11
@@ -74,7 +72,7 @@ def response(
     # A power of sqrt(2), so that a few tables serve all samples.
     reach = 2.0 ** (np.ceil(2 * np.log2(max(reach, 1e-3))) / 2)
     band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
-    to_nodes, to_band = tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers)
+    to_nodes, to_band = band_tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers, ERROR)
     shape = len(view.times_s), len(out.kappas), 2, len(to_nodes) // len(out.kappas)
     result = np.empty((len(out.places), len(back.places), *shape))
     fault = response_loops.moments(out, back, same, strength, reach, result)
@@ -151,21 +149,3 @@ def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
         return np.array([lowest])
     spread = np.pi * half * (_half_diagonal(np.array(network.transmit)) + _half_diagonal(np.array(network.receive)))
     return lowest + half + half * chebyshev_points(orders_of(spread, ERROR))
-
-
-@lru_cache(maxsize=64)
-def tables(nodes: int, spread: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the matrices (Q P, K) from moments to K frequencies of the band, and (K, M) from these to all subcarriers.
-
-    spread: largest |u| = 1 times the band, in turns: the phase of subcarrier m is 2 pi spread x u / 2,
-    x = (2 m - M + 1) / M. Both must not be changed.
-    """
-    argument = np.pi * spread * max(count - 1, 1) / count
-    orders, kept = orders_of(argument, ERROR), orders_of(argument, ERROR) + nodes
-    band = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
-    points = chebyshev_points(kept)
-    p = np.arange(orders)
-    bessel = np.where(p == 0, 1.0, 2.0) * (-1j) ** (p % 4) * jv(p, argument * points[:, None])
-    weights = interpolation(nodes, points)
-    to_nodes = (weights[:, None, :] * bessel.T[None]).reshape(nodes * orders, kept)
-    return np.ascontiguousarray(to_nodes), interpolation(kept, band)

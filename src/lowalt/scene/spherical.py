@@ -10,9 +10,9 @@ import numpy as np
 from scipy import fft
 
 from lowalt.machine.jit import INNER_VECTOR
+from lowalt.numerics.chebyshev_series import chebyshev_points, orders_of
 from lowalt.scene.phasor import phasor
 from lowalt.scene.response_loops import CHUNK, LOOPS, End
-from lowalt.scene.series import chebyshev_points, orders_of
 
 SYMBOLS = 600
 """Symbols that share a box."""

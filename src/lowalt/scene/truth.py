@@ -51,3 +51,18 @@ def observed(view: View, displacements: Iterable[Displacement], cells: int) -> t
         way_m = way_m + SPEED_OF_LIGHT * displacement.delay_s
         doppler_hz = doppler_hz + displacement.rise_hz
     return way_m / (2 * network.cell_m) % cells, network.folded_mps(-doppler_hz * wavelength_m / 2, station)
+
+
+def of_parts(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the range (N, P) m of the middle of each of a target's parts, and the lowest and the highest radial speed
+    (N, P) m/s of its points at each symbol, not folded, positive away from the station.
+
+    Rotors turn far between two symbols, so speeds are taken over two microseconds.
+    """
+    before, after = (view.ways_m(view.at(view.times_s + step).places) for step in (-1e-6, 1e-6))
+    # Ways are there and back, and the step from before to after is twice 1e-6 s.
+    speeds = (after - before) / 4e-6
+    parts = [view.cloud.part == part for part in range(len(view.cloud.names))]
+    ranges = [view.ways_m(view.places[:, part].mean(axis=1)) / 2 for part in parts]
+    low, high = ([bound(speeds[:, part], axis=1) for part in parts] for bound in (np.min, np.max))
+    return tuple(np.stack(columns, axis=1) for columns in (ranges, low, high))

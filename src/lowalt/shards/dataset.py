@@ -7,6 +7,7 @@ Torch is not imported: `Dataset` has a length and indexed samples, as `torch.uti
 import functools
 import itertools
 import json
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
 from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
 from lowalt.config.splits import FOLDS, fold
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.drawing import region_polygon
@@ -158,6 +159,9 @@ class Dataset:
         render = {key: config[key] for key in ("network", "spectra", "images")}
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
+        chosen = [self.published[name] for group in self.groups for name in self.plan.groups[group]]
+        if folds := self.maker.network.folding(chosen):
+            warnings.warn(folds, InputWarning, stacklevel=2)
 
     @functools.cached_property
     def _numbers(self) -> np.ndarray | None:
@@ -194,6 +198,16 @@ class Dataset:
         if not 0 <= number < len(self):
             raise IndexError(f"sample {number}: expected 0 to {len(self) - 1}")
         return self._place(number if self._numbers is None else int(self._numbers[number]))
+
+    def place_of(self, subtype: str, model: int, snr_db: float) -> Place:
+        """Return the place of any motion model of a subtype at any SNR (dB).
+
+        Raises: InputError for a subtype that is not selected.
+        """
+        for group, members in self.plan.groups.items():
+            if subtype in members:
+                return Place(group, subtype, model, snr_db)
+        raise InputError(f"subtype is {subtype!r}, expected one of {[*itertools.chain(*self.plan.groups.values())]}")
 
     def _fold(self, place: Place) -> str:
         """Fold of a sample."""

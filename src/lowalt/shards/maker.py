@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from lowalt.config.network import Network
+from lowalt.config.network import Network, Station
 from lowalt.echo.chunk import clean_signals
 from lowalt.noise.awgn import noisy_signals
+from lowalt.scene.chain import SceneSample
 from lowalt.scene.lateness import lateness
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.shards.sample_record import npy
@@ -68,14 +69,20 @@ class Maker:
         scene = {"seed": self.seed, "network": self.render["network"], **self.echo}
         return Cubes.from_settings(scene, self.clouds, self.occluders)
 
-    def cubes(self, row: dict, snr_db: float, signal: np.ndarray) -> list[Cube]:
+    def cubes(
+        self, row: dict, snr_db: float, signal: np.ndarray, stations: Sequence[int] | None = None
+    ) -> list[Cube]:  # fmt: skip
         """Return the cube of each station of a sample of the motion model `row` at an SNR (dB); signal: its noisy
-        signals (stations, symbols).
+        signals (stations, symbols); stations: numbers of those to make, all by default.
 
         Raises: InputError naming the sample that cannot be computed.
         """
-        pairs = zip(self.network.stations, signal, strict=True)
-        return [self._cubes.of(row, snr_db, station, heard) for station, heard in pairs]
+        chosen = range(len(self.network.stations)) if stations is None else stations
+        return [self._cubes.of(row, snr_db, self.network.stations[number], signal[number]) for number in chosen]
+
+    def seen(self, row: dict, snr_db: float, station: Station) -> SceneSample:
+        """Return the motion model `row` as a station of the scene sees it, at an SNR (dB)."""
+        return self._cubes.sample(row, snr_db, station)
 
     def shown(self, row: dict, snr_db: float, signal: np.ndarray) -> list[Cube] | None:
         """Return the cubes that images are made of, as `cubes`; None where no spectrum is made of range cells."""

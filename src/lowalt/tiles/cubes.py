@@ -16,6 +16,7 @@ from lowalt.scene.effects import called, every
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.scene.truth import geometric
+from lowalt.scene.view import View
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud, cloud_of
 
@@ -73,6 +74,12 @@ class Cubes:
             cells[there, chosen[there]] = signal[there]
         return Cube(cells, chosen, truths[0], truths[1:])
 
+    def sample(self, row: dict, snr_db: float, station: Station) -> SceneSample:
+        """Return a row of the motion table as a station of the scene sees it, at an SNR (dB)."""
+        scene = self.scene.at_snr(snr_db) if self.every_cell else self.scene
+        view = observe(scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"]))
+        return SceneSample(scene, view, self.clouds)
+
     def _seen(self, row: dict, snr_db: float, station: Station) -> tuple[np.ndarray, np.ndarray, tuple, float]:
         """Clean cells (N, M), chosen cells (N,), the truth of every target and the power (W) that SNRs refer to."""
         key = row["subtype"], row["model"], station.name, snr_db if self.every_cell else None
@@ -84,18 +91,20 @@ class Cubes:
 
     def _computed(self, row: dict, snr_db: float, station: Station) -> tuple:
         """Compute `_seen`."""
-        scene = self.scene.at_snr(snr_db) if self.every_cell else self.scene
-        view = observe(scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"]))
-        sample = SceneSample(scene, view, self.clouds)
+        sample = self.sample(row, snr_db, station)
         received, sampling = sample.received(), sample.view.sampling
         there = slice(None) if sampling is None else sampling.present
         seen = (sample.without_target() if self.empty else sample).filtered(sample.detection)
         cells = np.zeros((len(received.cell), seen.shape[1]), np.complex128)
         cells[there] = seen
-        truths = []
-        for target in sample.targets:
-            place, speed_mps = sample.observed(target)
-            known = np.full((len(cells), 2), -1.0)
-            known[there] = np.column_stack([sample.true_cell(target), place])
-            truths.append(np.column_stack([geometric(target), known, speed_mps]))
-        return cells, received.cell, tuple(truths), received.power
+        truths = tuple(true_columns(sample, target) for target in sample.targets)
+        return cells, received.cell, truths, received.power
+
+
+def true_columns(sample: SceneSample, target: View) -> np.ndarray:
+    """Return what is true of the middle of a sample's target at each symbol, (N, 7), columns `spectra.cube.TRUTH`."""
+    place, speed_mps = sample.observed(target)
+    known = np.full((len(speed_mps), 2), -1.0)
+    there = slice(None) if target.sampling is None else target.sampling.present
+    known[there] = np.column_stack([sample.true_cell(target), place])
+    return np.column_stack([geometric(target), known, speed_mps])

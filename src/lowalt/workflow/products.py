@@ -22,8 +22,8 @@ REFERENCE = "results/reference"
 PAGE = (".html", ".css", ".js")
 """Suffixes of the templates of the report."""
 TABLES = (
-    "accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv", "orderings.csv", "alarms.csv",
-    "calibration.csv",
+    "accuracy.csv", "confusion.csv", "confusion_by_snr.csv", "subtypes.csv", "comparisons.csv", "orderings.csv",
+    "alarms.csv", "calibration.csv",
 )  # fmt: skip
 """Tables of recognition; their rows name a protocol and a scheme."""
 PAGE_TABLES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds")

@@ -70,6 +70,12 @@ class Run:
         return f"targets: {len(self.records) - len(named)} built-in; from files: {', '.join(named)}"
 
     @property
+    def folding(self) -> str:
+        """A sentence where speeds of targets fold, else an empty text."""
+        network = Network.from_settings(self.config["network"])
+        return network.folding(record["published"] for record in self.records.values())
+
+    @property
     def name(self) -> str:
         """Name of the run; its files are in results/{name}/."""
         return self.config["run"]

@@ -123,26 +123,27 @@ def signal(scene, radar, refs, symbols, aims, paths, found, risks):
 
 
 @PLAIN
-def matrix(scene, radar, refs, aims, paths, cells, out):
-    """Fill out (N, M) with all range cells, or with subcarriers where `cells` is false; returns as `signal`."""
+def matrix(scene, radar, refs, aims, paths, out):
+    """Fill out (N, M) with all range cells, each by the closed form; returns as `signal`."""
     points, total = room(scene, paths), radar.subcarriers
-    z, u = points.z, points.u
     for n in range(len(refs)):
         fault = symbol(scene, radar, refs[n], n, aims, paths, points)
         if fault:
             return n * len(points.e) + fault
         base = int(refs[n, CELL])
-        if cells:
-            for j in range(total):
-                out[n, (base + j) % total] = cell_sum(z, u, j, total) * cell_phase(base + j, total)
-            continue
-        for m in range(total):
-            # Phase of subcarrier m relative to the effective carrier; the share of whole cells is reduced in integers.
-            whole = (((2 * m - (total - 1)) * (base % (2 * total))) % (2 * total)) / (2.0 * total)
-            value = 0.0j
-            for l in range(len(z)):  # noqa: E741
-                turn = (m - 0.5 * (total - 1)) / total * u[l] + whole
-                turn -= np.rint(turn)
-                value += z[l] * complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
-            out[n, m] = value
+        for j in range(total):
+            out[n, (base + j) % total] = cell_sum(points.z, points.u, j, total) * cell_phase(base + j, total)
+    return 0
+
+
+@PLAIN
+def amplitudes(scene, radar, refs, aims, paths, first, z, u):
+    """Fill z and u (K, L), or (K, paths * L), with what `terms` gives at K symbols from `first` on; returns as
+    `signal`."""
+    points = room(scene, paths)
+    for n in range(len(z)):
+        fault = symbol(scene, radar, refs[first + n], first + n, aims, paths, points)
+        if fault:
+            return (first + n) * len(points.e) + fault
+        z[n], u[n] = points.z, points.u
     return 0

@@ -10,7 +10,7 @@ from scipy.special import i0e
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
-from lowalt.scene import series
+from lowalt.numerics import chebyshev_series
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.fresnel import fresnel
 from lowalt.scene.response import ImagePath
@@ -76,5 +76,5 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
         smooth = fresnel(sine, *ground(settings, frequency), frequency, settings["polarisation"])
         return smooth * roughness(sine, settings["roughness_m"], frequency)
 
-    coefficient = series.at(reflected, sine) * view.relative_gain(images)
+    coefficient = chebyshev_series.at(reflected, sine) * view.relative_gain(images)
     return [ImagePath(images, coefficient, station_m * mirror)]

@@ -8,8 +8,8 @@ range cells.
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.numerics.chebyshev_series import chebyshev_points, interpolation, orders_of
 from lowalt.scene.response import ERROR
-from lowalt.scene.series import chebyshev_points, interpolation, orders_of
 from lowalt.scene.view import Displacement, View
 
 SOURCE = (

@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
-from lowalt.scene import series
+from lowalt.numerics import chebyshev_series
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.fresnel import fresnel
 from lowalt.scene.response import ImagePath
@@ -73,7 +73,7 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
         images, sine, reflected = mirrored(facade, view.places, station_m)
         behind = mirrored(facade, station_m[None, None], station_m)[0][0, 0]
         if reflected.any():
-            mirror = series.at(lambda sine: fresnel(sine, *material), sine) * view.relative_gain(images)
+            mirror = chebyshev_series.at(lambda sine: fresnel(sine, *material), sine) * view.relative_gain(images)
             result.append(ImagePath(images, np.where(reflected, mirror, 0.0), behind))
         else:
             result.append(ImagePath(view.places, 0.0, behind))

@@ -1,6 +1,7 @@
-"""Chebyshev series: how many terms a wave needs, points, interpolation, and a smooth function at many places."""
+"""Chebyshev series: how many terms a wave needs, points, interpolation, a band of waves, and a smooth function."""
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -20,7 +21,7 @@ def orders_of(argument: float, error: float) -> int:
     From an order above the argument on, each Bessel function is below half the one before it.
     """
     order = int(argument) + 1
-    while 4.0 * abs(jv(order, argument)) > error:
+    while 4.0 * abs(float(jv(order, argument))) > error:
         order += 1
     return order
 
@@ -39,6 +40,24 @@ def interpolation(count: int, at: np.ndarray) -> np.ndarray:
     values = np.cos(np.outer(order, np.arccos(np.clip(at, -1.0, 1.0))))
     values[1:] *= 2.0
     return np.cos(np.outer(np.pi * (order + 0.5) / count, order)) @ values / count
+
+
+@lru_cache(maxsize=64)
+def band_tables(nodes: int, spread: float, count: int, error: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrices (Q P, K) from moments to K frequencies of the band, and (K, M) from these to all subcarriers.
+
+    spread: largest |u| = 1 times the band, in turns: the phase of subcarrier m is 2 pi spread x u / 2,
+    x = (2 m - M + 1) / M; error: largest one, relative to the sum of the amplitudes. Both must not be changed.
+    """
+    argument = np.pi * spread * max(count - 1, 1) / count
+    orders, kept = orders_of(argument, error), orders_of(argument, error) + nodes
+    band = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
+    points = chebyshev_points(kept)
+    p = np.arange(orders)
+    bessel = np.where(p == 0, 1.0, 2.0) * (-1j) ** (p % 4) * jv(p, argument * points[:, None])
+    weights = interpolation(nodes, points)
+    to_nodes = (weights[:, None, :] * bessel.T[None]).reshape(nodes * orders, kept)
+    return np.ascontiguousarray(to_nodes), interpolation(kept, band)
 
 
 @VECTOR
@@ -68,7 +87,7 @@ def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.n
     """
     middle, half = 0.5 * (places.max() + places.min()), max(0.5 * float(np.ptp(places)), 1e-12)
     for count in (8, 16, 32, 64) if places.size > 256 else ():
-        terms = chebyshev.chebinterpolate(lambda x: function(middle + half * x).astype(np.complex128), count - 1)
+        terms = chebyshev.chebinterpolate(lambda x: function(middle + half * x).astype(np.complex128), count - 1)  # type: ignore[type-var]
         if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
             out = np.empty(places.shape, np.complex128)
             _summed(((places - middle) / half).ravel(), terms, np.empty((4, STRIP)), out.reshape(-1))
