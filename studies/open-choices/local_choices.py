@@ -5,7 +5,6 @@ A row of `choices.yaml` names them under `local`:
                look    the strongest of the look, after summing power over symbols
                first   the strongest of the first symbol, for the whole look
                centre  the cell of the target's middle at each symbol
-               whole   no cell: all cells added up, which is the first subcarrier
                smooth  the strongest of each symbol, its phase counted as if subcarriers lay evenly about the carrier
     rotors     aligned  every rotor starts as its cloud stands
                step     all rotors of a craft start at one random angle
@@ -22,7 +21,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from lowalt.config.classes import AIRBORNE
-from lowalt.motion.poses import Perturbation
+from lowalt.config.network import Network, Station
+from lowalt.echo import Rigid
+from lowalt.echo.api import echo_signal
+from lowalt.motion.poses import Perturbation, poses
 from lowalt.motion.rotations import attitude
 from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
@@ -30,7 +32,7 @@ from lowalt.scene.effects import NamedEffect
 from lowalt.scene.observe import Scene, observe
 from lowalt.targets.cloud import Cloud
 
-CELLS = ("look", "first", "centre", "whole", "smooth")
+CELLS = ("look", "first", "centre")
 
 
 def changed_row(row: dict, cloud: Cloud, local: dict) -> dict:
@@ -85,18 +87,23 @@ def local_effects(local: dict, published: dict, seed: int) -> tuple[NamedEffect,
 def signals_by_cell(sample: SceneSample) -> dict[str, np.ndarray]:
     """Return the signal (N,) of a sample under each choice of the range cell in CELLS."""
     cells = sample.cells
-    symbols, count = np.arange(len(cells)), cells.shape[1]
     power = abs(cells) ** 2
-    strongest, centre = power.argmax(axis=1), sample.true_cell(sample.view)
-    # With subcarriers from -M/2 to M/2 a cell's phase does not turn by pi (M - 1) / M from one cell to the next.
-    turn = np.exp(-1j * np.pi * (count - 1) / count * strongest)
+    centre = sample.true_cell(sample.view)
     return {
         "look": cells[:, power.sum(axis=0).argmax()],
-        "first": cells[:, strongest[0]],
-        "centre": cells[symbols, centre],
-        "whole": cells.sum(axis=1),
-        "smooth": cells[symbols, strongest] * turn,
+        "first": cells[:, power[0].argmax()],
+        "centre": cells[np.arange(len(cells)), centre],
     }
+
+
+def continuous(network: Network, station: Station, cloud: Cloud, row: dict) -> np.ndarray:
+    """Return the signal (N,) of the strongest cell of each symbol without the phase that a cell's number brings.
+
+    With subcarriers from -M/2 to M/2 the phase does not turn by pi (M - 1) / M from one cell to the next.
+    """
+    motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
+    echo = echo_signal(network, station, motion, cloud.rcs_m2, np.array([row[f"{axis}_m"] for axis in "xyz"]))
+    return echo.signal * np.exp(-1j * np.pi * (network.subcarriers - 1) / network.subcarriers * echo.cell)
 
 
 def sample_of(scene: Scene, name: str, cloud: Cloud, row: dict) -> SceneSample:

@@ -11,25 +11,26 @@ import hashlib
 import json
 import sys
 import time
+from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from local_choices import CELLS, changed_cloud, changed_row, local_effects, sample_of, signals_by_cell
+from local_choices import CELLS, changed_cloud, changed_row, continuous, local_effects, sample_of, signals_by_cell
 
 import trainings
 from lowalt.config.classes import label
 from lowalt.config.command import run
 from lowalt.config.layers import merge
 from lowalt.config.splits import fold
-from lowalt.files.atomic import replacing, slug
+from lowalt.echo.chunk import clean_signals
+from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
-from lowalt.echo.chunk import clean_signals
 from lowalt.noise.noisy_signals import noisy_signals
 from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions, runs, samples
-from lowalt.recognition.intervals import bootstrap, model_shares, strict_difference
+from lowalt.recognition.intervals import Interval, model_shares, strict_difference
 from lowalt.recognition.protocols import evaluated_folds, folds
 from lowalt.recognition.samples import Facts, ViewSamples
 from lowalt.recognition.schemes import TABLE, Scheme, named
@@ -39,6 +40,7 @@ from lowalt.scene.observe import Scene
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.sample_record import sample_key
+from lowalt.targets.cloud import Cloud
 from lowalt.tiles.resample import resize
 
 HERE, OUT = Path(__file__).parent, Path("results/open-choices")
@@ -48,6 +50,17 @@ SCHEME = "ABC:VRP+TRP+VT"
 def key_of(*what) -> str:
     """Return a file name that stands for all that decides its content."""
     return hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+CLOUDS: dict[str, Mapping[str, Cloud]] = {}
+
+
+def dataset_of(config: dict) -> Dataset:
+    """Return the data set of a configuration; rows of equal targets share their clouds."""
+    key = key_of(config["targets"], config["seed"])
+    dataset = Dataset(config, CLOUDS.get(key))
+    CLOUDS[key] = dataset.clouds
+    return dataset
 
 
 def motion_rows(dataset: Dataset, local: dict) -> list[dict]:
@@ -60,9 +73,9 @@ def motion_rows(dataset: Dataset, local: dict) -> list[dict]:
     return found
 
 
-def clean(dataset: Dataset, local: dict) -> dict[str, np.ndarray]:
+def clean(dataset: Dataset, local: dict, rows: list[dict]) -> dict[str, np.ndarray]:
     """Return clean signals (stations, models, N) or, with noise in all range cells, (stations, models, snrs, N), by
-    the choice of the range cell; "" is the strongest of each symbol."""
+    the choice of the range cell; "" is the strongest of each symbol. rows: motion table."""
     maker, config = dataset.maker, dataset.config
     stations = [station.name for station in maker.network.stations]
     asked = tuple(called(config["effects"]))
@@ -70,13 +83,16 @@ def clean(dataset: Dataset, local: dict) -> dict[str, np.ndarray]:
     parts: dict[str, list] = {}
     if not config["effects"] and not set(local) & {"cell", "amplitude"} and local.get("rotors") != "rates":
         clouds = {name: changed_cloud(cloud, local) for name, cloud in dataset.clouds.items()}
-        return {"": clean_signals(maker.network, stations, clouds, motion_rows(dataset, local), None)}
-    for row in motion_rows(dataset, local):
+        return {"": clean_signals(maker.network, stations, clouds, rows, None)}
+    for row in rows:
         name = row["subtype"]
         cloud = changed_cloud(dataset.clouds[name], local)
         more = local_effects(local, dataset.published[name], config["seed"])
         scene = Scene(maker.network, config["seed"], config["echo"]["tolerance"], (*asked, *more))
-        if "cell" in local:
+        if local.get("cell") == "smooth":
+            heard = {"smooth": [continuous(maker.network, maker.network.station(station), cloud, row)
+                                for station in stations]}  # fmt: skip
+        elif "cell" in local:
             every = [signals_by_cell(sample_of(scene, station, cloud, row)) for station in stations]
             heard = {cell: [one[cell] for one in every] for cell in CELLS}
         else:
@@ -90,12 +106,13 @@ def clean(dataset: Dataset, local: dict) -> dict[str, np.ndarray]:
 def kept_clean(config: dict, local: dict) -> np.ndarray:
     """Return the clean signals of a row, from its file where they were made before."""
     # All choices of the cell are made at once.
-    decides = {**local, "cell": "any"} if "cell" in local else local
+    decides = {**local, "cell": "any"} if local.get("cell") in CELLS else local
     blocks = {name: config[name] for name in ("seed", "network", "targets", "motion", "echo", "effects")}
     noise = config["noise"] if in_all_cells(config["effects"]) else None
     path = OUT / f"signals/{key_of(blocks, noise, decides)}.npz"
     if not path.is_file():
-        made = clean(Dataset(config), local)
+        dataset = dataset_of(config)
+        made = clean(dataset, local, motion_rows(dataset, local))
         with replacing(path) as temporary:
             np.savez(temporary, **{cell or "strongest": signals for cell, signals in made.items()})
     with np.load(path) as kept:
@@ -104,7 +121,7 @@ def kept_clean(config: dict, local: dict) -> np.ndarray:
 
 def write_views(config: dict, local: dict, path: Path) -> None:
     """Write the cache of views of all samples of a row."""
-    signals, dataset = kept_clean(config, local), Dataset(config)
+    signals, dataset = kept_clean(config, local), dataset_of(config)
     plan, maker, size = dataset.plan, dataset.maker, config["recognition"]["size"]
     rows, snrs = motion_rows(dataset, local), list(plan.snrs)
     stations = [station.name for station in maker.network.stations]
@@ -159,63 +176,73 @@ def judged(config: dict, local: dict) -> list[Path]:
     return trained(config, views, scheme, folder)
 
 
-class Judged:
-    """The answers of a row's networks on the held-out subtypes, a row a training seed and a column a motion model."""
+class Held:
+    """Answers to samples of held-out subtypes, a row a training seed and a column a motion model."""
 
-    def __init__(self, paths: list[Path]) -> None:
-        """paths: prediction files, one a training seed."""
-        every = [predictions.read(path) for path in paths]
-        held = [one.of(folds("unseen", "test")) for one in every]
-        first, self.count, self.shares = model_shares(held[0].motion, [one.correct for one in held])
-        self.subtype = held[0].subtype[first]
-        self.seen = float(np.mean([one.of(folds("unseen", "seen_test")).correct.mean() for one in every]))
-        said = np.concatenate([one.guesses for one in held])
-        of = np.concatenate([one.subtype for one in held])
-        self.said = {name: np.bincount(said[of == name], minlength=4) / (of == name).sum() for name in np.unique(of)}
+    def __init__(self, facts: Facts | predictions.Predictions, correct: list[np.ndarray]) -> None:
+        """facts: of the samples; correct: (samples,) bool, of each training seed."""
+        motion = np.char.add(np.char.add(facts.subtype, "/"), facts.model.astype(str))
+        first, self.count, self.shares = model_shares(motion, correct)
+        self.subtype = facts.subtype[first]
 
-    def of(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Shares (seeds, models) and counts (models,) of one subtype."""
+    def difference(self, other: "Held | None", name: str, seed: int, *keys: str) -> Interval:
+        """Return the share of right answers less that of others to the same samples, None for nothing, with its 95 %
+        interval over training seeds, motion models and, where no subtype is named, subtypes."""
+        mine = np.full(len(self.subtype), True) if not name else self.subtype == name
+        second = np.zeros((1, mine.sum())) if other is None else other.shares[:, mine]
+        facts = self.count[mine], self.subtype[mine], not name
+        return strict_difference(self.shares[:, mine], second, *facts, stream(seed, "open-choices", *keys, name))
+
+    def worst(self, count: int = 3) -> str:
+        """Return the subtypes that are right least often, with their percentages."""
+        shares = {name: self.share(name) for name in np.unique(self.subtype)}
+        return "; ".join(f"{name} {100 * shares[name]:.0f}" for name in sorted(shares, key=shares.__getitem__)[:count])
+
+    def share(self, name: str) -> float:
+        """Return the share of a subtype's samples that are right."""
         mine = self.subtype == name
-        return self.shares[:, mine], self.count[mine]
+        return float(np.average(self.shares[:, mine].mean(0), weights=self.count[mine]))
 
 
+def percents(values: Iterable[float]) -> list[str]:
+    """Return shares as percentages."""
+    return [f"{100 * value:.1f}" for value in values]
+
+
+NAMED = {"unseen": "", "eh216s": "EH 216 S", "sparrow": "Sparrow", "type_b": "Type-B Firefighting UAV",
+         "toucan": "Ramphastidae (toucan)"}  # fmt: skip
+"""Columns of the table and the subtypes whose samples they count, "" for all held-out ones."""
 COLUMNS = (
-    "choice", "section", "seen_percent", *(f"{name}{column}" for name in ("unseen", "eh216s", "sparrow", "type_b", "toucan")
-    for column in ("_percent", "_difference", "_low", "_high")), "worst", "core_s", "hardware", "physics",
+    "choice", "section", "seen_percent", *(f"{name}_{column}" for name in NAMED
+    for column in ("percent", "low", "high", "difference", "difference_low", "difference_high")),
+    "worst", "core_s", "hardware", "physics",
 )  # fmt: skip
-NAMED = ("EH 216 S", "Sparrow", "Type-B Firefighting UAV", "Ramphastidae (toucan)")
-
-
-def figures(found: Judged, base: Judged, name: str, choice: str, seed: int) -> list[str]:
-    """Percentage of a subtype's samples that are right, "" for all, and its difference to the base (points) with the
-    95 % interval, which resamples training seeds and motion models and, for all, subtypes."""
-    (shares, count), (before, _) = ((found.shares, found.count), (base.shares, 0)) if not name else (found.of(name), base.of(name))
-    subtypes = base.subtype if not name else np.full(len(count), name)
-    told = strict_difference(shares, before, count, subtypes, not name, stream(seed, "open-choices", choice, name))
-    return [f"{100 * value:.1f}" for value in (np.average(shares.mean(0), weights=count), *told)]
 
 
 def write_tables(table: dict, paths: dict[str, list[Path]], out: Path) -> None:
     """Write the tables of all rows that are trained."""
-    found = {name: Judged(files) for name, files in paths.items()}
-    base, seed, rows, each = found["base"], table["base"]["seed"], [], []
-    for choice, one in found.items():
-        told = [json.loads(path.with_suffix(".json").read_text()) for path in paths[choice]]
-        right = {name: np.average(one.of(name)[0].mean(0), weights=one.of(name)[1]) for name in np.unique(one.subtype)}
-        worst = sorted(right, key=right.__getitem__)[:3]
-        block = table["rows"][choice]
-        rows.append([
-            choice, block["section"], f"{100 * one.seen:.1f}",
-            *(value for name in ("", *NAMED) for value in figures(one, base, name, choice, seed)),
-            "; ".join(f"{name} {100 * right[name]:.0f}" for name in worst),
-            f"{sum(part['train_processor_s'] for part in told):.0f}", told[0]["hardware"], block["physics"],
-        ])  # fmt: skip
-        each += [[choice, name, f"{100 * right[name]:.1f}", *(f"{100 * share:.1f}" for share in one.said[name])]
-                 for name in right]  # fmt: skip
-    unseen, eh, sparrow = (COLUMNS.index(f"{name}_difference") for name in ("unseen", "eh216s", "sparrow"))
-    rows.sort(key=lambda row: -(float(row[eh]) + float(row[sparrow]) + float(row[unseen])))
-    write_csv(out / "choices.csv", COLUMNS, rows)
-    write_csv(out / "subtypes.csv", ("choice", "subtype", "right", "UAV", "Bird", "Vehicle", "Pedestrian"), each)
+    seed, rows, each, base = table["base"]["seed"], [], [], None
+    for choice, files in paths.items():
+        every = [predictions.read(path) for path in files]
+        held = [one.of(folds("unseen", "test")) for one in every]
+        found = Held(held[0], [one.correct for one in held])
+        base, told = base or found, [json.loads(path.with_suffix(".json").read_text()) for path in files]
+        cells = []
+        for name in NAMED.values():
+            cells += percents(found.difference(None, name, seed, choice))
+            cells += percents(found.difference(base, name, seed, choice))
+        seen = np.mean([one.of(folds("unseen", "seen_test")).correct.mean() for one in every])
+        took, block = sum(part["train_processor_s"] for part in told), table["rows"][choice]
+        rows.append([choice, block["section"], *percents([seen]), *cells, found.worst(), f"{took:.0f}",
+                     told[0]["hardware"], block["physics"]])  # fmt: skip
+        said, of = (np.concatenate([getattr(one, key) for one in held]) for key in ("guesses", "subtype"))
+        for name in np.unique(of):
+            shares = np.bincount(said[of == name], minlength=len(predictions.CATEGORIES)) / np.sum(of == name)
+            each.append([choice, name, *percents([found.share(name), *shares])])
+    decides = [COLUMNS.index(f"{name}_difference") for name in ("eh216s", "sparrow", "unseen")]
+    rows.sort(key=lambda row: -sum(float(row[place]) for place in decides))
+    write_csv(out / f"{table['name']}.csv", COLUMNS, rows)
+    write_csv(out / f"{table['name']}-subtypes.csv", ("choice", "subtype", "right", *predictions.CATEGORIES), each)
 
 
 def main(arguments: list[str]) -> None:
