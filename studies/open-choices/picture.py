@@ -8,7 +8,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from study import HERE, clean, motion_rows
+from choice_rows import HERE, clean, motion_rows
 
 import trainings
 from lowalt.config.command import run

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import timm
 import torch
+from choice_rows import HERE, OUT, key_of, write_views
+from choice_tables import Held, percents
 from sklearn.linear_model import LogisticRegression
 from sklearn.preprocessing import StandardScaler
-from study import HERE, OUT, Held, key_of, percents, write_views
 
 import trainings
 from lowalt.config.command import run
