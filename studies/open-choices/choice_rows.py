@@ -29,7 +29,6 @@ from lowalt.targets.cloud import Cloud
 from lowalt.tiles.resample import resize
 
 HERE, OUT = Path(__file__).parent, Path("results/open-choices")
-SCHEME = "ABC:VRP+TRP+VT"
 
 
 def key_of(*what) -> str:
@@ -58,11 +57,10 @@ def motion_rows(dataset: Dataset, local: dict) -> list[dict]:
     return found
 
 
-def clean(dataset: Dataset, local: dict, rows: list[dict]) -> dict[str, np.ndarray]:
+def clean(dataset: Dataset, local: dict, rows: list[dict], stations: list[str]) -> dict[str, np.ndarray]:
     """Return clean signals (stations, models, N) or, with noise in all range cells, (stations, models, snrs, N), by
-    the choice of the range cell; "" is the strongest of each symbol. rows: motion table."""
+    the choice of the range cell; "" is the strongest of each symbol. rows: motion table; stations: their names."""
     maker, config = dataset.maker, dataset.config
-    stations = [station.name for station in maker.network.stations]
     asked = tuple(called(config["effects"]))
     snrs = list(dataset.plan.snrs) if in_all_cells(config["effects"]) else None
     parts: dict[str, list] = {}
@@ -88,34 +86,35 @@ def clean(dataset: Dataset, local: dict, rows: list[dict]) -> dict[str, np.ndarr
     return {cell: np.stack(signals, axis=1) for cell, signals in parts.items()}
 
 
-def kept_clean(config: dict, local: dict) -> np.ndarray:
+def kept_clean(config: dict, local: dict, stations: list[str]) -> np.ndarray:
     """Return the clean signals of a row, from its file where they were made before."""
     # All choices of the cell are made at once.
     decides = {**local, "cell": "any"} if local.get("cell") in CELLS else local
     blocks = {name: config[name] for name in ("seed", "network", "targets", "motion", "echo", "effects")}
     noise = config["noise"] if in_all_cells(config["effects"]) else None
-    path = OUT / f"signals/{key_of(blocks, noise, decides)}.npz"
+    path = OUT / f"signals/{key_of(blocks, noise, decides, stations)}.npz"
     if not path.is_file():
         dataset = dataset_of(config)
-        made = clean(dataset, local, motion_rows(dataset, local))
+        made = clean(dataset, local, motion_rows(dataset, local), stations)
         with replacing(path) as temporary:
             np.savez(temporary, **{cell or "strongest": signals for cell, signals in made.items()})
     with np.load(path) as kept:
         return kept[local.get("cell", "strongest")]
 
 
-def write_views(config: dict, local: dict, path: Path) -> None:
-    """Write the cache of views of all samples of a row."""
-    signals, dataset = kept_clean(config, local), dataset_of(config)
+def write_views(config: dict, local: dict, stations: list[str], path: Path) -> None:
+    """Write the cache of views of all samples of a row; stations: the first of the network's, by name."""
+    signals, dataset = kept_clean(config, local, stations), dataset_of(config)
     plan, maker, size = dataset.plan, dataset.maker, config["recognition"]["size"]
     rows, snrs = motion_rows(dataset, local), list(plan.snrs)
-    stations = [station.name for station in maker.network.stations]
     columns = list(range(len(stations) * len(config["spectra"])))
     views = np.empty((len(rows) * len(snrs), len(columns), size, size), np.uint8)
+    every = np.zeros((len(maker.network.stations), maker.network.symbols), np.complex64)
     for number, row in enumerate(rows):
         noisy = noisy_signals(signals[:, number : number + 1], [row], stations, snrs, plan.seed)[0]
         for level, signal in enumerate(noisy):
-            views[number * len(snrs) + level] = resize(maker.renderer.some(signal, columns), size)
+            every[: len(stations)] = signal
+            views[number * len(snrs) + level] = resize(maker.renderer.some(every, columns), size)
     pairs = [(row, snr) for row in rows for snr in snrs]
     nowhere = np.full((len(pairs), len(stations)), np.nan)
     facts = Facts(
@@ -143,16 +142,20 @@ def trained(config: dict, views: Path, scheme: Scheme, seed: int, path: Path) ->
     runs.evaluate(model, of(evaluated_folds("unseen")), config["recognition"]["evaluation"], path)
 
 
-def judged(config: dict, local: dict, seed: int) -> Path:
-    """Return the prediction file of a row's training from one seed; whatever is there is not made again."""
-    scheme = named(TABLE, SCHEME, list(config["network"]["stations"]))
-    # Training alone sees these: rows that differ in nothing else share their images.
+def judged(config: dict, local: dict, scheme: str, seed: int) -> Path:
+    """Return the prediction file of a row's training from one seed; whatever is there is not made again.
+
+    scheme: name of one whose stations are the first of the network's.
+    """
+    names = list(config["network"]["stations"])
+    what = named(TABLE, scheme, names)
+    stations = [names[number] for number in what.stations]
     shown = {name: value for name, value in config.items() if name not in ("run", "report", "cost", "recognition")}
-    views = OUT / f"views/{key_of(shown, local, config['recognition']['size'])}.npz"
-    seen = {name: config["recognition"][name] for name in ("size", "network", "training", "augmentation")}
-    path = OUT / f"trained/{key_of(views.stem, config['images'], seen)}/{seed}/predictions.csv"
+    views = OUT / f"views/{key_of(shown, local, config['recognition']['size'], stations)}.npz"
+    seen = {name: config["recognition"][name] for name in ("size", "network", "training", "augmentation", "evaluation")}
+    path = OUT / f"trained/{key_of(views.stem, what.record, seen)}/{seed}/predictions.csv"
     if not path.with_suffix(".json").is_file():
         if not views.is_file():
-            write_views(config, local, views)
-        trained(config, views, scheme, seed, path)
+            write_views(config, local, stations, views)
+        trained(config, views, what, seed, path)
     return path

@@ -26,7 +26,7 @@ def images_of(table: dict, block: dict, model: int) -> dict[str, np.ndarray]:
     config["targets"]["select"] = list(TARGETS)
     dataset, local = Dataset(config), block.get("local", {})
     rows = [row for row in motion_rows(dataset, local) if row["model"] == model]
-    signals = clean(dataset, local, rows)[local.get("cell", "")]
+    signals = clean(dataset, local, rows, list(config["network"]["stations"]))[local.get("cell", "")]
     return {row["subtype"]: dataset.maker.renderer.some(signals[:, place], list(range(9)))
             for place, row in enumerate(rows)}  # fmt: skip
 

@@ -101,7 +101,7 @@ def main(arguments: list[str]) -> None:
     config = merge(merge(trainings.config_of(), table["base"]), {"recognition": {"size": given.size}})
     path = OUT / f"{key_of(config, 'views')}.npz"
     if not path.is_file():
-        write_views(config, {}, path)
+        write_views(config, {}, list(config["network"]["stations"]), path)
     scheme = named(TABLE, "ABC:VRP+TRP+VT", list(config["network"]["stations"]))
     every = ViewSamples(
         [path], scheme.columns, folds("seen", "train") | folds("seen", "validation") | folds("seen", "test")

@@ -33,7 +33,7 @@ def main(arguments: list[str]) -> None:
         for name, block in table["rows"].items():
             config = merge(merge(trainings.config_of(), table["base"]), block.get("overlay", {}))
             began = time.process_time()
-            paths.setdefault(name, []).append(judged(config, block.get("local", {}), seed))
+            paths.setdefault(name, []).append(judged(config, block.get("local", {}), table["scheme"], seed))
             print(f"{name}, seed {seed}: {time.process_time() - began:.0f} core-s", file=sys.stderr, flush=True)
         write_tables(table, paths, given.out)
 
