@@ -65,11 +65,11 @@ def clean(dataset: Dataset, local: dict, rows: list[dict], stations: list[str]) 
     snrs = list(dataset.plan.snrs) if in_all_cells(config["effects"]) else None
     parts: dict[str, list] = {}
     if not config["effects"] and not set(local) & {"cell", "amplitude"} and local.get("rotors") != "rates":
-        clouds = {name: changed_cloud(cloud, local) for name, cloud in dataset.clouds.items()}
+        clouds = {name: changed_cloud(cloud, local, dataset.published[name]) for name, cloud in dataset.clouds.items()}
         return {"": clean_signals(maker.network, stations, clouds, rows, None)}
     for row in rows:
         name = row["subtype"]
-        cloud = changed_cloud(dataset.clouds[name], local)
+        cloud = changed_cloud(dataset.clouds[name], local, dataset.published[name])
         more = local_effects(local, dataset.published[name], config["seed"])
         scene = Scene(maker.network, config["seed"], config["echo"]["tolerance"], (*asked, *more))
         if local.get("cell") == "smooth":

@@ -11,6 +11,8 @@ A row of `choices.yaml` names them under `local`:
                alike    all rotors turn in one sense
                rates    each rotor has a rate of its own, drawn from the published range
     course     nose     craft and birds move along their front, as fast as drawn
+    parts      strong   rotors, wings and wheels reflect ten times as much power a point as bodies
+    size       published craft and birds are scaled until their longest side is the published size
     amplitude  equal    every point's echo is as strong at any range
 """
 
@@ -30,7 +32,7 @@ from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.effects import NamedEffect
 from lowalt.scene.observe import Scene, observe
-from lowalt.targets.cloud import Cloud
+from lowalt.targets.cloud import Cloud, extent, scaled
 
 CELLS = ("look", "first", "centre")
 
@@ -50,14 +52,18 @@ def changed_row(row: dict, cloud: Cloud, local: dict) -> dict:
     return row
 
 
-def changed_cloud(cloud: Cloud, local: dict) -> Cloud:
-    """Return a target under the local choices."""
-    if local.get("rotors") != "alike":
-        return cloud
-    axes = cloud.axes.copy()
-    rotors = cloud.parts_of("rotor")
-    axes[rotors] = abs(axes[rotors])
-    return replace(cloud, axes=axes)
+def changed_cloud(cloud: Cloud, local: dict, published: dict) -> Cloud:
+    """Return a target under the local choices; published: its row of the table of targets."""
+    if local.get("rotors") == "alike":
+        axes, rotors = cloud.axes.copy(), cloud.parts_of("rotor")
+        axes[rotors] = abs(axes[rotors])
+        cloud = replace(cloud, axes=axes)
+    if local.get("parts") == "strong":
+        moving = [part for kind in ("rotor", "wing", "wheel") for part in cloud.parts_of(kind)]
+        cloud = replace(cloud, rcs_m2=np.where(np.isin(cloud.part, moving), 10.0, 1.0) * cloud.rcs_m2)
+    if local.get("size") == "published" and cloud.like in AIRBORNE:
+        cloud = scaled(cloud, published["size_m"] / extent(cloud))
+    return cloud
 
 
 def own_rates(published: dict, seed: int, cloud: Cloud, row: dict, times_s: np.ndarray, _) -> Perturbation:

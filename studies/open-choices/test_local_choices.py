@@ -33,7 +33,7 @@ def test_rotors_start_together_turn_in_one_sense_or_at_rates_of_their_own(datase
     assert {changed_row(row, cloud, {"rotors": "aligned"})[name] for name in phases} == {0.0}
     assert {changed_row(row, cloud, {"rotors": "step"})[name] for name in phases} == {row[phases[0]]}
     assert {-1.0, 1.0} == set(cloud.axes[rotors, 2]) and set(
-        changed_cloud(cloud, {"rotors": "alike"}).axes[rotors, 2]
+        changed_cloud(cloud, {"rotors": "alike"}, {}).axes[rotors, 2]
     ) == {1.0}
     (effect,) = local_effects({"rotors": "rates"}, dataset.published[CRAFT], 1)
     turns = effect.module.perturb({}, cloud, row, np.array([0.0, 1.0]), None).angle_rad
