@@ -51,7 +51,7 @@ NAMED = {"unseen": "", "eh216s": "EH 216 S", "sparrow": "Sparrow", "type_b": "Ty
          "toucan": "Ramphastidae (toucan)"}  # fmt: skip
 """Columns of the table and the subtypes whose samples they count, "" for all held-out ones."""
 COLUMNS = (
-    "choice", "section", "seen_percent", *(f"{name}_{column}" for name in NAMED
+    "choice", "section", "seeds", "seen_percent", *(f"{name}_{column}" for name in NAMED
     for column in ("percent", "low", "high", "difference", "difference_low", "difference_high")),
     "worst", "core_s", "hardware", "physics",
 )  # fmt: skip
@@ -71,7 +71,7 @@ def write_tables(table: dict, paths: dict[str, list[Path]], out: Path) -> None:
             cells += percents(found.difference(base, name, seed, choice))
         seen = np.mean([one.of(folds("unseen", "seen_test")).correct.mean() for one in every])
         took, block = sum(part["train_processor_s"] for part in told), table["rows"][choice]
-        rows.append([choice, block["section"], *percents([seen]), *cells, found.worst(), f"{took:.0f}",
+        rows.append([choice, block["section"], len(files), *percents([seen]), *cells, found.worst(), f"{took:.0f}",
                      told[0]["hardware"], block["physics"]])  # fmt: skip
         said, of = (np.concatenate([getattr(one, key) for one in held]) for key in ("guesses", "subtype"))
         for name in np.unique(of):

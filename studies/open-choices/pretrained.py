@@ -48,7 +48,7 @@ NOISELESS = [float("inf")]
 RUNS = (
     Run(224, "A", 30, NOISELESS, ()),
     Run(64, "A", 30, NOISELESS, (0,)),
-    Run(64, "ABC", 40, [8, *NOISELESS], (0, 1, 2)),
+    Run(64, "ABC", 40, [8, *NOISELESS], (0,)),
 )
 BACKBONE = "tf_efficientnet_lite0"
 STRENGTHS = (1e-4, 1e-3, 1e-2)
