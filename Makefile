@@ -4,15 +4,14 @@ PYTHON ?= python3
 CORES ?= all
 BIN := .venv/bin
 comma := ,
-# Packages that make data; those of training as well, which are most of the bytes; those of tests and linters as well.
+# Package sets: for data; with training, which is most of the bytes; with tests and linters.
 BASE := .venv/set-up-data
 SETUP := .venv/set-up
 TESTING := .venv/set-up-tests
-KERNELS := .venv/set-up-kernels
 BYTECODE := .venv/set-up-bytecode
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-# The small tables of a run that are kept.
+# The small tables of a run that `make reference` stores.
 TABLES := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 DOCS := .venv/set-up-docs
 
@@ -20,20 +19,20 @@ DOCS := .venv/set-up-docs
 
 all: default
 
-# Bytecode is kept even where the caller's environment says otherwise: a job of training spends 7 s on compiling torch's
-# modules without it, a short job 1 s.
+# Write bytecode even if the caller's environment disables it: without it a training job spends 7 s on compiling torch's
+# modules, a short job 1 s.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Snakemake and pip keep caches in HOME; the user of a service often has none that can be written.
+# Snakemake and pip keep caches in HOME, which is often not writable for the user of a service.
 ifneq ($(shell test -w "$$HOME" || echo no),)
 export XDG_CACHE_HOME ?= $(CURDIR)/.venv/cache
 endif
 
-# uv installs the same pinned packages in less time than pip; pip does it where uv cannot (an index that only pip knows).
-# The caller's pip brings uv, and uv brings pip; where the caller has none, the one that Python brings takes 4 s to unpack.
+# uv installs the same pinned packages faster than pip; pip is used where uv cannot (an index known only to pip).
+# The caller's pip installs uv, and uv installs pip. Without a caller's pip, the one of Python takes 4 s to unpack.
 PIP = { $(BIN)/python -m pip --version || $(BIN)/python -m ensurepip --default-pip; } >/dev/null 2>&1; $(BIN)/python -m pip install --quiet --disable-pip-version-check
 install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c envs/constraints.txt $(1) || { $(PIP) -c envs/constraints.txt $(1); }
-# The packages that an extra of pyproject.toml names, without this package: a Snakemake that runs would miss it for a moment.
+# The packages of an extra of pyproject.toml, without this package, which must not vanish while Snakemake is running.
 of_extra = $$($(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["$(1)"])')
 
 $(BASE): pyproject.toml envs/constraints.txt
@@ -42,26 +41,23 @@ $(BASE): pyproject.toml envs/constraints.txt
 	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check -c envs/constraints.txt uv \
 		2>/dev/null || { $(PIP) -c envs/constraints.txt uv || true; }
 	$(call install,-e '.[workflow$(comma)cost]' pip)
-	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) $(BYTECODE)
+	rm -f $(SETUP) $(TESTING) $(DOCS) $(BYTECODE)
 	touch $@
 
+# Compile the machine code of the data stages while packages are downloaded, so that neither first calls nor parallel
+# tests wait for it. Making one sample compiles nearly all of it.
+SAMPLE = $(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1
 $(SETUP): $(BASE)
-	$(call install,$(call of_extra,recognition))
+	$(SAMPLE) & sampling=$$!; { $(call install,$(call of_extra,recognition)); } && \
+		{ wait $$sampling || { cat .venv/kernels.log >&2; exit 1; }; }
 	touch $@
 
 $(TESTING): $(SETUP)
 	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,weights) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
-# Machine code of the data stages: compiled once, while packages come, and not by many tests at the same time. A sample
-# needs nearly all of it.
-SAMPLE = $(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1
-$(KERNELS): $(BASE)
-	$(SAMPLE) || { cat .venv/kernels.log >&2; exit 1; }
-	touch $@
-
-# Bytecode of the tests and of what they import: written once, not by both processes of the tests at the same time. Where a
-# file cannot be read, the tests say so.
+# Write the bytecode of the tests and their imports once, not in both test processes at the same time. The tests report
+# files that cannot be read.
 $(BYTECODE): $(TESTING)
 	$(BIN)/python -m pytest --collect-only -q >.venv/bytecode.log 2>&1 || true
 	touch $@
@@ -70,15 +66,15 @@ $(DOCS): $(BASE)
 	$(call install,$(call of_extra,docs))
 	touch $@
 
-# Where the packages of training are not there yet, they come while the data are made; so does the machine code. Bytecode
-# of torch takes ten seconds: written once here, not by two trainings at a time.
+# Missing packages of training are installed while the data are made. The bytecode of torch takes ten seconds and is
+# written once here, not in two trainings at the same time.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
-	@test -e $(SETUP) || { $(SAMPLE) & \
+	@test -e $(SETUP) || { \
 		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile && \
 		{ $(BIN)/python -c 'import lowalt.recognition.runs, lowalt.report.__main__' 2>.venv/bytecode.log & } }
 	$(SNAKEMAKE)
 
-# From a warm cache the packages are there in seconds; only a download is worth a Snakemake of its own.
+# From a warm cache packages install in seconds; a separate Snakemake run pays only for a download.
 .PHONY: meanwhile ready
 meanwhile: $(BASE)
 	@for second in 1 2 3 4 5 6 7 8; do test -e $(SETUP) && exit; sleep 1; done; $(SNAKEMAKE) -- prepared
@@ -92,7 +88,7 @@ real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 measured:  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
 	$(MAKE) --no-print-directory study NAME=measured
 
-ready: $(BYTECODE) $(KERNELS)
+ready: $(BYTECODE)
 
 test:  ## the test suite
 	@$(MAKE) --no-print-directory -j 2 ready
@@ -101,11 +97,11 @@ test:  ## the test suite
 test-slow: $(TESTING)  ## the slow checks
 	$(BIN)/python -m pytest -m slow
 
-# One process a reader; some ten minutes.
+# One process per reader; about ten minutes.
 fuzz: $(TESTING)  ## 2000 damaged files for every reader of files, 200 for one that starts a process each: results/benchmarks/fuzz.csv
 	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
-lint:  ## ruff, snakefmt, mypy, snakemake --lint
+lint:  ## ruff, snakefmt, mypy, snakemake --lint, no marks of an unfinished merge
 	@$(MAKE) --no-print-directory -j 2 ready
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target types style
 
@@ -114,6 +110,7 @@ types:
 	$(BIN)/python -m mypy
 
 style:
+	! git grep -nIE '^([<]{7}|[|]{7}|[>]{7}|={7}$$)'
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
@@ -122,7 +119,7 @@ style:
 cost: $(SETUP)  ## error of the echo over its time: results/default/cost.csv and cost.svg
 	$(SNAKEMAKE) -- cost
 
-accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings a row: results/default/accuracy_cost.csv and .svg
+accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings per row: results/default/accuracy_cost.csv and .svg
 	$(MAKE) --no-print-directory study NAME=heights
 	$(SNAKEMAKE) --configfile config/cost/accuracy.yaml -- accuracy_cost
 
@@ -133,7 +130,7 @@ check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/r
 	for run in $(filter-out $(if $(LOWALT_INPUTS),,real),$(basename $(notdir $(wildcard results/reference/*.sha256)))); do $(SNAKEMAKE) --forceall --configfile config/$$run.yaml -- data && \
 		$(BIN)/python -m lowalt.shards.manifest check --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
 
-# Of runs that are finished: tables, manifests and pictures. What changed, git shows.
+# Tables, manifests and pictures of finished runs; git shows the changes.
 reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	for run in default real; do for table in $(TABLES); do cp results/$$run/$$table results/reference/$$run-$$table 2>/dev/null || true; done; done
 	for table in cost accuracy_cost; do cp results/default/$$table.csv results/reference/default-$$table.csv 2>/dev/null || true; done

@@ -1,4 +1,4 @@
-# lowalt: from records of targets to a benchmark and its report. One rule file a stage, in pipeline order.
+# lowalt: from records of targets to a benchmark and its report. One rule file per stage, in pipeline order.
 import sys
 
 from snakemake.utils import min_version
@@ -68,7 +68,7 @@ rule training_samples:
     localrule: True
 
 
-# What needs no torch before the first training: `make` has it made while torch is still on its way.
+# Everything before the first training that needs no torch: `make` makes it while torch is being downloaded.
 rule prepared:
     input:
         products.prepared,

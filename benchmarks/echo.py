@@ -23,9 +23,9 @@ import numpy as np
 from lowalt.config.layers import canonical
 from lowalt.config.network import Network
 from lowalt.echo import echo_signal
+from lowalt.echo.echo_input import Rigid
 from lowalt.echo.fast import driver
 from lowalt.echo.rounding import nearest
-from lowalt.echo.scene import Rigid
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.measure import echo_cost as cost
@@ -59,7 +59,7 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
 def stage(
     config: dict, paths: dict[str, str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path
 ) -> float:  # fmt: skip
-    """Seconds that the echo command takes for all rows, `processes` at a time: a job a chunk and list of stations.
+    """Seconds that the echo command takes for all rows, `processes` at a time: a job per chunk and list of stations.
 
     paths: the cloud file of each subtype; a job gets those of its chunk. A job has one thread, as Snakemake gives it:
     jobs side by side would otherwise fight for cores. Python may keep its bytecode, as it does unless forbidden to.

@@ -26,7 +26,7 @@ from lowalt.config.layers import load
 from lowalt.files.csv_tables import write_csv
 from lowalt.machine.hardware import describe
 from lowalt.numerics.streams import stream
-from lowalt.recognition.made import DatasetSamples
+from lowalt.recognition.dataset_samples import DatasetSamples
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import train
 from lowalt.recognition.schemes import Scheme

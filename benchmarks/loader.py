@@ -28,7 +28,7 @@ from lowalt.files.errors import InputError
 from lowalt.machine.hardware import describe
 from lowalt.motion import read_table
 from lowalt.numerics.streams import stream
-from lowalt.recognition.order import batches, epoch_order
+from lowalt.recognition.batches import batches, epoch_order
 from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet
 from lowalt.shards.index import build

@@ -2,7 +2,7 @@
 
     python benchmarks/planted_faults.py --out results/benchmarks/planted_faults.csv
 
-`planted_faults.csv` next to this file has one fault a row: the stage, what is wrong, the file, the text there (which
+`planted_faults.csv` next to this file has one fault per row: the stage, what is wrong, the file, the text there (which
 must stand there once), the text put in its place, and the test files. Each is planted into a temporary copy of the
 tree. Tests that pin bytes are left out, since they notice every change and say nothing about which is right.
 """

@@ -15,8 +15,8 @@ import numpy as np
 
 from lowalt.config.layers import load
 from lowalt.echo import echo_signal
+from lowalt.echo.echo_input import Rigid, Target, target
 from lowalt.echo.rounding import nearest
-from lowalt.echo.scene import Rigid, Target, target
 from lowalt.files.csv_tables import write_csv
 from lowalt.machine.hardware import describe
 from lowalt.motion import poses
@@ -76,7 +76,7 @@ def measured(dataset: Dataset, models: int, points: int | None, calls: int) -> d
 def main() -> None:
     """Measure and write the table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--models", type=int, default=5, help="motion models a subtype (default 5)")
+    options.add_argument("--models", type=int, default=5, help="motion models per subtype (default 5)")
     options.add_argument("--calls", type=int, default=9, help="calls of a signal in each way (default 9)")
     options.add_argument("--out", type=Path, required=True, help="table to write")
     given = options.parse_args()

@@ -9,6 +9,7 @@ of attention while they are computed, comes on top.
 """
 
 import argparse
+import itertools
 
 import numpy as np
 import torch
@@ -29,6 +30,9 @@ COLUMNS = (
 )  # fmt: skip
 STATES = 5
 """Copies of the weights in memory: weights, gradients, two moments of AdamW, moving average."""
+
+
+KINDS = tuple(itertools.product(("workstation", "paper"), ((1, False), (4, False), (1, True), (4, True))))
 
 
 def kept_bytes(config: dict, accumulate: int, again: bool) -> tuple[int, int]:
@@ -61,23 +65,30 @@ def kept_bytes(config: dict, accumulate: int, again: bool) -> tuple[int, int]:
     return weights, sum(size for storage, size in held.items() if storage not in own)
 
 
+def row(overlay: str, accumulate: int, again: bool) -> list[str]:
+    """Return the table's row of a configuration; accumulate: parts of a batch; again: activations are computed twice.
+
+    overlay: the configuration's name in `config/`, which is read from the current folder.
+    """
+    config = load_yaml("config/default.yaml")
+    for key, value in load_yaml(f"config/{overlay}.yaml")["recognition"].items():
+        config["recognition"][key] = {**config["recognition"][key], **value} if isinstance(value, dict) else value
+    block = config["recognition"]
+    weights, activations = kept_bytes(config, accumulate, again)
+    gigabytes = [STATES * weights / 1e9, activations / 1e9, (STATES * weights + activations) / 1e9]
+    facts = [block["network"]["backbone"], block["size"], 9 * block["training"]["batch"], accumulate, again]
+    return [*map(str, facts), *(f"{value:.2f}" for value in gigabytes)]
+
+
 def main() -> None:
     """Count for the larger configurations and write the table."""
     line = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     line.add_argument("--out", required=True, help="table to write (.csv)")
     given = line.parse_args()
     rows = []
-    for overlay in ("workstation", "paper"):
-        config = load_yaml("config/default.yaml")
-        for key, value in load_yaml(f"config/{overlay}.yaml")["recognition"].items():
-            config["recognition"][key] = {**config["recognition"][key], **value} if isinstance(value, dict) else value
-        block = config["recognition"]
-        for accumulate, again in ((1, False), (4, False), (1, True), (4, True)):
-            weights, activations = kept_bytes(config, accumulate, again)
-            gigabytes = [STATES * weights / 1e9, activations / 1e9, (STATES * weights + activations) / 1e9]
-            row = [block["network"]["backbone"], block["size"], 9 * block["training"]["batch"], accumulate, again]
-            rows.append([str(value) for value in row] + [f"{value:.2f}" for value in gigabytes])
-            print(*rows[-1], flush=True)
+    for overlay, kind in KINDS:
+        rows.append(row(overlay, *kind))
+        print(*rows[-1], flush=True)
     write_csv(given.out, COLUMNS, rows)
 
 

@@ -12,7 +12,7 @@ from matplotlib import pyplot as plt
 
 from lowalt.config.command import run
 from lowalt.files.atomic import replacing
-from lowalt.files.street import PACKAGE, STREET, modules, purpose, rooms_imported
+from lowalt.files.package_plan import PACKAGE, ROOMS, modules, purpose, rooms_imported
 from lowalt.report.figures.style import png
 
 WIDTH = 60
@@ -22,7 +22,7 @@ WIDTH = 60
 def imports() -> tuple[list[str], list[str]]:
     """Return the pairs (room, room that it imports) as two lists, a pair as often as a file of the room imports it."""
     pairs = [
-        (room, other) for room in STREET for path in modules(room) for other in rooms_imported(path) if other != room
+        (room, other) for room in ROOMS for path in modules(room) for other in rooms_imported(path) if other != room
     ]
     return [room for room, _ in pairs], [other for _, other in pairs]
 
@@ -40,24 +40,24 @@ def _words(room: str) -> str:
 
 
 def draw() -> bytes:
-    """Return PNG bytes: a row a room in the order of the street; a dot says that it imports the room of the column.
+    """Return PNG bytes: one row per room, in the order in which data passes them, and one column per imported room.
 
-    The area of a dot grows with the number of files that import.
+    A dot means that the room of the row imports that of the column. Its area grows with the number of importing files.
     """
     rows, columns = imports()
-    count = len(STREET)
+    count = len(ROOMS)
     figure, panel = plt.subplots(figsize=(16, 0.62 * count + 1.2))
-    for place, room in enumerate(STREET):
+    for place, room in enumerate(ROOMS):
         panel.axhline(place + 0.5, color="0.9", lw=0.8)
         panel.text(-8.2, place, room, fontsize=13, weight="bold", va="center", ha="right")
         panel.text(-7.9, place, _words(room), fontsize=8.5, va="center", color="0.25", linespacing=1.3)
         panel.add_patch(plt.Rectangle((place - 0.5, place - 0.5), 1, 1, color="0.92", zorder=0))
     for room, other in dict.fromkeys(zip(rows, columns, strict=True)):
         files = sum((room, other) == pair for pair in zip(rows, columns, strict=True))
-        panel.scatter(STREET.index(other), STREET.index(room), s=18 * files, color="C0", alpha=0.8, linewidths=0)
+        panel.scatter(ROOMS.index(other), ROOMS.index(room), s=18 * files, color="C0", alpha=0.8, linewidths=0)
     panel.set(xlim=(-10.8, count - 0.5), ylim=(count - 0.5, -0.5))
     panel.xaxis.tick_top()
-    panel.set_xticks(range(count), STREET, rotation=40, ha="left", fontsize=10)
+    panel.set_xticks(range(count), ROOMS, rotation=40, ha="left", fontsize=10)
     panel.set_yticks([])
     panel.tick_params(length=0)
     for side in panel.spines.values():

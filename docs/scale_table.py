@@ -1,7 +1,7 @@
 """Time and disk that a configuration would take, scaled from the measured stages of a finished run.
 
-Data stages scale with samples: core-seconds a sample of the measured run, times the samples planned. Training scales
-with images through the backbone: milliseconds a training sample of the same backbone at the same size on one core, as
+Data stages scale with samples: core-seconds per sample of the measured run, times the samples planned. Training scales
+with images through the backbone: milliseconds per training sample of the same backbone at the same size on one core, as
 accuracy_cost.csv has it, times all steps of all schemes. Early stopping and validation are left out. A network that
 was never timed gets no estimate. All times are those of the measured processor, not of a GPU.
 """
@@ -45,7 +45,7 @@ def _images(row: dict[str, str]) -> int:
 def training_hours(costs: list[dict[str, str]], config: dict) -> tuple[int, float | None, str]:
     """Return (trainings, core-hours of them all, hardware) of a configuration; None and "" if a network was not timed.
 
-    costs: rows of accuracy_cost.csv. Of each network the row of the most images a sample counts; a scheme of another
+    costs: rows of accuracy_cost.csv. Of each network the row of the most images per sample counts; a scheme of another
     number of images takes time in proportion.
     """
     block, known = config["recognition"], {}

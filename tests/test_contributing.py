@@ -40,7 +40,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.spectra.segments import segments
+from lowalt.spectra.fourier import segments
 
 TITLE = "mean power"
 SOURCE = "any textbook, ch. 3"

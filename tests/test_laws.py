@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from lowalt.config.splits import FOLDS, fold
-from lowalt.noise.noisy_signals import noisy_signals
-from lowalt.recognition import statistics, tables
+from lowalt.noise.awgn import noisy_signals
+from lowalt.recognition import tables
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import bootstrap, model_shares
 from lowalt.spectra import trp, vrp, vt
@@ -137,24 +137,6 @@ def test_tables_do_not_depend_on_the_order_of_predictions_or_of_runs(seed):
         assert "accuracy.csv" in written and len(written) > 6
         for table in written:
             assert (folder / "after" / table).read_bytes() == (folder / "before" / table).read_bytes(), table
-
-
-@FEW
-@given(seed=SEEDS, classes=st.integers(2, 6), samples=st.integers(20, 200))
-def test_statistics_are_those_of_scipy(seed, classes, samples):
-    rng = np.random.default_rng(seed)
-    labels, probabilities = rng.integers(0, classes, samples), rng.dirichlet(np.ones(classes), samples)
-    guesses = probabilities.argmax(1)
-    # Counts of a contingency table.
-    expected = stats.contingency.crosstab(labels, guesses, levels=(range(classes), range(classes))).count
-    np.testing.assert_array_equal(statistics.confusion(labels, guesses, classes), expected)
-    shares = statistics.accuracy_by(labels, guesses == labels)
-    means = stats.binned_statistic(labels, guesses == labels, bins=np.arange(classes + 1) - 0.5)
-    for label, (share, count) in shares.items():
-        assert share == pytest.approx(means.statistic[label]) and count == (means.binnumber == label + 1).sum()
-    # Cross entropy is the entropy of each true label relative to the prediction.
-    each = [stats.entropy(np.eye(classes)[label], row) for label, row in zip(labels, probabilities, strict=True)]
-    assert statistics.cross_entropy(probabilities, labels) == pytest.approx(np.mean(each))
 
 
 @settings(max_examples=6, deadline=None)

@@ -17,9 +17,9 @@ def __getattr__(name: str):
 
         return getattr(dataset, name)
     if name in ("train", "evaluate"):
-        from lowalt.recognition import one_call
+        from lowalt.recognition import train_evaluate
 
-        return getattr(one_call, name)
+        return getattr(train_evaluate, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -1,36 +1,57 @@
 """The command `lowalt`, for people: run the workflow, look at scenes, spectra, samples and runs, make own targets.
 
-Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input. Stages have commands of their own
-(python -m lowalt.STAGE).
+Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input, 130 interrupted. Stages have commands of
+their own (python -m lowalt.STAGE).
 """
 
 import argparse
+import signal
 import sys
+from importlib import import_module
 
-from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
-from lowalt.commands.command_line import Answer, as_json
-from lowalt.config.command import refusal
+from lowalt.commands.command_table import COMMANDS
 from lowalt.files.errors import InputError
+
+
+def command_line(asked: str) -> argparse.ArgumentParser:
+    """Return the parser of `lowalt`, with the options of the command `asked`, or of all for "completion"."""
+    examples = "\n".join(f"  {entry.example}" for entry in COMMANDS.values())
+    line = argparse.ArgumentParser(
+        prog="lowalt", description=__doc__, epilog=f"examples:\n{examples}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    commands = line.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    modules = {entry.module: None for name, entry in COMMANDS.items() if asked in (name, "completion")}
+    added = {module: import_module(f"lowalt.commands.{module}") for module in modules}
+    for name, entry in COMMANDS.items():
+        if entry.module in added:
+            added[entry.module].add_to(commands, name)
+        else:
+            commands.add_parser(name, help=entry.meaning)
+    return line
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command of `lowalt`; returns the exit status."""
-    line = argparse.ArgumentParser(
-        prog="lowalt", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    commands = line.add_subparsers(dest="command", required=True)
-    for part in (explain, workflow, sample, data, compare, report, target, spectra):
-        part.add_to(commands)
-    completion.add_to(commands, line)
-    options = line.parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else arguments
+    line = command_line(next((word for word in words if not word.startswith("-")), ""))
+    options = line.parse_args(words)
     try:
-        answer: Answer = options.act(options)
+        answer = options.act(options)
     except (InputError, OSError) as error:
-        print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
+        from lowalt.config.command import refusal
+
+        print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
-    text = as_json(answer.facts) if options.json else answer.text
-    if text:
-        print(text)
+    except KeyboardInterrupt:
+        print("interrupted: the same command goes on from here", file=sys.stderr)
+        return 128 + signal.SIGINT
+    if options.json:
+        from lowalt.commands.command_line import as_json
+
+        print(as_json(answer.facts))
+    elif answer.text:
+        print(answer.text)
     return answer.status
 
 

@@ -1,9 +1,10 @@
-"""Snakemake's log as one line a stage: `snakemake --logger lowalt`, as the profiles of this project ask.
+"""Snakemake's log as one line per stage: `snakemake --logger lowalt`, as the profiles of this project ask.
 
 On a terminal the lines of the stages that run are drawn anew in place; in a log each stage has a line when it starts,
 every half minute and when it ends. Everything else is in files: Snakemake's own log, whose path it prints at the end,
-and the log of each job, whose last lines are shown when it fails. A dry run prints what Snakemake prints. A quiet run
-shows warnings and failures alone and keeps no status, since Snakemake then does not say which jobs have ended.
+and the log of each job, whose last lines are shown when it fails. A dry run prints a table of stages, their
+jobs and why these would run; with --printshellcmds it prints what Snakemake prints of every job. A quiet run shows
+warnings and failures alone and keeps no status, since Snakemake then does not say which jobs have ended.
 """
 
 import contextlib
@@ -14,6 +15,8 @@ import shutil
 import sys
 import threading
 import time
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 from snakemake.logging import ColorizingTextHandler, DefaultFilter, DefaultFormatter
@@ -38,9 +41,13 @@ QUIET = {
 NOISE = (
     "Assuming unrestricted shared filesystem", "Building DAG of jobs", "Conda environments: ignored", "Config file",
     "Job rate limit", "Removing temporary output", "Select jobs to execute", "Singularity containers: ignored",
-    "Using profile", "Using shell", "Using workflow specific profile", "host:",
+    "Using profile", "Using shell", "Using workflow specific profile", "host:", "Would remove temporary output",
+    "Some jobs were triggered by provenance", "If you prefer that only modification time", "If you are sure that",
+    "Rules with provenance triggered jobs", "Reasons:",
 )  # fmt: skip
 """Beginnings of messages that say nothing about this run."""
+FOLLOWS = "input files updated by another job"
+"""Snakemake's reason of a job that runs because another one does."""
 
 INTERRUPTED = "on user request"
 """Part of the message with which Snakemake answers Ctrl-C and SIGTERM."""
@@ -53,6 +60,26 @@ def quiet_on_a_full_disk(file: logging.FileHandler, record: logging.LogRecord) -
     """
     if getattr(sys.exc_info()[1], "errno", None) not in FULL:
         logging.Handler.handleError(file, record)
+
+
+def short_reason(reason: str) -> str:
+    """Return why a job would run without the files that Snakemake names, such as "missing output files"."""
+    kinds = dict.fromkeys(part.partition(":")[0].strip().lower() for part in reason.split("; "))
+    # A job that has a reason of its own would run whatever happens to its inputs.
+    own = [kind for kind in kinds if kind and kind != FOLLOWS]
+    return ", ".join(own or kinds)
+
+
+def plan_table(planned: Mapping[str, Mapping[str, int]]) -> list[str]:
+    """Return the lines of a dry run's table. planned: by rule the number of jobs for each reason."""
+    wide = max(map(len, ("stage", *planned)))
+    lines = [f"{'stage':{wide}}  jobs  why"]
+    for rule, reasons in planned.items():
+        for count, (reason, jobs) in enumerate(sorted(reasons.items(), key=lambda pair: -pair[1])):
+            lines.append(f"{'' if count else rule:{wide}}  {jobs:4}  {reason}")
+    total = sum(sum(reasons.values()) for reasons in planned.values())
+    more = "files, reasons and commands of every job: the same with --printshellcmds"
+    return [*lines, f"{'total':{wide}}  {total:4}  ({more})"]
 
 
 class LogHandler(LogHandlerBase):
@@ -74,7 +101,8 @@ class LogHandler(LogHandlerBase):
             DefaultFilter(given.quiet, given.debug_dag, given.verbose, given.dryrun, given.printshellcmds),
         )  # fmt: skip
         # These options of Snakemake ask for its own messages.
-        self._all = given.dryrun or given.verbose or given.debug_dag or given.printshellcmds
+        self._all = given.verbose or given.debug_dag or given.printshellcmds
+        self._planned: dict[str, Counter[str]] | None = {} if given.dryrun and not self._all else None
         self._quiet = bool({Quietness.PROGRESS, Quietness.ALL} & set(given.quiet or ()))
         self._board: Board | None = None
         self._drawn, self._shown = 0, 0.0
@@ -89,8 +117,10 @@ class LogHandler(LogHandlerBase):
         """Show one record of Snakemake's, or note what it says about the run."""
         try:
             with self._guard:
-                if self._all:
-                    self._plan(record)
+                self._plan(record)
+                if self._planned is not None:
+                    self._count(record)
+                elif self._all:
                     if self._plain.filter(record):
                         self._plain.handle(record)
                 else:
@@ -102,6 +132,9 @@ class LogHandler(LogHandlerBase):
         """Show the last state and leave the status file behind."""
         self._stop.set()
         with self._guard:
+            if self._planned:
+                print("\n".join(plan_table(self._planned)), file=self._stream, flush=True)
+                self._planned = None
             if self._board:
                 self._erase()
                 self._keep(self._outcome)
@@ -123,6 +156,14 @@ class LogHandler(LogHandlerBase):
             job = {"rule": record.rule_name, "files": list(map(str, record.output)), "reason": str(record.reason)}
             with Path(path).open("a") as file:
                 file.write(json.dumps(job) + "\n")
+
+    def _count(self, record: logging.LogRecord) -> None:
+        """Count a job that would run by its rule and reasons; show messages that say something about this run."""
+        event = getattr(record, "event", None)
+        if event == LogEvent.JOB_INFO:
+            self._planned.setdefault(record.rule_name, Counter())[short_reason(str(record.reason))] += 1
+        elif event not in QUIET and not self._noise(record):
+            self._say(self._plain.format(record))
 
     def _take(self, record: logging.LogRecord) -> None:
         """Update the display by one record of Snakemake."""
@@ -198,6 +239,9 @@ class LogHandler(LogHandlerBase):
                 text = Path(log).read_text(errors="replace").splitlines()
             except OSError:
                 text = []
+            if text[-1:] == ["KeyboardInterrupt"]:
+                lines[0] = f"interrupted: {record.rule_name}, job {record.jobid}"
+                continue
             lines += [f"  its log: {log}" + ("; the last lines:" if text else ", which is empty or not there")]
             lines += [f"    {line}" for line in text[-LAST_LINES:]]
         self._say("\n".join(lines))

@@ -19,7 +19,7 @@ import yaml
 from lowalt.config.layers import load
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition.one_sample import answer
+from lowalt.recognition.predict_sample import answer
 from lowalt.recognition.runs import load as load_model
 from lowalt.shards.dataset import Dataset
 from lowalt.targets.cloud import Cloud

@@ -13,7 +13,7 @@ from lowalt.config.classes import label
 from lowalt.config.splits import fold
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition.made import stations_of, views_of
+from lowalt.recognition.dataset_samples import stations_of, views_of
 from lowalt.recognition.samples import Facts, Samples, fingerprint
 from lowalt.recognition.schemes import columns_in
 from lowalt.shards.dataset import Dataset, Place

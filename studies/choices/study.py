@@ -33,8 +33,8 @@ from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions, runs
+from lowalt.recognition.dataset_samples import opened
 from lowalt.recognition.intervals import model_shares, strict_difference
-from lowalt.recognition.made import opened
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import Facts, ViewSamples, joined_sources
 from lowalt.recognition.schemes import TABLE, named

@@ -71,7 +71,7 @@ def measured_height_m(network: Network, station: Station, range_m: float, omega:
 def heights_m(entry: dict, network: Network) -> list[float]:
     """Return the heights (m) that the stations measure of a sample; entry: its record.
 
-    Errors are drawn by the record's root seed, its key and the station's name alone.
+    Errors are drawn by the record's random seed, its key and the station's name alone.
     """
     _, snr_db = row_of(entry)
     found = []

@@ -3,16 +3,16 @@
 measured-recognition.csv: one row a radar, training seed and recording, with the number of windows of each name. The
     seed "mean" stands for all networks together, by the mean of their probabilities.
 measured-accuracy.csv: share of right windows of each class in each half, mean over its files, and balanced accuracy
-    over the radar's classes; intervals resample files within their class. One row is for all radars together.
+    over the twin's classes. low and high resample files within their class; devices_low and devices_high resample the
+    radars that recorded a class, then their files, where there are two or more. One row is for all twins together.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
 from recorded_sets import HALVES, Measured
 from torch import nn
-from twin_networks import simulated, train
-from twin_scenes import Library
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.atomic import replacing
@@ -20,13 +20,16 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, runs
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recordings.twin_scenes import Library
+from lowalt.recordings.twin_training import simulated, train
 from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.tiles import join
 from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import encode
 
-RECOGNITION = ("radar", "seed", "set", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
-ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")
+RECOGNITION = ("radar", "seed", "device", "set", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
+ACCURACY = ("radar", "half", "class", "devices", "files", "windows", "accuracy_percent", "low", "high", "devices_low",
+            "devices_high", "chance_percent")  # fmt: skip
 REPEATS = 4000
 PIXELS = 3
 """Side of a network's pixel in a picture."""
@@ -82,7 +85,7 @@ def recognition_rows(name: str, measured: Heard, networks: dict[int, nn.Module],
         answers = {seed: probabilities(network, windows, every, machine, block["evaluation"]["batch"])
                    for seed, network in networks.items()}  # fmt: skip
         answers["mean"] = np.mean(list(answers.values()), axis=0)
-        about = recording.set, recording.half, recording.name, recording.record.label
+        about = recording.device, recording.set, recording.half, recording.name, recording.record.label
         for seed, shares in answers.items():
             guesses = shares.argmax(1)
             counts = np.bincount(guesses, minlength=len(CATEGORIES)).tolist()
@@ -112,30 +115,54 @@ def radar_rows(
     return recognition_rows(name, measured, networks, block)
 
 
-def _interval(by_class: list[np.ndarray], rng: np.random.Generator) -> tuple[float, float, float]:
-    """Mean over classes of the mean over files, with the 95 % interval from resampling files within each class."""
-    draws = [values[rng.integers(0, len(values), (REPEATS, len(values)))].mean(axis=1) for values in by_class]
-    low, high = np.quantile(np.mean(draws, axis=0), [0.025, 0.975])
-    return float(np.mean([values.mean() for values in by_class])), float(low), float(high)
+Right = dict[str, list[float]]
+"""Share of right windows (percent) of the files of a class, by the radar that recorded them."""
+
+
+def _interval(classes: list[Right], rng: np.random.Generator, devices: bool) -> tuple[float, float]:
+    """The 95 % interval of the mean over classes of the mean over files, from resampling files within each class.
+
+    devices: resample the radars of each class first, then the files of each; a file counts once.
+    """
+    means = []
+    for _ in range(REPEATS):
+        by_class = []
+        for files in classes:
+            names = list(files)
+            drawn = rng.choice(names, len(names)) if devices else names
+            values = np.concatenate([files[name] for name in drawn]) if not devices else np.concatenate(
+                [rng.choice(files[name], len(files[name])) for name in drawn])  # fmt: skip
+            by_class.append((values if devices else rng.choice(values, len(values))).mean())
+        means.append(np.mean(by_class))
+    low, high = np.quantile(means, [0.025, 0.975])
+    return float(low), float(high)
 
 
 def accuracy_rows(rows: list[list], seed: int) -> list[list]:
     """Return the rows of `ACCURACY` from those of `RECOGNITION` whose seed is "mean"; a file counts once.
 
-    Classes are counted for each radar: drones at 10 GHz and drones at 3.3 GHz are two classes.
+    Classes are counted for each twin: drones at 10 GHz and drones at 3.3 GHz are two classes.
     """
-    files: dict[tuple[str, str, str], list[tuple[int, float]]] = {}
-    for name, kind, _, half, _, label, windows, *_, right in rows:
+    files: dict[tuple[str, str, str], Right] = {}
+    windows: dict[tuple[str, str, str], int] = {}
+    for name, kind, device, _, half, _, label, count, *_, right in rows:
         if kind == "mean":
-            files.setdefault((name, half, label), []).append((windows, right))
+            key = name, half, label
+            files.setdefault(key, {}).setdefault(device, []).append(right)
+            windows[key] = windows.get(key, 0) + count
     result = []
 
     def add(name: str, half: str, title: str, classes: list[tuple[str, str, str]]) -> None:
         """Append the row of `classes`, (radar, half, class), under the name `title`."""
         rng = stream(seed, "measured-accuracy", name, half, title)
-        interval = _interval([np.array([right for _, right in files[key]]) for key in classes], rng)
-        counts = [windows for key in classes for windows, _ in files[key]]
-        result.append([name, half, title, len(counts), sum(counts), *interval, 100 / len(CATEGORIES)])
+        shares = [files[key] for key in classes]
+        middle = float(np.mean([np.mean(np.concatenate(list(of.values()))) for of in shares]))
+        devices = {device for of in shares for device in of}
+        several = all(len(of) > 1 for of in shares)
+        over = _interval(shares, rng, True) if several else (math.nan, math.nan)
+        counts = sum(len(right) for of in shares for right in of.values()), sum(windows[key] for key in classes)
+        interval = _interval(shares, rng, False)
+        result.append([name, half, title, len(devices), *counts, middle, *interval, *over, 100 / len(CATEGORIES)])
 
     for half in HALVES:
         for name in dict.fromkeys(name for name, _, _ in files):

@@ -18,12 +18,12 @@ from pairs import simulated_stretch
 from recorded_sets import HALVES, Measured
 from scipy.stats import wasserstein_distance
 from spectral_figures import INTERVAL, interval_figures, unit
-from twin_scenes import Library
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.numerics.streams import stream
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_scenes import Library
 from lowalt.recordings.windows import at_symbol_rate
 
 FIGURES = (

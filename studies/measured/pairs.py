@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from recorded_sets import Measured
 from spectral_figures import spectrogram
-from twin_scenes import clouds_of, heard, samples, stretch
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recordings.presence import speeds_shown
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_scenes import clouds_of, heard, samples, stretch
 from lowalt.recordings.windows import at_symbol_rate
 
 FLOOR_DB = -45.0

@@ -1,7 +1,7 @@
 """Recordings of real radars held against the twins of these radars.
 
-    python studies/measured/study.py pairs | compare | recognise --inputs FOLDER --out FOLDER
-    python studies/measured/study.py page --out FOLDER
+    python studies/measured/study.py pairs | compare | noise | recognise --inputs FOLDER --out FOLDER
+    python studies/measured/study.py presence | page --out FOLDER
 
 FOLDER of the inputs: one folder a measured set (`sets.yaml`). `--out` gets the tables measured-*.csv, the pictures and
 report.html. `recognise` trains networks into the folder `--models`.
@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 from recorded_sets import Measured, recordings, usable
-from twin_scenes import Library
 
 from lowalt.config.command import dispatch, run
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
+from lowalt.recordings.twin_scenes import Library
 from lowalt.targets.records import load_records
 
 HERE = Path(__file__).parent
@@ -113,11 +113,36 @@ def compare(arguments: list[str]) -> None:
     _write(options.out, "distances", DISTANCES, [row for rows in apart for row in rows])
 
 
+def noise(arguments: list[str]) -> None:
+    """Compute measured-noise.csv: the noise floors of the raw recordings with one real channel."""
+    inputs = _inputs("noise", noise.__doc__, arguments)
+    from noise_floors import NOISE, row
+
+    _write(inputs.options.out, "noise", NOISE, [row(one) for one in inputs.recordings if one.record.channel == "real"])
+
+
+def presence(arguments: list[str]) -> None:
+    """Compute measured-presence.csv: false alarms in simulated noise, and simulated targets that are found."""
+    line = argparse.ArgumentParser("study.py presence", description=presence.__doc__)
+    line.add_argument("--out", required=True, type=Path, help="folder to write")
+    line.add_argument("--twins", type=Path, default=TWINS, help="radars and scenes")
+    line.add_argument("--noises", type=int, default=100, help="recordings of noise a row")
+    line.add_argument("--scenes", type=int, default=12, help="recordings of a category")
+    options = line.parse_args(arguments)
+    from presence_rates import PRESENCE, noise_rows, target_rows
+
+    library = Library.read(options.twins)
+    rows = [row for name in library.twins for row in noise_rows(name, library, options.noises)]
+    rows += [row for name in library.twins for row in target_rows(name, library, options.scenes)]
+    _write(options.out, "presence", PRESENCE, rows)
+
+
 def recognise(arguments: list[str]) -> None:
     """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
     inputs = _inputs("recognise", recognise.__doc__, arguments, trains=True)
     from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
-    from twin_networks import settings
+
+    from lowalt.recordings.twin_training import settings
 
     options, block = inputs.options, settings(inputs.options.recognition)
     shared = inputs.recordings, inputs.library, block, options.models, options.out, options.reuse
@@ -147,7 +172,14 @@ def write_page(arguments: list[str]) -> None:
         temporary.write_text(page(folder))
 
 
-COMMANDS = {"pairs": pairs, "compare": compare, "recognise": recognise, "page": write_page}
+COMMANDS = {
+    "pairs": pairs,
+    "compare": compare,
+    "noise": noise,
+    "presence": presence,
+    "recognise": recognise,
+    "page": write_page,
+}
 
 
 def main(arguments: list[str]) -> None:

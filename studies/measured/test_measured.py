@@ -1,6 +1,7 @@
 """Recordings held against twins: which files count, what the figures read off, what tables and page say of them."""
 
 import hashlib
+import re
 import runpy
 from pathlib import Path
 
@@ -15,12 +16,12 @@ import yaml
 from comparison import DISTANCES, FIGURES, distance_rows
 from recorded_sets import SETS, halves, recordings, usable
 from scipy.io import wavfile
-from twin_scenes import Library
 
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_scenes import Library
 
 HERE = Path(__file__).parent
 # Several studies have a program of this name.
@@ -46,7 +47,7 @@ def drive(folder, rate, **more):
 def test_the_files_are_whole_and_halves_share_no_recording(library):
     sets, split = load_yaml(SETS), halves()
     assert sorted(name for names in library.sets.values() for name in names) == sorted(sets) == sorted(split)
-    for block in split.values():
+    for block in (block for name, block in split.items() if name != "car_24ghz"):
         assert block["tuning"] and block["test"] and not set(block["tuning"]) & set(block["test"])
     for pair in load_yaml(HERE / "pictures.yaml")["pairs"].values():
         assert pair["file"] in split[pair["set"]]["tuning"]
@@ -54,27 +55,43 @@ def test_the_files_are_whole_and_halves_share_no_recording(library):
     addresses = fetch.addresses(load_yaml(fetch.SOURCES))
     named = {f"{name}/{file}" for name, block in split.items() for half in block.values() for file in half}
     assert named == set(addresses) - {"vehicle_24ghz/LICENSE"}
-    for places, pinned in addresses.values():
-        assert len(pinned) == 64 and int(pinned, 16) and all(place.startswith("https://") for place in places)
+    further = fetch.addresses(load_yaml(HERE / "further.yaml"))
+    assert not set(further) & set(addresses)
+    # A file counts by its content, whatever its name is.
+    sums = [pinned for _, pinned in (addresses | further).values()]
+    assert len(set(sums)) == len(sums) and all(len(pinned) == 64 and int(pinned, 16) for pinned in sums)
+    for address, _ in (addresses | further).values():
+        assert re.fullmatch(r"https://raw.githubusercontent.com/[\w.-]+/[\w.-]+/[0-9a-f]{40}/[\w./%-]+", address)
 
 
-def test_what_is_fetched_comes_from_the_first_address_that_has_the_pinned_bytes(tmp_path, capsys):
-    here, gone = tmp_path / "here", tmp_path / "gone"
-    here.mkdir()
+def test_what_is_fetched_has_the_pinned_bytes_and_a_copy_is_checked_without_network(tmp_path, capsys, monkeypatch):
+    here = tmp_path / "owner/name/0a1b/some folder"
+    here.mkdir(parents=True)
     (here / "a b.wav").write_bytes(b"sound")
     sums = {name: hashlib.sha256(text).hexdigest() for name, text in (("a b.wav", b"sound"), ("c.wav", b"other"))}
-    block = {"set": [{"addresses": [gone.as_uri(), here.as_uri()], "files": sums}]}
-    (tmp_path / "sources.yaml").write_text(yaml.safe_dump(block))
+    block = {"repository": "owner/name", "commit": "0a1b", "folder": "some folder", "files": sums}
+    (tmp_path / "sources.yaml").write_text(yaml.safe_dump({"set": [block]}))
+    monkeypatch.setattr(fetch, "RAW", tmp_path.as_uri())
     arguments = ["--out", str(tmp_path / "out"), "--sources", str(tmp_path / "sources.yaml")]
     with pytest.raises(InputError, match="1 of 2 files could not be fetched"):
         fetch.main(arguments)
     assert (tmp_path / "out/set/a b.wav").read_bytes() == b"sound"
-    assert "set/c.wav" in capsys.readouterr().err
+    assert "c.wav" in capsys.readouterr().err
     (here / "c.wav").write_bytes(b"changed")
     with pytest.raises(InputError, match="1 of 2"):
         fetch.main(arguments)
     assert "SHA-256 is" in capsys.readouterr().err
     assert not (tmp_path / "out/set/c.wav").exists()
+    with pytest.raises(InputError, match=r"out: lacks 1 of 2 files of sources\.yaml"):
+        fetch.main([*arguments, "--check"])
+    assert "set/c.wav: missing, see file://" in capsys.readouterr().out
+    (tmp_path / "out/set/c.wav").write_bytes(b"changed")
+    with pytest.raises(InputError, match="lacks 1"):
+        fetch.main([*arguments, "--check"])
+    assert f"expected {sums['c.wav']}" in capsys.readouterr().out
+    (tmp_path / "out/set/c.wav").write_bytes(b"other")
+    fetch.main([*arguments, "--check"])
+    assert "all 2 files of sources.yaml are there" in capsys.readouterr().out
 
 
 def test_files_of_a_set_that_came_later_are_test_files_and_name_their_carrier(tmp_path):
@@ -115,7 +132,7 @@ def test_later_files_of_a_set_may_have_another_rate_and_bad_ones_are_left_out_by
     folder = tmp_path / "bird_drone_10ghz"
     volts(folder, "bird99.csv", 10000)
     volts(folder, "bird98.csv", 20000)
-    volts(folder, "DRONE97.CSV", 10000)
+    volts(folder, "DRONE97.CSV", 10000, seconds=1.001)
     volts(folder, "bird96.csv", 8000)
     volts(folder, "bird95.csv", 10000, seconds=0.2)
     volts(folder, "quadcopter.csv", 10000)
@@ -176,8 +193,8 @@ def test_a_network_names_each_recording_once_a_seed_and_by_the_mean(tmp_path):
 
 
 def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
-    def row(radar, seed, folder, half, file, label, windows, right):
-        return [radar, seed, folder, half, file, label, windows, 0, 0, 0, 0, right]
+    def row(radar, seed, device, half, file, label, windows, right):
+        return [radar, seed, device, "set", half, file, label, windows, 0, 0, 0, 0, right]
 
     test = "test"
     rows = [
@@ -186,15 +203,34 @@ def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
         row("fm", "mean", "one", test, "c", "UAV", 7, 30.0), row("cw", "mean", "one", "tuning", "d", "UAV", 3, 10.0),
     ]  # fmt: skip
     found = {tuple(line[:3]): line[3:] for line in accuracy.accuracy_rows(rows, 1)}
-    assert {key: line[:3] for key, line in found.items()} == {
-        ("cw", "tuning", "UAV"): [1, 3, 10.0], ("all", "tuning", "balanced"): [1, 3, 10.0],
-        ("cw", "test", "Bird"): [2, 30, 60.0], ("cw", "test", "UAV"): [1, 5, 90.0],
-        ("cw", "test", "balanced"): [3, 35, 75.0], ("fm", "test", "UAV"): [1, 7, 30.0],
-        ("all", "test", "balanced"): [4, 42, 60.0],
+    assert {key: line[:4] for key, line in found.items()} == {
+        ("cw", "tuning", "UAV"): [1, 1, 3, 10.0], ("all", "tuning", "balanced"): [1, 1, 3, 10.0],
+        ("cw", "test", "Bird"): [2, 2, 30, 60.0], ("cw", "test", "UAV"): [1, 1, 5, 90.0],
+        ("cw", "test", "balanced"): [2, 3, 35, 75.0], ("fm", "test", "UAV"): [1, 1, 7, 30.0],
+        ("all", "test", "balanced"): [2, 4, 42, 60.0],
     }  # fmt: skip
     # Two files of a class are drawn with replacement: both bounds are reached, and a class of one file stays.
-    assert found["cw", "test", "Bird"][3:] == [40.0, 80.0, 25.0] and found["cw", "test", "UAV"][3:5] == [90.0, 90.0]
-    assert found["cw", "test", "balanced"][3:5] == [65.0, 85.0]
+    assert found["cw", "test", "Bird"][4:] == [40.0, 80.0, 40.0, 80.0, 25.0]
+    assert found["cw", "test", "UAV"][4:6] == [90.0, 90.0] and np.isnan(found["cw", "test", "UAV"][6:8]).all()
+    assert found["cw", "test", "balanced"][4:6] == [65.0, 85.0]
+
+
+def test_two_radars_that_differ_widen_the_interval_over_radars_and_not_that_over_files():
+    rows = [["cw", "mean", device, "set", "test", f"{number}", "Vehicle", 5, 0, 0, 0, 0, right]
+            for device, right in (("one", 90.0), ("two", 50.0)) for number in range(8)]  # fmt: skip
+    ((*_, low, high, devices_low, devices_high, _), _) = accuracy.accuracy_rows(rows, 1)
+    assert (devices_low, devices_high) == (50.0, 90.0) and 55 < low < 65 and 75 < high < 85
+
+
+def test_a_recording_counts_once_under_two_names(tmp_path, capsys, library):
+    folder = tmp_path / "vehicle_24ghz"
+    folder.mkdir()
+    drive(folder, 22050, label="Vehicle")
+    (folder / "a.wav").write_bytes((folder / "drive.wav").read_bytes())
+    (folder / "a.yaml").write_text((folder / "drive.yaml").read_text().replace("drive.wav", "a.wav"))
+    found = usable(recordings(tmp_path), library)
+    assert [one.name for one in found] == ["a.wav"]
+    assert re.search(r"drive\.wav: the same bytes as .*a\.wav", capsys.readouterr().err)
 
 
 def libraries():

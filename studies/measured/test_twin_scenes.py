@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from twin_courses import hover, straight, to_and_fro
-from twin_echo import beam_gain, blade_points, echo, still_row, strengthened, textured
-from twin_receiver import Receiver, received
-from twin_scenes import MARGIN, clouds_of, heard, samples, stretch
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_courses import hover, straight, to_and_fro
+from lowalt.recordings.twin_echo import beam_gain, blade_points, echo, still_row, strengthened, textured
+from lowalt.recordings.twin_receiver import Receiver, received
+from lowalt.recordings.twin_scenes import MARGIN, clouds_of, heard, samples, stretch
 from lowalt.targets.records import load_records
 
 QUIET = {

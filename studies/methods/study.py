@@ -22,7 +22,7 @@ from lowalt.config.command import run
 from lowalt.files.atomic import replacing
 from lowalt.machine.hardware import describe
 from lowalt.recognition import predictions
-from lowalt.recognition.order import epoch_order
+from lowalt.recognition.batches import epoch_order
 from lowalt.recognition.protocols import FOLDS, folds
 from lowalt.recognition.recogniser import built as plain
 from lowalt.recognition.samples import Samples

@@ -69,17 +69,20 @@ def read_made(rng: np.random.Generator, count: int, lines: float, rotors: int) -
     return Read(error, np.nan, found.level, told, lines)
 
 
+def row(rotors: int, count: int, lines: float, draws: int) -> list:
+    """Return the table's row of one of KINDS."""
+    rng = stream(0, "made rotors", rotors, count, lines)
+    reads = [read_made(rng, count, lines, rotors) for _ in range(draws)]
+    right, _, _, _, *lengths = summary(reads, count, NEAR_CYCLES / (SYMBOLS * INTERVAL_S))
+    return [rotors, count, lines, draws, right, *lengths]
+
+
 def main(arguments: list[str]) -> None:
     """Write the table."""
     options = argparse.ArgumentParser("study.py made", description=__doc__.splitlines()[0])
     options.add_argument("--draws", type=int, default=30, help="signals of each kind (default: 30)")
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
-    rows = []
-    for rotors, count, lines in KINDS:
-        rng = stream(0, "made rotors", rotors, count, lines)
-        reads = [read_made(rng, count, lines, rotors) for _ in range(given.draws)]
-        right, _, _, _, *lengths = summary(reads, count, NEAR_CYCLES / (SYMBOLS * INTERVAL_S))
-        rows.append([rotors, count, lines, given.draws, right, *lengths])
+    rows = [row(*kind, given.draws) for kind in KINDS]
     write_csv(given.out, COLUMNS, rows)
     print(f"{given.out}: {len(rows)} rows", file=sys.stderr)

@@ -7,10 +7,10 @@ import numpy as np
 
 import trainings
 from lowalt import Dataset
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.numerics.streams import stream
 from lowalt.recognition import samples
-from lowalt.recognition.made import DatasetSamples
+from lowalt.recognition.dataset_samples import DatasetSamples
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import Scheme, columns_in
 from lowalt.shards.maker import Maker

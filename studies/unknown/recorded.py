@@ -18,9 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import recorded_sets
 import rejection
-import twin_networks
 from study import logits
-from twin_scenes import MARGIN, Library, samples, stretch
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
@@ -32,11 +30,13 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition import runs, zoo
 from lowalt.recognition.samples import fingerprint, joined
 from lowalt.recognition.schemes import TABLE, named
+from lowalt.recordings import twin_training
 from lowalt.recordings.channel import coherent_intervals
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
 from lowalt.recordings.twin import Twin
+from lowalt.recordings.twin_scenes import MARGIN, Library, samples, stretch
 from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.recordings.windows import at_symbol_rate
 from lowalt.tiles.image_settings import Images
@@ -103,9 +103,9 @@ def foreign(entry: dict, folder: Path, twin: Twin) -> np.ndarray:
     path = folder / entry["file"]
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the recording that foreign.yaml names")
-    record = Record(path, entry["carrier_hz"], "real", "foreign.yaml", "none stated")
+    record = Record(path, entry["carrier_hz"], "real")
     signal = at_symbol_rate(record, twin, of_text(path) if path.suffix == ".txt" else read(record))
-    return coherent_intervals(signal, twin.symbols, name=str(path))
+    return coherent_intervals(signal, twin.symbols, str(path), twin.slow)
 
 
 def swung(times_s: np.ndarray, wavelength_m: float, rng: np.random.Generator) -> np.ndarray:
@@ -130,7 +130,7 @@ def empty(radar: Radar, library: Library, kind: str, count: int, fold: str) -> n
         rng = stream(library.seed, "unknown", radar.name, kind, fold, number)
         signal = swung(times, SPEED_OF_LIGHT / twin.carrier_hz, rng)
         values = samples(twin, receivers[number % len(receivers)], signal, rng, target=kind != "noise")
-        found.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols)[0])
+        found.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)[0])
     return np.array(found)
 
 
@@ -144,7 +144,7 @@ class Kept(Windows):
 
 def with_empty(radar: Radar, library: Library, block: dict, fold: str) -> Kept:
     """Return the twin's windows of a fold, "train" or "validation", and as many of an extra class as of another."""
-    known = twin_networks.simulated(library, radar.name, block, fold)
+    known = twin_training.simulated(library, radar.name, block, fold)
     count = len(known.facts) // (2 * len(CATEGORIES))
     parts, told = [known.images], [known.facts]
     for kind in EMPTY:
@@ -198,8 +198,8 @@ def foreign_parts(radar: Radar, folder: Path) -> list[Part]:
 
 def rows_of(radar: Radar, library: Library, inputs: Path, folder: Path, models: Path) -> list[list]:
     """Return the table's rows of one network of the zoo, and of one with an extra class."""
-    block = twin_networks.settings(FOLDER / "recognition.yaml")
-    own = twin_networks.simulated(library, radar.name, block, "validation")
+    block = twin_training.settings(FOLDER / "recognition.yaml")
+    own = twin_training.simulated(library, radar.name, block, "validation")
     hollow = {kind: empty(radar, library, kind, ASKED, "test") for kind in EMPTY}
     rows = []
     for asked, scores in ((radar, SCORES), (with_extra(radar, library, block, models), EXTRA)):

@@ -21,10 +21,10 @@ def test_settings_come_as_json_or_as_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{", "not JSON"),
+        ("{", "not settings, expected a JSON object"),
         # Of a long text the first 80 characters are shown.
-        ("{" + 90 * "a", rf"^--settings '{{{79 * 'a'}': not JSON"),
-        (f"[{90 * '1'}]", rf"^--settings '\[{79 * '1'}': list, expected"),
+        ("{" + 90 * "a", rf"^--settings '{{{79 * 'a'}': not settings"),
+        (f"[{90 * '1'}]", rf"^--settings '\[{79 * '1'}': not settings \(list, expected"),
         ("[1]", "list, expected a JSON object"),
         ("@none.json", "no file at none.json"),
     ],

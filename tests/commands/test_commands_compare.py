@@ -2,7 +2,11 @@
 
 import json
 
+import pytest
+
 from lowalt.__main__ import main
+from lowalt.commands import workflow
+from lowalt.files.errors import LONGEST
 from run_folders import run_folder
 
 
@@ -36,3 +40,35 @@ data: {one} | {other}
     )
     assert main(["compare", str(one), str(tmp_path)]) == 2
     assert f"{tmp_path}: has no config.yaml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [(file, text) for file, texts in {
+        "shards/index.json": ["", "[" * 100_000, "[]", "{}", '{"samples": "x", "bytes": []}',
+                              '{"samples": NaN, "bytes": 1}',
+                              f'{{"samples": 1, "bytes": {"9" * 5000}}}'],
+        "stages.csv": ["rule,cpu_s\necho,abc\n", "rule,cpu_s\necho,\n", "rule,cpu_s\necho,nan\n"],
+        "accuracy.csv": ["protocol,scheme,snr_db,accuracy_percent\nseen,A:VT,avg," + "9" * 5000 + "x\n"],
+        "config.yaml": ["run: {1: 2}\n", "seed: .nan\n", "run: 2026-01-01\n", "a: " + "{a: " * 300 + "1" + "}" * 300],
+    }.items() for text in texts],
+)  # fmt: skip
+def test_a_damaged_file_of_a_run_is_refused_in_one_line(tmp_path, capsys, file, text):
+    one, other = run_folder(tmp_path / "one", 80, 5.0), run_folder(tmp_path / "other", 81, 2.5)
+    (one / "shards").mkdir()
+    (one / file).write_text(text)
+    for line in (["compare", str(one), str(other)], ["report", "--gallery", "--results", str(tmp_path)]):
+        assert main(line) == 2
+        told = capsys.readouterr().err
+        assert told.count("\n") == 1 and f"{one / file}: " in told and len(told) <= LONGEST + len("error: \n")
+    assert not (tmp_path / "index.html").exists()
+
+
+def test_an_interrupted_command_ends_with_one_line_and_130(tmp_path, capsys, monkeypatch):
+    def interrupted(*given, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(workflow.subprocess, "run", interrupted)
+    assert main(["run"]) == 130
+    assert capsys.readouterr().err == "interrupted: the same command goes on from here\n"

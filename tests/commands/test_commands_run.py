@@ -14,7 +14,16 @@ from lowalt.files.shipped import SHIPPED
 
 def given(**changes):
     return SimpleNamespace(
-        **{"overlay": [], "configfile": [], "target": [], "cores": None, "dry_run": False, "profile": None} | changes
+        **{
+            "overlay": [],
+            "configfile": [],
+            "target": [],
+            "cores": None,
+            "dry_run": False,
+            "printshellcmds": False,
+            "profile": None,
+        }
+        | changes
     )
 
 

@@ -12,7 +12,7 @@ from craft import NETWORK, craft, row
 from lowalt.config.network import Network
 from lowalt.echo import echo_signal, echo_signals
 from lowalt.echo.__main__ import main
-from lowalt.echo.scene import Rigid, target
+from lowalt.echo.echo_input import Rigid, target
 from lowalt.files.errors import InputError
 from lowalt.measure import echo_baselines
 from lowalt.motion import poses, positions, write_table

@@ -11,7 +11,8 @@ import lowalt
 from forks import printed
 from lowalt.echo.fast.driver import run
 from lowalt.echo.pointwise.results import matrix
-from lowalt.machine.jit import INNER, LEAN, _DigestCache, digest
+from lowalt.machine.jit import INNER, LEAN, digest
+from lowalt.machine.machine_code import _DigestCache
 
 PROGRAM = """
 import sys
@@ -29,7 +30,7 @@ from lowalt.machine.jit import digest
 from lowalt.echo.fast.driver import run
 from lowalt.echo.pointwise.results import matrix
 path.write_text(kept)
-print(digest(run.py_func), digest(matrix.py_func))
+print(digest(run.function), digest(matrix.function))
 """
 """Edits a source file of a copy of the package and prints the digests of two of the echo's kernels."""
 
@@ -70,8 +71,9 @@ def test_kernels_of_the_echo_are_kept_by_that_key():
 
     # numba offers no public name for the key of a cache entry; only the key shows that this cache is asked.
     for compiled in (run, matrix):
-        key = compiled._cache._index_key(("signature",), Codegen())
-        assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func, compiled._cache.options) in key
+        cache = compiled.dispatcher._cache
+        assert isinstance(cache, _DigestCache)
+        assert digest(compiled.function, compiled.options) in cache._index_key(("signature",), Codegen())
 
 
 def test_a_kernel_without_an_entry_for_python_refuses_a_call_and_serves_kernels():
@@ -140,7 +142,8 @@ CALLED = """
 import platform
 import numpy as np
 from numba.core.registry import cpu_target
-from lowalt.machine.jit import INNER, LEAN, PLAIN, VECTOR, _DigestCache
+from lowalt.machine.jit import INNER, LEAN, PLAIN, VECTOR
+from lowalt.machine.machine_code import _DigestCache
 
 _DigestCache.load_overload = lambda *_arguments: None
 
@@ -178,5 +181,5 @@ def test_a_function_done_as_written_stays_so_for_a_first_caller_that_may_fuse(tm
 
 def test_the_key_of_kept_code_has_the_kernel_s_own_options():
     assert (
-        len({digest(run.py_func, options) for options in (None, {"fastmath": {"contract"}}, {"fastmath": set()})}) == 3
+        len({digest(run.function, options) for options in (None, {"fastmath": {"contract"}}, {"fastmath": set()})}) == 3
     )

@@ -8,7 +8,7 @@ from test_echo import network
 
 from lowalt.config.network import Station
 from lowalt.echo import Path, Rigid, echo_matrix, echo_signal
-from lowalt.echo.scene import target
+from lowalt.echo.echo_input import target
 from lowalt.files.errors import InputError
 
 NET = network(symbols=2)

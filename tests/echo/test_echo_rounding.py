@@ -14,8 +14,8 @@ from lowalt.echo.rounding import nearest, sums
 from lowalt.machine.jit import LEAN
 from lowalt.numerics.exact import sines
 
-sine_cosine, dirichlet = LEAN(sines.sine_cosine.py_func), LEAN(sines.dirichlet.py_func)
-to_odd, same_double = LEAN(nearest.to_odd.py_func), LEAN(nearest.same_double.py_func)
+sine_cosine, dirichlet = LEAN(sines.sine_cosine.function), LEAN(sines.dirichlet.function)
+to_odd, same_double = LEAN(nearest.to_odd.function), LEAN(nearest.same_double.function)
 
 
 def exact(pair) -> mpmath.mpf:

@@ -34,6 +34,15 @@ def test_error_and_bound_stay_within_the_tolerance(seed, points, size, away, tol
         assert (result.cell == truth.cell).all() or result.near_ties + truth.near_ties
 
 
+def test_a_target_of_no_cross_section_is_silent_and_exact_at_any_tolerance():
+    net = network(symbols=40)
+    motion = cloud_in_motion(np.random.default_rng(1), 40, 200, (200.0, 30.0, 60.0), 0.3)
+    for tolerance in (1e-2, 1e-9, 1e-15, None):
+        result = echo_signal(net, net.stations[0], motion, 0.0, motion.translation[0, 0], tolerance)
+        assert not result.signal.any()
+        assert result.bound == 0
+
+
 def test_a_looser_tolerance_takes_shorter_polynomials(always_approximate):
     net = network()
     motion = cloud_in_motion(np.random.default_rng(2), 400, 100, (200.0, 30.0, 60.0), 0.3)

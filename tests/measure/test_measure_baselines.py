@@ -8,7 +8,7 @@ import pytest
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import echo_signal
-from lowalt.echo.scene import Rigid
+from lowalt.echo.echo_input import Rigid
 from lowalt.measure import echo_baselines, fifty_digits
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))

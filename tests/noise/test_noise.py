@@ -10,7 +10,7 @@ from lowalt.files.errors import InputError
 from lowalt.motion import write_table
 from lowalt.noise import add_noise
 from lowalt.noise.__main__ import load_echoes, load_powers, main
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.numerics import normals
 from lowalt.numerics.draws import Draws
 from moving_clouds import row

@@ -9,7 +9,7 @@ import torch
 
 from lowalt.files.errors import InputError
 from lowalt.recognition import inference, objective, recipe, recogniser, runs
-from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.schemes import SPECTRA
 from lowalt.tiles import colour_map
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
@@ -78,7 +78,7 @@ class Who:
 
 
 def test_workers_read_in_order_and_live_as_long_as_their_reader():
-    read = ReadAhead(Unchanged(Who(12)), workers=2, pin=False)
+    read = Prefetch(Unchanged(Who(12)), workers=2, pin=False)
     processes = set()
     for first in (0, 6, 3):
         found = torch.cat(list(read([np.array([first, first + 1]), np.array([first + 2])]))).numpy()

@@ -12,7 +12,7 @@ from dataset import RENDER, SNRS, build
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, one_sample, predictions, recogniser, runs, samples, schemes, score, views
+from lowalt.recognition import checkpoint, predict_sample, predictions, recogniser, runs, samples, schemes, score, views
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.protocols import folds
 from lowalt.shards import ShardSet
@@ -112,7 +112,7 @@ def test_predicting_from_a_signal_and_from_its_tile_agree_with_the_network(datas
     for number in (0, 5):
         (tmp_path / "tile.png").write_bytes(shards.png(number))
         np.save(tmp_path / "signal.npy", signals[shards.tile(number).tobytes()])
-        given = [one_sample.predict(trained, tmp_path / name, RENDER) for name in ("tile.png", "signal.npy")]
+        given = [predict_sample.predict(trained, tmp_path / name, RENDER) for name in ("tile.png", "signal.npy")]
         assert given[0] == given[1]
         assert list(given[0]) == ["UAV", "Bird", "Vehicle", "Pedestrian"]
         assert sum(given[0].values()) == pytest.approx(1, abs=1e-12)
@@ -123,7 +123,7 @@ def test_predicting_from_a_signal_and_from_its_tile_agree_with_the_network(datas
     for name, words in (("short.npy", "shape"), ("note.txt", "expected signals")):
         (tmp_path / "note.txt").write_text("")
         with pytest.raises(InputError, match=words):
-            one_sample.predict(trained, tmp_path / name, RENDER)
+            predict_sample.predict(trained, tmp_path / name, RENDER)
 
 
 def test_scores_come_from_the_shards_labels_not_from_the_file(dataset, model, tmp_path):

@@ -14,7 +14,7 @@ from safetensors import safe_open
 
 from lowalt.__main__ import main
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, eight_bits, model_file, one_sample, runs, zoo
+from lowalt.recognition import checkpoint, eight_bits, model_file, predict_sample, runs, zoo, zoo_files
 from lowalt.recognition.export import export
 from made_predictions import facts
 from pictures import IMAGES, NETWORK, SPECTRA
@@ -169,7 +169,7 @@ def test_an_entry_that_loses_accuracy_or_is_large_or_ill_named_is_not_written(fi
 @pytest.mark.parametrize("name", ["default-seen", "default-unseen"])
 def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    assert name in zoo.names()
+    assert name in zoo_files.names()
     path = zoo.ZOO / f"{name}.safetensors"
     assert path.stat().st_size < zoo.LARGEST_BYTES
     measured, card = model_file.read(path).measured, path.with_suffix(".md").read_text()
@@ -180,7 +180,7 @@ def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name
     found = json.loads(capsys.readouterr().out)
     assert list(found) == ["UAV", "Bird", "Vehicle", "Pedestrian"] and sum(found.values()) == pytest.approx(1)
     model, made = zoo.opened(name)
-    assert found == one_sample.predict(model, tmp_path / "a.npy", made)
+    assert found == predict_sample.predict(model, tmp_path / "a.npy", made)
 
 
 @pytest.mark.parametrize("name", ["uav_3ghz", "bird_drone_10ghz", "cw_24ghz"])
@@ -209,7 +209,7 @@ def test_signals_become_images_as_the_model_file_says_unless_overlays_are_given(
         assert main(["predict", str(path), str(signals), "--json", *more]) == 0
         found.append(json.loads(capsys.readouterr().out))
     for gamma, answer in zip((1.0, 0.25), found, strict=True):
-        assert answer == one_sample.predict(model, signals, {**made, "images": {**made["images"], "gamma": gamma}})
+        assert answer == predict_sample.predict(model, signals, {**made, "images": {**made["images"], "gamma": gamma}})
     assert found[0] != found[1]
 
 

@@ -1,5 +1,4 @@
-"""Tables made of prediction files: values by hand, macro F1 as scikit-learn computes it, orderings by intervals, and
-models of other runs compared sample by sample."""
+"""Tables from prediction files: values by hand, orderings by intervals, and models of other runs compared by sample."""
 
 import json
 import re
@@ -10,56 +9,14 @@ import pytest
 
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import orderings, predictions, samples, schemes, statistics, tables, transfer
+from lowalt.recognition import paper_claims, predictions, samples, schemes, tables, transfer
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
-from lowalt.report.pivots import macro_f1 as in_words
-from made_predictions import facts, read_rows, run_files
+from made_predictions import read_rows, run_files
 
 SNRS = (3.0, np.inf)
-PUBLISHED = orderings.read_published("config/published_accuracy.csv")
-
-
-def test_tables_say_what_the_predictions_say(tmp_path):
-    names = schemes.names("config/schemes.csv")
-    path, found, guess = run_files(tmp_path, "seen", "ABC:VRP+TRP+VT", 0.95)
-    weak, _, weak_guess = run_files(tmp_path, "seen", "A:VRP+TRP+VT", 0.6, seed=3)
-    weak.with_suffix(".json").write_text(weak.with_suffix(".json").read_text().replace('"seed": 3', '"seed": 0'))
-    unseen, *_ = run_files(tmp_path, "unseen", "A:VT", 0.7)
-    tables.write([Evaluated(p) for p in (unseen, weak, path)], names, PUBLISHED, tmp_path / "out", seed=1)
-    test = found.fold == "test"
-    accuracy = read_rows(tmp_path / "out/accuracy.csv")
-    assert [row["scheme"] for row in accuracy] == ["A:VRP+TRP+VT"] * 4 + ["ABC:VRP+TRP+VT"] * 4 + ["A:VT"] * 4
-    head = ["protocol", "scheme", "snr_db", "accuracy_percent", *tables.F1, "samples", "hardware", "seeds"]
-    assert list(accuracy[0]) == [*head, "spread_points"]
-    assert (accuracy[0]["seeds"], accuracy[0]["spread_points"]) == ("1", "")
-    for row in accuracy[4:7]:
-        chosen = test & (found.snr_db == float(row["snr_db"]))
-        assert float(row["accuracy_percent"]) == pytest.approx(100 * (guess == found.label)[chosen].mean(), abs=1e-4)
-        assert int(row["samples"]) == chosen.sum()
-    assert [row["snr_db"] for row in accuracy[4:8]] == ["3", "13", "inf", "avg"]
-    mean = np.mean([float(row["accuracy_percent"]) for row in accuracy[4:7]])
-    assert float(accuracy[7]["accuracy_percent"]) == pytest.approx(mean, abs=1e-3)
-    assert {row["protocol"] for row in read_rows(tmp_path / "out/seen_test.csv")} == {"unseen"}
-    counts = {(row["category"], row["predicted"]): int(row["samples"])
-              for row in read_rows(tmp_path / "out/confusion.csv") if row["scheme"] == "ABC:VRP+TRP+VT"}  # fmt: skip
-    assert counts["Bird", "Vehicle"] == (test & (found.label == 1) & (guess == 2)).sum()
-    assert sum(counts.values()) == test.sum()
-    compared = read_rows(tmp_path / "out/comparisons.csv")
-    assert [(row["over"], row["resampled"], row["seeds"]) for row in compared] == [
-        ("A:VRP+TRP+VT", "motion models", "1")
-    ]
-    gain = 100 * ((guess == found.label)[test].mean() - (weak_guess == found.label)[test].mean())
-    for row in compared:
-        assert float(row["difference_points"]) == pytest.approx(gain, abs=1e-3)
-        assert float(row["low"]) < gain < float(row["high"])
-        assert float(row["low"]) > 0
-    (ordering,) = read_rows(tmp_path / "out/orderings.csv")
-    assert (ordering["ordering"], ordering["over"]) == ("not ranked", "A:VRP+TRP+VT")
-    assert float(ordering["paper_points"]) == pytest.approx(99.88 - 98.94)
-    alarms = read_rows(tmp_path / "out/alarms.csv")
-    assert [float(row["asked_percent"]) for row in alarms[:3]] == [90, 95, 99]
+PUBLISHED = paper_claims.read_published("config/published_accuracy.csv")
 
 
 def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
@@ -70,22 +27,6 @@ def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
     other, *_ = run_files(tmp_path, "seen", "D:VT", 0.9)
     with pytest.raises(InputError, match="D:VT"):
         tables.write([Evaluated(other)], names, {}, tmp_path, 1)
-
-
-def test_several_seeds_are_averaged(tmp_path):
-    names = schemes.names("config/schemes.csv")
-    paths = [run_files(tmp_path, "seen", "A:VT", 0.9, seed=seed)[0] for seed in (0, 1, 2)]
-    tables.write([Evaluated(path) for path in paths], names, {}, tmp_path, 1)
-    trainings = read_rows(tmp_path / "seeds.csv")
-    assert [(row["seed"], row["train_s"], row["hardware"]) for row in trainings[1:]] == [
-        ("1", "12.5", "test bench"), ("2", "12.5", "test bench"),
-    ]  # fmt: skip
-    seeds = [float(row["accuracy_percent"]) for row in trainings]
-    average = next(row for row in read_rows(tmp_path / "accuracy.csv") if row["snr_db"] == "avg")
-    assert len(seeds) == 3 and len(set(seeds)) > 1
-    assert float(average["accuracy_percent"]) == pytest.approx(np.mean(seeds), abs=1e-3)
-    assert average["seeds"] == "3"
-    assert float(average["spread_points"]) == pytest.approx(np.std(seeds, ddof=1), abs=1e-3)
 
 
 def test_bands_begin_at_multiples_of_their_width_and_leave_out_samples_without_a_value(tmp_path):
@@ -115,17 +56,17 @@ def test_an_ordering_holds_only_where_its_interval_lies_above_zero(low, high, or
     row = ["seen", "ABC:X", "A:X", "stations", "seeds, motion models"]
     published = {("seen", "ABC:X"): 99.0, ("seen", "A:X"): 97.5}
     for seeds, expected in ((3, ordering), (2, "not ranked")):
-        assert list(orderings.ordering_rows([[*row, seeds, "1.0", low, high]], published)) == [
+        assert list(paper_claims.ordering_rows([[*row, seeds, "1.0", low, high]], published)) == [
             ["seen", "ABC:X", "A:X", "stations", "1.50", seeds, "1.0", low, high, expected]
         ]
-    assert next(orderings.ordering_rows([[*row, 3, "1.0", low, high]], {}))[4] == ""
+    assert next(paper_claims.ordering_rows([[*row, 3, "1.0", low, high]], {}))[4] == ""
 
 
 def test_published_accuracies_are_read_as_averages_and_others_refused(tmp_path):
     assert PUBLISHED["seen", "ABC:VRP+TRP+VT"] == 99.88
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match=r"other\.csv: lacks the columns"):
-        orderings.read_published(tmp_path / "other.csv")
+        paper_claims.read_published(tmp_path / "other.csv")
 
 
 def test_macro_f1_by_hand_counts_every_class_alike():
@@ -135,37 +76,6 @@ def test_macro_f1_by_hand_counts_every_class_alike():
     assert macro_f1(np.diag([5, 0, 3])) == 1.0
     # A class without samples that is guessed lowers the others' precision alone.
     assert macro_f1(np.array([[2, 2], [0, 0]])) == pytest.approx(2 * 2 / (2 * 2 + 0 + 2))
-
-
-def test_macro_f1_is_scikit_learns():
-    scores = pytest.importorskip("sklearn.metrics")
-    rng = stream(1, "f1")
-    labels, guesses = rng.integers(0, 4, 500), rng.integers(0, 4, 500)
-    counts = np.zeros((4, 4))
-    np.add.at(counts, (labels, guesses), 1)
-    assert macro_f1(counts) == pytest.approx(scores.f1_score(labels, guesses, average="macro"), abs=1e-12)
-
-
-def test_the_table_holds_macro_f1_within_its_interval_and_the_report_reads_it(tmp_path):
-    paths = [run_files(tmp_path, "seen", "A:VT", share, seed)[0] for seed, share in ((0, 0.8), (1, 0.7))]
-    runs = [Evaluated(path) for path in paths]
-    tables.write(runs, schemes.names("config/schemes.csv"), {}, tmp_path / "out", seed=1)
-    rows = read_rows(tmp_path / "out/accuracy.csv")
-    for row in rows[:3]:
-        wanted = []
-        for run in runs:
-            part = run.test.take(run.test.snr_db == float(row["snr_db"]))
-            counts = np.zeros((4, 4))
-            np.add.at(counts, (part.label, part.guesses), 1)
-            wanted.append(100 * macro_f1(counts))
-        assert float(row["macro_f1_percent"]) == pytest.approx(np.mean(wanted), abs=1e-4)
-        assert float(row["macro_f1_low"]) < float(row["macro_f1_percent"]) < float(row["macro_f1_high"])
-    mean = np.mean([float(row["macro_f1_percent"]) for row in rows[:3]])
-    assert float(rows[3]["macro_f1_percent"]) == pytest.approx(mean, abs=1e-3)
-    words = in_words(rows)["seen"]["A:VT"]
-    assert words.startswith(f"{mean:.1f}"[:-1]) and " to " in words
-    # A table of an earlier version has no macro F1; nothing is then said.
-    assert in_words([{key: row[key] for key in ("protocol", "scheme", "snr_db")} for row in rows]) == {}
 
 
 def test_whole_subtypes_give_the_wider_interval_where_subtypes_differ(tmp_path):
@@ -249,35 +159,6 @@ def test_a_split_that_would_leak_is_refused():
         transfer.check_folds(own, {**own, "run": "there", "split": {**own["split"], "by": "sample"}})
 
 
-def test_thresholds_come_from_validation_samples_and_not_from_those_they_are_judged_by(tmp_path):
-    found = facts(models=200)
-    score = stream(1, "scores").uniform(0, 1, len(found))
-    # Scores of test samples are half of those of validation samples.
-    score[found.fold == "test"] /= 2
-    rest = np.repeat(((1 - score) / 3)[:, None], 3, 1)
-    path, *_ = run_files(tmp_path, "seen", "A:VT", 0.9)
-    predictions.write(path, predictions.from_facts(found, (0,), np.column_stack([score, rest])))
-    tables.write([Evaluated(path)], ["A:VT"], {}, tmp_path, 1)
-    uav = found.label == 0
-    levels = {
-        fold: statistics.threshold(score[found.fold == fold], found.label[found.fold == fold], 0.8)
-        for fold in ("val", "test")
-    }
-    assert levels["val"] > 1.5 * levels["test"]
-    for row in read_rows(tmp_path / "alarms.csv"):
-        if row["threshold"] == "not measurable":
-            continue
-        asked = float(row["asked_percent"]) / 100
-        mine = found.fold == "val"
-        level = statistics.threshold(score[mine], found.label[mine], asked)
-        assert float(row["threshold"]) == level
-        reached = (score[uav & (found.fold == "test")] >= level).mean()
-        assert float(row["detected_percent"]) == pytest.approx(100 * reached, abs=1e-3)
-    rows = read_rows(tmp_path / "alarms.csv")
-    # 120 UAVs validate: a tenth of them are twelve samples, a twentieth are six.
-    assert [row["threshold"] == "not measurable" for row in rows] == [False, True, True]
-
-
 def test_a_comparison_averages_all_seeds_and_not_the_first(tmp_path):
     one, other = (
         [Evaluated(run_files(tmp_path, "seen", name, share, seed=seed)[0]) for seed, share in enumerate(shares)]
@@ -294,7 +175,9 @@ def test_a_comparison_averages_all_seeds_and_not_the_first(tmp_path):
 
 def test_every_table_that_the_report_s_page_or_recognition_s_document_names_is_kept_or_made_by_a_rule():
     kept = {
-        path.name for folder in ("results/reference", "results/benchmarks", "config") for path in Path(folder).iterdir()
+        path.name
+        for folder in ("results", "results/reference", "results/benchmarks", "config")
+        for path in Path(folder).iterdir()
     }
     rules = "".join(path.read_text() for path in [*Path("workflow").rglob("*.smk"), *Path("src/lowalt").rglob("*.py")])
     made = set(re.findall(r"[\w-]+\.csv", rules))

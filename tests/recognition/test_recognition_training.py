@@ -17,10 +17,9 @@ from torch.optim.optimizer import register_optimizer_step_pre_hook
 from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, inference, recipe, runs, samples
 from lowalt.recognition import training as loop
-from lowalt.recognition.ahead import Augmented
+from lowalt.recognition.batches import Augmented, batches, epoch_order
 from lowalt.recognition.matrix_products import MatrixProduct
 from lowalt.recognition.objective import objective
-from lowalt.recognition.order import batches, epoch_order
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
 
 PATHS = os.pathsep.join(str(Path(__file__).parents[2] / folder) for folder in ("src", "tests/support"))
@@ -82,7 +81,7 @@ def test_a_gradient_that_overflows_is_left_out_and_ten_in_a_row_stop_the_run(vie
     monkeypatch.setattr(torch.nn.utils, "clip_grad_norm_", overflow)
     weights, _ = train(views, tmp_path / "survives", with_training(steps=12))
     assert all(value.isfinite().all() for value in weights.values() if value.is_floating_point())
-    assert "step left out" in capsys.readouterr().err
+    assert "step skipped" in capsys.readouterr().err
     limit[0] = 1
     with pytest.raises(InputError, match="ten gradients in a row were not finite, last at step 9"):
         train(views, tmp_path / "stops", with_training(steps=12))

@@ -51,20 +51,6 @@ def test_a_motion_model_brings_one_value_however_many_snrs_it_has():
     np.testing.assert_allclose(shares, [[1 / 2, 2 / 3], [1, 1]])
 
 
-def test_calibration_of_a_perfectly_calibrated_and_of_an_overconfident_model():
-    rng = stream(6, "calibration")
-    confidence = rng.uniform(0.4, 1.0, 200_000)
-    probabilities = np.stack([confidence, *[(1 - confidence) / 3] * 3], axis=1)
-    right = rng.random(len(confidence)) < confidence
-    labels = np.where(right, 0, 1)
-    assert statistics.calibration(probabilities, labels)["calibration_error"] < 0.01
-    sure = np.zeros_like(probabilities)
-    sure[:, 0] = 1
-    found = statistics.calibration(sure, labels)
-    assert found["calibration_error"] == pytest.approx(1 - right.mean(), abs=1e-12)
-    assert found["brier"] == pytest.approx(2 * (1 - right.mean()), abs=1e-12)
-
-
 def test_bands_of_confidence_are_fifteen_of_equal_width():
     """0.66 and 0.67 lie on two sides of 10/15, 0.93 and 0.94 of 14/15; a certain guess belongs to the last band, with
     one of 0.95. Too little confidence in one band does not make up for too much in the next."""

@@ -1,7 +1,7 @@
 """Recordings in: every format gives the same samples, bad files are refused by name, rates and tones come out right."""
 
 import struct
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,9 @@ from lowalt.config.schema import BROUGHT
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings import coherent_intervals, read, read_record, symbol_rate
-from lowalt.recordings.channel import analytic
+from lowalt.recordings.channel import ONE_SIDED_EDGE, analytic
 from lowalt.recordings.record import Record, record
-from lowalt.recordings.twin import CHANNELS
+from lowalt.recordings.twin import CHANNELS, radars
 
 RATE = 8000.0
 BASE = {"carrier_hz": 24.0e9, "source": "made here", "licence": "MIT"}
@@ -85,7 +85,6 @@ def test_bad_samples_are_refused_by_name(tmp_path):
     values = tone(200.0)
     refused(np.where(np.arange(len(values)) == 7, np.nan, values), r"x.npy: sample 7 is .*nan")
     refused(np.full(100, 0.25), r"x.npy: silent, all 100 samples of channel are 0.25", "real")
-    refused(np.clip(values.real, -0.8, 0.8), r"x.npy: clipped, [\d.]+ % of the samples of channel", "real")
     refused(values.real * (1 + 1j), r"I and Q hold the same signal")
     # Positive Doppler approaches; the conjugate is what exchanged columns give.
     refused(values.conj(), r"channels swapped, the record says the target moves towards", moves="towards")
@@ -149,6 +148,33 @@ def test_a_record_file_says_where_its_samples_are(tmp_path):
     )
     found = read_record(tmp_path / "r.yaml")
     assert (found.file, found.name, found.label) == (tmp_path / "a.wav", "a", "Vehicle")
+    assert (found.source, found.licence) == ("me", "MIT")
+
+
+def test_a_record_needs_three_keys_and_takes_numbers_in_any_writing(tmp_path):
+    path = tmp_path / "r.yaml"
+    for text in ("3.3e9", "3300000000", "3.3e+9", ".33e10", "+33E8"):
+        path.write_text(f"file: a.csv\ncarrier_hz: {text}\nchannel: real\nrate_hz: 8e3\ncolumns: [2.0]\n")
+        found = read_record(path)
+        assert (found.carrier_hz, found.rate_hz) == (3.3e9, 8e3) and repr(found.columns) == "(2,)"
+    for text in (".inf", ".nan", "1e400", "3.3 GHz", "'0x10'"):
+        path.write_text(f"file: a.csv\ncarrier_hz: {text}\nchannel: real\n")
+        with pytest.raises(InputError, match=r"r\.yaml: carrier_hz: value .*, expected type number"):
+            read_record(path)
+
+
+def test_a_radar_of_twins_takes_numbers_in_any_writing_and_is_refused_by_key(tmp_path):
+    path, known = tmp_path / "twins.yaml", asdict(radars()["uav_3ghz"])
+    path.write_text(f"twins: {{mine: {{radar: {known | {'carrier_hz': 3.3e9}}}}}}".replace("3300000000.0", "3.3e9"))
+    assert "3.3e9" in path.read_text() and asdict(radars(path)["mine"]) == known
+    for change, words in (({"carrier_hz": ".inf"}, "carrier_hz"), ({"sampling": [1]}, "sampling")):
+        path.write_text(f"twins: {{mine: {{radar: {known | change}}}}}".replace("'.inf'", ".inf"))
+        with pytest.raises(InputError, match=rf"twins\.yaml: mine: {words}: value "):
+            radars(path)
+    for text in ("twins: []", "twins: {mine: 1}"):
+        path.write_text(text)
+        with pytest.raises(InputError, match="expected under twins"):
+            radars(path)
 
 
 @pytest.mark.parametrize("sampling", ["anti_aliased", "bare"])
@@ -170,14 +196,40 @@ def test_a_fast_tone_folds_bare_and_vanishes_anti_aliased():
     assert abs(symbol_rate(fast, 8000.0, 1e-3, "anti_aliased")[60:-60]).max() < 1e-3
 
 
-def test_one_sided_sampling_keeps_a_real_channel_up_to_the_whole_symbol_rate():
-    time = np.arange(8000) / 8000.0
-    found = symbol_rate(np.cos(2 * np.pi * 800.0 * time), 8000.0, 1e-3, "one_sided")[80:-80]
+PASSED = {"anti_aliased": (-0.4, 0.4), "one_sided": (0.0, ONE_SIDED_EDGE), "bare": (-1.0, 1.0)}
+"""Band over the symbol rate in which a tone keeps its amplitude; the rest is filtered away, or folds (bare)."""
+STOPPED = {"anti_aliased": 0.5, "one_sided": 1.0, "bare": np.inf}
+
+
+@pytest.mark.parametrize("channel", ["real", "complex"])
+@pytest.mark.parametrize("sampling", ["anti_aliased", "one_sided", "bare"])
+@pytest.mark.parametrize("rate", [2000.0, 2205.0, 8000.0])
+def test_tones_across_the_band_keep_their_amplitude_or_vanish(sampling, channel, rate):
+    """A symbol rate of 1000: the gain of tones from 2 Hz on, at least 99.9 % where kept, at most 0.1 % where not."""
+    if sampling == "one_sided" and channel == "complex":
+        with pytest.raises(InputError, match="one_sided' for a complex channel"):
+            symbol_rate(np.ones(100, complex), rate, 1e-3, sampling)
+        return
+    low, high = PASSED[sampling]
+    for hertz in (2.0, 5.0, 20.0, 60.0, 150.0, 399.0, 520.0, 700.0, 900.0, 940.0, 1010.0, 1300.0, 1900.0, 3900.0):
+        for sign in (1, -1) if channel == "complex" else (1,):
+            if hertz >= (0.5 if channel == "real" or sampling != "bare" else 0.4) * rate:
+                continue
+            tone = np.exp(2j * np.pi * sign * hertz * np.arange(int(2 * rate)) / rate)
+            found = symbol_rate(tone if channel == "complex" else tone.real, rate, 1e-3, sampling)
+            count = np.arange(len(found))[200:-200]
+            taper = np.hanning(len(count))
+            left = abs(np.sum(taper * found[count] * np.exp(-2e-3j * np.pi * sign * hertz * count))) / taper.sum()
+            if low <= sign * hertz / 1000 <= high or (sampling == "bare" and hertz < rate / 2):
+                assert left == pytest.approx(1, abs=1e-3), (hertz, sign)
+            elif hertz / 1000 >= STOPPED[sampling]:
+                assert abs(found[count]).max() < 1e-3, (hertz, sign)
+
+
+def test_one_sided_sampling_shows_the_upper_half_of_its_band_as_negative_frequencies():
+    found = symbol_rate(np.cos(2 * np.pi * 800.0 * np.arange(8000) / 8000.0), 8000.0, 1e-3, "one_sided")[80:-80]
     spectrum = abs(np.fft.fft(found * np.hanning(len(found))))
     assert np.fft.fftfreq(len(found), 1e-3)[spectrum.argmax()] == pytest.approx(-200.0, abs=2)
-    assert abs(symbol_rate(np.cos(2 * np.pi * 1300.0 * time), 8000.0, 1e-3, "one_sided")[80:-80]).max() < 1e-3
-    with pytest.raises(InputError, match="one_sided' for a complex channel"):
-        symbol_rate(np.ones(100, complex), 8000.0, 1e-3, "one_sided")
 
 
 def test_the_analytic_signal_loses_the_sign_of_the_doppler_and_nothing_else():
@@ -195,6 +247,27 @@ def test_intervals_do_not_overlap_and_lose_only_what_stands_still():
     np.testing.assert_allclose(found[0], signal[:400] - signal[:400].mean(), atol=1e-9)
     with pytest.raises(InputError, match="short: 399 symbols, shorter than one window of 400"):
         coherent_intervals(signal[:399], 400, name="short")
+
+
+def test_what_is_slower_than_the_slowest_target_is_gone_and_all_else_keeps_its_level():
+    time, taper = np.arange(1200) / 3000, np.hanning(1200)
+    for hertz, wanted in (
+        (5.0, -50),
+        (20.0, -50),
+        (45.0, -50),
+        (64.0, 0),
+        (80.0, 0),
+        (150.0, 0),
+        (-64.0, 0),
+        (1400.0, 0),
+    ):
+        for phase in (0.0, 1.0, 2.0):
+            tone = np.exp(2j * np.pi * hertz * time + 1j * phase)
+            left = coherent_intervals(tone, 1200, slow=64 / 3000)[0] * taper
+            level = 20 * np.log10(np.linalg.norm(left) / np.linalg.norm(taper))
+            assert level < wanted if wanted else level == pytest.approx(0, abs=0.05), (hertz, phase, level)
+    still = coherent_intervals(np.full(1200, 3 + 4j), 1200, slow=64 / 3000)
+    assert not still.any()
 
 
 def test_a_recording_slower_than_the_symbols_is_refused():

@@ -11,6 +11,7 @@ from scipy.io import savemat, wavfile
 
 from lowalt.files.errors import InputError
 from lowalt.recordings import read, read_record
+from lowalt.recordings.faults import clipped
 from lowalt.recordings.record import record
 
 RATE = 12000.0
@@ -164,18 +165,20 @@ def test_pairs_that_are_read_as_one_real_channel_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("hertz, top", [(20.0, 20000), (5.0, 300), (200.0, 32767), (97.3, 30000)])
-def test_a_clean_tone_is_not_clipped_and_a_cut_one_is(tmp_path, hertz, top):
+def test_a_clean_tone_is_not_clipped_and_a_cut_one_is(hertz, top):
     tone = top * np.sin(2 * np.pi * hertz * np.arange(44100) / 44100)
-    np.save(tmp_path / "a.npy", np.round(tone).astype(np.int16))
-    assert len(read(entry(tmp_path, "a.npy", "real")).values) == 44100
-    np.save(tmp_path / "a.npy", np.round(np.clip(tone, -0.9 * top, 0.9 * top)).astype(np.int16))
-    with pytest.raises(InputError, match="clipped"):
-        read(entry(tmp_path, "a.npy", "real"))
+    whole, cut = np.round(tone), np.round(np.clip(tone, -0.9 * top, 0.9 * top))
+    assert not clipped(whole).any() and not clipped(whole + 1j * whole).any()
+    # A cut sine spends as long at its tops as it does beyond 0.9 of its amplitude.
+    for found in (clipped(cut), clipped(whole + 1j * cut)):
+        assert found.mean() == pytest.approx(1 - 2 / np.pi * np.arcsin(0.9), rel=0.1)
+        assert (abs(cut[found]) == np.round(0.9 * top)).all()
 
 
 READ_AS = {
     "inter_cplx": "say `layout`", "inter_real": "mirrored about a quarter of the rate", "sig_freq": "a capture at",
-    "sig_two": "a capture at", "sig_start": None, "tone_44100_i2": None,
+    "sig_two": "a capture at", "sig_start": None, "tone_44100_i2": None, "e9": None, "N3": None, "N10": None,
+    "dca_iqiq": "layout 'dca2'", "dca_iiqq": "layout 'dca2'",
 }  # fmt: skip
 
 

@@ -65,6 +65,38 @@ def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path, 
     assert "3 of 3 windows hold a target: " in capsys.readouterr().out
 
 
+def test_a_clipped_stretch_costs_its_own_windows_and_noise_is_nothing_there(tmp_path, capsys):
+    path = drive(tmp_path, 44100, False)
+    rate, values = wavfile.read(tmp_path / "drive.wav")
+    values[20000:30000] = np.clip(4 * values[20000:30000].astype(int), -5500, 5500)
+    wavfile.write(tmp_path / "drive.wav", rate, values)
+    assert lowalt(["predict", "cw_24ghz", str(path), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [(row["clipped"], row["target"]) for row in rows] == [(False, True), (True, False), (False, True)]
+    main(["import", "--record", str(path), "--radar", "cw_24ghz", "--out", str(tmp_path / "out")])
+    assert len(np.load(tmp_path / "out/signals.npy")) == 2
+    wavfile.write(tmp_path / "drive.wav", rate, np.clip(4 * values.astype(int), -5500, 5500).astype(np.int16))
+    assert lowalt(["predict", "cw_24ghz", str(path)]) == 2
+    assert "drive.wav: clipped, " in capsys.readouterr().err
+    noise = np.random.default_rng(0).standard_normal(2 * rate)
+    wavfile.write(tmp_path / "drive.wav", rate, (1000 * noise).astype(np.int16))
+    assert lowalt(["predict", "cw_24ghz", str(path)]) == 0
+    assert (
+        capsys.readouterr()
+        .out.rstrip()
+        .endswith("nothing there: none of 5 windows holds a target that this network could know")
+    )
+
+
+def test_a_window_with_a_speed_that_the_network_cannot_show_says_so(tmp_path, capsys):
+    time = np.arange(44100) / 44100
+    fast = np.cos(2 * np.pi * 5000.0 * time) + 1e-3 * np.random.default_rng(0).standard_normal(len(time))
+    path = drive(tmp_path, 44100, False)
+    wavfile.write(tmp_path / "drive.wav", 44100, (16000 * fast).astype(np.int16))
+    assert lowalt(["predict", "cw_24ghz", str(path)]) == 0
+    assert "a line at 31.2 m/s, beyond the 17.6 m/s of this network" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("model, file, changes, words", [
     ("cw_24ghz", "drive.yaml", {"carrier_hz": 3.4e9}, "carrier_hz is 3.4e+09, .*expected a network of .*uav_3ghz"),
     ("cw_24ghz", "drive.yaml", {"carrier_hz": 5.8e9}, "carrier_hz is 5.8e+09, .*the zoo has none"),

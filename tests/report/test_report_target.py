@@ -7,10 +7,10 @@ import pytest
 from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgba
 
-from craft import craft
+from craft import craft, row
+from lowalt.drafting.guesses import Component
+from lowalt.drafting.inspection import Inspection
 from lowalt.report.figures import mesh_picture, target_picture
-from lowalt.targets.guesses import Component
-from lowalt.targets.inspection import Inspection
 
 
 @pytest.fixture
@@ -81,6 +81,7 @@ def test_an_inspected_bird_has_its_shoulders_marked_on_both_sides(drawn):
 def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monkeypatch):
     monkeypatch.setattr(target_picture, "_motion_row", lambda *given: {})
     monkeypatch.setattr(target_picture, "_spectra", lambda *given: None)
+    monkeypatch.setattr(target_picture, "_instants", lambda *given: None)
     cloud = craft()
     cloud.normals[3] = [0.0, 0.0, 1.0]
     figure = drawn(target_picture, "target_picture", cloud)
@@ -108,3 +109,21 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
             np.testing.assert_allclose(tip - start, 0.8 * half * along)
             assert (abs(np.array([start, tip]) - middle[[across, up]]) < half).all()
     assert figure.get_suptitle().startswith("DJI Mini 2 (UAV, test): 20 points, 2 parts, ")
+
+
+def test_a_rotor_is_shown_at_four_instants_an_eighth_of_a_turn_apart_and_its_tip_draws_a_circle(drawn, monkeypatch):
+    monkeypatch.setattr(target_picture, "_motion_row", lambda *given: row(0))
+    monkeypatch.setattr(target_picture, "_spectra", lambda *given: None)
+    cloud = craft()
+    figure = drawn(target_picture, "target_picture", cloud)
+    angles = []
+    for panel in figure.axes[3:7]:
+        path, tip = (np.array(line.get_xydata()) for line in panel.lines)
+        radii = np.linalg.norm(path - cloud.hinges[1, :2], axis=1)
+        np.testing.assert_allclose(radii, radii[0], rtol=1e-9)
+        blade = cloud.points[cloud.part == 1] - cloud.hinges[1]
+        assert radii[0] == pytest.approx(np.linalg.norm(blade[:, :2], axis=1).max())
+        angles.append(np.arctan2(*(tip[0] - cloud.hinges[1, :2])[::-1]))
+        assert len(offsets(panel)) == len(cloud.points)
+    np.testing.assert_allclose(np.abs(np.diff(np.unwrap(angles))), 2 * np.pi / 8)
+    assert [panel.get_title().split(", ")[1] for panel in figure.axes[3:5]] == ["0 of 12.5 ms", "1.562 of 12.5 ms"]

@@ -83,7 +83,8 @@ def page():
     panels = viewer.panels(renderer)
     assert [(panel["row"], panel["column"]) for panel in panels] == [(r, c) for r in range(2) for c in range(3)]
     vt = panels[2]
-    assert (vt["low"], vt["high"]) == (-6.0, 6.0) and set(vt["y"]) <= set(np.arange(-6.0, 6.5, 0.5))
+    # Filters are matched at the lowest subcarrier, and echoes turn at the middle one.
+    assert vt["low"] == -vt["high"] == pytest.approx(-6.0, rel=2e-3) and set(vt["y"]) <= set(np.arange(-6.0, 6.5, 0.5))
     # Fewer symbols than the signal has: a window of 4 of 24, 2.5 ms apart.
     assert vt["right"] == pytest.approx(20 * 2.5e-3) and max(vt["x"]) <= vt["right"]
     tile = [
@@ -137,7 +138,8 @@ def test_every_control_of_the_viewer_works(page, tmp_path):
     spoken, power, phase, marks = json.loads(html.unescape(re.search('data-echo="(.*?)"', found, re.S)[1]))
     network = viewer.Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}).network
     station = network.stations[0]
-    shown, folds = viewer_echoes.folded(17.0, station.frequency_hz, network.symbol_interval_s)
+    shown = network.folded_mps(17.0, station)
+    folds = round((17.0 - shown) / (2 * network.largest_mps(station)))
     assert f"A 17 m/s (shown at {round(shown, 2)} m/s, folded {folds} time" in spoken and "B" not in spoken
     # The power of a line is flat at the top of its panel, that of a silent station at the bottom.
     assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", power[0])) == {"0.0"}
@@ -151,13 +153,19 @@ def test_every_control_of_the_viewer_works(page, tmp_path):
 
 
 def test_a_speed_is_shown_where_its_phase_repeats():
-    limit = viewer_echoes.largest_speed(4.9e9, 2.5e-3)
-    assert limit == pytest.approx(6.118, abs=1e-3)
-    assert viewer_echoes.folded(3.0, 4.9e9, 2.5e-3) == (3.0, 0)
-    shown, folds = viewer_echoes.folded(-20.0, 4.9e9, 2.5e-3)
-    assert (shown, folds) == (pytest.approx(-20 + 4 * limit), 2)
-    turns = [2 * 4.9e9 / 299_792_458 * speed * 2.5e-3 for speed in (-20.0, shown)]
+    network = viewer.Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}).network
+    station = network.stations[1]
+    middle_hz = station.frequency_hz + (network.subcarriers - 1) / 2 * network.subcarrier_spacing_hz
+    limit = 299_792_458 / (4 * middle_hz * network.symbol_interval_s)
+    assert network.largest_mps(station) == pytest.approx(limit)
+    shown = network.folded_mps(np.array([0.4 * limit, -3.2 * limit, limit, -limit]), station)
+    assert shown == pytest.approx(np.array([0.4, 0.8, 1.0, 1.0]) * limit)
+    turns = 2 * middle_hz / 299_792_458 * network.symbol_interval_s * np.array([-3.2 * limit, shown[1]])
     assert turns[0] % 1 == pytest.approx(turns[1] % 1)
+    entries = viewer_echoes.echoes(
+        np.ones((2, 4)), {"A": {"radial_mps": None}, "B": {"radial_mps": -3.2 * limit}}, network
+    )
+    assert "speed" not in entries[0] and entries[1]["shown"] == round(0.8 * limit, 2) and entries[1]["folds"] == 2
 
 
 def test_power_and_phase_come_back_from_their_bytes():

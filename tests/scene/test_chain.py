@@ -12,7 +12,7 @@ from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.effects.channel import interference
-from lowalt.scene.effects.receiver.offsets import of_stations
+from lowalt.scene.laws.offsets import of_stations
 from lowalt.scene.observe import observe
 from lowalt.scene.response import response
 from scenes import A, B, network, scene, target, view_of
@@ -112,7 +112,7 @@ def test_another_station_is_heard_by_its_own_clock_and_oscillator(model, beside)
     radio, (cloud, row) = network(symbols=3, stations=(A, shared)), target(np.random.default_rng(5), model=model)
     asked = scene({"interference": {"sigma_ppm": 0.5, "sigma_s": 1e-6}}, radio)
     settings, sample = asked.effects[0].settings, SceneSample(asked, observe(asked, A, cloud, row))
-    errors = of_stations(settings, radio, sample.draws("link_offset"))
+    errors = of_stations(settings, radio, asked.stream("link_offset", row))
     ppm, shift_s = np.subtract(errors["B"], errors["A"])
     data, frequencies = interference.sent(settings, sample, shared), (np.arange(32) - 16) * 120e3
     truth, seen = np.zeros((3, 32), complex), set()
@@ -162,7 +162,8 @@ def test_adding_an_effect_moves_no_other_draw():
 
 
 def test_sampling_and_carrier_come_of_one_oscillator():
-    row, asked = target(np.random.default_rng(1))[1], scene({})
+    row = target(np.random.default_rng(1))[1]
+    asked = scene({"clock_offset": {}, "carrier_offset": {}, "timing_offset": {}})
     drawn = [asked.drawn(row, A, name).random() for name in ("clock_offset", "carrier_offset", "timing_offset")]
     assert drawn[0] == drawn[1] != drawn[2] and drawn[0] != asked.drawn(row, B, "clock_offset").random()
 

@@ -43,6 +43,20 @@ def test_a_target_a_hundred_times_as_strong_stands_20_db_higher_over_the_land():
     assert np.isfinite(weak) and strong == pytest.approx(weak + 20)
 
 
+@pytest.mark.parametrize("ms, spread_ms, text", [(9.0, 2.0, "9.0"), (1.0, 2.0, "<2.0"), (-15.4, 2.0, "<15.4")])
+def test_a_cost_below_its_spread_is_said_to_be_below_it(ms, spread_ms, text):
+    change = explanation.Change("adc", "receiver", True, 0.1, 0.2, {}, ms, spread_ms)
+    line = explanation.effects_table([change], False)[1]
+    assert line.split() == ["adc", "named", "10.0%", "20.0%", text]
+
+
+def test_a_finding_says_how_fast_the_range_grows():
+    still = dict.fromkeys(("vx_mps", "vy_mps", "vz_mps"), 0.0)
+    ahead = {"x_m": 300.0, "y_m": 0.0, "z_m": 25.0}
+    for velocity, expected in (({"vx_mps": 8.0}, 8.0), ({"vx_mps": -3.0}, -3.0), ({"vy_mps": 5.0}, 0.0)):
+        assert found({}, **ahead | still | velocity).radial_mps == pytest.approx(expected, abs=0.1)
+
+
 def test_the_cell_beside_the_target_holds_it_at_the_end_of_ranges_too():
     """An error of one cell to either side, where the target stands in cell 0: 32 cells of 39 m farther."""
     always = {"cell_error": {"probability": 1.0, "spread_cells": 1}}

@@ -10,7 +10,8 @@ from scipy.special import gamma, kv
 from lowalt.echo.radar import radar
 from lowalt.scene import land
 from lowalt.scene.antenna import Element, gain
-from lowalt.scene.effects.channel import clutter, windblown
+from lowalt.scene.effects.channel import clutter
+from lowalt.scene.laws import windblown
 from scenes import A, B, link, linked, network, view_of
 
 AIMS = np.array([[60.0, 30.0, 25.0], [62.0, 28.0, 24.0]])
@@ -121,7 +122,7 @@ def test_drawn_land_has_its_mean_power_in_every_cell_side_lobes_and_folds_includ
     view = view_of(radio, np.broadcast_to(aim, (2, 1, 3)), np.ones(1), aim)
     for settings in (settings_of(law="rayleigh", reach_m=150.0), settings_of(law="rayleigh", reach_m=500.0)):
         power, _ = clutter.mean_power(settings, view)
-        drawn = [clutter.scatter(settings, view, np.random.default_rng(seed))[0] for seed in range(1000)]
+        drawn = [clutter.scatter(settings, view, np.random.default_rng(seed)).response[0] for seed in range(1000)]
         found = (abs(np.fft.ifft(drawn, axis=1)) ** 2).mean(axis=0)
         np.testing.assert_allclose(found, land.with_side_lobes(power, 16), rtol=0.15)
         assert found.sum() == pytest.approx(power.sum(), rel=0.08)

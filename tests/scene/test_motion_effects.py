@@ -9,7 +9,8 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from lowalt.config.layers import load
 from lowalt.motion.rotations import attitude
 from lowalt.numerics.streams import stream
-from lowalt.scene.effects.motion import flight, gusts, markov, rotor_spread
+from lowalt.scene.effects.motion import gusts, rotor_spread
+from lowalt.scene.laws import flight, markov
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 

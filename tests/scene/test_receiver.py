@@ -17,7 +17,7 @@ from lowalt.scene.effects.receiver import (
     timing_offset,
     transmit_leakage,
 )
-from lowalt.scene.effects.receiver.offsets import of_stations
+from lowalt.scene.laws.offsets import of_stations
 from scenes import A, B, link, linked, network
 
 
@@ -147,6 +147,20 @@ def test_a_converter_errs_as_uniform_steps_do_and_clips():
     coarse = adc.quantise(np.array([0.1, 0.9, 3.0, -3.0]) + 0j, 2, 1.0)
     assert coarse.real.tolist() == [0.25, 0.75, 0.75, -0.75]
     assert not adc.receive(adc.DEFAULTS, np.zeros((2, 4), complex), None, None).any()
+
+
+def test_only_clipping_costs_a_look_with_strong_symbols_more_than_quantisation():
+    samples = np.random.default_rng(2).standard_normal((400, 256, 2)) @ [1, 1j]
+    uneven = samples * np.where(np.arange(400) % 20 == 0, 10 ** (6 / 20), 1.0)[:, None]
+    for look, backoff_db, expected_db in ((samples, 12.0, 40.5), (uneven, 12.0, 29.2), (uneven, 18.0, 34.9)):
+        error = adc.receive({"bits": 8, "backoff_db": backoff_db}, look, None, None) - look
+        # Steps of full scale / 2^7: a component's error has a twelfth of a step's square.
+        quantised_db = 10 * np.log10(12 * 2**14) - backoff_db
+        power, whole = np.mean(abs(look) ** 2), adc.full_scale(look, backoff_db)
+        inside = np.maximum(abs(look.real), abs(look.imag)) < whole
+        assert 10 * np.log10(power / np.mean(abs(error) ** 2)) == pytest.approx(expected_db, abs=0.3)
+        # Leaving out the samples that clip, and nothing else, gives what quantisation alone gives.
+        assert 10 * np.log10(power / np.mean(abs(error[inside]) ** 2)) == pytest.approx(quantised_db, abs=0.1)
 
 
 def integral(settings, weight, low=1e-1, high=32 * 60e3):

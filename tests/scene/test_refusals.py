@@ -3,6 +3,7 @@
 import importlib
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 import yaml
@@ -67,6 +68,7 @@ GAPS = {"slow_time": {"downlink": 0.75}}
         (ALONE, GAPS, NOISY, "slow_time: gaps hold no signal"),
         (ALONE, {"detector": {"gate_cells": 128}}, QUIET, "detector.gate_cells: 128, expected less than half"),
         (ALONE, {"detector": {"training": 200}}, QUIET, r"detector.guard \+ training: 202"),
+        (ALONE, {"detector": {"range_window": "hann", "guard": 1}}, QUIET, "detector.guard: 1, expected at least 2"),
         (ALONE, {"cell_error": {"spread_cells": 128}}, QUIET, "cell_error.spread_cells: 128, expected less than half"),
         (LINKED, {}, QUIET, r"network.stations: \['AB'\] are links .*expected effects.direct_path"),
         (LINKED, {"direct_path": {}, "transmit_leakage": {}}, QUIET, "not modelled between two stations"),
@@ -91,6 +93,19 @@ def test_effects_that_later_stages_do_not_fit_are_refused(blocks, said):
     effects = {"clutter": {}, "canceller": {}, "slow_time": {"downlink": 1, "jitter_s": 1e-4, "regrid": "nudft"}}
     with pytest.raises(InputError, match=said):
         check({"network": ALONE, "effects": effects} | blocks)
+
+
+@pytest.mark.parametrize("function", ["data", "range_cells"])
+def test_two_effects_that_offer_the_same_function_are_refused_where_a_scene_has_one(function, monkeypatch):
+    own = ModuleType("lowalt.scene.effects.transmitter.own")
+    own.DEFAULTS, own.data, own.range_cells = {}, len, len
+    monkeypatch.setitem(PLACES, "own", "transmitter")
+    monkeypatch.setitem(sys.modules, own.__name__, own)
+    other = {"data": "data_symbols", "range_cells": "comb_pilots"}[function]
+    with pytest.raises(InputError, match=f"{other} and own both offer {function}, expected one of them") as refused:
+        check({"network": ALONE, "noise": {"snr_db": QUIET}, "effects": {other: {}, "own": {}}})
+    assert len(str(refused.value)) < 400
+    assert [effect.name for effect in called({other: {}, "phase_noise": {}})] == [other, "phase_noise"]
 
 
 @pytest.mark.parametrize("name", PLACES)

@@ -7,8 +7,9 @@ import pytest
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.scene.antenna import gain
-from lowalt.scene.effects.channel import background_channel, fast_fading
-from lowalt.scene.effects.channel.fast_fading import Large, Link
+from lowalt.scene.effects.channel import background_channel
+from lowalt.scene.laws import fast_fading
+from lowalt.scene.laws.fast_fading import Large, Link
 from lowalt.scene.observe import observe
 from scenes import A, network, scene, target
 
@@ -102,7 +103,7 @@ def test_the_response_is_the_sum_over_rays_and_elements():
     radio = network(transmit=(4, 2), receive=(3, 1), subcarriers=16, symbols=3)
     asked = scene({"element_pattern": {}}, radio)
     view = observe(asked, A, *target(np.random.default_rng(1)))
-    found = background_channel.scatter(background_channel.DEFAULTS, view, np.random.default_rng(7))
+    found = background_channel.scatter(background_channel.DEFAULTS, view, np.random.default_rng(7)).response
     ghz = 4.9 + 7.5 * 120e3 / 1e9
     rays = background_channel.drawn(background_channel.DEFAULTS, A, ghz, np.random.default_rng(7))
     across, up = np.array([-np.sin(0.3), np.cos(0.3), 0.0]), np.array([0.0, 0.0, 1.0])

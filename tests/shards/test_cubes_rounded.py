@@ -123,7 +123,7 @@ def test_the_size_that_is_said_is_the_files_size(number, written, datasets, tmp_
         space.before(workflow, dataset.plan, dataset.config)
     each, whole = stated["sample_bytes"] / 1e6, stated["bytes"] / 1e9
     said = capsys.readouterr().err
-    assert said == f"cube shards: {each:.2f} MB a sample, {whole:.3f} GB in all (8 samples, {number})\n"
+    assert said == f"cube shards: {each:.2f} MB per sample, {whole:.3f} GB in all (8 samples, {number})\n"
 
 
 def test_explain_says_the_size_first(tmp_path, capsys):

@@ -23,7 +23,7 @@ from lowalt.shards import ShardSet, card
 from lowalt.shards.__main__ import main as shards
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset, Endless
-from lowalt.targets import occluders
+from lowalt.targets import make, occluders
 from lowalt.targets.cloud import read
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.targets.records import records_of
@@ -244,3 +244,12 @@ def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(d
     occluders.write(tmp_path / "elsewhere/dji-mini-2.npz", moved, "DJI Mini 2")
     assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 1
     assert f"sample {key}: its signal comes out otherwise" in capsys.readouterr().out
+
+
+def test_a_cloud_is_made_once_and_when_a_sample_of_its_target_is_asked_for(monkeypatch):
+    made, whole = [], make.make
+    monkeypatch.setattr(make, "make", lambda record, *rest: made.append(record["subtype"]) or whole(record, *rest))
+    samples = Dataset(configuration())
+    assert len(samples.clouds) == 3 and not made
+    asked = [samples[0].record["subtype"] for _ in range(2)]
+    assert made == asked[:1]

@@ -82,8 +82,8 @@ def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):
              "group": "seen", "fold": "train"}  # fmt: skip
     index = {"kind": "image", "shards": [entry], "render": render}
     found = metadata(index, {"path": "samples.csv", "bytes": 1, "sha256": "0"}, {})
-    (content,) = [field for field in found["recordSet"][1]["field"] if field["name"] == "content"]
-    assert content["description"] == "256 x 512 palette PNG: rows are stations, columns TRP."
+    (images,) = [entry for entry in found["distribution"] if entry["name"] == "images"]
+    assert images["description"] == "256 x 512 palette PNG of every sample: rows are stations, columns TRP."
     rows, network = [motion_rows("seen")[0] | {"fold": "train"}], Network.from_settings(render["network"])
     chunk = ChunkSamples(rows, [3.0], SPLIT, SEED, network)
     write_shard(tmp_path / "seen-train-0.tar", chunk, "train", "image", lambda *_: (b"", {}))

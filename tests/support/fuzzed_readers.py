@@ -12,7 +12,8 @@ import yaml
 from scipy.io import savemat, wavfile
 
 from craft import craft, row
-from fuzzed_seals import ARCHIVE, INDEX, MATLAB, PNG
+from fuzzed_folders import folders
+from fuzzed_seals import ARCHIVE, CHECKPOINT, INDEX, JSON, MATLAB, MODEL, PNG, YAML
 from fuzzing import Reader
 from shown_meshes import dae, ply, prism, skinned
 
@@ -116,7 +117,7 @@ def _meshes() -> list[Reader]:
 
 def _robots() -> list[Reader]:
     """Readers of robots' descriptions, each with a good file."""
-    from lowalt.targets.robot_files import read_robot
+    from lowalt.drafting.robot_files import read_robot
     from made_robots import MJCF, SDF, urdf
 
     files = {".urdf": urdf(blade="").replace('<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'),
@@ -132,8 +133,9 @@ def _texts() -> list[Reader]:
     from lowalt.files.csv_tables import read_csv
     from lowalt.files.yaml_files import load_yaml
     from lowalt.motion import read_table, write_table
-    from lowalt.recognition import freeze, orderings, schemes
+    from lowalt.recognition import freeze, paper_claims, schemes
     from lowalt.recordings.record import read_record
+    from lowalt.recordings.twin import radars
     from lowalt.shards import manifest
     from lowalt.targets.records import load_records, load_table
     from lowalt.workflow.run import Run
@@ -153,23 +155,25 @@ def _texts() -> list[Reader]:
     record = yaml.safe_dump({"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"})
     return [
         Reader("configuration", "a.yaml", Path("config/default.yaml").read_bytes(),
-               lambda p: check(load_yaml(p), schema)),
-        Reader("overlay", "a.yaml", Path("config/workstation.yaml").read_bytes(), run),
-        Reader("scene", "a.yaml", Path("config/scenes/worst.yaml").read_bytes(), run),
+               lambda p: check(load_yaml(p), schema), seal=YAML),
+        Reader("overlay", "a.yaml", Path("config/workstation.yaml").read_bytes(), run, seal=YAML),
+        Reader("scene", "a.yaml", Path("config/scenes/worst.yaml").read_bytes(), run, seal=YAML),
+        Reader("whole configuration", "a.yaml", Path("config/default.yaml").read_bytes(), run, seal=YAML),
         Reader("record of a target", "a.yaml", Path("config/targets/pedestrian.yaml").read_bytes(),
-               lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p])),
+               lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p]), seal=YAML),
+        Reader("twins", "a.yaml", Path("config/measured/twins.yaml").read_bytes(), radars, seal=YAML),
         Reader("table of targets", "a.csv", table, load_table),
         Reader("schemes", "a.csv", Path("config/schemes.csv").read_bytes(), lambda p: schemes.read(p, "ABC")),
         Reader("published accuracies", "a.csv", Path("config/published_accuracy.csv").read_bytes(),
-               orderings.read_published),
+               paper_claims.read_published),
         Reader("table", "a.csv", Path("config/cost/accuracy.csv").read_bytes(), read_csv),
         Reader("motion table", "a.csv", _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
                read_table),
         Reader("manifest", "a.sha256", Path("results/reference/tiny.sha256").read_bytes(), manifest.read),
         Reader("checksums", "SHA256SUMS", (hashlib.sha256(b"").hexdigest() + "  a\n").encode(), sums),
-        Reader("record of a recording", "a.yaml", record.encode(), read_record),
+        Reader("record of a recording", "a.yaml", record.encode(), read_record, seal=YAML),
         Reader("settings", "a.json", json.dumps({"seed": 1, "network": config["network"]}).encode(),
-               lambda p: settings(f"@{p}")),
+               lambda p: settings(f"@{p}"), seal=JSON),
     ]  # fmt: skip
 
 
@@ -200,7 +204,7 @@ def _arrays() -> list[Reader]:
 
     from lowalt.files.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
-    from lowalt.recognition.one_sample import images_of
+    from lowalt.recognition.predict_sample import images_of
     from lowalt.shards import sample_table
     from lowalt.shards.index import load as load_index
     from lowalt.shards.sample_table import map_samples, read_header
@@ -253,6 +257,22 @@ def _index(render: dict) -> bytes:
     return INDEX.closed({"index": json.dumps(index).encode()})
 
 
+def _models() -> list[Reader]:
+    """Readers of trained models."""
+    import torch
+
+    from lowalt.recognition import checkpoint, model_file, zoo_files
+
+    path = zoo_files.path_of("default-seen")
+    known = model_file.read(path)
+    state = {**known.model, "weights": {"a": torch.ones(5)}}
+    trained = _bytes(lambda p: checkpoint.save(p, json.dumps(known.identity), state), "a.pt")
+    return [
+        Reader("trained model", "a.pt", trained, checkpoint.model, seal=CHECKPOINT),
+        Reader("model file", "a.safetensors", path.read_bytes(), model_file.read, share=0.2, seal=MODEL),
+    ]
+
+
 def _all(tiles) -> list[bytes]:
     """All images of a tiles file."""
     return [tiles[number] for number in range(len(tiles))]
@@ -260,4 +280,4 @@ def _all(tiles) -> list[bytes]:
 
 def readers() -> list[Reader]:
     """Return every reader with a good file of its kind."""
-    return [*_texts(), *_arrays(), *_captures(), *_recordings(), *_meshes(), *_robots()]
+    return [*_texts(), *_arrays(), *_models(), *_captures(), *_recordings(), *_meshes(), *_robots(), *folders()]

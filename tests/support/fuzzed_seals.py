@@ -1,17 +1,25 @@
 """Seals of files: how a file is taken apart and put together again with right checksums, so that damage reaches the
 reader behind them."""
 
+import contextlib
 import hashlib
 import io
 import json
 import struct
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
+import torch
+import yaml
+from safetensors.torch import load as load_tensors
+from safetensors.torch import save as save_tensors
 from scipy.io import loadmat, savemat
 
+from lowalt.recognition import checkpoint, model_file
 from lowalt.tiles.png import SIGNATURE
 
 Parts = dict[str, bytes]
@@ -66,8 +74,53 @@ def _index(parts: Parts) -> bytes:
         content = json.loads(parts["index"])
         signed = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         return json.dumps(content | {"sha256": signed}).encode()
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, RecursionError):
         return parts["index"]
+
+
+def _json_of_yaml(data: bytes) -> Parts:
+    """A YAML file as JSON, which is YAML too."""
+    return {"json": json.dumps(yaml.safe_load(data), default=str).encode()}
+
+
+def _model(data: bytes) -> Parts:
+    """What a model file says of itself, and the file."""
+    size = int.from_bytes(data[:8], "little")
+    about = json.loads(json.loads(data[8 : 8 + size])["__metadata__"]["lowalt"])
+    return {"about": json.dumps(about | {"digest": None}).encode(), "file": data}
+
+
+def _signed_model(parts: Parts) -> bytes:
+    """A model file that says this of itself, with the SHA-256 of its content; a damaged file stays as it is."""
+    try:
+        tensors = load_tensors(parts["file"])
+    except Exception:
+        return parts["file"]
+    text = parts["about"].decode(errors="replace")
+    with contextlib.suppress(ValueError, RecursionError, AttributeError):
+        about = json.loads(text)
+        del about["digest"]
+        text = json.dumps(about | {"digest": model_file._digest(tensors, about)})
+    return save_tensors(tensors, {"lowalt": text})
+
+
+def _checkpoint(data: bytes) -> Parts:
+    """The identity and the settings of a checkpoint."""
+    content = torch.load(io.BytesIO(data), weights_only=True)
+    settings = {name: value for name, value in content["state"].items() if name != "weights"}
+    return {"identity": content["identity"].encode(), "settings": json.dumps(settings).encode()}
+
+
+def _signed_checkpoint(parts: Parts) -> bytes:
+    """A checkpoint of an identity and settings, with one weight, and the SHA-256 of all."""
+    try:
+        settings = json.loads(parts["settings"])
+    except (ValueError, RecursionError):
+        settings = parts["settings"].decode(errors="replace")
+    state = settings | {"weights": {"a": torch.ones(5)}} if isinstance(settings, dict) else settings
+    with tempfile.TemporaryDirectory() as folder:
+        checkpoint.save(Path(folder) / "a.pt", parts["identity"].decode(errors="replace"), state)
+        return (Path(folder) / "a.pt").read_bytes()
 
 
 def _unsigned(data: bytes) -> Parts:
@@ -84,6 +137,10 @@ def _plain_matlab(data: bytes) -> Parts:
     return {"file": out.getvalue()}
 
 
+YAML = Seal(_json_of_yaml, lambda parts: parts["json"].replace(b"Infinity", b".inf").replace(b"NaN", b".nan"))
+JSON = Seal(lambda data: {"json": data}, lambda parts: parts["json"])
+MODEL = Seal(_model, _signed_model)
+CHECKPOINT = Seal(_checkpoint, _signed_checkpoint)
 ARCHIVE = Seal(_members, _archive)
 PNG = Seal(_chunks, _png)
 INDEX = Seal(_unsigned, _index)

@@ -5,6 +5,7 @@
 A reader must accept its good file. A damaged one it may accept or refuse with one `InputError`. Every other end is a
 fault: another exception, a crash of the process, more than LIMIT_S seconds or more than LIMIT_MB of memory. Where a
 file has checksums, every second one is damaged behind them: its parts are changed and sealed again (`fuzzed_seals`).
+Of a part that is a JSON object, every second time one value is replaced by one of VALUES.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import contextlib
 import csv
 import hashlib
 import io
+import json
 import multiprocessing
 import os
 import re
@@ -19,13 +21,13 @@ import resource
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import LONGEST, InputError
 
 LIMIT_S = 20.0
 LIMIT_MB = 2048
@@ -40,6 +42,30 @@ NUMBERS = (
     b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\x00" * 8, b"\xff" * 8, b"\xff" * 7 + b"\x7f",
 )  # fmt: skip
 """What is written over a number of a binary file."""
+
+
+VALUES = (
+    b"NaN", b"Infinity", b"-Infinity", b".nan", b".inf", b"-.inf", b"1e400", b"-1", b"9" * 400, b"9" * 5000,
+    b"[" * 100_000 + b"]" * 100_000, b'{"a":' * 300 + b"1" + b"}" * 300, b'"' + b"x" * 100_000 + b'"', b"{}", b"[]",
+    b"null", b"true", b'""', b'"../x"', b'"/etc/passwd"', b'"a.py:f"', b'"\\u0000"',
+)  # fmt: skip
+"""What a value of a JSON object is replaced by: numbers that are none, huge and deeply nested values, other types."""
+
+
+def revalued(data: bytes, rng: np.random.Generator) -> bytes:
+    """Return a JSON object with one of its values, at any depth, replaced by one of VALUES."""
+    whole = json.loads(data)
+    places = [*_places(whole)]
+    block, key = places[int(rng.integers(len(places)))]
+    block[key] = "the value"
+    return json.dumps(whole).encode().replace(b'"the value"', VALUES[int(rng.integers(len(VALUES)))], 1)
+
+
+def _places(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Every block of nested mappings and lists with each of its keys."""
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
+        yield value, key
+        yield from _places(item)
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:
@@ -92,7 +118,8 @@ class Reader:
             return mutated(self.data, rng)
         parts = self.seal.opened(self.data)
         name = list(parts)[int(rng.integers(len(parts)))]
-        return self.seal.closed(parts | {name: mutated(parts[name], rng)})
+        change = revalued if parts[name].startswith(b"{") and rng.random() < 0.5 else mutated
+        return self.seal.closed(parts | {name: change(parts[name], rng)})
 
     def outcome(self, data: bytes, folder: Path) -> str:
         """Return "accepted", "refused" or the fault that reading these bytes ends with."""
@@ -103,7 +130,8 @@ class Reader:
                 warnings.simplefilter("ignore")
                 self.read(path)
         except InputError as error:
-            return "refused" if str(error) else "InputError without a message"
+            length = len(str(error))
+            return "refused" if 0 < length <= LONGEST else f"a refusal of {length} characters"
         except (Exception, SystemExit) as error:
             return f"{type(error).__name__}: {error}"[:200]
         return "accepted"

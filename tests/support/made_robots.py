@@ -36,3 +36,31 @@ MJCF = """<mujoco><compiler angle="degree" meshdir="."/><default><default class=
 <body name="rotor_b" pos="-0.3 0 0" quat="0 1 0 0" childclass="blade"><joint axis="0 0 2"/><geom mesh="p"/></body>
 <body name="fin" pos="0 0.1 0"><joint name="fin" axis="0 1 0" range="-20 20"/><geom type="capsule" size="0.01"
 fromto="0 0 0 0 0.1 0"/></body></body></worldbody></mujoco>"""
+
+
+def car_urdf(turned: bool = False) -> str:
+    """A car along x, or turned by a quarter along y: four wheels, of which those at the front are steered, and a
+    steering wheel that turns without end."""
+    links, joints = [], []
+    for name, x, y in (("fl", 1.3, 0.8), ("fr", 1.3, -0.8), ("rl", -1.3, 0.8), ("rr", -1.3, -0.8)):
+        links.append(f'<link name="wheel{len(links)}"><visual><origin rpy="1.5707963 0 0"/><geometry><cylinder '
+                     'radius="0.3" length="0.2"/></geometry></visual></link>')  # fmt: skip
+        parent = "base"
+        if name[0] == "f":
+            parent = f"knuckle_{len(links)}"
+            joints.append(f'<link name="{parent}"/><joint name="steer{len(links)}" type="revolute"><origin '
+                          f'xyz="{x} {y} 0.3"/><parent link="base"/><child link="{parent}"/><axis xyz="0 0 1"/>'
+                          '<limit lower="-0.5" upper="0.5"/></joint>')  # fmt: skip
+            x = y = 0.0
+        joints.append(f'<joint name="axle{len(links)}" type="continuous"><origin xyz="{x} {y} '
+                      f'{0.3 if parent == "base" else 0}"/><parent link="{parent}"/><child link="wheel{len(links) - 1}"'
+                      '/><axis xyz="0 1 0"/></joint>')  # fmt: skip
+    helm = ('<link name="steering_wheel"><visual><geometry><cylinder radius="0.2" length="0.03"/></geometry></visual>'
+            '</link><joint name="column" type="continuous"><origin xyz="0.4 0.4 0.9"/><parent link="base"/>'
+            '<child link="steering_wheel"/><axis xyz="0 0 1"/></joint>')  # fmt: skip
+    base = ('<link name="base"><visual><origin xyz="0 0 0.75"/><geometry><box size="4.2 1.6 1.1"/></geometry></visual>'
+            '</link>')  # fmt: skip
+    yaw = 1.5707963267948966 if turned else 0
+    root = (f'<link name="world"/><joint name="w" type="fixed"><origin rpy="0 0 {yaw}"/><parent link="world"/>'
+            '<child link="base"/></joint>')  # fmt: skip
+    return f'<robot name="car">{root}{base}{"".join(links)}{"".join(joints)}{helm}</robot>'

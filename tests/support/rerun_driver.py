@@ -46,11 +46,11 @@ def edited(path: Path, old: str, new: str):
 def run() -> None:
     """Write what the first plan, and the plan after each change of changes.json, print: said.json."""
     Path("change.yaml").write_text("{}")
-    plans = {"whole": said("--dry-run")}
+    plans = {"whole": said("--dry-run", "--printshellcmds")}
     make_files(plans["whole"])
     said("--touch", "--forceall")
     for name, (overlay, edit) in json.loads(Path("changes.json").read_text()).items():
         Path("change.yaml").write_text(overlay)
         with edited(Path(edit[0]), *edit[1:]) if edit else contextlib.nullcontext():
-            plans[name] = said("--dry-run")
+            plans[name] = said("--dry-run", "--printshellcmds")
     Path("said.json").write_text(json.dumps(plans))

@@ -6,12 +6,45 @@ from pathlib import Path
 from lowalt.workflow.sources import PACKAGE, sources
 
 ROOT = Path(__file__).parents[2]
-# Python imports this by itself at start: every job notes its command and the package's modules it ended up with, and a
-# job that asks for the network ends.
+# Python imports this by itself at start: every job notes its command and the package's modules it ended up with, the
+# files that it opened, and the keys of its settings that it asked for; a job that asks for the network ends.
 SPY = """
-import atexit, os, pathlib, sys, uuid
+import atexit, json, os, pathlib, sys, uuid
+
+opened, absent = set(), set()
+
+class Asked(dict):
+    # A block of settings that notes the keys that are asked for and are not there.
+    def __contains__(self, key):
+        found = super().__contains__(key)
+        if not found:
+            absent.add(key)
+        return found
+
+    def get(self, key, default=None):
+        return self[key] if key in self else default
+
+    def pop(self, key, *default):
+        key in self
+        return super().pop(key, *default)
+
+if "--settings" in sys.orig_argv and not {"lowalt.config.layers", "lowalt.report", "train"} & {*sys.orig_argv}:
+    # These write their settings to files as they are.
+    settings, loads = sys.orig_argv[sys.orig_argv.index("--settings") + 1], json.loads
+    json.loads = lambda text, **how: loads(text, **how | ({"object_pairs_hook": Asked} if text == settings else {}))
 
 def note():
+    log = pathlib.Path(os.environ["LOWALT_TEST_IMPORTS"]).parent / "opened"
+    log.mkdir(exist_ok=True)
+    try:
+        mine = {"log": os.path.relpath(os.readlink("/proc/self/fd/2")), "opened": sorted(opened),
+                "absent": sorted(map(str, absent))}
+    except (OSError, ValueError):
+        return
+    if mine["log"].startswith("results"):
+        (log / uuid.uuid4().hex).write_text(json.dumps(mine))
+
+def note_imports():
     files = {getattr(module, "__file__", None) or "" for module in list(sys.modules.values())}
     base = os.environ["LOWALT_TEST_PACKAGE"]
     files = sorted(os.path.relpath(file, base) for file in files if file.startswith(base))
@@ -21,9 +54,12 @@ def note():
         pathlib.Path(os.environ["LOWALT_TEST_IMPORTS"], uuid.uuid4().hex).write_text(lines)
 
 if "LOWALT_TEST_IMPORTS" in os.environ:
+    atexit.register(note_imports)
     atexit.register(note)
 
     def refuse(event, arguments):
+        if event == "open" and isinstance(arguments[0], (str, bytes, os.PathLike)) and not arguments[2] & 3:
+            opened.add(os.path.relpath(os.path.abspath(os.fsdecode(arguments[0]))))
         if event == "socket.getaddrinfo" or event == "socket.connect" and not isinstance(arguments[1], (str, bytes)):
             raise RuntimeError(f"a job asked for the network: {event} {arguments[1:]}")
 

@@ -33,6 +33,7 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
         ("bytes.dae", bytes(range(256)) * 4, "no triangle|not a readable"),
         ("mesh.fbx", b"Kaydara FBX", "format '.fbx', expected one of"),
         ("gone.stl", None, "no file"),
+        ("cut.stl", bytes(80) + (60).to_bytes(4, "little") + bytes(50 * 10), "states 60 triangles .* ends after 10"),
     ],
 )
 def test_bad_files_are_refused_by_name_and_reason(name, text, reason, tmp_path):
@@ -185,9 +186,9 @@ def wheeled(tmp_path, axis=0, centre=0.33, count=4, turns=None) -> dict:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"centre": 1.3}, "fl: its centre lies 0.9 m above the lowest point of a body 1 m high.*is `up` reversed"),
-        ({"axis": 1}, "fl: it measures 0.66 m along its axis and 0.2 x 0.66 m across"),
-        ({"turns": [0, 1, 0]}, r"rr: its axis is .*1.0, -?0.0. .right, front, up., expected right or left"),
+        ({"centre": 1.3}, "fl, fr, rl, rr: its centre lies 0.9 m above .* a body 1 m high.*`up` .--up. reversed"),
+        ({"axis": 1}, "fl, fr, rl, rr: its surface measures 0.66 m along its axle and 0.2 x 0.66 m across"),
+        ({"turns": [0, 1, 0]}, r"rr: its axle points front, .0.0, 1.0, 0.0. .* expected right or left"),
     ],
 )
 def test_wheels_that_cannot_roll_are_refused_with_their_measures(changes, words, tmp_path):

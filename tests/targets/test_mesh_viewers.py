@@ -153,3 +153,33 @@ def test_a_collada_file_states_its_unit_outside_comments_and_has_no_entities_or_
     path.write_text(dae(*prism()).replace("instance_geometry", "instance_controller"))
     with pytest.raises(InputError, match=r"a\.dae: has a skin or morph .*apply it"):
         pieces(path)
+
+
+def test_every_instance_of_a_glb_is_placed_turned_and_scaled_in_its_node(tmp_path):
+    shifts, turns = np.array([[1, 0, 0], [0, 2, 0]], "<f4"), np.array([[0, 0, 0, 1], [0, 0, 1, 0]], "<f4")
+    sizes = np.array([[1, 1, 1], [2, 2, 2]], "<f4")
+    attributes = {"TRANSLATION": 2, "ROTATION": 3, "SCALE": 4}
+    node = {"mesh": 0, "translation": [0, 0, 5], "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}}}
+    head = {"nodes": [node], "extensionsUsed": ["EXT_mesh_gpu_instancing"]}
+    arrays = {"POSITION": TETRAHEDRON.astype("<f4"), "indices": FACES.ravel().astype("<u4")}
+    found = pieces(glb(tmp_path / "a.glb", head, **arrays, shifts=shifts, turns=turns, sizes=sizes))
+    np.testing.assert_allclose(found[0].vertices, TETRAHEDRON + np.array([1, 0, 5]))
+    # Half a turn about z, and twice the size.
+    np.testing.assert_allclose(found[1].vertices, TETRAHEDRON * [-2, -2, 2] + np.array([0, 2, 5]), atol=1e-6)
+    assert len(found) == 2 and len({piece.names[0] for piece in found}) == 2
+
+
+def test_a_collada_surface_whose_texture_is_missing_is_kept(tmp_path):
+    surface = '<newparam sid="s"><surface type="2D"><init_from>gone</init_from></surface></newparam>'
+    more = f'<library_effects><effect id="e"><profile_COMMON>{surface}</profile_COMMON></effect></library_effects>'
+    more += '<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>'
+    bound = '<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="M" target="#m"/>'
+    text = dae(*prism()).replace("<library_geometries>", f"{more}<library_geometries>")
+    text = text.replace("<polylist ", '<polylist material="M" ')
+    text = text.replace(
+        '<instance_geometry url="#g"/>', f"{bound}</technique_common></bind_material></instance_geometry>"
+    )
+    (tmp_path / "plain.dae").write_text(dae(*prism()))
+    (tmp_path / "bound.dae").write_text(text)
+    plain, found = (pieces(tmp_path / f"{name}.dae") for name in ("plain", "bound"))
+    assert [len(piece.faces) for piece in found] == [len(piece.faces) for piece in plain] == [20]

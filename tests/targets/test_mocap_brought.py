@@ -186,3 +186,18 @@ def test_every_real_recording_that_walks_or_runs_becomes_a_cloud_where_its_known
         assert track[:, NODES.index("head"), 2].mean() > 0.5
     bvh = cloud_of(FOLDER, skeleton=None, rate_hz=None, motion="cmu/131/131_01.bvh", max_mismatch_m=0.4)
     assert np.ptp(bvh.points[:, 2]) == pytest.approx(1.75, rel=0.1)
+
+
+def test_a_person_without_a_neck_or_toes_and_with_shins_is_the_same_person():
+    rng = np.random.default_rng(3)
+    names = ("Hips", "Head", *(f"{side}{part}" for side in ("Left", "Right")
+             for part in ("Hip", "Knee", "Ankle", "Toe", "Shoulder", "Elbow", "Wrist")))  # fmt: skip
+    joints = {name: rng.normal(size=(4, 3)) for name in names}
+    neck = (joints["LeftShoulder"] + joints["RightShoulder"]) / 2
+    expected = to_nodes(joints | {"Neck": neck}, "a")
+    np.testing.assert_array_equal(to_nodes(joints, "a"), expected)
+    for old, new in (("Hip", "Leg"), ("Knee", "Shin"), ("Ankle", "Foot")):
+        joints |= {f"{side}{new}": joints.pop(f"{side}{old}") for side in ("Left", "Right")}
+    np.testing.assert_array_equal(to_nodes(joints, "a"), expected)
+    joints |= {f"{side}Foot/end": joints.pop(f"{side}Toe") for side in ("Left", "Right")}
+    np.testing.assert_array_equal(to_nodes(joints, "a"), expected)

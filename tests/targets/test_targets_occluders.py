@@ -10,7 +10,7 @@ from lowalt.files.errors import InputError
 from lowalt.targets import occluders
 from lowalt.targets.builtin import MODULES
 from lowalt.targets.skeleton import NODES, PARENTS
-from lowalt.targets.surfaces import Surface, box
+from lowalt.targets.surfaces import Surface, box, longest_edge, quartered
 
 
 def areas(corners):
@@ -20,10 +20,10 @@ def areas(corners):
 
 def test_a_quartered_triangle_is_four_like_it_of_half_its_size_and_together_it():
     corners = np.random.default_rng(1).normal(size=(5, 3, 3))
-    pieces = occluders.quartered(corners).reshape(4, 5, 3, 3)
+    pieces = quartered(corners).reshape(4, 5, 3, 3)
     longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
     for place, piece in enumerate(pieces):
-        np.testing.assert_allclose(occluders.longest_edge(piece), longest / 2)
+        np.testing.assert_allclose(longest_edge(piece), longest / 2)
         np.testing.assert_allclose(areas(piece), areas(corners) / 4)
         # Three keep a corner, the fourth lies in the middle.
         kept = piece[:, place] == corners[:, place] if place < 3 else abs((piece - corners).mean(axis=1)) < 1e-15

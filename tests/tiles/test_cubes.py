@@ -154,21 +154,21 @@ def test_a_range_doppler_map_peaks_at_the_range_and_folded_speed_of_an_echo():
     for speed_mps in (-4.0, 0.0, 2.5, 9.0):
         held = np.zeros((symbols, cells), np.complex64)
         held[:, 22] = 3 * np.exp(-4j * np.pi * speed_mps * times / wavelength_m)
-        found = range_doppler.definition(Cube(held, np.full(symbols, 20), np.zeros((symbols, 5))), settings)
+        found = range_doppler.definition(Cube(held, np.full(symbols, 20), np.zeros((symbols, len(TRUTH)))), settings)
         row, column = np.unravel_index(found.argmax(), found.shape)
         folded = (speed_mps + fold) % (2 * fold) - fold
         speeds = -np.fft.fftshift(np.fft.fftfreq(512, interval_s))[::-1] * wavelength_m / 2
         assert row == 4 + 2 and abs(speeds[column] - folded) < 2 * fold / 512
         assert 2.7 < found.max() <= 3.001  # between two speeds a Hann window loses up to a tenth
     out = np.empty((9, 512), np.float32)
-    range_doppler.fill_cells(Cube(held, np.full(symbols, 20), np.zeros((symbols, 5))), settings, out)
+    range_doppler.fill_cells(Cube(held, np.full(symbols, 20), np.zeros((symbols, len(TRUTH)))), settings, out)
     np.testing.assert_allclose(out, found, rtol=1e-6)
 
 
 def test_a_range_profile_is_the_mean_power_around_the_chosen_cells():
     rng = np.random.default_rng(1)
     cells = (rng.normal(size=(40, 16)) + 1j * rng.normal(size=(40, 16))).astype(np.complex64)
-    cube = Cube(cells, rng.integers(0, 16, 40), np.zeros((40, 5)))
+    cube = Cube(cells, rng.integers(0, 16, 40), np.zeros((40, len(TRUTH))))
     for settings in (hrrp.Settings(1, 1, 9), hrrp.Settings(5, 3, 9)):
         found = hrrp.definition(cube, settings)
         for column in (0, 7, found.shape[1] - 1):
@@ -185,7 +185,10 @@ def test_a_range_profile_is_the_mean_power_around_the_chosen_cells():
 def test_axes_are_metres_and_metres_a_second(dataset):
     network, station = dataset.maker.network, dataset.maker.network.stations[0]
     (_, left, right), (_, low, high) = range_doppler.axes(range_doppler.Settings(9, 512), network, station)
-    assert right == -left == pytest.approx(SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s))
+    # Bins begin one above the negative end, at which speeds fold; the carrier is that of the middle subcarrier.
+    middle_hz = station.frequency_hz + 511 / 2 * 480e3
+    assert right == pytest.approx(SPEED_OF_LIGHT / (4 * middle_hz * network.symbol_interval_s))
+    assert left == pytest.approx(-right * 255 / 256)
     assert high == -low == pytest.approx(4 * SPEED_OF_LIGHT / (2 * 512 * 480e3))
     assert hrrp.axes(hrrp.Settings(2, 1, 9), network, station)[0][2] == pytest.approx(398 * 2.5e-3)
 

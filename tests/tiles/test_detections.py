@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.tiles.cubes import Cubes
@@ -26,15 +27,17 @@ def noise(network, seed=1):
 
 def held(network, cells, cell, speed_mps):
     truth = np.zeros((network.symbols, len(TRUTH)))
-    truth[:, TRUTH.index("cell")], truth[:, TRUTH.index("radial_mps")] = cell, speed_mps
+    truth[:, TRUTH.index("cell")] = truth[:, TRUTH.index("observed_cell")] = cell
+    truth[:, TRUTH.index("observed_mps")] = speed_mps
     return Cube(cells, np.full(network.symbols, 40), truth)
 
 
 def test_noise_alone_passes_at_the_rate_asked_for(dataset):
     network = dataset.maker.network
-    for rate in (1e-2, 1e-3):
+    for rate, cfar in ((1e-2, "cell_averaging"), (1e-3, "cell_averaging"), (1e-2, "ordered_statistic")):
         found = [
-            detections(held(network, noise(network, n), 0, 0), network, network.stations[0], rate) for n in range(3)
+            detections(held(network, noise(network, n), 0, 0), network, network.stations[0], rate, cfar=cfar)
+            for n in range(3)
         ]
         # A value is a detection only where none of its eight neighbours, which the window makes alike, is larger.
         per_value = np.mean([len(each) for each in found]) / (network.symbols * network.subcarriers)
@@ -46,10 +49,10 @@ def test_an_echo_in_noise_is_found_at_its_range_and_folded_speed(dataset, speed_
     network = dataset.maker.network
     station = network.stations[0]
     cells = noise(network)
-    turns = 4 * np.pi * speed_mps * network.times_s * station.frequency_hz / SPEED_OF_LIGHT
+    turns = 4 * np.pi * speed_mps * network.times_s * network.effective_hz(station) / SPEED_OF_LIGHT
     cells[:, 51] += np.exp(-1j * turns)
     best = detections(held(network, cells, 51, speed_mps), network, station)[0]
-    fold = SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s)
+    fold = SPEED_OF_LIGHT / (4 * network.effective_hz(station) * network.symbol_interval_s)
     assert best["true"] and best["cell"] == 51 and best["range_m"] == pytest.approx(51 * network.cell_m)
     assert abs(best["radial_mps"] - ((speed_mps + fold) % (2 * fold) - fold)) <= 2 * fold / network.symbols
     # A Hann window spreads the noise of 2 over 400 symbols, 1.5 times as much as none: 21 dB below an echo of 1.
@@ -68,6 +71,24 @@ def test_a_target_longer_than_the_guard_hides_itself(dataset):
     for guard, seen in ((0, False), (4, True)):
         found = detections(held(network, cells, 51, 0), network, network.stations[0], 1e-4, guard, training=2)
         assert (abs(found["cell"][found["over_db"] > 15] - 51) <= 2).any() == seen
+
+
+def test_a_weaker_neighbour_of_one_speed_is_seen_by_an_ordered_threshold_behind_a_range_window(dataset):
+    network, station = dataset.maker.network, dataset.maker.network.stations[0]
+    cells, steps = noise(network), np.arange(network.subcarriers)
+    for cell, level in ((51.5, 30.0), (58.0, 1.0)):
+        # An echo between two cells: its frequency response turns by a whole number and a half over the subcarriers.
+        cells += level * np.fft.ifft(np.exp(-2j * np.pi * steps * cell / network.subcarriers))
+    for cfar, window, seen in (
+        ("cell_averaging", "none", False), ("cell_averaging", "hann", False),
+        ("ordered_statistic", "none", False), ("ordered_statistic", "hann", True),
+    ):  # fmt: skip
+        found = detections(held(network, cells, 58, 0), network, station, cfar=cfar, range_window=window)
+        assert found["true"].any() == seen, (cfar, window)
+    with pytest.raises(InputError, match=r"cfar: 'ordered', expected one of cell_averaging, ordered_statistic"):
+        detections(held(network, cells, 58, 0), network, station, cfar="ordered")
+    with pytest.raises(InputError, match="guard: 1, expected at least 2"):
+        detections(held(network, cells, 58, 0), network, station, guard=1, range_window="hann")
 
 
 def test_a_target_is_detected_and_the_same_look_without_it_is_empty(dataset):

@@ -1,5 +1,6 @@
 """The real workflow on a tiny overlay: it runs, repeats to the byte, and re-runs only what a change touches."""
 
+import base64
 import hashlib
 import json
 import os
@@ -66,7 +67,7 @@ def snakemake(folder: Path, *arguments: str, cores: int = 2, status: int = 0) ->
 
 def planned(folder: Path, *arguments: str) -> set[str]:
     """The rules a dry run would execute."""
-    text = snakemake(folder, "--dry-run", *arguments)
+    text = snakemake(folder, "--dry-run", "--printshellcmds", *arguments)
     return set(re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE))
 
 
@@ -172,6 +173,114 @@ def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
         assert "files/errors.py" in imported
 
 
+VOUCHING = {"SHA256SUMS": ("clouds/", "motion/"), "index.json": ("",), "model.pt": ("",)}
+"""Inputs that hold checksums of other files, or stand for the folder that one job writes: prefixes of the others."""
+OF_OTHER_KINDS = {"shard": {"echo"}}
+"""Settings that a stage asks for and this kind of data set has no use for: only cubes are made from echoes again."""
+
+
+def said_by_jobs(folder: Path) -> dict[str, dict[str, set[str]]]:
+    """By each job's log file: `inputs` and `outputs` of its rule; `opened`, the files that it read; `absent`, the keys
+    that it asked its settings for in vain."""
+    jobs = {}
+    for path in filter(Path.is_file, (folder / ".snakemake/metadata").rglob("*")):
+        record = json.loads(path.read_text())
+        name = base64.b64decode("".join(path.relative_to(folder / ".snakemake/metadata").parts)).decode()
+        for log in record["log"]:
+            job = jobs.setdefault(log, {name: set() for name in ("inputs", "outputs", "opened", "absent")})
+            job["inputs"] |= {*record["input"]}
+            job["outputs"].add(name)
+    for path in (folder / "opened").iterdir():
+        found = json.loads(path.read_text())
+        if found["log"] in jobs:
+            jobs[found["log"]]["opened"] |= {*found["opened"]}
+            jobs[found["log"]]["absent"] |= {*found["absent"]}
+    return jobs
+
+
+def undeclared(folder: Path) -> dict[str, list[str]]:
+    """By each job's log file: files that it read and its rule does not name, other than code and schemas, for which no
+    named file vouches; and keys of the configuration that it asked its settings for in vain."""
+    keys = set(re.findall(r"^ *(?:- )?(\w+):", (folder / "results/test/config.yaml").read_text(), re.MULTILINE))
+    elsewhere, found = ("..", ".venv/", ".snakemake/", "src/lowalt.egg-info/"), {}
+    for log, job in said_by_jobs(folder).items():
+        vouched = tuple(str(Path(name).parent) + "/" + prefix for name in job["inputs"]
+                        for prefix in VOUCHING.get(Path(name).name, ()))  # fmt: skip
+        read = {
+            name
+            for name in job["opened"] - job["inputs"] - job["outputs"]
+            if (folder / name).is_file() and not name.startswith(elsewhere + vouched)
+            and not re.search(r"\.py|\.schema\.yaml$", name)
+        }  # fmt: skip
+        missed = job["absent"] & keys - OF_OTHER_KINDS.get(Path(log).relative_to("results/test/logs").parts[0], set())
+        if read or missed:
+            found[log] = sorted(read | missed)
+    return found
+
+
+def test_every_file_and_every_setting_that_a_job_reads_is_named_by_its_rule(finished):
+    jobs = said_by_jobs(finished)
+    assert sum(bool(job["opened"]) for job in jobs.values()) > 20
+    assert undeclared(finished) == {}
+
+
+FLIGHT = "time_s,x_m,y_m,z_m\n0,200,100,60\n2.5,220,105,62\n5,240,120,64\n9,270,150,60\n"
+MOVED = {"motion": {"looks": 3, "track": "flight.csv", "sizes_m": {"UAV": [0.25, 0.4], "Bird": [0.2, 0.6]}}}
+"""Settings that a configuration may leave out, and a file that one of them names."""
+REMOVED = {
+    "flight log": ("workflow/rules/motion.smk", "        track=products.track,\n", "", "motion/seen-00000.csv"),
+    "style sheet": ("src/lowalt/workflow/products.py", '".html", ".css", ".js"', '".html", ".js"', "report.html"),
+    "index tables": ("workflow/rules/shards.smk", re.compile("        tables=.*\n"), "", "shards/index.json"),
+    "card template": (
+        "workflow/rules/shards.smk",
+        "        template=products.card_template,\n",
+        "",
+        "shards/README.md",
+    ),
+    "sizes_m": ("src/lowalt/workflow/stage_settings.py", ' "sizes_m",', "", "motion/seen-00000.csv"),
+    "records": ("workflow/rules/recognition.smk", re.compile("        about=.*RUN.trainings.,\n"), "", "accuracy.csv"),
+}
+"""Inputs and settings that a rule could lose while its command still runs: file, text, its substitute, a product."""
+
+
+def remade(finished: Path, folder: Path, product: str, edit: tuple = ()) -> Path:
+    """A copy of a finished workplace in which the jobs that an edit touches, and the one of a product, ran again."""
+    shutil.copytree(finished, folder, symlinks=True)
+    shutil.rmtree(folder / "opened")
+    if edit:
+        file, old, new = edit
+        text = (folder / file).read_text()
+        other = re.sub(old, new, text, count=1) if isinstance(old, re.Pattern) else text.replace(old, new, 1)
+        assert other != text
+        (folder / file).write_text(other)
+    if product.startswith("motion/"):
+        (folder / "flight.csv").write_text(FLIGHT)
+        (folder / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY | {"motion": OVERLAY["motion"] | MOVED["motion"]}))
+    names = [f"results/test/{name}" for name in (product, "config.yaml")]
+    # Without the product its job runs, whatever its rule says.
+    (folder / names[0]).unlink()
+    snakemake(folder, "--rerun-triggers", "params", "--allowed-rules", RULE_OF[product], "configuration", "--", *names)
+    return folder
+
+
+RULE_OF = {"motion/seen-00000.csv": "motion", "report.html": "report", "shards/index.json": "index",
+           "shards/README.md": "card", "accuracy.csv": "tables"}  # fmt: skip
+
+
+def test_the_flight_log_and_settings_that_may_be_left_out_are_named_by_the_rule_of_motion(finished, tmp_path):
+    folder = remade(finished, tmp_path / "moved", "motion/seen-00000.csv")
+    (job,) = [job for log, job in said_by_jobs(folder).items() if "/motion/" in log and job["opened"]]
+    assert "flight.csv" in job["opened"]
+    assert undeclared(folder) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REMOVED)
+def test_an_input_or_a_setting_that_is_taken_from_a_rule_is_noticed(finished, tmp_path, name):
+    *edit, product = REMOVED[name]
+    assert undeclared(remade(finished, tmp_path / "removed", product, tuple(edit)))
+
+
 def test_any_one_sample_is_made_again_alone_from_its_row(finished):
     base = finished / "results/test"
     network = Network.from_settings(load_yaml(finished / "config/default.yaml")["network"])
@@ -200,7 +309,7 @@ def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, 
 
 def test_the_catalogue_s_snakefile_plans_the_same_run(finished):
     """It reads the other file, by which nothing of a finished run is left to do."""
-    text = snakemake(finished, "--dry-run", "--snakefile", "workflow/Snakefile")
+    text = snakemake(finished, "--dry-run", "--printshellcmds", "--snakefile", "workflow/Snakefile")
     assert "Nothing to be done" in text and not re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE)
 
 

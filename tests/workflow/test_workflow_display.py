@@ -86,8 +86,24 @@ def test_a_full_disk_is_named_where_snakemake_meets_it_and_other_faults_of_a_log
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_a_dry_run_shows_what_snakemake_shows():
+def test_a_dry_run_shows_stages_jobs_and_reasons_and_on_demand_what_snakemake_shows():
+    follows = "Input files updated by another job: results/a/echo/x.npy"
+    reasons = ["Missing output files: results/a/echo/x.npy", follows, f"Params have changed; {follows}", follows]
     handler = handler_of(dryrun=True)
+    handler.emit(record("Building DAG of jobs..."))
+    for job, reason in enumerate(reasons):
+        rule = "a rule of a long name" if job == 0 else "echo"
+        handler.emit(record("rule", event="job_info", jobid=job, rule_name=rule, output=["x"], reason=reason))
+    handler.emit(record("Nothing to be done."))
+    handler.close()
+    lines = handler._stream.getvalue().splitlines()
+    assert lines[0] == "Nothing to be done."
+    assert [" ".join(line.split()) for line in lines[1:-1]] == [
+        "stage jobs why", "a rule of a long name 1 missing output files",
+        "echo 2 input files updated by another job", "1 params have changed",
+    ]  # fmt: skip
+    assert lines[-1].split()[:2] == ["total", "4"] and "--printshellcmds" in lines[-1]
+    handler = handler_of(dryrun=True, printshellcmds=True)
     handler._plain.stream = handler._stream
     handler.emit(record("Building DAG of jobs..."))
     assert handler._stream.getvalue() == "Building DAG of jobs...\n"

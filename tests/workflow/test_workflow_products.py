@@ -34,23 +34,6 @@ def test_the_chunks_with_the_first_motion_models_tell_of_every_subtype():
     assert products.first_motion(CHUNK) == [f"results/default/motion/{group}-00000.csv" for group in ("seen", "unseen")]
 
 
-def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
-    run, products, _ = parts({"report": {"cost": "", "accuracy": ""}})
-    base, page = "results/default", products.report(CHUNK)
-    named = ("index", "distances", "seeds")
-    assert {name: page[name] for name in named} == {
-        "index": f"{base}/shards/index.json",
-        "distances": f"{base}/distances.csv", "seeds": f"{base}/seeds.csv",
-    }  # fmt: skip
-    assert page["clouds"] == [f"{base}/clouds/{subtype}.npz" for subtype in run.subtypes]
-    assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]
-    assert not {"transfer", "echo_cost", "accuracy_cost"} & set(page)
-    accuracy = "config/cost/accuracy.csv"
-    _, products, _ = parts({"report": {"cost": accuracy, "accuracy": accuracy}, "recognition": {"transfer": ["other"]}})
-    more = {name: path for name, path in products.report(CHUNK).items() if name not in page}
-    assert more == {"transfer": f"{base}/transfer.csv", "echo_cost": accuracy, "accuracy_cost": accuracy}
-
-
 def test_samples_made_on_the_spot_need_clouds_and_surfaces_only_where_points_are_hidden():
     made, wildcards = {"cache": False, "input": "dataset"}, SimpleNamespace(scheme="a-vrp-trp-vt")
     for effects in ({}, {"occlusion": {}}):

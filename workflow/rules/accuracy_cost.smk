@@ -1,4 +1,4 @@
-# Accuracy: what recognition accuracy costs in time, over the schemes trained and the networks only timed.
+# Accuracy: recognition accuracy against computing time, for trained schemes and for networks that are only timed.
 # REQUIRED INPUTS: predictions of the run in the unseen protocol; those of the presets that a study trains
 #                  (`make accuracy-cost` does all); a quiet machine
 # OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv, results/{run}/accuracy_cost.svg
@@ -16,7 +16,7 @@ rule speed:
         "results/{run}/benchmarks/speed/{scheme}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    # All cores, so that nothing else runs while this is timed.
+    # Reserve all cores, so that nothing else runs during the timing.
     threads: workflow.cores or 1
     params:
         settings=settings.training,

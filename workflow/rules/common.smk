@@ -1,6 +1,6 @@
-# What the rules share: the run that follows from the configuration, and the functions that rules name.
+# Common to all rules: the run derived from the configuration, and the functions used in rules.
 # RUN: names, plan and schemes; products: the files a rule reads; settings: what a stage reads of the configuration;
-# options: parts of a command line that not every job has; code: the source files that a command runs.
+# options: command-line options that only some jobs have; code: the source files of a command.
 from functools import partial
 from pathlib import Path
 
@@ -26,9 +26,9 @@ products = Refusing(Products(RUN))
 settings = Refusing(Settings(RUN))
 code = partial(code_of, spectra=tuple(name for name in config["spectra"] if name != "times"))
 
-# The run whose data set is trained on, RUN's own unless the configuration names another.
+# The run whose data set is used for training: RUN, unless the configuration names another.
 DATA = f"results/{RUN.data}"
-# An echo job makes the signals of one station, or of all.
+# An echo job computes the signals of one station or of all stations.
 LISTENING = ["{station}"] if RUN.echo_per_station else RUN.stations
 OF_STATION = "-{station}" if RUN.echo_per_station else ""
 
@@ -43,7 +43,7 @@ wildcard_constraints:
     fold="train|val|test",
     protocol="seen|unseen",
     scheme="|".join(RUN.schemes_by_slug),
-    # Where the configuration names no other runs, nothing matches.
+    # Matches nothing if the configuration names no other runs.
     other="|".join(config["recognition"]["transfer"]) or "(?!)",
     size=r"\d+",
     call=r"[a-z0-9_-]+",

@@ -1,4 +1,4 @@
-# Cost: what the echo's accuracy costs in time, one cloud a category.
+# Cost: error of the echo against computing time, with one cloud per category.
 # REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of this workflow runs meanwhile)
 # OUTPUTS: results/{run}/cost.csv, results/{run}/cost.svg
 

@@ -1,4 +1,4 @@
-# Echo: the clean symbol-domain signals that one base station hears of a chunk's motion models, or all in one job.
+# Echo: the clean symbol-domain signals of a chunk's motion models at one base station, or at all in one job.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols)
 

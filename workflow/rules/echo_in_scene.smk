@@ -1,4 +1,4 @@
-# Echo in a scene with effects: the signals one base station hears, or all in one job, and the powers of the targets'
+# Echo in a scene with effects: the signals at one base station, or at all in one job, and the powers of the targets'
 # own echoes.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz; results/{run}/occluders/*.npz
 #                  where the scene hides points behind surfaces

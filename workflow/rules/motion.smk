@@ -1,4 +1,4 @@
-# Motion: the table of motion models of one chunk, one row a model, every parameter drawn from its own stream; of a track, one row a look.
+# Motion: the table of motion models of one chunk, one row per model (per look where motion.looks asks for tracks), every parameter drawn from its own stream.
 # REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's subtypes; the flight log that motion.track names
 # OUTPUTS: results/{run}/motion/{group}-{part}.csv
 

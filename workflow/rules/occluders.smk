@@ -1,4 +1,4 @@
-# Occluders: the opaque surfaces of a subtype, made only where something asks for points hidden behind them.
+# Occluders: the opaque surfaces of a subtype, made only for scenes with the effect `occlusion`.
 # REQUIRED INPUTS: as the cloud of the subtype
 # OUTPUTS: results/{run}/occluders/{subtype}.npz
 

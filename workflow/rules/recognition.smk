@@ -1,4 +1,4 @@
-# Recognition: freeze what was simulated, train every scheme in its protocols, predict, and make the tables.
+# Recognition: freeze the simulated data, train every scheme in its protocols, predict, and make the tables.
 # REQUIRED INPUTS: results/{run}/shards/index.json and its shards, all clouds and motion tables
 # OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its companions; where the
 #          configuration names other runs, results/{run}/transfer.csv: their models on this run's test samples
@@ -80,7 +80,7 @@ rule train:
         "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
     benchmark:
         "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
-    # Trainings of more images take longer. The longest start first, so that no core waits for one at the end.
+    # Trainings with more images take longer. Start the longest first, so that no core waits for it at the end.
     priority: RUN.images_of_job
     conda:
         "../../envs/environment.yaml"

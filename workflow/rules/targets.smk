@@ -1,4 +1,4 @@
-# Targets: one calibration point cloud a subtype, from a built-in model, a mesh or a recording.
+# Targets: one calibration point cloud per subtype, from a built-in model, a mesh or a recording.
 # REQUIRED INPUTS: config/targets.csv and the record files; the user's files where a record names one.
 # OUTPUTS: results/{run}/clouds/{subtype}.npz, results/{run}/clouds.png
 

@@ -1,7 +1,7 @@
-# Tiles: three spectra a station, nine images a sample, tiled 3 x 3 and encoded without loss.
+# Tiles: three spectra per station, nine images per sample, tiled 3 x 3 and encoded without loss.
 # REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy; the motion table where spectra know late symbols' instants,
 #                  and with it clouds and surfaces where spectra show range cells
-# OUTPUTS: results/{run}/tiles/{group}-{part}.npz, gone once its shards are written, and for every size of tiles.reduced
+# OUTPUTS: results/{run}/tiles/{group}-{part}.npz, deleted once its shards are written, and for every size of tiles.reduced
 #          results/{run}/reduced/{size}/{group}-{part}.npy
 
 

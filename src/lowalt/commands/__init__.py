@@ -1,1 +1,1 @@
-"""Commands for people: `lowalt COMMAND`. They call the stages and print; nothing is computed here."""
+"""The commands of `lowalt COMMAND`. They call the stages and print results; nothing is computed here."""

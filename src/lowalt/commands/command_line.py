@@ -1,4 +1,4 @@
-"""What all commands share: their place on the command line, and their answer as text or as JSON."""
+"""Common parts of all commands: their parser entry, and their answer as text or JSON."""
 
 import argparse
 import dataclasses
@@ -10,9 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.commands.command_table import COMMANDS
+
 
 class Answer(NamedTuple):
-    """What a command has to say: `facts` for a program, `text` for a person, and the exit status."""
+    """The answer of a command: `facts` as JSON for programs, `text` for users, and the exit status."""
 
     facts: object
     text: str
@@ -20,13 +22,15 @@ class Answer(NamedTuple):
 
 
 def add_command(
-    commands: argparse._SubParsersAction, name: str, act: Callable[[argparse.Namespace], Answer], meaning: str,
-    example: str,
+    commands: argparse._SubParsersAction, name: str, act: Callable[[argparse.Namespace], Answer], meaning: str = "",
+    example: str = "",
 ) -> argparse.ArgumentParser:  # fmt: skip
-    """Add a command to a parser's and return its line, which has the option `--json` already.
+    """Add a command to a parser and return its own parser, with the option `--json`.
 
-    act: what it does with its options; meaning: its help; example: a command line.
+    act: function called with its options; meaning, example: its help, by default that of the table of commands.
     """
+    if not meaning:
+        _, meaning, example = COMMANDS[name]
     line = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     line.add_argument("--json", action="store_true", help="print JSON for a program")
     line.set_defaults(act=act)
@@ -34,7 +38,7 @@ def add_command(
 
 
 def _plain(value: object) -> object:
-    """A value in the types that JSON has: no number stands as null, an infinity as "inf" or "-inf"."""
+    """Convert a value to JSON types: NaN becomes null, an infinity "inf" or "-inf"."""
     if dataclasses.is_dataclass(value):
         value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, (np.ndarray, np.generic)):

@@ -1,29 +1,27 @@
 """The command `lowalt compare`: two finished runs side by side: configuration, accuracy, time, bytes."""
 
 import argparse
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
-from lowalt.files.atomic import text_of
-from lowalt.files.csv_tables import read_csv
-from lowalt.files.errors import InputError
-from lowalt.files.yaml_files import load_yaml
+from lowalt.config.layers import of_run
+from lowalt.config.schema import check_brought
+from lowalt.files.csv_tables import number, read_csv
+from lowalt.files.json_objects import read_object
 from lowalt.workflow.closing import averages
 
 MEASURED = ("accuracy_percent", "processor_s", "data")
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `compare` to a parser's commands."""
-    meaning = "two finished runs: what differs in configuration, accuracy, time and bytes"
-    line = add_command(commands, "compare", run, meaning, "lowalt compare results/default results/tiny")
+    line = add_command(commands, name, run)
     line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
-    """Yield (dotted key, value) of everything in nested mappings that is no mapping, or is an empty one."""
+    """Yield (dotted key, value) for all values in nested mappings that are not mappings or are empty."""
     for key, value in block.items():
         if isinstance(value, dict) and value:
             yield from leaves(value, f"{where}{key}.")
@@ -36,25 +34,26 @@ def facts(folder: Path) -> dict[str, dict]:
 
     Parts: configuration (dotted keys), accuracy_percent (averages over the SNRs by "protocol scheme"), processor_s (by
     stage), data (samples and bytes); a part is empty where the run has no such table.
-    Raises: InputError naming the folder that is no run's.
+    Raises: InputError naming the folder that is no run's, or the file in it that is damaged.
     """
-    if not (folder / "config.yaml").is_file():
-        raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
+    config = of_run(folder)
     accuracy, stages, index = (folder / name for name in ("accuracy.csv", "stages.csv", "shards/index.json"))
     shares = averages(accuracy) if accuracy.exists() else {}
     times = read_csv(stages, "rule", "cpu_s") if stages.exists() else []
-    data = json.loads(text_of(index, "index")) if index.exists() else {}
+    data = read_object(index, "an index of shards") if index.exists() else {}
+    if index.exists():
+        check_brought("sizes", data, index)
     return {
-        "configuration": dict(leaves(load_yaml(folder / "config.yaml"))),
+        "configuration": dict(leaves(config)),
         "accuracy_percent": {f"{protocol} {scheme}": share for (scheme, protocol), share in shares.items()},
-        "processor_s": {row["rule"]: float(row["cpu_s"]) for row in times},
+        "processor_s": {row["rule"]: number(row, "cpu_s", stages) for row in times},
         "data": {name: data[name] for name in ("samples", "bytes") if data},
     }
 
 
 def compared(*folders: Path) -> dict[str, dict[str, tuple]]:
-    """Return {part: {name: (value of the first run, value of the second)}}: of the configuration only what differs, of
-    the parts MEASURED everything. None stands where a run has none.
+    """Return {part: {name: (value of the first run, value of the second)}}: only differences of the configuration, and
+    everything in the parts MEASURED. A missing value is None.
 
     Raises: InputError naming the folder that is no run's.
     """
@@ -73,7 +72,7 @@ def _cell(value: object) -> str:
 
 
 def _change(part: str, first: object, second: object) -> str:
-    """The difference of two measured numbers; of times and sizes as a share of the first too."""
+    """The difference of two measured numbers; for times and sizes also relative to the first."""
     if part not in MEASURED or None in (first, second):
         return ""
     share = f" ({second / first - 1:+.1%})" if part != "accuracy_percent" and first else ""

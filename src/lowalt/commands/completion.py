@@ -1,9 +1,9 @@
-"""The command `lowalt completion`: a script by which a shell completes commands, options and files."""
+"""The command `lowalt completion`: a shell script for tab completion of commands, options and files."""
 
 import argparse
 from collections.abc import Iterator
 
-from lowalt.commands.command_line import Answer
+from lowalt.commands.command_line import Answer, add_command
 
 SCRIPT = """# Completion of lowalt for bash and zsh; load it by: source <(lowalt completion)
 if [ -n "${{ZSH_VERSION-}}" ]; then autoload -Uz compinit bashcompinit && compinit -u && bashcompinit; fi
@@ -26,13 +26,17 @@ _lowalt() {{
 complete -o filenames -F _lowalt lowalt .venv/bin/lowalt"""
 
 
-def add_to(commands: argparse._SubParsersAction, whole: argparse.ArgumentParser) -> None:
-    """Add `completion` to the commands of a parser, whose whole line it completes."""
-    line = commands.add_parser(
-        "completion", help="print the completion of commands, options and files for bash and zsh",
-        epilog="example: source <(lowalt completion)",
-    )  # fmt: skip
-    line.set_defaults(act=lambda options: Answer({}, script(whole)), json=False)
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
+    """Add `completion` to the commands of a parser."""
+    add_command(commands, name, run)
+
+
+def run(_options: argparse.Namespace) -> Answer:
+    """Return the script that completes every command."""
+    from lowalt.__main__ import command_line
+
+    text = script(command_line("completion"))
+    return Answer({"script": text}, text)
 
 
 def parsers(line: argparse.ArgumentParser, path: str = "") -> Iterator[tuple[str, list[str], list[str]]]:

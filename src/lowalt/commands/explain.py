@@ -28,11 +28,9 @@ def _sample(text: str) -> tuple[str, int]:
     return name, int(model)
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `explain` to a parser's commands."""
-    meaning = "say whether a scene's receiver finds its targets, and what each effect changes"
-    example = "lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml"
-    line = add_command(commands, "explain", run, meaning, example)
+    line = add_command(commands, name, run)
     line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the default; more may follow it")
     line.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
     line.add_argument("--station", help="the station of the table of effects (default: the first)")
@@ -88,7 +86,7 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def _size(config: dict, inputs: Path | None) -> dict:
-    """What the data set of a scene takes where its shards are cubes, else nothing."""
+    """The size of a scene's data set if its shards are cubes, else an empty text."""
     if config["shards"]["kind"] != "cube":
         return {}
     records = records_of(config["targets"], inputs)
@@ -105,7 +103,7 @@ def _shown(config: dict, stations: list[str], model: Path | None) -> Callable[[n
     seen = dataclasses.replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
     if model is not None:
-        from lowalt.recognition.one_sample import answer
+        from lowalt.recognition.predict_sample import answer
         from lowalt.recognition.zoo import opened
         from lowalt.tiles import split
 

@@ -1,4 +1,4 @@
-"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two of them."""
+"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two."""
 
 import argparse
 import tempfile
@@ -9,18 +9,20 @@ import yaml
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
+from lowalt.config.layers import SCHEMA, check, of_run
+from lowalt.config.named_code import allowed, refuse_effects
 from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
-from lowalt.files.shipped import as_named, shipped
+from lowalt.files.shipped import as_named, located, shipped
 from lowalt.files.yaml_files import load_yaml
 
 BASE = "config/default.yaml"
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `report` to a parser's commands."""
-    meaning = "make the page of one run again, or a page that links all runs and compares any two"
-    line = add_command(commands, "report", run, meaning, "lowalt report results/default, or lowalt report --gallery")
+    line = add_command(commands, name, run)
     line.add_argument("run", type=Path, nargs="?", help="folder of a run that was started here")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only name the files that would be made, and why")
@@ -39,26 +41,40 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def page(options: argparse.Namespace) -> Answer:
-    """Let the workflow make the page of a run, with all that it needs and that is not there or no longer current.
+    """Let the workflow make the page of a run, and all its inputs that are missing or outdated.
 
     Raises: InputError where the folder holds no run.
     """
     from lowalt.report.provenance import changes
 
-    if not (options.run / "config.yaml").is_file():
-        raise InputError(f"{options.run}: has no config.yaml, expected the folder of a run")
-    config = load_yaml(options.run / "config.yaml")
+    config = of_run(options.run)
     name = config.get("run")
     written = f"results/{name}/report.html"
     if not isinstance(name, str) or options.run.resolve() != Path(written).parent.resolve():
         raise InputError(f"{options.run}: its config.yaml is of the run {name!r}, expected to stand in results/{name}")
+    _refuse_code(config, options.run)
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
         yaml.safe_dump({"run": name, **changes(load_yaml(shipped(BASE)), as_named(config))}, overlay)
         overlay.flush()
-        line = {"overlay": [Path(overlay.name)], "configfile": [], "target": [written], "profile": None}
+        line = {
+            "overlay": [Path(overlay.name)],
+            "configfile": [],
+            "target": [written],
+            "profile": None,
+            "printshellcmds": False,
+        }
         ran = workflow.ended(argparse.Namespace(**vars(options) | line))
     files = [] if options.dry_run or ran["status"] else [written]
     return Answer({"files": files, **ran}, "".join(files), ran["status"])
+
+
+def _refuse_code(config: dict, folder: Path) -> None:
+    """Refuse a run whose configuration, or whose table of schemes, names code that the workflow would run."""
+    refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
+    block = located(config)["recognition"]
+    how = f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
+    for name in (block["network"]["backbone"], *(row["backbone"] for row in read_csv(block["table"], "backbone"))):
+        allowed(name, "", folder, how)
 
 
 def gallery(results: Path) -> Answer:

@@ -16,10 +16,9 @@ from lowalt.shards.sample_record import sample_key
 from lowalt.tiles.png import encode
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `sample` to a parser's commands."""
-    meaning = "one sample: tile, signals, record, and a picture with axes"
-    line = add_command(commands, "sample", run, meaning, "lowalt sample Crow 3 --snr 13 --out samples")
+    line = add_command(commands, name, run)
     line.add_argument("subtype", help="name of the subtype, as in the table of targets")
     line.add_argument("model", type=int, help="number of the motion model; any number, also beyond the configuration's")
     line.add_argument("--snr", type=float, default=math.inf, help="signal-to-noise ratio in dB (default: no noise)")

@@ -1,4 +1,4 @@
-"""The action `lowalt spectra`: a configuration's spectra, their settings and sources, and the time of an image."""
+"""The command `lowalt spectra`: a configuration's spectra, their settings and sources, and the time per image."""
 
 import argparse
 import functools
@@ -19,10 +19,9 @@ from lowalt.tiles.render import Renderer, normalised
 REPEATS = 5
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `spectra` to a parser's commands."""
-    meaning = "the spectra of a configuration, and the time an image of each takes"
-    line = add_command(commands, "spectra", run, meaning, "lowalt spectra config/tiny.yaml")
+    line = add_command(commands, name, run)
     line.add_argument("overlay", type=Path, nargs="*", help="overlays on the default")
 
 
@@ -32,7 +31,7 @@ def facts(config: dict) -> list[dict]:
     symbols = renderer.network.symbols
     signal = normalised(np.exp(0.1j * np.arange(symbols) ** 1.5).astype(np.complex64))
     if renderer.spectra.times == "known":
-        # A look without gaps would take the time of even symbols.
+        # Use a look with gaps: without gaps the kernels for evenly spaced symbols would be timed.
         signal[3::4] = 0
     image = np.empty((renderer.images.size, renderer.images.size), np.uint8)
     still, no_truth = np.zeros(symbols, np.int64), np.zeros((symbols, 0))

@@ -1,4 +1,4 @@
-"""The commands `lowalt run` and `lowalt status`: Snakemake underneath, in the same folders and files."""
+"""The commands `lowalt run` and `lowalt status`, which call Snakemake in the same folders and files."""
 
 import argparse
 import json
@@ -20,17 +20,21 @@ from lowalt.workflow.status import PLANNED_JOBS
 SNAKEFILE = SHIPPED / "Snakefile"
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
-    """Add `run` and `status` to a parser's commands."""
-    meaning = "run the workflow: the default, or with overlays"
-    line = add_command(commands, "run", run, meaning, "lowalt run config/tiny.yaml --target data --cores 2")
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
+    """Add `run` or `status` to a parser's commands."""
+    if name == "status":
+        add_command(commands, name, states)
+        return
+    line = add_command(commands, name, run)
     line.add_argument("overlay", type=shipped, nargs="*", help="overlays on the default configuration")
     line.add_argument("--configfile", type=shipped, nargs="+", default=[], help="more overlays, as in snakemake")
     line.add_argument("--target", nargs="+", default=[], help="rules or files to make (default: everything)")
     line.add_argument("--cores", help="cores to use (default: all; with --profile what that says)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
+    line.add_argument(
+        "-p", "--printshellcmds", action="store_true", help="print files, reason and command of every job"
+    )
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
-    add_command(commands, "status", states, "the state of a run in another terminal", "lowalt status")
 
 
 def command(options: argparse.Namespace) -> list[str]:
@@ -49,7 +53,7 @@ def command(options: argparse.Namespace) -> list[str]:
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
     if options.cores not in (None, "all") and not (options.cores.isdecimal() and int(options.cores)):
         raise InputError(f"--cores {options.cores!r}, expected a whole number of at least 1, or all")
-    # A profile that is not there is no error to Snakemake: the run would go on without it.
+    # Snakemake would silently ignore a missing profile.
     if options.profile and not any(options.profile.glob("config*.yaml")):
         raise InputError(f"--profile {options.profile}: no config.yaml there, expected a folder such as profiles/slurm")
     cores = options.cores or (None if options.profile else "all")
@@ -57,7 +61,7 @@ def command(options: argparse.Namespace) -> list[str]:
     profile = options.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))
     line += ["--workflow-profile", str(profile)] if profile else []
     line += ["--configfile", *map(str, [*base, *overlays])] if base or overlays else []
-    line += ["--dry-run"] if options.dry_run else []
+    line += [*(["--dry-run"] if options.dry_run else []), *(["--printshellcmds"] if options.printshellcmds else [])]
     return [*line, "--", *options.target] if options.target else line
 
 

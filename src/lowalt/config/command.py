@@ -1,14 +1,13 @@
-"""Parts of all stages' command lines: the argument with the settings, errors in one line, the peak memory.
+"""Common parts of the stages' command lines: the settings argument, one-line errors, and peak memory.
 
 A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings @file.json`.
-The workflow passes the object itself, so that Snakemake sees every change in it; a person passes a file.
+The workflow passes the object itself, so that Snakemake notices every change; users usually pass a file.
 """
 
 import argparse
 import contextlib
 import errno
 import functools
-import json
 import resource
 import sys
 import warnings
@@ -17,14 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, InputWarning, shortened
+from lowalt.files.json_objects import json_object
 from lowalt.machine.memory import keep_freed_memory
 
 
 def exit_status(code: int) -> int:
-    """Return the status of an ended process as shells give it: 128 and the signal's number where a signal ended it.
+    """Return the exit status of a process as a shell reports it: 128 + signal number if a signal ended it.
 
-    code: as `subprocess` gives it, a signal's number negative.
+    code: return code of `subprocess`, negative for a signal.
     """
     return code if code >= 0 else 128 - code
 
@@ -44,7 +44,7 @@ def name_backbone(line: argparse.ArgumentParser) -> None:
 
 
 def _argument(text: str) -> dict:
-    """Return `settings` of the text and keep its error message: argparse replaces the message of any ValueError."""
+    """Return `settings` of the text but keep its error message, which argparse would replace for a ValueError."""
     try:
         return settings(text)
     except InputError as error:
@@ -60,13 +60,7 @@ def settings(text: str) -> dict:
     source = text
     if text.startswith("@"):
         source = text_of(text[1:], "--settings")
-    try:
-        value = json.loads(source)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"--settings {text[:80]!r}: not JSON ({error})") from error
-    if not isinstance(value, dict):
-        raise InputError(f"--settings {text[:80]!r}: {type(value).__name__}, expected a JSON object")
-    return value
+    return json_object(source, f"--settings {text[:80]!r}", "settings")
 
 
 def pick(block: dict, *keys: str) -> list:
@@ -92,29 +86,34 @@ def dispatch(module: str, commands: Mapping[str, Callable[[list[str]], None]], a
 
 
 REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
-"""Errors of the operating system that a path given by the user causes, such as a folder that may only be read."""
+"""Operating system errors caused by a path of the user, such as a read-only folder."""
 
 
-def refusal(error: OSError) -> str:
-    """Return the sentence on a path that the operating system refuses. Raises: the error itself for any other one."""
+def refusal(error: InputError | OSError) -> str:
+    """Return the message of a refusal, of bounded length: that of an InputError, or one about the path in an error of
+    the operating system.
+
+    Raises: any other error unchanged.
+    """
+    if isinstance(error, InputError):
+        return str(error)
     if error.errno not in REFUSED or error.filename is None:
         raise error
-    return f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
+    return shortened(f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write")
 
 
 @contextlib.contextmanager
 def refusing() -> Iterator[None]:
-    """Turn an InputError, or a path that the operating system refuses, into one line and exit status 2."""
+    """Turn an InputError, or an operating system error about a path, into one line and exit status 2."""
     try:
         yield
     except (InputError, OSError) as error:
-        print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
+        print(f"error: {refusal(error)}", file=sys.stderr)
         raise SystemExit(2) from None
 
 
 class Refusing:
-    """An object whose methods answer as `refusing` says: Snakemake would show what a rule's function raises as a
-    traceback."""
+    """Wraps an object so that its methods handle errors as `refusing` does; Snakemake would print tracebacks."""
 
     def __init__(self, held: object) -> None:
         """Take the object."""
@@ -127,20 +126,29 @@ class Refusing:
 
         @functools.wraps(held)
         def asked(*given: Any, **named: Any) -> Any:
-            """Answer, or end the process after one line."""
+            """Return the method's result, or exit after one line."""
             with refusing():
                 return held(*given, **named)
 
         return asked
 
 
+USUAL_FORMAT = warnings.formatwarning
+
+
+def warn_in_one_line() -> None:
+    """Print each InputWarning as one line without its place in the source."""
+    warnings.formatwarning = lambda message, category, *place, **more: (
+        f"warning: {message}\n"
+        if issubclass(category, InputWarning)
+        else USUAL_FORMAT(message, category, *place, **more)
+    )
+
+
 def run(main: Callable[[list[str]], None]) -> None:
     """Run a stage's `main` on the process's arguments, as `refusing` says; an InputWarning becomes one line."""
     keep_freed_memory()
-    usual = warnings.formatwarning
-    warnings.formatwarning = lambda message, category, *place, **more: (
-        f"warning: {message}\n" if issubclass(category, InputWarning) else usual(message, category, *place, **more)
-    )
+    warn_in_one_line()
     with refusing():
         main(sys.argv[1:])
     # ru_maxrss includes short peaks that sampling misses; it is in KiB on Linux.

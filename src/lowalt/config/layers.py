@@ -1,6 +1,6 @@
-"""The configuration: merged from files, checked against the schema, cut into the stages' settings.
+"""The configuration: merges files and checks the result against the schema.
 
-This module does not depend on any stage. Faults are found before any job starts and named by key and value.
+This module does not depend on any stage. Errors are found before any job starts and name key and value.
 """
 
 import json
@@ -13,9 +13,9 @@ import yaml
 
 from lowalt.config.command import parser, run
 from lowalt.config.network import OFDM
-from lowalt.config.schema import faults, plain
+from lowalt.config.schema import check_brought, faults, plain, with_numbers
 from lowalt.files.atomic import replacing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 
@@ -32,55 +32,48 @@ def merge(base: dict, overlay: dict) -> dict:
 
 
 def canonical(value: object) -> str:
-    """Return the one JSON text of a settings block: sorted keys, so equal settings are equal texts."""
+    """Return the canonical JSON text of a settings block: keys are sorted, so equal settings give equal texts."""
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
 
 
-NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
-"""A number in the YAML of today; that of 2005, which the library reads, takes 28e9 for a text."""
+def _may_be_null(entry: dict) -> bool:
+    """Whether a schema's entry allows null, itself or as one of its choices."""
+    return "null" in entry.get("type", ()) or any(map(_may_be_null, entry.get("oneOf", ())))
 
 
-def _kinds(entry: dict) -> set[str]:
-    """The types that a schema's entry allows, those of its choices too."""
-    kinds = entry.get("type", [])
-    return (
-        {kinds}
-        if isinstance(kinds, str)
-        else {*kinds, *(kind for one in entry.get("oneOf", ()) for kind in _kinds(one))}
-    )
-
-
-def _as_meant(value: object, entry: dict) -> object:
-    """The value with texts such as 28e9 as numbers, and whole numbers as integers, where the entry wants these."""
-    kinds = _kinds(entry)
-    if isinstance(value, dict):
-        _settle(value, entry)
-    elif isinstance(value, list):
-        return [_as_meant(item, entry.get("items", {})) for item in value]
-    elif isinstance(value, str) and kinds & {"number", "integer"} and "string" not in kinds and NUMBER.fullmatch(value):
-        value = float(value)
-    if isinstance(value, float) and value.is_integer() and "integer" in kinds and "number" not in kinds:
-        return int(value)
-    return value
-
-
-def _settle(block: dict, schema: dict) -> None:
-    """Take the nulls out of a block whose keys may be left out and hold no null, and read its numbers (`_as_meant`)."""
+def _without_nulls(block: object, schema: dict) -> None:
+    """Remove nulls from a block and its inner blocks, for optional keys whose schema does not allow null."""
+    if isinstance(block, list):
+        for item in block:
+            _without_nulls(item, schema.get("items", {}))
+    if not isinstance(block, dict):
+        return
     needed, known, further = (schema.get(key, {}) for key in ("required", "properties", "additionalProperties"))
     for key, value in list(block.items()):
         if not isinstance(key, str):
             raise InputError(f"configuration: key {key!r} among {list(block)}, expected text: put it in quotes")
-        entry = known.get(key, further)
+        patterns = (entry for pattern, entry in schema.get("patternProperties", {}).items() if re.search(pattern, key))
+        entry = known.get(key, next(patterns, further))
         if not isinstance(entry, dict):
             continue
-        if value is None and key not in needed and "null" not in _kinds(entry):
+        if value is None and key not in needed and not _may_be_null(entry):
             del block[key]
         else:
-            block[key] = _as_meant(value, entry)
+            _without_nulls(value, entry)
+
+
+def _listed(lines: list[str]) -> str:
+    """The first faults, as many as fit into a message, and the number of the others."""
+    text = lines[0]
+    for number, line in enumerate(lines[1:], 1):
+        if len(text) + len(line) > LONGEST - 50:
+            return f"{text}\n  and {len(lines) - number} more"
+        text += f"\n  {line}"
+    return text
 
 
 def _without_ofdm(network: dict) -> None:
-    """Take the embedded default's subcarriers out of a network whose waveform has none, and a waveform that is OFDM."""
+    """Remove the default's subcarriers from a network whose waveform has none, and a waveform block that says OFDM."""
     if network.get("waveform") == {"kind": "ofdm"}:
         del network["waveform"]
     elif "waveform" in network:
@@ -91,27 +84,27 @@ def _without_ofdm(network: dict) -> None:
 
 
 def check(config: dict, schema_path: str | Path) -> dict:
-    """Return the configuration if it fits the schema, without nulls that take out what a lower layer has.
+    """Return the configuration if it fits the schema, without the nulls that remove keys of a lower layer.
 
-    A layer of configuration can only add keys to a mapping, so a null removes one that may be left out, such as a
-    station, a spectrum, a start or an effect. A number may be written 28e9. Where the waveform has no subcarriers,
-    those of the embedded default go.
-    The configuration is changed in place. Raises: InputError with one line a fault.
+    A layer can only add keys to a mapping. A null therefore removes an optional key, such as a station, a spectrum or
+    an effect. A number may be written 28e9. If the waveform has no subcarriers, those of the embedded default are
+    removed. The configuration is changed in place. Raises: InputError with one line per fault.
     """
     schema = load_yaml(schema_path)
-    _settle(config, schema)
+    _without_nulls(config, schema)
+    with_numbers(config, schema)
     if isinstance(config.get("network"), dict):
         _without_ofdm(config["network"])
     lines = faults(config, schema)
     if lines:
-        raise InputError("configuration refused: " + "\n  ".join(lines))
+        raise InputError(f"configuration refused: {_listed(lines)}")
     return config
 
 
 def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     """Return the checked configuration of a base file and its overlays, in order.
 
-    A file that the working directory lacks is taken from those that came with the package.
+    A file that is not in the working directory is taken from the package.
     Raises: InputError naming file, key and value.
 
         >>> config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
@@ -122,6 +115,20 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     for path in paths:
         result = merge(result, load_yaml(shipped(path)))
     return located(check(result, shipped(schema_path)))
+
+
+def of_run(folder: str | Path) -> dict:
+    """Return the configuration in a run's folder, plain values only; it may be of an older schema.
+
+    The folder is untrusted, so nothing in it may choose code (`named_code.allowed`).
+    Raises: InputError naming a folder that is not a run's, or the file and the wrong key.
+    """
+    path = Path(folder) / "config.yaml"
+    if not path.is_file():
+        raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
+    config = load_yaml(path)
+    check_brought("settings", config, path)
+    return config
 
 
 def overlaid(overlays: Iterable[str | Path]) -> dict:

@@ -1,6 +1,6 @@
-"""The network of base stations: carrier, subcarriers, symbols, arrays and where each station stands.
+"""The network of base stations: carrier, subcarriers, symbols, arrays and station positions.
 
-This module states facts about the radar; `lowalt.echo` computes its signals.
+This module describes the radar; `lowalt.echo` computes its signals.
 Axes: x and y horizontal, z up, metres, global frame. Angles in degrees only in the configuration.
 """
 
@@ -53,9 +53,9 @@ def _link(name: str, place: dict, known: dict[str, Station]) -> Station:
 
 
 def station_names(block: dict) -> list[str]:
-    """Return the names of the stations of a `network` block in their one order, the alphabetical one.
+    """Return the names of the stations of a `network` block in alphabetical order.
 
-    Settings travel as JSON with sorted keys, so no other order would reach every stage.
+    Settings are passed as JSON with sorted keys, so every stage sees this order.
     """
     return sorted(block["stations"])
 
@@ -63,7 +63,7 @@ def station_names(block: dict) -> list[str]:
 def as_far_as(block: dict, name: str) -> dict:
     """Return a `network` block with only those stations on which the echo at the station `name` depends.
 
-    The number of stations before it decides its sub-band; a link needs the two stations that it connects.
+    Its sub-band depends on the number of stations before it; a link needs the two stations that it connects.
     """
     stations = block["stations"]
     last = max(name, *(stations[name].get(end, name) for end in ("transmit", "receive")))
@@ -219,8 +219,32 @@ class Network:
 
     @property
     def noise_bandwidth_hz(self) -> float:
-        """Bandwidth (Hz) whose noise a value of Eq. 24 has: a subcarrier's, or the sample rate of an FMCW sweep."""
+        """Noise bandwidth (Hz) of a value of Eq. 24: that of a subcarrier, or the sample rate of an FMCW sweep."""
         return self.symbol_rate_hz * (1 if self.sweep_s is None else self.subcarriers)
+
+    def effective_hz(self, station: Station) -> float:
+        """Return the effective carrier f_k + (M - 1) df / 2 (Hz): it determines phase and Doppler in a range cell.
+
+        Source: paper, Eq. 7, the inverse transform over subcarriers.
+        """
+        return station.frequency_hz + (self.subcarriers - 1) * self.subcarrier_spacing_hz / 2
+
+    def largest_mps(self, station: Station) -> float:
+        """Return c / (4 f T_r) (m/s), f the effective carrier: faster targets fold, because their phase turns by
+        more than half a circle per symbol."""
+        return SPEED_OF_LIGHT / (4 * self.effective_hz(station) * self.symbol_interval_s)
+
+    def folded_mps(self, speed_mps: np.ndarray, station: Station) -> np.ndarray:
+        """Return the speeds (m/s, any shape) at which a station sees radial speeds, above -largest to largest."""
+        largest = self.largest_mps(station)
+        return largest - (largest - speed_mps) % (2 * largest)
+
+    def bin_speeds_mps(self, points: int, station: Station) -> np.ndarray:
+        """Return the radial speeds (points,) m/s, ascending, positive receding, of a Fourier transform over symbols.
+
+        Bin k of `numpy.fft.fftfreq` is the speed -2 k / points times the largest: an echo that recedes turns backwards.
+        """
+        return -2 * self.largest_mps(station) * np.fft.fftshift(np.fft.fftfreq(points))[::-1]
 
     @property
     def cell_m(self) -> float:

@@ -1,9 +1,8 @@
-"""The plan of a run: its subtypes, chunks and shards, all known from the configuration before any job starts.
+"""The plan of a run: its subtypes, chunks and shards, which follow from the configuration before any job starts.
 
-A data set can grow without being made again: subtypes and SNRs that the configuration names under `added` get chunks of
-their own. The step t (1, 2, ...) of that list that adds subtypes makes chunks {group}-{part}t{t} with motion models of
-these alone; a step that adds SNRs makes a chunk {chunk}s{t} for every earlier one, with the same motion models and
-echoes.
+A data set can grow without remaking it: subtypes and SNRs under `added` in the configuration get their own chunks. If
+step t (1, 2, ...) of that list adds subtypes, their motion models are in chunks {group}-{part}t{t}. If it adds SNRs,
+there is a chunk {chunk}s{t} for every earlier chunk, with the same motion models and echoes.
 """
 
 import math
@@ -19,21 +18,21 @@ GROUPS = ("seen", "unseen")
 PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
 """Regular expression of a chunk's part."""
 PIECE = r"(?:p\d+)?"
-"""Regular expression of a shard's piece, where a fold of a chunk is packed in several shards."""
+"""Regular expression of a shard's piece, if a fold of a chunk is packed into several shards."""
 JUMPING = ("rotor_spread", "gusts", "companions")
-"""Effects that draw a motion of their own for each look."""
+"""Effects that draw a motion for each look."""
 RECORD_BYTES = 2048
-"""Space of a sample's JSON record in the tar, padded."""
+"""Bytes of a sample's JSON record in the tar, including padding."""
 PIXEL_BYTES = 0.5
-"""Bytes that a shard holds for each pixel of a tile: at most so many were measured."""
+"""Largest measured number of bytes in a shard per pixel of a tile."""
 CELL_BYTES = {"complex64": 8, "int16": 4}
 """Bytes of a range cell of a cube, by the type that it is stored as."""
-TRUTH_BYTES = 47
-"""Bytes of the record for what is true of a cube at one symbol: the chosen cell and five numbers of six decimals."""
+TRUTH_BYTES = 65
+"""Bytes of the record per symbol of a cube, for its ground truth: the chosen cell and the numbers `cube.TRUTH`."""
 
 
 EVERY = 2**53
-"""Samples of a shard where none is too many."""
+"""Limit of samples per shard where there is no limit of size."""
 
 
 def snrs_of(config: dict) -> tuple[float, ...]:
@@ -55,7 +54,7 @@ def motion_block(config: dict) -> dict:
 
 
 def _refuse_tracks(config: dict) -> None:
-    """Refuse tracks that a split takes apart, or whose targets a scene would make jump from look to look."""
+    """Refuse tracks that a split would divide, or whose targets would jump between looks in this scene."""
     if "looks" not in config["motion"]:
         return
     if config["split"]["by"] != "motion":
@@ -102,8 +101,8 @@ class Plan:
     """Chunks and shards of a run; `groups` maps a group to its subtypes in the table's order.
 
     groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each step added to them;
-    models: rows of the motion table of each subtype, one a look; looks: at each motion model; largest: samples that a
-    shard holds.
+    models: rows of the motion table per subtype, one per look; looks: number per motion model; largest: samples per
+    shard.
     """
 
     groups: dict[str, tuple[str, ...]]
@@ -192,7 +191,7 @@ class Plan:
 
     @property
     def sources(self) -> list[str]:
-        """Names of the chunks with motion models of their own."""
+        """Names of the chunks that have their own motion models."""
         return [name for name, chunk in self._chunks.items() if chunk.source == name]
 
     def chunk(self, name: str) -> Chunk:
@@ -217,7 +216,7 @@ class Plan:
         return [name for name in FOLDS if name in dealt]
 
     def pieces(self, chunk: str, fold: str) -> list[str]:
-        """Return what the names of a chunk's shards of one fold end on: nothing, or p0, p1, ... for several."""
+        """Return the suffixes of a chunk's shards of one fold: an empty one, or p0, p1, ... for several."""
         held = self._chunks[chunk]
         models = held.count * len(held.members) * self.split[fold] / sum(self.split[name] for name in FOLDS)
         # The samples of a motion model stay together.

@@ -1,24 +1,26 @@
-"""Settings against a JSON schema, one sentence a fault; and the schema of all settings that a file brings.
+"""Checks settings against a JSON schema, with one sentence per fault; also settings in untrusted files.
 
-Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; text that a pattern describes has no
-control characters, so that it can be printed.
+Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; `const: inf` also accepts an infinity;
+text that a pattern describes has no control characters, so that it can be printed.
 """
 
 import functools
 import math
-from collections.abc import Iterator
+import operator
+import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 
-from lowalt.files.errors import InputError, instead
+from lowalt.files.errors import InputError, instead, shown
 from lowalt.files.shipped import SHIPPED
 from lowalt.files.yaml_files import load_yaml
 
 BROUGHT = Path(__file__).with_name("brought.schema.yaml")
-LONGEST = 200
-"""Characters of a value that a sentence shows."""
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+"""A number in YAML 1.2. PyYAML and Snakemake read YAML 1.1, in which 28e9 is a text."""
 
 
 def _whole(checker: Any, value: object) -> bool:
@@ -32,16 +34,29 @@ def _number(checker: Any, value: object) -> bool:
 
 
 def _pattern(validator: Any, pattern: str, value: object, schema: dict) -> Iterator[jsonschema.ValidationError]:
-    """Refuse text that has control characters or is not as the pattern says."""
+    """Refuse text with control characters or that does not match the pattern."""
     if isinstance(value, str) and any(ord(sign) < 32 or ord(sign) == 127 for sign in value):
         yield jsonschema.ValidationError("control characters")
     yield from jsonschema.Draft202012Validator.VALIDATORS["pattern"](validator, pattern, value, schema)
 
 
+def _const(validator: Any, wanted: object, value: object, schema: dict) -> Iterator[jsonschema.ValidationError]:
+    """Refuse what differs from the one value; the text inf stands for an infinity, which JSON has not."""
+    if wanted != "inf" or value != math.inf:
+        yield from jsonschema.Draft202012Validator.VALIDATORS["const"](validator, wanted, value, schema)
+
+
+def _array(checker: Any, value: object) -> bool:
+    """Whether a value is a list, or a tuple in its place."""
+    return isinstance(value, (list, tuple))
+
+
 Validator = jsonschema.validators.extend(
     jsonschema.Draft202012Validator,
-    {"pattern": _pattern},
-    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine_many({"integer": _whole, "number": _number}),
+    {"pattern": _pattern, "const": _const},
+    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine_many(
+        {"integer": _whole, "number": _number, "array": _array}
+    ),
 )
 
 
@@ -50,7 +65,7 @@ COUNTS = ("minProperties", "maxProperties")
 
 
 def plain(value: object) -> object:
-    """Return `value` with infinities and NaN as the texts "inf" and "nan", which JSON has not as numbers."""
+    """Return checked settings with infinities as the text "inf", which JSON has not as a number."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -58,17 +73,38 @@ def plain(value: object) -> object:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _shown(value: object) -> str:
-    """A value as text of bounded length."""
-    text = repr(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+def _innermost(errors: Iterable[Any]) -> Iterator[Any]:
+    """The innermost errors, such as those within each of several choices."""
+    for error in errors:
+        yield from _innermost(error.context) if error.context else (error,)
+
+
+def with_numbers(settings: Any, schema: dict) -> Any:
+    """Return settings that people write in YAML, their numbers read as meant; nested values change in place.
+
+    Where a schema expects a number and no text, a text such as 28e9 is one; where it expects an integer, so is 4.0e+2.
+    """
+    held: Any = [settings]
+    for error in _innermost([*Validator(schema).iter_errors(settings)]):
+        if error.validator != "type":
+            continue
+        value, wanted = error.instance, error.validator_value
+        kinds = {wanted} if isinstance(wanted, str) else {*wanted}
+        if isinstance(value, str) and NUMBER.fullmatch(value):
+            value = float(value)
+        if isinstance(value, float) and "integer" in kinds - {"number"} and value.is_integer():
+            value = int(value)
+        if value is not error.instance and any(Validator.TYPE_CHECKER.is_type(value, kind) for kind in kinds):
+            way = [0, *error.absolute_path]
+            functools.reduce(operator.getitem, way[:-1], held)[way[-1]] = value
+    return held[0]
 
 
 def _expected(error: Any) -> str:
     """Return the schema's expectation in words."""
     rule, wanted = error.validator, error.validator_value
     if rule == "oneOf":
-        # A number out of its range is told that; anything else, which types there are.
+        # For a number out of range state the range, otherwise the expected types.
         ranges = [choice for choice in error.context if choice.validator not in ("type", "const")]
         return _expected(ranges[0]) if ranges else " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
     if rule == "dependentRequired":
@@ -88,7 +124,7 @@ def _expected(error: Any) -> str:
         "pattern": f"text like {wanted}",
         "not": f"none of {wanted.get('enum')}" if isinstance(wanted, dict) else "",
     }
-    return words.get(str(rule), error.message if len(error.message) <= LONGEST else "another value")
+    return words.get(str(rule), error.message if len(error.message) <= 200 else "another value")
 
 
 def _fault(error: Any) -> str:
@@ -96,23 +132,23 @@ def _fault(error: Any) -> str:
     if error.validator == "additionalProperties":
         known = sorted(error.schema.get("properties", {}))
         unknown = [name for name in error.instance if name not in known]
-        return f"unknown key(s) {_shown(unknown)}, expected {instead(unknown, known)}"
+        return f"unknown key(s) {shown(unknown)}, expected {instead(unknown, known)}"
     if error.validator == "required":
         return f"missing key(s) {[name for name in error.validator_value if name not in error.instance]}"
     meaning = error.schema.get("description", "") if isinstance(error.schema, dict) else ""
-    return f"value {_shown(error.instance)}, expected {_expected(error)}" + f" ({meaning})" * bool(meaning)
+    return f"value {shown(error.instance)}, expected {_expected(error)}" + f" ({meaning})" * bool(meaning)
 
 
 def faults(settings: object, schema: dict, whole: str = "configuration") -> list[str]:
-    """Return one line a fault of settings against a JSON schema: key, value and what was expected.
+    """Return one line per fault of settings against a JSON schema: key, value and what was expected.
 
-    whole: the word for all that is checked. Of the items of a list with the same fault, the first is named.
+    whole: name of the checked settings. If several items of a list have the same fault, the first is named.
     """
     lines: dict[tuple, str] = {}
-    errors = Validator(schema).iter_errors(plain(settings))
+    errors = Validator(schema).iter_errors(settings)
     for error in sorted(errors, key=lambda error: ([*map(str, error.absolute_path)], error.validator in COUNTS)):
         block = tuple(part for part in error.absolute_path if isinstance(part, str))
-        # Of a block with another fault, the number of its keys says nothing more.
+        # If a block has another fault, do not report its number of keys.
         if error.validator not in COUNTS or not any(other[:-1] == block for other in lines):
             key = ".".join(map(str, error.absolute_path)) or whole
             lines.setdefault((*block, error.validator), f"{key}: {_fault(error)}")
@@ -121,18 +157,23 @@ def faults(settings: object, schema: dict, whole: str = "configuration") -> list
 
 @functools.cache
 def _brought() -> dict:
-    """The schema of what files bring, with the configuration's own, from which it takes the blocks they share."""
+    """The schema of settings in files, together with the configuration's schema, with which it shares blocks."""
     return {**load_yaml(BROUGHT)["$defs"], "config": load_yaml(SHIPPED / "workflow/schemas/config.schema.yaml")}
 
 
+def of_brought(part: str) -> dict:
+    """Return the schema of a definition of `brought.schema.yaml`."""
+    return {"$ref": f"#/$defs/{part}", "$defs": _brought()}
+
+
 def check_brought(part: str, settings: object, where: str | Path) -> None:
-    """Refuse settings that a file brings, before anything is made of them.
+    """Refuse wrong settings of a file before they are used.
 
     part: a definition of `brought.schema.yaml`; where: the file.
     Raises: InputError naming the file, the first key that is wrong, its value and what was expected.
     """
     try:
-        lines = faults(settings, {"$ref": f"#/$defs/{part}", "$defs": _brought()}, part)
+        lines = faults(settings, of_brought(part), part)
     except RecursionError:
         raise InputError(f"{where}: values stand in each other too deeply, expected a few levels") from None
     if lines:

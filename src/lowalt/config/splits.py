@@ -1,8 +1,8 @@
-"""Which fold a sample belongs to: train, val or test, by the sample's name alone.
+"""The fold of a sample (train, val or test), which depends only on the sample's name.
 
 Models are assigned in blocks: every block of `train + val + test` consecutive model numbers of a subtype is
-shuffled by its own stream and cut into the three shares. Full blocks therefore have exact shares, and adding
-models, subtypes or SNRs moves no fold.
+shuffled by its own stream and divided into the three shares. Full blocks therefore have exact shares, and added
+models, subtypes or SNRs do not change existing folds.
 """
 
 import functools

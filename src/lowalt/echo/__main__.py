@@ -1,4 +1,4 @@
-"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals, one file a station."""
+"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals, one file per station."""
 
 import sys
 
@@ -20,7 +20,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
     options.add_argument("--station", nargs="+", required=True, help="names of the stations that listen")
     options.add_argument(
-        "--out", nargs="+", required=True, help="clean signals to write (.npy), a file a station: complex64 (models, N)"
+        "--out", nargs="+", required=True, help="clean signals to write (.npy), one per station: complex64 (models, N)"
     )
     given = options.parse_args(arguments)
     if len(given.out) != len(given.station):

@@ -7,21 +7,21 @@ import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo import refine
+from lowalt.echo.echo_input import EchoInput, Rigid, Target, check, target
 from lowalt.echo.pointwise import results
 from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
 from lowalt.echo.refine import Method
 from lowalt.echo.rounding import nearest
-from lowalt.echo.scene import EchoScene, Rigid, Target, check, target
 from lowalt.files.errors import BelowFloor, InputError
 
 
 class Path(NamedTuple):
-    """One propagation path of the wave to every point and back.
+    """One two-way propagation path from the station to every point and back.
 
-    delay_s: delay beyond the direct path's (s), gain: complex factor, each a number or an array that broadcasts to
-    (N, L). The direct path is Path(0.0, 1.0).
+    delay_s: delay relative to the direct path (s); gain: complex factor. Each is a number or an array that broadcasts
+    to (N, L). The direct path is Path(0.0, 1.0).
     """
 
     delay_s: float | np.ndarray = 0.0
@@ -32,11 +32,11 @@ class EchoResult(NamedTuple):
     """Signal of one station.
 
     signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in 0..M-1; near_ties: number
-    of symbols in which a second cell is within a relative 1e-12, so that rounding decides between both; bound: proved
-    bound of the error relative to max |signal|, inf where nothing can be said; method: how it was computed, and why;
-    gap: (N,) float64, certified lower bound of |Y| at the strongest cell less |Y| at any other, 0 where none is known;
+    of symbols whose two strongest cells differ by less than a relative 1e-12, so that rounding decides; bound: proved
+    bound of the error relative to max |signal|, inf if none is proved; method: how it was computed, and why;
+    gap: (N,) float64, proved lower bound of |Y| at the strongest cell minus |Y| at any other, 0 if there is none;
     totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included. With a tolerance it is an
-    upper bound, too large by at most the tolerance times the largest.
+    upper bound that exceeds the sum by at most the tolerance times the largest value.
     """
 
     signal: np.ndarray
@@ -60,12 +60,12 @@ def echo_signal(
 ) -> EchoResult:
     """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M range cells.
 
-    motion: `Rigid`, positions (N, L, 3) in metres, or a `scene.Target` that was checked before, with rcs_m2 None;
+    motion: `Rigid`, positions (N, L, 3) in metres, or an already checked `echo_input.Target`, with rcs_m2 None;
     rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error allowed, relative to
-    the sample's max |Y_bin|, None for the exact closed form; paths: all propagation paths (default: the direct one
-    alone); sample: a name for error messages.
-    Raises: InputError naming the argument, its value and the sample; BelowFloor, a kind of it, for a tolerance smaller
-    than the bound that float64 can prove for this sample. Source: paper Eqs. 7 and 22 to 25.
+    the sample's max |Y_bin|, None for the exact closed form; paths: all propagation paths (default: only the
+    direct one); sample: a name for error messages.
+    Raises: InputError naming the argument, its value and the sample; BelowFloor (a subclass) for a tolerance below the
+    error bound that float64 can prove for this sample. Source: paper Eqs. 7 and 22 to 25.
 
     A point of 0.01 m2 that stands 226 m from station A, in cell 46 of 4.9 m each:
 
@@ -91,7 +91,8 @@ def echo_signal(
     if tolerance is None and paths is None:
         method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
     largest = float(abs(found.values).max())
-    bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
+    worst = float(found.bounds.max())
+    bound = worst / largest if largest > 0 else np.inf if worst > 0 else 0.0
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
             f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 promises {bound:.1e} "
@@ -196,7 +197,7 @@ def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) ->
     return results.Paths(*result)
 
 
-def check_fault(fault: int, scene: EchoScene, station: Station, sample: str) -> None:
+def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> None:
     """Raise InputError for a point in the station, which a kernel reports as `fault` = 1 + n L + l."""
     if fault:
         points = len(scene.part) or scene.translation.shape[1]

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.config.network import Network
 from lowalt.echo.api import echo_signal
-from lowalt.echo.scene import Rigid, target
+from lowalt.echo.echo_input import Rigid, target
 from lowalt.machine.progress import reported
 from lowalt.motion import poses
 from lowalt.targets.cloud import Cloud, cloud_of

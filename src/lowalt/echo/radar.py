@@ -1,7 +1,7 @@
-"""The constants of one station that the kernels need, as floats and double-doubles computed once.
+"""The constants of one station for the kernels, as floats and double-doubles.
 
-A double-double is the unevaluated sum of two doubles (about 32 digits). Turns per metre are stored so, because at
-100 km and 4.9 GHz the phase is 2e7 rad, and one double would leave only eight digits of the turn.
+A double-double is the unevaluated sum of two doubles (about 32 digits). It is needed for turns of phase per metre: at
+100 km and 4.9 GHz the phase is 2e7 rad, so a single double would leave only eight digits for the fraction of a turn.
 """
 
 from decimal import Decimal, localcontext
@@ -71,8 +71,8 @@ class Radar(NamedTuple):
     bandwidth_hz: float
     """M df (Hz): range cells per second of delay."""
     exact: np.ndarray
-    """(8, 2), the same constants as double-doubles in the order of `Exact`: one array comes cheaper into compiled code
-    than eight pairs. `constants` gives them their names."""
+    """(8, 2), the constants as double-doubles in the order of `Exact`. Compiled code takes one array faster than eight
+    pairs; `constants` unpacks it."""
 
 
 @lru_cache(maxsize=64)

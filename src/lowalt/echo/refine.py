@@ -1,9 +1,10 @@
-"""How a tolerance is kept: bound the error, compute, compare, and compute finer where cancellation needs it."""
+"""Keeps a tolerance: bound the error, compute, compare, and recompute more precisely where terms cancel."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.echo.echo_input import EchoInput
 from lowalt.echo.fast import driver
 from lowalt.echo.fast.cell_kernel import CellPolynomials, cell_polynomials
 from lowalt.echo.fast.error_model import (
@@ -22,25 +23,24 @@ from lowalt.echo.fast.strongest_cell import CERTAIN
 from lowalt.echo.fast.workspace import Approximation, Found, Symbols, workspace
 from lowalt.echo.pointwise.reference_range import RANGE
 from lowalt.echo.radar import Radar
-from lowalt.echo.scene import EchoScene
 
 LONGEST = 100
-"""Most symbols of a segment."""
+"""Largest number of symbols in a segment."""
 PROBES = 8
-"""Symbols computed exactly first: their largest value is a lower bound of the sample's largest."""
+"""Number of symbols computed exactly first; their largest value is a lower bound of the sample's largest value."""
 PROBE_COST = 20_000
 """Cost of the probes and of a second pass, in points x symbols of the exact plan. A cheaper plan must save more."""
 SAVED_SINGLE, SAVED = 0.4, 0.1
-"""Share of the exact plan's cost that plans in float32 and in float64 save, as measured."""
+"""Measured share of the exact plan's cost that a cheaper plan saves, in float32 and in float64."""
 
 
 class Method(NamedTuple):
-    """How a sample was computed, and which bounds allowed it.
+    """Record of how a sample was computed and which error bounds were proved.
 
     single: float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel; cheap, exact,
     general: symbols by the cheap plan, by the exact plan and by the pointwise kernel; pointwise_bound: error bound of
-    the pointwise kernel relative to its sums of amplitudes and of risks; again: symbols computed again so that
-    complex64 is rounded correctly, and how many of them that leaves open.
+    the pointwise kernel relative to its sums of amplitudes and of risks; again: number of symbols recomputed
+    for correct rounding to complex64, and how many of them remain undecided.
     """
 
     single: bool
@@ -53,12 +53,12 @@ class Method(NamedTuple):
 
 
 def compute(
-    scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
+    scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
 ) -> tuple[Found, np.ndarray, Method, EchoSample]:
-    """Return (found, symbols left for the pointwise kernel, method, sample): the cheap plan, then the exact one.
+    """Run the cheap plan, then the exact one; return (found, symbols left for the pointwise kernel, method, sample).
 
-    A symbol is computed again where its bound exceeds the tolerance times the largest value, where its strongest cell
-    is not certain to that bound, and where far cells could not be excluded.
+    The exact plan recomputes a symbol if its error bound exceeds the tolerance times the largest value, if the bound
+    leaves its strongest cell undecided, or if far cells could not be excluded.
     """
     run = _Run(scene, radar, refs, aims)
     found = Found.empty(len(refs))
@@ -86,15 +86,15 @@ def compute(
 
 
 def _least_largest(found: Found) -> float:
-    """Return a lower bound of the largest |value| that holds for all errors within their bounds."""
+    """Return a lower bound of the largest true |value|, given the error bounds."""
     done = found.state == CERTAIN
     return float((abs(found.values) - found.bounds)[done].max()) if done.any() else 0.0
 
 
 class _Run:
-    """The calls of the fast kernel on one sample, and its extents."""
+    """Calls of the fast kernel for one sample, with the table of extents."""
 
-    def __init__(self, scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float]) -> None:
+    def __init__(self, scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float]) -> None:
         peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
         first = int(scene.part[0]) if len(scene.part) else 0
         self.sample = EchoSample(scene, layout(scene, peak), radar, first, aims)
@@ -103,11 +103,11 @@ class _Run:
         self.size_m = float(self.extents[:, SIZE].max())
 
     def plan(self, error: float) -> EchoPlan:
-        """Return the plan that keeps `error` (0: the exact mode)."""
+        """Return the plan for an error bound of `error` (0: exact mode)."""
         return echo_plan(self.sample.radar, self.points, error)
 
     def peaks(self, symbols: np.ndarray) -> np.ndarray:
-        """Return the sum of amplitudes at the arrays' peak gain, an upper bound for each of the symbols."""
+        """Return for each symbol an upper bound: the sum of amplitudes at the arrays' peak gain."""
         return self.sample.lay.total / (self.refs[symbols, RANGE] * (1 - self.extents[symbols, SPREAD])) ** 2
 
     def saving(self, tolerance: float) -> float:
@@ -115,17 +115,17 @@ class _Run:
         return (SAVED_SINGLE if 0.5 * tolerance > SINGLE_ERROR else SAVED) * len(self.refs) * self.points
 
     def cells(self, chosen: EchoPlan) -> CellPolynomials | None:
-        """Return the cell kernels that the plan needs; None where the target is too deep for them."""
+        """Return the cell kernels of a plan; None if the target extends over too many cells."""
         radar = self.sample.radar
         return cell_polynomials(radar.subcarriers, round_up(self.size_m * radar.cells, 6), chosen.fit)
 
     def compute(self, symbols: np.ndarray, chosen: EchoPlan, final: bool, found: Found) -> None:
-        """Compute `symbols` into `found` by the plan chosen; `final`: leads that are not proved are accepted."""
+        """Compute `symbols` into `found` by the plan `chosen`; `final`: accept unproved strongest cells."""
         refs, extents = self.refs, self.extents
         if len(symbols) < len(refs):
             refs, extents = refs[symbols], extents[symbols]
         gains, cells = array_gains(self.sample.radar), self.cells(chosen)
-        assert cells is not None  # no plan is chosen for a target that is too deep
+        assert cells is not None  # `compute` checked the plan's cell kernels before
         segments = np.empty((len(symbols), 6))
         count = cut_segments(extents, gains.horizontal.rates[0], gains.vertical.rates[0], LONGEST, segments)
         approximation = Approximation(chosen, gains, cells, folding())

@@ -1,1 +1,1 @@
-"""Files and their errors: whole or not there, one sentence for what is wrong in them. No stage is known here."""
+"""File access for all stages: atomic writing, strict readers, and error messages of one sentence."""

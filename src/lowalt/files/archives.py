@@ -1,7 +1,7 @@
-"""Archives of arrays (.npz) whose bytes depend on the arrays alone.
+"""Archives of arrays (.npz) whose bytes depend only on the arrays.
 
-Python's zipfile writes another version number and another length into a member's header since 3.11.4, so `np.savez`
-gives other bytes with another Python. Here every byte is written by hand: members are stored as they are, dated 1980.
+Since Python 3.11.4 zipfile writes another version number and length into a member's header, so the bytes of `np.savez`
+depend on the Python version. This module writes every byte itself; members are uncompressed and dated 1980.
 Source: PKWARE, "APPNOTE: .ZIP File Format Specification" 6.3.10, sections 4.3 and 4.5.3.
 """
 
@@ -17,10 +17,10 @@ from lowalt.files.errors import InputError
 
 _LARGEST = 2**31 - 1
 _VERSION = 45
-"""Version of the format that a reader must know, 4.5: the one with the long sizes of section 4.5.3."""
+"""Version of the format that a reader needs, 4.5, for the 64-bit sizes of section 4.5.3."""
 _UNIX = 3
 _DATE = 1 << 5 | 1
-"""1 January 1980, the first day that the format has."""
+"""1 January 1980, the earliest date of the format."""
 _MODE = 0o600 << 16
 
 
@@ -34,7 +34,7 @@ def _member(array: np.ndarray) -> bytes:
 def write_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
     """Write arrays by name as an uncompressed .npz, as `np.savez` of Python 3.11.4 and later does.
 
-    Raises: InputError naming the file where it would pass 2 GiB.
+    Raises: InputError naming the file where it would exceed 2 GiB.
     """
     with Path(path).open("wb") as file:
         listed = []

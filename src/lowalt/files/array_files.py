@@ -20,7 +20,7 @@ UNREADABLE = (
 """Errors that numpy and zipfile raise on a file that is damaged or no array file."""
 
 FREE_BYTES = 64 << 20
-"""Up to this size a member of an archive may expand as it likes."""
+"""Members of an archive up to this size (bytes) may have any compression ratio."""
 MOST_EXPANSION = 16
 """Larger members may be this many times their compressed size; the project's own files are not compressed."""
 
@@ -43,9 +43,8 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
 def checked_archive(path: str | Path, what: str) -> Path:
     """Return the path of a .npz whose members are arrays of plausible sizes, and whose texts are texts.
 
-    Raises: InputError naming the file where it is missing, no archive, or has a member that would fill the memory, that
-    is no array, which numpy would return as bytes, or whose characters there are none, which Python's functions meet
-    with errors of their own.
+    Raises: InputError naming the file where it is missing, is no archive, or has a member that would fill the memory,
+    is not an array (NumPy would return bytes), or holds invalid characters (which would fail later).
     """
     path = existing(path, what)
     try:
@@ -65,7 +64,7 @@ def checked_archive(path: str | Path, what: str) -> Path:
 
 
 def _expands(member: zipfile.ZipInfo) -> bool:
-    """Whether a member of an archive states a size that would fill the memory."""
+    """Whether the stated size of an archive's member would fill the memory."""
     return member.file_size > max(FREE_BYTES, MOST_EXPANSION * member.compress_size)
 
 

@@ -1,4 +1,4 @@
-"""Files at the edges of the stages: no file stays half-written; checksums; plain file names."""
+"""Atomic writing of files, checksums, and plain file names."""
 
 import contextlib
 import csv
@@ -16,15 +16,15 @@ from lowalt.files.processes import lives
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 NEARLY_FULL_BYTES = 1 << 20
-"""An error without a number, as numpy and torch raise them, means a full disk where less than this is free."""
+"""NumPy and torch raise write errors without a number; with less than this free (bytes) they mean a full disk."""
 
 
 @contextlib.contextmanager
 def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
-    """Yield a temporary path next to `path` that takes its place only if the block ends without an error.
+    """Yield a temporary path next to `path` that replaces it only if the block ends without an error.
 
-    size: bytes that the file has at least, where they are known before it is written.
-    Raises: SpaceError naming the file, what it needs and what is free where the disk is too small or becomes full.
+    size: minimum size of the file (bytes), if known before it is written.
+    Raises: SpaceError naming the file, the size and the free space where the disk is too small or becomes full.
     """
     path = Path(path)
     # Keep the suffix: many writers choose the format by it.
@@ -53,7 +53,7 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
 
 
 def _sweep(path: Path) -> None:
-    """Remove the temporary files that killed processes left of `path`: a full disk needs the room."""
+    """Remove temporary files of `path` left by killed processes, to free disk space."""
     begin, end = f".{path.stem}.", f".part{path.suffix}"
     for entry in os.scandir(path.parent):
         number = entry.name.removeprefix(begin).removesuffix(end)
@@ -91,7 +91,7 @@ def sha256(path: str | Path) -> str:
 def existing(path: str | Path, what: str) -> Path:
     """Return `path` as a Path.
 
-    Raises: InputError naming `what` and the path where there is no such file, or where no file can have this name.
+    Raises: InputError naming `what` and the path where there is no such file, or the name is not valid.
     """
     path = Path(path)
     try:

@@ -1,20 +1,21 @@
-"""Tables as CSV files: the only place that writes one, and the reader of tables whose cells stay text.
+"""Reads and writes tables as CSV files; all tables are written here. Cells are read as text.
 
 Lines end with a single newline on every system, and equal rows give equal bytes.
 """
 
 import csv
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from lowalt.files.atomic import replacing, text_file
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, shown
 
 
 def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[str, str]]:
     """Return a CSV file's rows as dicts of text; what: the file in words, for errors.
 
-    Raises: InputError naming the file and the columns it lacks, or the line that has not a cell for every column.
+    Raises: InputError naming the file and the columns it lacks, or the line whose number of cells differs.
     """
     with text_file(path, what) as file:
         reader = csv.reader(file)
@@ -30,10 +31,21 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
         return rows
 
 
+def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
+    """Return a cell of a table of texts as a finite number. Raises: InputError naming the file, column and cell."""
+    try:
+        value = float(row[column])
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{path}: {column} is {shown(row[column])}, expected a number")
+    return value
+
+
 def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:
     """Write a header of `columns` and the rows: sequences of cells, or dicts, whose missing keys become empty cells.
 
-    Cells are written as `str` gives them, None as an empty cell. The file is there only once it is whole.
+    Cells are written by `str`, None as an empty cell. The file appears only when it is complete.
     Raises: InputError naming the file and the keys of a dict that are no columns.
     """
     with replacing(path) as temporary, temporary.open("w", newline="") as file:

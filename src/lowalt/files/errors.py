@@ -7,14 +7,41 @@ from pathlib import Path
 
 
 def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = "") -> str:
-    """Return what was expected instead of unknown names: the known ones like them, else `otherwise` or all."""
+    """Return what was expected instead of unknown names: similar known names, else `otherwise` or all."""
     known = list(known)
     near = dict.fromkeys(other for name in unknown for other in difflib.get_close_matches(str(name), known, 1))
     return f"perhaps {list(near)}" if near else otherwise or f"only {known}"
 
 
+LONGEST = 400
+"""Largest number of characters in an error message, whatever a file contains."""
+
+
+def shortened(text: str, longest: int = LONGEST) -> str:
+    """Return a text of at most `longest` characters, with its middle cut out: the start tells where a fault is, the
+    end what was expected."""
+    start = 2 * longest // 3
+    return text if len(text) <= longest else f"{text[:start]} ... {text[start + 5 - longest :]}"
+
+
+def shown(value: object) -> str:
+    """Return a value of a file as text of at most 200 characters."""
+    try:
+        return shortened(repr(value), LONGEST // 2)
+    except (RecursionError, ValueError):
+        # Values are nested too deeply, or a number has more than 4300 digits.
+        return f"a {type(value).__name__} too large to show"
+
+
 class InputError(ValueError):
-    """Bad input from outside; the message names the file, key or value and what was expected instead."""
+    """Bad input from outside; the message names the file, key or value and what was expected instead.
+
+    It has at most LONGEST characters.
+    """
+
+    def __init__(self, message: str) -> None:
+        """Take the message; its middle is cut out if it is too long."""
+        super().__init__(shortened(message))
 
 
 class BelowFloor(InputError):
@@ -22,14 +49,14 @@ class BelowFloor(InputError):
 
 
 class SpaceError(InputError):
-    """A disk or memory is too small; the message names the file or run, what it needs, and what is free."""
+    """A disk or memory is too small; the message names the file or run, the required and the free space."""
 
 
 @contextmanager
 def reading(path: str | Path, kind: str) -> Iterator[None]:
-    """Name the file in whatever its reader raises; libraries meet damaged files with exceptions of many types.
+    """Turn any exception of a reader into an InputError that names the file, since libraries raise many types.
 
-    Raises: InputError, the reader's own one, or that the file is not a readable `kind`.
+    Raises: InputError, the reader's own, or that the file is not a readable `kind`.
     """
     try:
         yield
@@ -45,4 +72,4 @@ def in_one_line(error: Exception) -> str:
 
 
 class InputWarning(UserWarning):
-    """The user's input is used as it is, although something in it looks wrong; the message says what and where."""
+    """Warning: the user's input looks wrong but is used unchanged; the message says what and where."""

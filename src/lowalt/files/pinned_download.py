@@ -16,7 +16,7 @@ TIMEOUT_S = 60
 def download(address: str, target: Path, pinned: str, checksum: Callable[[Path], str] = sha256) -> None:
     """Write the file at `address` to `target` if `checksum` of it is `pinned`.
 
-    Raises: InputError naming the address where the download fails or the content is another; nothing is kept then.
+    Raises: InputError naming the address where the download fails or the content differs; then nothing is kept.
     """
     with replacing(target) as temporary:
         try:

@@ -1,11 +1,11 @@
-"""Which processes of this machine live, as Linux tells in /proc."""
+"""State of processes on this machine, from /proc."""
 
 import os
 from pathlib import Path
 
 
 def lives(pid: int) -> bool:
-    """Return whether this machine runs a process of that id; one that has ended does not, though its id may be kept."""
+    """Return whether a process of that id is running on this machine; a zombie process is not."""
     try:
         os.kill(pid, 0)
     except (ProcessLookupError, OverflowError):
@@ -16,9 +16,9 @@ def lives(pid: int) -> bool:
 
 
 def started(pid: int) -> int | None:
-    """Return when a process started, in clock ticks after boot, or None where no such process lives."""
+    """Return when a process started, in clock ticks after boot, or None if it is not running."""
     fields = _fields(pid)
-    # A zombie has ended; only its parent has not asked for its status yet.
+    # A zombie process has ended; its parent has not read its exit status yet.
     return None if fields is None or fields[0] in "ZX" else int(fields[19])
 
 
@@ -29,7 +29,7 @@ def state(pid: int) -> str | None:
 
 
 def _fields(pid: int) -> list[str] | None:
-    """Fields of /proc/PID/stat from the third (the state) on; the second may itself hold spaces and brackets."""
+    """Fields of /proc/PID/stat from the third (the state) on; the second may contain spaces and brackets."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:

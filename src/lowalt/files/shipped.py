@@ -1,13 +1,13 @@
-"""The place of the files that come with the package: Snakefile, rules, schema, configurations, profiles.
+"""Locates the files that come with the package: Snakefile, rules, schema, configurations, profiles.
 
-In a checkout they stand at its root. An installation from a wheel has them inside the package.
+In a checkout they are at its root; a wheel installs them inside the package.
 """
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lowalt.files.street import PACKAGE
+from lowalt.files.package_plan import PACKAGE
 
 SHIPPED = PACKAGE / "shipped" if (PACKAGE / "shipped/Snakefile").is_file() else PACKAGE.parents[1]
 """The folder that holds `Snakefile`, `config/`, `workflow/` and `profiles/`."""
@@ -27,7 +27,7 @@ def shipped(name: str | Path) -> Path:
 
 
 def located(config: dict, folder: Path = SHIPPED) -> dict:
-    """Return the configuration with each file that only `folder` has named by its path there.
+    """Return the configuration with absolute paths for files that exist only in `folder`.
 
     A run in another folder, or another workflow that uses this one as a module, finds config/targets.csv that way.
     """
@@ -40,10 +40,10 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
 
 
 def as_named(config: dict, folder: Path = SHIPPED) -> dict:
-    """Return the configuration with each file of `folder` named relative to it: what `located` undoes.
+    """Return the configuration with files of `folder` named relative to it: the inverse of `located`.
 
-    Files that a run keeps or shares are then the same wherever the package is installed. A file whose relative name
-    means another one in the working directory keeps its path.
+    Files that a run stores or shares then do not depend on the place of installation. A path stays absolute if its
+    relative name would mean another file in the working directory.
     """
 
     def named(name: str) -> str:

@@ -1,4 +1,4 @@
-"""YAML files read strictly: a mapping in which every key stands once. Configuration and records share it."""
+"""Strict reader of YAML files (configuration, records): a mapping without duplicate keys."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from lowalt.files.errors import InputError, in_one_line
 
 
 class _UniqueKeys:
-    """Safe YAML in which a key given twice is an error, not a silent overwrite; `name` is the file's in messages."""
+    """Safe YAML loader in which a duplicate key is an error; `name` is the file's name in messages."""
 
     name: str
 
@@ -29,19 +29,19 @@ class _UniqueKeys:
 
 
 class _Loader(_UniqueKeys, yaml.SafeLoader):
-    """The library's own parser, in Python: it ends in an error where values stand in each other too deeply."""
+    """PyYAML's parser in Python, which raises an error for values that are nested too deeply."""
 
 
 class _FastLoader(_UniqueKeys, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """libyaml's parser, seven times as fast. It calls itself for each level: a million of them end the process."""
+    """libyaml's parser, seven times as fast. It is recursive, so a million nesting levels would crash the process."""
 
 
 DEEPEST = 10_000
-"""Signs that can begin a level of nesting; a text with more of them is read by the parser in Python."""
+"""Limit on characters that can open a nesting level; a text with more of them is read by the Python parser."""
 
 
 MOST_NODES = 1_000_000
-"""Values that a file may hold, counted as often as anchors repeat them: ten lines can stand for billions."""
+"""Limit on the values of a file after the expansion of anchors: ten lines can expand to billions."""
 
 TEMPLATE = "__use_yte__"
 """The key with which a configuration asks Snakemake's reader to run the Python expressions in it."""
@@ -52,7 +52,7 @@ def _check_size(root: yaml.Node | None, path: str | Path) -> None:
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node | None) -> int:
-        """Number of values in a node, counted as often as anchors repeat them; it stops beyond MOST_NODES."""
+        """Number of values in a node after the expansion of anchors; counting stops beyond MOST_NODES."""
         if not isinstance(node, yaml.CollectionNode):
             return 1
         if id(node) not in sizes:
@@ -80,7 +80,7 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         value = None if root is None else loader.construct_document(root)
     except InputError:
         raise
-    # The library also raises errors of its converters, as for a date of month 99 or a number of 5000 digits.
+    # PyYAML also raises errors of its converters, such as for month 99 of a date or a number of 5000 digits.
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(f"{path}: not YAML ({in_one_line(error)})") from error
     except RecursionError:

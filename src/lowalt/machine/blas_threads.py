@@ -1,7 +1,7 @@
-"""One thread for BLAS while something is computed whose last bits must not depend on the number of threads.
+"""Limits BLAS to one thread for computations whose last bits must not depend on the number of threads.
 
-A BLAS with more threads cuts products of matrices and sums into other pieces, and their last bits change. It is also
-slower for products as small as ours wherever other processes use the cores.
+With another number of threads, BLAS splits matrix products and sums differently, which changes the last bits. For the
+small products here, more threads are also slower while other processes use the cores.
 """
 
 import contextlib
@@ -12,7 +12,7 @@ from typing import Any
 
 @cache
 def _controller() -> Any:
-    """What sets the threads of the BLAS libraries that are loaded; looking for them takes milliseconds."""
+    """Controller of the loaded BLAS libraries; cached, because finding them takes milliseconds."""
     import numpy  # noqa: F401, so that its BLAS is loaded
     from threadpoolctl import ThreadpoolController
 
@@ -21,10 +21,10 @@ def _controller() -> Any:
 
 @contextlib.contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Compute the block with one thread of NumPy's BLAS; blocks may stand in each other.
+    """Run the block with one BLAS thread; blocks may be nested.
 
-    Blocks of several threads of one program may end with the others' number, so last bits may differ there.
-    Source: threadpoolctl, which knows how each library is told.
+    The limit is per process, so it does not hold if several Python threads use such blocks at the same time.
+    Source: threadpoolctl.
     """
     with _controller().limit(limits=1, user_api="blas"):
         yield

@@ -1,4 +1,4 @@
-"""The machine in words, for every measured figure: processor, cores, memory, and an accelerator where there is one."""
+"""A description of the machine for measured figures: processor, cores, memory and GPU."""
 
 import os
 import platform
@@ -19,7 +19,7 @@ def processor() -> str:
 
 
 def _accelerator() -> str:
-    """First NVIDIA GPU's name by its driver's own tool, without importing a framework; none where it is hidden."""
+    """Name of the first visible NVIDIA GPU from nvidia-smi, without importing a framework; "no GPU" without one."""
     tool = shutil.which("nvidia-smi")
     if not tool or os.environ.get("CUDA_VISIBLE_DEVICES") in ("", "-1"):
         return "no GPU"

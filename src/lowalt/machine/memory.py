@@ -1,4 +1,4 @@
-"""Memory of a process: blocks that arrays have freed stay with it, so that the next arrays fetch no pages.
+"""Memory of a process: what a block of code may take, and blocks that arrays have freed, which stay with the process.
 
 By default the C library hands each large freed block back to the system, which then gives zeroed pages one by one: for
 a fifth of the time of a sample with many effects. With other C libraries than glibc nothing changes.
@@ -6,6 +6,29 @@ a fifth of the time of a sample with many effects. With other C libraries than g
 
 import contextlib
 import ctypes
+import resource
+from collections.abc import Iterator
+from pathlib import Path
+
+
+@contextlib.contextmanager
+def at_most(size: int) -> Iterator[None]:
+    """Let a block of code take at most `size` more bytes of address space; an allocation beyond that fails.
+
+    Systems without /proc set no limit. Source: setrlimit(2), RLIMIT_AS; proc(5), statm.
+    """
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    limit = int(statm.read_text().split()[0]) * resource.getpagesize() + size
+    limits = [limit, *(known for known in (soft, hard) if known != resource.RLIM_INFINITY)]
+    resource.setrlimit(resource.RLIMIT_AS, (min(limits), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def keep_freed_memory() -> None:

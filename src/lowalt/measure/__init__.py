@@ -1,1 +1,1 @@
-"""Measuring: the time that accuracy and larger scales cost. Nothing here makes data or draws."""
+"""Measurements of computing time against accuracy and scale. Nothing here makes data."""

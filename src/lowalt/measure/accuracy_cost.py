@@ -1,9 +1,9 @@
-"""Recognition accuracy over its time: trained schemes with their measured times, and networks that were only timed.
+"""Recognition accuracy against computing time: trained schemes, and networks that were only timed.
 
     python -m lowalt.measure.accuracy_cost --settings JSON --predictions a.csv ... --speeds a.json ...
         --data-jobs a.jsonl ... --index index.json --presets presets.csv --out accuracy_cost.csv
 
-Settings: seed. accuracy_cost.csv, one row a scheme, accuracies averaged over the SNRs and the training seeds:
+Settings: seed. accuracy_cost.csv, one row per scheme, accuracies averaged over the SNRs and the training seeds:
     kind                 trained: accuracy and times measured; timed: times of a network that was not trained, without
                          accuracy, its core_s_training extrapolated from the time of one step
     preset, command      name of a preset and the command that runs it
@@ -16,9 +16,9 @@ Settings: seed. accuracy_cost.csv, one row a scheme, accuracies averaged over th
     train_ms             of one sample of a training step on one core, images in memory
     core_s_data          processor time of making the samples trained on: all spectra at the stations that are seen
     core_s_training      processor time of the whole training, validation included
-    network_bytes        bytes of images a sample that the network takes in
+    network_bytes        bytes of images per sample that the network takes in
     seeds, spread_points training seeds, and the standard deviation of unseen accuracy between them
-    front                the rows that no other beats in unseen accuracy at equal or less time of data and training
+    front                Pareto front: no other row is more accurate on unseen subtypes in equal or less time
 """
 
 import json
@@ -90,8 +90,8 @@ def sample_seconds(paths: list[str | Path], samples: int) -> float:
 def trained_row(runs: list[Evaluated], base: list[Evaluated], data_s: float, seed: int) -> dict:
     """Return the measured columns of a trained scheme, compared with `base` on the same samples.
 
-    runs, base: trainings of the scheme and of the first scheme, one a seed; data_s: processor seconds a sample.
-    Raises: as `compared.difference`.
+    runs, base: trainings of the scheme and of the first scheme, one per seed; data_s: processor seconds per sample.
+    Raises: as `evaluated.difference`.
     """
     about = runs[0].about
     unseen = list(accuracy_rows(runs, "test", seed))[-1]
@@ -112,7 +112,7 @@ def table_rows(
 ) -> list[dict]:
     """Return the rows of accuracy_cost.csv: the trained schemes in their order, then those only timed.
 
-    runs: trainings of each scheme by its name, one a seed, the first scheme's first; speeds: as `read_speeds` gives
+    runs: trainings of each scheme by its name, one per seed, the first scheme's first; speeds: as `read_speeds` gives
     them; presets: rows with the columns PRESETS. Raises: InputError for unequal numbers of trainings, and for a preset
     whose scheme was not trained.
     """

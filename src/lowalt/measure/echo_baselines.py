@@ -1,13 +1,13 @@
-"""Other methods for the same signal, for comparison: none of them is used to make data.
+"""Other methods for the same signal, only for comparison.
 
-Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and does the same work, geometry and gains
-included: the paper's closed form written down in NumPy, in either precision, and one non-uniform FFT a symbol.
+Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and computes everything, including geometry and
+gains: the paper's closed form in NumPy, in single or double precision, and a non-uniform FFT per symbol.
 """
 
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.echo.scene import Rigid
+from lowalt.echo.echo_input import Rigid
 
 
 def positions(motion: Rigid) -> np.ndarray:
@@ -66,7 +66,7 @@ def closed(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dty
 
 
 def finufft(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9) -> np.ndarray:
-    """Signal (N,): one non-uniform FFT (type 1, FINUFFT) a symbol from points to subcarriers, one plan for all."""
+    """Signal (N,): one non-uniform FFT (type 1, FINUFFT) per symbol, from points to subcarriers, one plan for all."""
     from finufft import Plan
 
     r, amplitude = amplitudes(network, station, motion, rcs_m2, aim_m)

@@ -1,9 +1,9 @@
-"""Error of the echo over its time: every method and tolerance at several numbers of points.
+"""Error of the echo against computing time: every method and tolerance at several numbers of points.
 
     python -m lowalt.measure.echo_cost --settings JSON --clouds a.npz ... --out cost.csv
 
-Settings: network, motion and cost blocks of the configuration, its seed, and the published rows of the targets. A row
-of the table, one a method, tolerance and number of points:
+Settings: network, motion and cost blocks of the configuration, its seed, and the published rows of the targets. The
+table has one row per method, tolerance and number of points:
     seconds         of one signal at one station on one core: median of the repeats, mean over the clouds
     relative_error  largest error over the judged symbols and clouds, relative to the largest value of the signal
 The truth is `lowalt.measure.fifty_digits`, at two random symbols and the deepest fade.
@@ -19,7 +19,7 @@ import numpy as np
 from lowalt.config.command import parser, pick, run
 from lowalt.config.network import Network
 from lowalt.echo.api import echo_signal
-from lowalt.echo.scene import Rigid
+from lowalt.echo.echo_input import Rigid
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import BelowFloor
 from lowalt.machine.hardware import processor
@@ -96,7 +96,7 @@ def measured(network: Network, sample: tuple, seed: int, block: dict) -> dict[tu
             call()
         except BelowFloor:
             continue
-        # A call takes about a millisecond: with only five calls, one interrupt would be a quarter of the time.
+        # A call takes about a millisecond, so with only five calls one interrupt would be a quarter of the time.
         calls[ENGINE, tolerance or "exact"] = call, repeats, 8
     timed = in_turn(list(calls.values()))
     return {

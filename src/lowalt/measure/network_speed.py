@@ -1,11 +1,11 @@
-"""Time of a scheme's network on this machine: of inference and of a training step, both a sample.
+"""Time per sample of a scheme's network on this machine, for inference and for a training step.
 
     python -m lowalt.measure.network_speed --settings JSON --scheme NAME --stations A B C
         --out speed.json
 
 Settings: seed, size, colour_map, network, training, augmentation.
-The weights are untrained, since time does not depend on them. The images are in memory, so reading is not timed.
-The least of several passes counts, because other work on the machine only ever adds time. On one thread the time is
+The weights are untrained, because time does not depend on them. The images are in memory, so reading is not timed.
+The minimum of several passes is used, because other work on the machine can only add time. On one thread the time is
 processor time.
 """
 
@@ -43,20 +43,20 @@ def _clock(machine: Machine, threads: int) -> Callable[[], float]:
 
 
 def _inputs(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
-    """Random images of a scheme's views; size: pixels a side."""
+    """Random images of a scheme's views; size: pixels per side."""
     generator = torch.Generator().manual_seed(0)
     shape = (samples, len(scheme.columns), size, size)
     return torch.randint(0, 256, shape, dtype=torch.uint8, generator=generator)
 
 
 def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
-    """Return the times of a scheme's network on one machine, in ms a sample, and its size.
+    """Return the times of a scheme's network on one machine, in ms per sample, and its size.
 
     settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training; limit_s: seconds
-    spent on one figure. A batch that one call cannot do within the limit is left out (None); the training step takes
-    the largest power of two of samples, up to the setting's batch, that it can do in a quarter of the limit, and one at
-    least; by the time of a sample in the largest batch timed, since a GPU takes one sample no faster than several.
-    Where the settings compile, the training step is that of the compiled network, as in a training.
+    spent on one figure. A batch that takes longer than the limit is omitted (None). The batch of the training step is
+    the largest power of two, from 1 up to the setting's batch, that takes at most a quarter of the limit, estimated
+    from the largest timed batch, because a GPU processes one sample no faster than several. If the settings compile,
+    the training step uses the compiled network, as in a training.
     Raises: InputError for a wrong setting.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
@@ -93,7 +93,7 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
         steps.zero_grad(set_to_none=True)
 
     if block["compile"] or machine.gpu:
-        # The first call compiles, or chooses and loads the GPU's kernels, once a training, so it is not timed.
+        # Do not time the first call, which compiles or loads GPU kernels, once per training.
         step()
     return {
         "scheme": scheme.name, "size": settings["size"], "parameters": recogniser.parameters(model), **times,

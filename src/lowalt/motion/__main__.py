@@ -15,7 +15,7 @@ from lowalt.targets.cloud import read
 def main(arguments: list[str]) -> None:
     """Draw rows `--first` .. `--first + --count - 1` of every cloud's subtype, row-major, and write the table.
 
-    Where the settings' block `motion` has `looks`, each motion model has so many rows, one a look.
+    If the settings' block `motion` has `looks`, each motion model has that many rows, one per look.
     """
     options = parser("lowalt.motion", __doc__)
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files, in the order of the rows")

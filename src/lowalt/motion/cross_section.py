@@ -1,7 +1,7 @@
 """The mean radar cross section of a moving target, whose points add with their phases.
 
-Points closer than a quarter of a wave add as amplitudes, and a smooth skin sends little back where it does not face the
-station, so the mean lies up to 5 dB beside the sum of the points' cross sections.
+The amplitudes of points closer than a quarter of a wavelength add coherently, and a smooth surface that does not face
+the station reflects little. The mean therefore differs from the sum of the points' cross sections by up to 5 dB.
 """
 
 import numpy as np
@@ -24,9 +24,9 @@ _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 6
 def mean_cross_section(cloud: Cloud, wavelength_m: float) -> float:
     """Return the mean over aspects and motion of |sum of sqrt(rcs) exp(-j 4 pi r / wavelength)|^2, in m2.
 
-    Plane waves of one frequency: losses of beams and range cells are no part of it. Aspects are those of
+    For plane waves of one frequency, without the losses of beams and range cells. Aspects are those of
     config/default.yaml: every yaw, `TILT_DEG`, `SEEN_FROM_DEG`; motion is every phase of rotors, wheels and wings, and
-    every moment of a recording. They follow a fixed even sequence, which gives the mean to about 0.2 dB.
+    every moment of a recording. They follow a low-discrepancy sequence, which gives the mean to about 0.2 dB.
     Source: Knott et al., Radar Cross Section, 1993, 3.3; multiples of roots of primes: Niederreiter 1992, ch. 3.
     """
     turning = [*cloud.parts_of("rotor"), *cloud.parts_of("wheel")]

@@ -1,7 +1,7 @@
 """Drawing motion models from the published ranges, and from our defaults where the paper gives none.
 
-One stream a motion model (seed, "motion", subtype, model); draws happen in a fixed order, so a model is the
-same whatever else the configuration names.
+Each motion model has its own stream (seed, "motion", subtype, model) and a fixed order of draws, so it does not depend
+on the rest of the configuration.
 """
 
 import math
@@ -20,7 +20,7 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
 
     Raises: InputError where the polygon is degenerate.
     """
-    # The Snakefile imports this module, and needs a hull only where the configuration gives a region.
+    # Imported late: the Snakefile imports this module and rarely needs a hull.
     from scipy.spatial import ConvexHull, QhullError
 
     corners = np.array(masts_m if polygon_m is None else polygon_m, dtype=float)
@@ -41,7 +41,7 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
 
 
 def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Return cross products (K,) of each edge and the way to a point; all > 0 inside a counter-clockwise polygon."""
+    """Return cross products (K,) of each edge and the vector to a point; all > 0 inside a counter-clockwise polygon."""
     step, to_point = np.roll(corners, -1, axis=0) - corners, point - corners
     return step[:, 0] * to_point[:, 1] - step[:, 1] * to_point[:, 0]
 
@@ -55,7 +55,7 @@ def masts_in_reach(masts_m: list[list[float]], polygon_m: list | None, mast_clea
     if polygon_m is None:
         return masts_m
     corners = region_polygon(np.zeros((0, 2)), polygon_m)
-    # Two clearances, so that no rounding here decides about a draw.
+    # Use twice the clearance, so that rounding cannot change a draw.
     return [mast for mast in masts_m if _distance_m(np.array(mast, dtype=float), corners) < 2 * mast_clearance_m]
 
 
@@ -89,7 +89,7 @@ def heights(settings: dict, subtype: str, category: str, like: str) -> list[floa
 
 
 def follow_speed(cloud: Cloud, row: dict, speed: float, cadence: str) -> None:
-    """Set what a row's speed over ground (m/s) decides: the rate of wheels, and how fast a recording plays.
+    """Set the values that depend on the ground speed (m/s): the rate of wheels and the playback rate of a recording.
 
     cadence: "free", or "tied" to the speed.
     """
@@ -174,5 +174,5 @@ def draw(
         low_m, high_m = sizes[cloud.category]
         _resize(rng, cloud, low_m, high_m, row)
     elif sizes:
-        row[SCALE] = 1.0  # every row of a table has the column
+        row[SCALE] = 1.0  # all rows of a table need the column
     return {"subtype": cloud.subtype, "category": cloud.category, **row}

@@ -1,6 +1,6 @@
-"""Poses: where each rigid part of a target stands at each symbol, in closed form from the initial pose.
+"""Poses: position and orientation of each rigid part at each symbol, in closed form from the initial pose.
 
-Angles are beta_0 + 2 pi F t, never a product of many small rotations, so nothing drifts however long the look. All
+Angles are beta_0 + 2 pi F t instead of products of many small rotations, so errors do not accumulate. All
 poses have the same bits on every processor: sines and products are those of `pose_kernels` and `portable`.
 """
 
@@ -86,7 +86,7 @@ def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.
 def _perturbed(
     cloud: Cloud, angles: dict[str, np.ndarray], phases: dict[int, tuple[str, float]], added: dict[int, np.ndarray]
 ) -> None:
-    """Give each part of `added` an angle of its own: the angle it had plus added[part] (N,) rad.
+    """Give each part in `added` its own angle: its previous angle plus added[part] (N,) rad.
 
     Raises: InputError naming the parts that do not move.
     """
@@ -102,10 +102,10 @@ def _perturbed(
 def _series(
     cloud: Cloud, row: dict, times_s: np.ndarray, added: dict[int, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Functions of time (N, K) and matrices (K, P, 4, 4) whose sum over K of products is every part's motion.
+    """Return functions of time (N, K) and matrices (K, P, 4, 4); the sum of their products over K is the parts' motion.
 
     A turn by angle a about a hinge is A + cos(a) B + sin(a) C; the motion of a part on a moving part is a product of
-    such sums. The cost is a few cosines a symbol and one matrix product, however many parts there are. The body's own
+    such sums. The cost is a few cosines per symbol and one matrix product, for any number of parts. The body's own
     motion is not included.
     """
     angles, phases = _angles(cloud, row, times_s)
@@ -151,7 +151,7 @@ def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
 
 
 def _curved(row: dict, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far a track's path has left its tangent (N, 3) m, and the turn of its yaw, pitch and roll (N, 3) rad."""
+    """Deviation of a track's path from its tangent (N, 3) m, and change of yaw, pitch and roll (N, 3) rad."""
     bent, bending = (np.array([row[name] for name in PATH[start : start + 3]]) for start in (0, 3))
     turned_rad = np.zeros((len(times_s), 3))
     turned_rad[:, 0] = row["turn_radps"] * times_s

@@ -1,4 +1,4 @@
-"""Rotations: the angle that a rate reaches at a time, and the matrices of turns about axes.
+"""Rotation angles from a rate and a time, and rotation matrices.
 
 All of them have the same bits on every processor: sines and products are those of `pose_kernels` and `portable`.
 """
@@ -17,7 +17,7 @@ def compiled():
 
 
 def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
-    """Return rate_hz * times_s less the nearest whole number of turns, in [-1/2, 1/2]; shape of `times_s`.
+    """Return rate_hz * times_s minus the nearest integer number of turns, in [-1/2, 1/2]; shape of `times_s`.
 
     The product is a double-double, so the fraction keeps full precision after 10^6 turns.
     """

@@ -1,4 +1,4 @@
-"""The motion table: one row a motion model, a CSV file a person can read and a computer reads back exactly."""
+"""The motion table: one row per motion model, a CSV file that is readable and is read back exactly."""
 
 import csv
 import math
@@ -21,16 +21,16 @@ NUMBERS = (
 COLUMNS = (*TEXTS, "model", *NUMBERS)
 TRACK = ("track", "look")
 PATH = ("ax_mps2", "ay_mps2", "az_mps2", "jx_mps3", "jy_mps3", "jz_mps3", "turn_radps")
-"""Further columns of tables whose targets are looked at again and again: numbers of the track in its subtype and of the
-look in its track; acceleration at the first symbol, its rate of change, and the rate at which the heading turns."""
+"""Further columns of tables with tracks: number of the track in its subtype and of the look in its track; acceleration
+at the first symbol, its rate of change (jerk), and heading rate."""
 SCALE = "scale"
-"""A further column of tables whose targets have drawn sizes: how many times as large as its cloud a target is."""
+"""A further column of tables with random sizes: size of the target relative to its cloud."""
 
 
 def write_table(path: str | Path, rows: list[dict]) -> None:
-    """Write rows (a dict a motion model, NaN where a column does not apply) as CSV; equal rows, equal bytes.
+    """Write rows (one dict per motion model, NaN where a column does not apply) as CSV; equal rows give equal bytes.
 
-    Rows of targets with drawn sizes all have the key SCALE, those of tracks the keys TRACK and PATH.
+    Rows of targets with random sizes have the key SCALE, those of tracks the keys TRACK and PATH.
     """
     further = _further(rows[0] if rows else ())
     write_csv(path, (*COLUMNS, *further), (_cells(row, (*NUMBERS, *further)) for row in rows))

@@ -1,4 +1,4 @@
-"""Command line of the noise stage: clean echoes of a chunk, a file a station -> noisy signals at all SNRs."""
+"""Command line of the noise stage: clean echoes of a chunk, a file per station -> noisy signals at all SNRs."""
 
 import functools
 import sys
@@ -10,13 +10,13 @@ from lowalt.files.array_files import array_of
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 
 
 def load_echoes(paths: list[str], stations: list[str], models: int, snrs: int | None = None) -> list[np.ndarray]:
-    """Return the clean echoes of a chunk as memory maps, one (models, symbols) a station.
+    """Return the clean echoes of a chunk as memory maps, one (models, symbols) per station.
 
-    snrs: echoes may also be (models, snrs, symbols), which hold the noise of so many SNRs.
+    snrs: number of SNRs; echoes may also be (models, snrs, symbols), which already contain the noise.
 
     Raises: InputError naming the file that is missing, or that does not fit stations, models or the other files.
     """
@@ -47,8 +47,8 @@ def main(arguments: list[str]) -> None:
     """Add noise to one chunk's echoes and write one array file."""
     options = parser("lowalt.noise", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
-    options.add_argument("--echoes", nargs="+", required=True, help="clean echoes, one file a station")
-    options.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station")
+    options.add_argument("--echoes", nargs="+", required=True, help="clean echoes, one file per station")
+    options.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), one file per station")
     options.add_argument("--out", required=True, help="noisy signals to write (.npy)")
     given = options.parse_args(arguments)
     canceller, behind = given.settings.pop("canceller", None), None

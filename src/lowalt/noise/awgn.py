@@ -1,13 +1,15 @@
-"""Complex white Gaussian noise at a set SNR; the reference is the signal's own mean power."""
+"""Complex white Gaussian noise at a set SNR: for one signal, whose mean power is the reference, and for a chunk."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.numerics.normals import circular
-from lowalt.numerics.power import rms
+from lowalt.numerics.portable import rms
+from lowalt.numerics.streams import stream
 
 
 def add_noise(
@@ -20,7 +22,7 @@ def add_noise(
     returned unchanged. A signal of zeros has no power to refer to and stays zeros.
     Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, a negative power, or no generator
     where noise is to be drawn.
-    Source: paper, section V-A; unit-power circular noise has variance 1/2 a component.
+    Source: paper, section V-A; unit-power circular noise has variance 1/2 per component.
 
         >>> signal = np.exp(1j * np.arange(10_000))
         >>> noise = add_noise(signal, 13.0, np.random.default_rng(0)) - signal
@@ -49,3 +51,43 @@ def add_noise(
         part + more.reshape(signal.shape) for part, more in ((signal.real, real), (signal.imag, imaginary))
     )
     return result
+
+
+def noisy_signals(
+    echoes: np.ndarray,
+    rows: list[dict],
+    stations: list[str],
+    snrs: list[float],
+    seed: int,
+    powers: np.ndarray | None = None,
+    behind: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> np.ndarray:
+    """Return noisy signals (models, snrs, stations, N) complex64 of clean `echoes` (stations, models, N).
+
+    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by default; behind: filters
+    noise (N,) as the scene's canceller does, if there is one. Echoes (stations, models, snrs, N) already contain their
+    noise. Each (subtype, model, station, SNR) has its own noise stream.
+    """
+    if np.ndim(echoes) == 4:
+        return np.ascontiguousarray(np.moveaxis(echoes, 0, 2), np.complex64)
+    result = np.empty((len(rows), len(snrs), len(stations), echoes.shape[-1]), np.complex64)
+    for model, row in enumerate(rows):
+        for level, snr_db in enumerate(snrs):
+            for place, name in enumerate(stations):
+                rng = None if np.isposinf(snr_db) else stream(seed, "noise", row["subtype"], row["model"], name, snr_db)
+                power = None if powers is None else float(powers[place, model])
+                result[model, level, place] = _noisy(echoes[place, model], snr_db, rng, power, behind)
+    return result
+
+
+def _noisy(
+    echo: np.ndarray,
+    snr_db: float,
+    rng: np.random.Generator | None,
+    power: float | None,
+    behind: Callable[[np.ndarray], np.ndarray] | None,
+) -> np.ndarray:
+    """Return an echo (N,) with noise at one SNR."""
+    if behind is None or rng is None:
+        return add_noise(echo, snr_db, rng, power)
+    return echo + behind(add_noise(np.zeros(len(echo)), snr_db, rng, power))

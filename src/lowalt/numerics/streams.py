@@ -1,6 +1,6 @@
 """Random streams: one independent generator for each named purpose; no stream is named by its number in a list.
 
-A stream is keyed by its purpose (root seed, name, subtype, model, ...), so adding a subtype, an
+A stream is keyed by its purpose (random seed, name, subtype, model, ...), so adding a subtype, an
 SNR or an effect moves no other stream, and no result depends on shards, jobs or workers.
 """
 

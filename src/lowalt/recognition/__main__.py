@@ -48,15 +48,15 @@ def _freeze(arguments: list[str]) -> None:
 
 
 def _add_source(line: ArgumentParser) -> None:
-    """Add the options that name samples, and the files that these rest on."""
+    """Add the options that name the source of samples and the frozen files behind them."""
     line.add_argument("--views", nargs="+", help="caches of views (.npz)")
     line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
-    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds, whose samples are made")
+    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds; samples are simulated")
     line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
 
 
 def _source(options: Namespace):
-    """Return the source of samples that a command line names, after a check of what is frozen."""
+    """Return the source of samples that a command line names, after checking the frozen files."""
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.sample_sources import Source
 
@@ -66,7 +66,7 @@ def _source(options: Namespace):
         raise InputError("expected one of --views, --index and --dataset")
     if options.dataset is None:
         return Source(options.views, options.index)
-    from lowalt.recognition.made import DatasetSamples, opened
+    from lowalt.recognition.dataset_samples import DatasetSamples, opened
 
     return Source(made=partial(DatasetSamples, opened(options.dataset)))
 
@@ -112,7 +112,7 @@ def _tables(arguments: list[str]) -> None:
     """Write accuracy.csv and its companions from prediction files. Settings: seed."""
     from lowalt.recognition import tables
     from lowalt.recognition.evaluated import Evaluated
-    from lowalt.recognition.orderings import read_published
+    from lowalt.recognition.paper_claims import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
     line.add_argument("--predictions", nargs="+", required=True, help="predictions (.csv), records next to them")
@@ -133,7 +133,7 @@ def _transfer(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition transfer", _transfer.__doc__)
     line.add_argument("--own", nargs="+", required=True, help="prediction files of this run's models (.csv)")
-    line.add_argument("--other", nargs="+", required=True, help="of other runs' models, evaluated with --trained-on")
+    line.add_argument("--other", nargs="+", required=True, help="those of other runs' models (evaluate --trained-on)")
     line.add_argument("--configs", nargs="+", required=True, help="configuration of this run, then of the others")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="table to write (.csv)")
@@ -147,7 +147,7 @@ def _transfer(arguments: list[str]) -> None:
 
 
 def _distances(arguments: list[str]) -> None:
-    """Write how far the subtypes of a category lie from each other. Settings: none ({})."""
+    """Write the distances between the subtypes of each category. Settings: none ({})."""
     from lowalt.motion import read_table
     from lowalt.recognition import distances
     from lowalt.targets.cloud import read as read_cloud
@@ -163,7 +163,7 @@ def _distances(arguments: list[str]) -> None:
 
 
 def _score(arguments: list[str]) -> None:
-    """Score anyone's predictions on a protocol's test part, against the shards' own labels. Settings: none ({})."""
+    """Score a prediction file on a protocol's test part, with the labels of the shards. Settings: none ({})."""
     from lowalt.recognition.score import score
 
     line = parser("lowalt.recognition score", _score.__doc__)

@@ -1,4 +1,4 @@
-"""Light augmentation of index images: one draw a sample, the same for all its views.
+"""Light augmentation of index images: one draw per sample, the same for all its views.
 
 Every change keeps the class: a mirrored Doppler axis is the target turned by 180 degrees, a cyclic shift along it
 another speed, a shift in time another start. No left-right flip: that would be time reversed.

@@ -1,7 +1,7 @@
-"""Checkpoints: written atomically; one that is damaged or of another run is refused with an error that names it.
+"""Checkpoints: written atomically. A damaged checkpoint, or one of another run, is refused with an error.
 
 A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity holds everything that
-determines the weights (settings, scheme, protocol, samples); a file of another identity is never resumed.
+determines the weights (settings, scheme, protocol, samples). A training resumes only from a file of its own identity.
 """
 
 import hashlib
@@ -12,7 +12,8 @@ import torch
 
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, replacing
-from lowalt.files.errors import InputError, in_one_line
+from lowalt.files.errors import InputError, in_one_line, shown
+from lowalt.files.json_objects import json_object
 
 
 def _digest(state: object) -> str:
@@ -22,7 +23,7 @@ def _digest(state: object) -> str:
     def walk(value: object) -> None:
         """Feed a value, and all values inside it, to the hasher."""
         if isinstance(value, torch.Tensor):
-            # A tensor may state a size that its bytes do not hold, by repeating them.
+            # A tensor with stride 0 can claim more elements than its storage has; refuse it.
             if value.numel() * value.element_size() > value.untyped_storage().nbytes():
                 raise ValueError(f"a tensor of shape {tuple(value.shape)} in fewer bytes")
             raw = value.detach().cpu().contiguous()
@@ -55,12 +56,11 @@ def save(path: str | Path, name: str, state: dict) -> None:
 
 
 def _facts(identity: str) -> dict:
-    """The facts that an identity states in JSON, none where it is another text."""
+    """The parts of an identity (JSON text); empty where it is not JSON."""
     try:
-        facts = json.loads(identity)
-    except ValueError:
+        return json_object(identity, "checkpoint", "an identity")
+    except InputError:
         return {}
-    return facts if isinstance(facts, dict) else {}
 
 
 def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
@@ -76,7 +76,7 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
         stored, digest, state = content["identity"], content["digest"], content["state"]
         computed, named = _digest(state), isinstance(stored, str)
     except Exception as error:
-        # torch's reader meets damaged bytes with nearly any exception.
+        # For damaged bytes torch's reader raises almost any exception.
         raise InputError(f"{path}: not a checkpoint ({in_one_line(error)})") from error
     if not named:
         raise InputError(f"{path}: not a checkpoint (its identity is {type(stored).__name__}, expected text)")
@@ -95,9 +95,31 @@ def model(path: str | Path) -> tuple[dict, dict]:
     Raises: InputError as `load`, or naming the setting that is wrong.
     """
     stored, state = load(path)
-    if not isinstance(state, dict) or not isinstance(json.loads(stored), dict):
+    if not isinstance(state, dict):
         raise InputError(f"{path}: not a trained model, expected a model.pt")
-    check_brought("model", {name: value for name, value in state.items() if name != "weights"}, path)
-    if "weights" not in state:
+    facts, settings = json_object(stored, path, "a trained model"), {**state}
+    if settings.pop("weights", None) is None:
         raise InputError(f"{path}: not a trained model, it has no weights")
-    return json.loads(stored), state
+    check_model(facts, settings, path)
+    return facts, state
+
+
+def check_model(facts: dict, settings: dict, path: str | Path) -> None:
+    """Refuse a model file whose settings are wrong, or contradict the identity under which it was trained.
+
+    facts: its identity; settings: of its network; path: the file. Raises: InputError naming the setting that is wrong.
+    """
+    check_brought("model", settings, path)
+    trained = facts.get("settings")
+    trained = trained if isinstance(trained, dict) else {}
+    named = {"network": trained, "size": trained, "colour_map": trained, "classes": trained, "protocol": facts}
+    if isinstance(facts.get("scheme"), dict):
+        named["scheme"] = facts
+    for key, block in named.items():
+        said, meant = block.get(key), json.loads(json.dumps(settings.get(key)))
+        if None in (said, meant) or said == meant:
+            continue
+        if isinstance(said, dict) and isinstance(meant, dict):
+            inner = next(name for name in {**meant, **said} if meant.get(name) != said.get(name))
+            key, said, meant = f"{key}.{inner}", said.get(inner), meant.get(inner)
+        raise InputError(f"{path}: {key} is {shown(meant)}, expected {shown(said)}, with which it was trained")

@@ -7,7 +7,7 @@ as the ratio of size. The energy distance is a metric, is zero for equal distrib
 no grid, and changes little by one stray point, unlike the Hausdorff distance (Szekely and Rizzo, J. Stat. Plan.
 Inference 143, 2013).
 
-distances.csv, one row a subtype:
+distances.csv, one row per subtype:
     category, subtype, group
     nearest, distance, size_ratio                the nearest other subtype of the category
     nearest_trained, trained_distance, trained_size_ratio    the same among the subtypes of the group seen, on which the

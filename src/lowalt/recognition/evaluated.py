@@ -1,7 +1,4 @@
-"""Trained and evaluated schemes, read back from prediction files and the records next to them; and their differences.
-
-Which differences a table shows is the table's business.
-"""
+"""Evaluated schemes, read from prediction files and the records next to them, and differences between schemes."""
 
 from pathlib import Path
 
@@ -16,7 +13,7 @@ from lowalt.recognition.protocols import folds
 
 
 class Evaluated:
-    """One trained and evaluated scheme: its predictions and what is known of the run."""
+    """One evaluated scheme: its predictions and the record of the run."""
 
     def __init__(self, path: str | Path) -> None:
         """path: the prediction file; the JSON file next to it holds protocol, scheme, seed and hardware.
@@ -45,8 +42,8 @@ def difference(
 ) -> Interval:
     """Return the mean over seeds of first - second, with its 95 % interval; all in shares of correct samples.
 
-    first, second: trainings of the two schemes, one a seed; snr_db: the SNR whose samples count, None for all. The
-    interval resamples seeds, in the unseen protocol subtypes, and motion models. A scheme differs from itself by 0.
+    first, second: trainings of the two schemes, one per seed; snr_db: the SNR whose samples count, None for all. The
+    interval resamples seeds, subtypes (unseen protocol) and motion models. The difference of a scheme to itself is 0.
     Raises: InputError where the trainings were tested on different samples. Source: `intervals.strict_difference`.
     """
     test = first[0].test
@@ -62,7 +59,7 @@ def difference(
 
 
 def whole_subtypes(runs: list[Evaluated]) -> bool:
-    """Return whether results of these trainings are to hold for other subtypes, so that whole subtypes are drawn."""
+    """Return whether intervals resample whole subtypes, because the results should generalise to other subtypes."""
     return runs[0].protocol == "unseen"
 
 

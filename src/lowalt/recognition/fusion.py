@@ -70,7 +70,7 @@ class AttentionFusion(Fusion):
         return self.inter(self.stations(tokens)).amax(dim=1)
 
     def stations(self, tokens: torch.Tensor) -> torch.Tensor:
-        """Tokens (B, K, V, features) -> one token a station (B, K, features)."""
+        """Tokens (B, K, V, features) -> one token per station (B, K, features)."""
         station = self.intra((tokens + self.modality).flatten(0, 1)).mean(dim=1)
         return station.unflatten(0, tokens.shape[:2])
 

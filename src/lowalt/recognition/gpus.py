@@ -1,6 +1,6 @@
 """A GPU of one's own: jobs of one process that run on a machine at the same time never share a GPU.
 
-A job locks one file a GPU, and the system frees the lock of a job that ends. Processes that torchrun starts take the
+A job locks one file per GPU, and the system frees the lock of a job that ends. Processes that torchrun starts take the
 visible GPUs in order and lock none: on one machine let one such training run at a time, by `recognition.gpu: true` and
 `--resources gpu=N` with N its processes.
 """

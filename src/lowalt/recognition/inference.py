@@ -1,4 +1,4 @@
-"""Class probabilities from a network, on one machine or over ranks: every rank count gives the same bits."""
+"""Class probabilities of a network, on one machine or several ranks; any number of ranks gives the same bits."""
 
 import contextlib
 import hashlib
@@ -12,7 +12,7 @@ from torch import distributed, nn
 from lowalt.config.command import pick
 from lowalt.files.errors import InputError
 from lowalt.recognition import gpus
-from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.samples import Samples
 
@@ -27,7 +27,7 @@ def arithmetic(precision: str, device: str) -> str:
     if device == "cuda":
         return "bf16" if torch.cuda.is_bf16_supported(including_emulation=False) else "fp32"
     known = torch.cpu.get_capabilities()
-    # Arm processors name their units otherwise.
+    # Arm processors use other names for these units.
     return "bf16" if any(known.get(unit) for unit in ("amx_bf16", "avx512_bf16", "bf16")) else "fp32"
 
 
@@ -42,8 +42,9 @@ class Machine:
 
     @classmethod
     def here(cls, precision: str) -> "Machine":
-        """Return this process's machine: a GPU where there is one, and no other job's; gloo (CPU) or nccl (GPU) under
-        torchrun, whose ranks take the visible GPUs in order.
+        """Return this process's machine: a free GPU if there is any, else the CPU.
+
+        Under torchrun, ranks take the visible GPUs in order and communicate by nccl (GPU) or gloo (CPU).
 
         precision: "auto", "bf16" or "fp32". Raises: InputError where a rank finds no GPU left.
         """
@@ -86,7 +87,7 @@ class Machine:
         return model if self.ranks == 1 else nn.parallel.DistributedDataParallel(model)
 
     def agree(self, identity: str, steps: int) -> None:
-        """Refuse ranks that train unlike things, or from unlike steps, without a sign of it in any result.
+        """Refuse ranks whose settings, samples or steps differ, since the result would not show it.
 
         identity: all that determines the weights; steps: those done before. Raises: InputError on every rank.
         """
@@ -98,8 +99,8 @@ class Machine:
         if int(bounds.sum()):
             raise InputError(
                 f"training: rank {self.rank} computes in {self.precision} and stands at step {steps}, another rank "
-                "differs in that or in its samples; expected nodes of one kind that see the same files (a set "
-                "training.precision, not auto, makes unlike nodes compute alike)"
+                "differs in that or in its samples; expected identical nodes that see the same files (with an "
+                "explicit training.precision instead of auto, different nodes compute alike)"
             )
 
 
@@ -119,7 +120,7 @@ def probabilities(
     machine: Machine,
     batch: int,
     mirror: bool = False,
-    ahead: ReadAhead | None = None,
+    ahead: Prefetch | None = None,
 ) -> np.ndarray:
     """Return class probabilities (len(numbers), classes) float64 of the samples `numbers`.
 
@@ -130,7 +131,7 @@ def probabilities(
     model.eval()
     result = torch.zeros(len(numbers), model.classes, dtype=torch.float64)
     mine = list(range(0, len(numbers), batch))[machine.rank :: machine.ranks]
-    ahead = ahead or ReadAhead(Unchanged(samples), 0, pin=False)
+    ahead = ahead or Prefetch(Unchanged(samples), 0, pin=False)
     read = ahead([numbers[start : start + batch] for start in mine])
     for start, inputs in zip(mine, read, strict=True):
         images = inputs.to(machine.device, non_blocking=True)
@@ -139,7 +140,7 @@ def probabilities(
             logits = [model(image) for image in seen]
         result[start : start + batch] = torch.stack([value.double().softmax(1) for value in logits]).mean(0).cpu()
     if machine.ranks > 1:
-        # Every entry is non-zero on one rank only: the sum is exact.
+        # Each entry is non-zero on one rank only, so the sum is exact.
         result = result.to(machine.device)
         distributed.all_reduce(result)
         result = result.cpu()

@@ -37,8 +37,8 @@ def bootstrap(
 
 
 def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the first sample (models,) and the number of samples (models,) of each motion model, and its share of
-    correct samples by seed (seeds, models), so that a motion model brings one value.
+    """Return for each motion model its first sample (models,), its number of samples (models,) and its share of correct
+    samples by seed (seeds, models).
 
     motion (samples,): name of the motion model; correct: (samples,) of every training seed.
     """
@@ -50,8 +50,8 @@ def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndar
 def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> np.ndarray:
     """Return how often each seed is drawn, (repeats, seeds), as a share of the draws.
 
-    Deviations from 1 / seeds are multiplied by `_stretch`; two schemes of as many seeds each have 2 (seeds - 1) degrees
-    of freedom.
+    Deviations from 1 / seeds are multiplied by `_stretch`. Two schemes with `seeds` seeds each have 2 (seeds - 1)
+    degrees of freedom.
     """
     if seeds == 1:
         return np.ones((repeats, 1))
@@ -60,23 +60,23 @@ def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> n
 
 
 def _stretch(count: int, freedom: int) -> float:
-    """Return the factor by which resampling `count` values gives too narrow an interval of their mean.
+    """Return the factor by which an interval of a mean from resampling `count` values is too narrow.
 
     Resampling n values gives (n - 1) / n of the variance of their mean. A spread that is estimated with `freedom`
     degrees of freedom needs Student's quantile instead of the normal one. Source: Davison and Hinkley, Bootstrap
     Methods and their Application, 1997, section 2; Hesterberg, What Teachers Should Know about the Bootstrap, 2015.
     """
-    # The Snakefile imports this module, and SciPy takes time to import: scipy.stats, with the same values, a second.
+    # Imported late and not from scipy.stats (same values, one second), because the Snakefile imports this module.
     from scipy.special import ndtri, stdtrit
 
     return float(np.sqrt(count / (count - 1)) * stdtrit(freedom, 0.975) / ndtri(0.975))
 
 
 def _subtype_weights(subtypes: np.ndarray, repeats: int, generator: np.random.Generator) -> np.ndarray:
-    """How much each motion model counts, (repeats, models), where whole subtypes are drawn with all their models.
+    """Weight of each motion model, (repeats, models), when whole subtypes are drawn with all their models.
 
-    Models are not drawn again within a drawn subtype: the spread between subtypes already holds theirs. Deviations are
-    stretched for few subtypes, so a weight may be slightly negative. Source: Davison and Hinkley 1997, section 3.8.
+    Models are not resampled within a drawn subtype, because the spread between subtypes includes theirs. Deviations
+    are stretched for few subtypes, so a weight may be slightly negative. Source: Davison and Hinkley 1997, section 3.8.
     """
     names, place = np.unique(subtypes, return_inverse=True)
     if len(names) == 1:
@@ -97,7 +97,7 @@ def model_weights(subtypes: np.ndarray, whole: bool, repeats: int, generator: np
     weights = np.zeros((repeats, len(subtypes)))
     for number in range(len(names)):
         members = np.flatnonzero(place == number)
-        # A subtype that is drawn twice brings its motion models twice, each time drawn anew.
+        # For a subtype drawn twice, its motion models are drawn twice, independently.
         weights[:, members] = generator.multinomial(
             drawn[:, number] * len(members), np.full(len(members), 1 / len(members))
         )
@@ -110,12 +110,12 @@ def strict_difference(
 ) -> Interval:  # fmt: skip
     """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes and models.
 
-    first, second (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of
-    the two are drawn independently, since two schemes draw different numbers from equal seeds. count (models,): samples
+    first, second (seeds, models): share of correct samples of each motion model, a row per training seed; the seeds of
+    both are drawn independently, because equal seeds give two schemes different numbers. count (models,): samples
     of each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of
-    motion models, for results that are to hold for other subtypes. With one seed the interval holds for these trained
-    networks alone.
-    How often such intervals hold the truth is simulated in `benchmarks/interval_coverage.py`. Source: as `_stretch`.
+    motion models, for results that should generalise to other subtypes. With one seed the interval is valid only for
+    these trained networks.
+    The coverage of these intervals is simulated in `benchmarks/interval_coverage.py`. Source: as `_stretch`.
     """
     if whole_subtypes:
         weights = _subtype_weights(subtypes, repeats, generator) * count

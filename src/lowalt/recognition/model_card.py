@@ -88,7 +88,7 @@ def _rounded(measured: dict) -> str:
     """The section on 8-bit weights."""
     return f"""## Weights in 8 bits
 
-Matrices are whole numbers of 8 bits with one scale a row; everything else is float32. Both sets of weights answered
+Matrices are whole numbers of 8 bits with one scale per row; everything else is float32. Both sets of weights answered
 all {measured["samples"]} samples of the validation fold, in float32:
 
 {

@@ -22,8 +22,9 @@ from safetensors.torch import save
 
 from lowalt.config.classes import stated
 from lowalt.config.schema import check_brought
-from lowalt.files.atomic import existing, replacing, text_of
+from lowalt.files.atomic import existing, replacing
 from lowalt.files.errors import InputError, in_one_line
+from lowalt.files.json_objects import json_object, read_object
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
 from lowalt.recognition.eight_bits import restored
@@ -68,7 +69,7 @@ def of_run(path: str | Path) -> ModelFile:
     config = load_yaml(folder / "config.yaml") if folder and (folder / "config.yaml").is_file() else {}
     return ModelFile(
         tensors, identity, {**state, "classes": list(stated(state))},
-        json.loads(text_of(record, "run record")) if record.is_file() else {},
+        read_object(record, "a run record") if record.is_file() else {},
         {name: config[name] for name in INPUT} if config else {},
     )  # fmt: skip
 
@@ -103,9 +104,11 @@ def read(path: str | Path) -> ModelFile:
     existing(path, "model")
     try:
         with safe_open(path, framework="pt") as file:
-            about = json.loads((file.metadata() or {})["lowalt"])
+            about = json_object((file.metadata() or {})["lowalt"], path, "a model file")
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         digest, computed = about.pop("digest"), _digest(tensors, about)
+    except InputError:
+        raise
     except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{path}: not a model file of lowalt ({type(error).__name__}: {in_one_line(error)})"
@@ -113,6 +116,7 @@ def read(path: str | Path) -> ModelFile:
     if computed != digest:
         raise InputError(f"{path}: model file is damaged, its content does not match its SHA-256")
     check_brought("about", about, path)
+    checkpoint.check_model(about["identity"], about["model"], path)
     return ModelFile(tensors, **about)
 
 

@@ -2,9 +2,9 @@
 
     python -m lowalt.recognition.nodes NODES COUNT MODULE [ARGUMENT ...]
 
-runs MODULE in NODES times COUNT processes: srun starts one task a node, and torchrun in each task COUNT processes. They
-find each other through a store that this process keeps, at a port that is free.
-Ranks compute the same whichever node they are on, so nodes of one kind train to the bytes of one machine.
+runs MODULE in NODES x COUNT processes: srun starts one task per node, and torchrun starts COUNT processes in each task.
+The processes find each other through a store, which this process keeps open at a free port.
+A rank computes the same on every node. Training on nodes of one kind therefore gives the same bytes as on one machine.
 """
 
 import os
@@ -18,17 +18,19 @@ from lowalt.config.command import exit_status
 from lowalt.files.errors import InputError
 
 NAMED = ["sh", "-c", 'export PET_LOCAL_ADDR="$(hostname)"; exec "$@"', "sh"]
-"""Before a task's command: torchrun's own idea of its node's name is "localhost" where /etc/hosts lists that first."""
+"""Prefix of a task's command that tells torchrun the node's name.
+
+Without it torchrun calls its node "localhost" where /etc/hosts lists that name first."""
 
 
 def command(nodes: int, count: int, endpoint: str, job: str, module: list[str]) -> list[str]:
     """Return the command that runs a module, with its arguments, in `count` processes on each of `nodes` nodes.
 
-    endpoint: HOST:PORT of the store; job: Slurm's number of the job. Each task gets the cores of this process's job,
-    which Snakemake writes into OMP_NUM_THREADS.
+    endpoint: HOST:PORT of the store; job: the Slurm job's number. Each task gets as many cores as this process's job,
+    a number that Snakemake writes into OMP_NUM_THREADS.
     """
     cores = os.environ.get("OMP_NUM_THREADS", "1")
-    # Another step of the job, such as the one this process may run in, keeps no core from these tasks.
+    # --overlap: share cores with the job step that this process may run in.
     step = ["srun", f"--nodes={nodes}", f"--ntasks={nodes}", "--ntasks-per-node=1", f"--cpus-per-task={cores}"]
     step += ["--overlap", "--kill-on-bad-exit=1", "--export=ALL", "--input=none"]
     torchrun = ["-m", "torch.distributed.run", f"--nnodes={nodes}", f"--nproc-per-node={count}", "--rdzv-backend=c10d"]
@@ -51,7 +53,7 @@ def main(arguments: list[str]) -> None:
             f"recognition.nodes: no Slurm job here ({lacking}), expected one: --workflow-profile profiles/slurm, "
             "or recognition.nodes: 1"
         )
-    # Only here, so that a refusal does not wait for torch.
+    # Imported late, so that a refusal does not wait for torch.
     from torch.distributed import TCPStore
 
     host = socket.gethostname()

@@ -1,42 +1,21 @@
 """A backbone of the user's own: a function of a Python file, which the configuration names as FILE.py:FUNCTION.
 
-The function takes the pixels a side of an image and returns a torch module, RGB images (B, 3, size, size) float32 to
+The function takes the pixels per side of an image and returns a torch module, RGB images (B, 3, size, size) float32 to
 features (B, features). The file runs with the rights of the user, so it is to be trusted like any program: its name
 comes from the user's configuration or command line. A model keeps the name, which is never followed.
 """
 
 import importlib.util
 import sys
-from pathlib import Path
 
 import torch
 from torch import nn
 
+from lowalt.config.named_code import file_of
 from lowalt.files.errors import InputError
 
 MIDDLE = {"mean": (0.5, 0.5, 0.5), "std": (0.5, 0.5, 0.5)}
 """How colours in 0..1 are shifted and scaled for a module that has no `pretrained_cfg` of its own."""
-
-
-def file_of(name: str) -> Path | None:
-    """Return the Python file of a backbone's name, None for a name of a library's model."""
-    path, colon, _ = name.rpartition(":")
-    return Path(path) if colon and path.endswith(".py") else None
-
-
-def allowed(name: str, trusted: str) -> str:
-    """Return the backbone of a model whose file names `name`; trusted: the FILE.py:FUNCTION that the user names, or "".
-
-    Raises: InputError where the file names code and the user does not.
-    """
-    if file_of(name) is None:
-        return name
-    if file_of(trusted) is None:
-        raise InputError(
-            f"its backbone {name!r} is code, which a file may not choose; "
-            "expected `--backbone FILE.py:FUNCTION` with code that you trust"
-        )
-    return trusted
 
 
 def backbone(name: str, size: int) -> nn.Module:

@@ -1,18 +1,17 @@
-"""The prediction file: class probabilities of every sample, in a format that other people's models can write too.
+"""The prediction file: class probabilities of every sample, in a format that any other program can write.
 
-A CSV table, one row a sample, in any order. The command `score` needs only `key` and the probabilities, and takes the
+A CSV table, one row per sample, in any order. The command `score` needs only `key` and the probabilities and takes the
 rest from the data set. Probabilities are not negative and sum to one within 1e-3.
 
     key            the sample's key in the shards
     subtype, group, fold, model, snr_db, label    as in the sample's record ("inf" for no noise)
     range_m        distance of the nearest station the model used, aspect_deg the aspect seen from it; may be empty
     p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities, by the names and in the order of the classes
-    part           of the protocol that the network was trained in: "test" rows are those whose accuracy counts; others
-                   are "validation" and, of the protocol unseen, "seen_test"; may be left out
+    part           of the training's protocol: "test" (its accuracy counts), "validation" or, in the unseen protocol,
+                   "seen_test"; optional
 """
 
 import csv
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.config.classes import CATEGORIES, word
-from lowalt.files.atomic import existing, text_file, text_of
+from lowalt.files.atomic import existing, text_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
 from lowalt.recognition.protocols import FOLDS
 from lowalt.recognition.samples import Facts
 
@@ -38,7 +38,7 @@ def probability_columns(classes: tuple[str, ...]) -> tuple[str, ...]:
 def shares_of(row: dict, columns: tuple[str, ...], where: str) -> list[float]:
     """Return the class probabilities of a row of a prediction file; columns: theirs.
 
-    Raises: InputError naming `where` for what is no number, negative, or does not sum to one.
+    Raises: InputError naming `where` for values that are not numbers, are negative, or do not sum to one.
     """
     try:
         values = [float(row[name]) for name in columns]
@@ -99,13 +99,7 @@ def record(path: str | Path) -> dict:
     Raises: InputError where it is missing or no JSON object.
     """
     side = existing(Path(path).with_suffix(".json"), "run record")
-    try:
-        content = json.loads(text_of(side, "run record"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{side}: not a run record ({error})") from error
-    if not isinstance(content, dict):
-        raise InputError(f"{side}: not a run record, expected a JSON object")
-    return content
+    return read_object(side, "a run record")
 
 
 def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarray) -> Predictions:
@@ -164,5 +158,5 @@ def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions
         raise InputError(f"{path}: no predictions")
     predictions = Predictions(*(np.array(column) for column in zip(*rows, strict=True)))
     if len(np.unique(predictions.key)) != len(predictions):
-        raise InputError(f"{path}: a key stands twice, expected one row a sample")
+        raise InputError(f"{path}: a key stands twice, expected one row per sample")
     return predictions

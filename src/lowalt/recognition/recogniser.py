@@ -9,15 +9,16 @@ from pathlib import Path
 from pickle import UnpicklingError
 
 import numpy as np
-import timm
 import torch
 from safetensors import SafetensorError
 from torch import nn
 
 from lowalt.config.command import pick
+from lowalt.config.named_code import file_of
 from lowalt.files.errors import InputError
 from lowalt.recognition import own_backbone
 from lowalt.recognition.fusion import Fused
+from lowalt.recognition.light_timm import timm
 from lowalt.recognition.schemes import SPECTRA, Scheme
 from lowalt.tiles import colour_map
 
@@ -31,7 +32,7 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
     weights: "none", "hub" or a local file. Models with a fixed input size are built for `size` where timm can.
     Raises: InputError for an unknown name, a missing file, or weights that do not fit.
     """
-    if own_backbone.file_of(name) is not None:
+    if file_of(name) is not None:
         if weights != "none":
             raise InputError(f"network: backbone {name!r} has no weights {weights!r}, expected 'none'")
         return own_backbone.backbone(name, size)
@@ -55,7 +56,7 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
 
 
 class Palettes(nn.Module):
-    """Turns index images into normalised RGB by one table a spectrum, so that colours are never stored.
+    """Turns index images into normalised RGB by one table per spectrum, so that colours are never stored.
 
     table (spectra, 256, 3) float32: (colour - mean) / deviation, colours in 0..1, both of the backbone's channels.
     """
@@ -114,7 +115,7 @@ class Recogniser(Fused):
 def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) -> nn.Module:
     """Return a network with fresh weights.
 
-    block: `recognition.network`; size: pixels a side; colours: name of the colour map; classes: their number.
+    block: `recognition.network`; size: pixels per side; colours: name of the colour map; classes: their number.
     Raises: InputError for a setting that does not fit.
     """
     return Recogniser(scheme, block, size, np.stack([colour_map(colours)] * len(SPECTRA)), classes)

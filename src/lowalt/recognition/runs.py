@@ -1,7 +1,7 @@
-"""From settings to files: build a network and train it, read it back, evaluate it.
+"""Build and train a network from settings, load a trained one, and evaluate it.
 
-`model.pt` carries everything a model needs to be used again: scheme, protocol, network settings, image size and
-palettes and the weights.
+`model.pt` holds everything needed to use the model: scheme, protocol, network settings, image size, palettes and
+weights.
 """
 
 import json
@@ -12,19 +12,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import timm
 import torch
 from torch import nn
 
 from lowalt.config.classes import stated
 from lowalt.config.command import pick
+from lowalt.config.named_code import allowed, file_of
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import replacing, sha256
 from lowalt.files.errors import InputError, in_one_line
+from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
-from lowalt.recognition import checkpoint, inference, metrics, own_backbone, predictions, recipe, recogniser
-from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition import checkpoint, inference, metrics, predictions, recipe, recogniser
+from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.light_timm import timm
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
@@ -32,19 +34,19 @@ from lowalt.recognition.training import Trainer, TrainingRun
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
 
 Build = Callable[[Scheme, dict, int, str, int], nn.Module]
-"""Makes a network of a scheme, the settings of networks, a size, a colour map and a number of classes."""
+"""Makes a network from: scheme, block `recognition.network`, image size, colour map, number of classes."""
 
 
 def train(
     samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False,
     build: Build = built,
 ) -> None:  # fmt: skip
-    """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
+    """Train a scheme, from its checkpoint if there is one; write `model.pt`, `history.csv`, `run.json` into `folder`.
 
     samples: the sources "train", of which the scheme's share is kept, and "validation"; settings: {seed, size,
     colour_map, network, training, augmentation, classes}, the classes by label; events: whether to write the metrics
     for TensorBoard too, into `events/` of the folder; build: makes the network.
-    Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
+    Raises: InputError for a wrong setting, a checkpoint of another run, or a loss that becomes NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block, classes = recipe.check(settings["training"]), settings["classes"]
@@ -90,7 +92,7 @@ def train(
 
 def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine) -> str:
     """Return the JSON text of all that determines a training's weights."""
-    code = own_backbone.file_of(scheme.backbone_of(settings["network"]))
+    code = file_of(scheme.backbone_of(settings["network"]))
     # Leave out settings that change no weight, and name the precision that this machine computes with.
     replaced = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     return checkpoint.identity(
@@ -109,7 +111,7 @@ def _record(path: Path, content: dict) -> None:
 
 @dataclass(frozen=True)
 class Trained:
-    """A trained model read back: the network with its weights, what it sees, and where it came from."""
+    """A loaded trained model: the network with its weights, the views it uses, and its origin."""
 
     model: nn.Module
     scheme: Scheme
@@ -142,7 +144,7 @@ def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = bu
     except InputError as error:
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from error
     except Exception as error:
-        # torch and timm meet settings that do not fit together with nearly any exception.
+        # For settings that do not fit together, torch and timm raise almost any exception.
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
     return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), classes)
 
@@ -150,7 +152,7 @@ def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = bu
 def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, trusted: str, build: Build) -> nn.Module:
     """The network of a file with its weights; trusted, build: as in `of_state`."""
     named_backbone = scheme.backbone_of(state["network"])
-    name = own_backbone.allowed(named_backbone, trusted)
+    name = allowed(named_backbone, trusted)
     block, bare = {**state["network"], "backbone": name, "weights": "none"}, replace(scheme, backbone="")
     views, size = len(scheme.columns), state["size"]
 
@@ -159,8 +161,8 @@ def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, truste
         return build(bare, block, size, state["colour_map"], classes)
 
     if name == named_backbone and build is built:
-        return filled(fresh, lambda: torch.zeros(2, views, size, size, dtype=torch.uint8), state["weights"], path)
-    # The user's own code may not know of the device without memory.
+        return filled(fresh, lambda: torch.zeros(1, views, size, size, dtype=torch.uint8), state["weights"], path)
+    # The user named this code, so it is trusted; its output cannot be checked here.
     model = fresh()
     refuse_unfit(state["weights"], model, path)
     model.load_state_dict(state["weights"])
@@ -171,7 +173,7 @@ def answers(trained: Trained, samples: Samples, settings: dict, machine: Machine
     """Return the class probabilities (n, classes) of all samples of a source; settings as in `evaluate`."""
     batch, threads, _, mirror, workers = inference.evaluation(settings)
     recipe.seeded(trained.seed, ("evaluate",), threads)
-    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.gpu)
+    ahead = Prefetch(Unchanged(samples), workers, pin=machine.gpu)
     every = np.arange(len(samples.facts))
     return probabilities(machine.placed(trained.model), samples, every, machine, batch, mirror, ahead)
 
@@ -194,7 +196,7 @@ def evaluate(
     table = predictions.from_facts(samples.facts, trained.scheme.stations, shares)
     predictions.write(out, table, trained.classes, trained.protocol)
     side = trained.path.with_name("run.json")
-    known = json.loads(side.read_text()) if side.exists() else {}
+    known = read_object(side, "a run record") if side.exists() else {}
     _record(Path(out).with_suffix(".json"), {
         **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
         "hardware": describe(), "evaluated_samples": len(shares), "evaluate_s": seconds,

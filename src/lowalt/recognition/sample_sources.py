@@ -1,4 +1,4 @@
-"""The one door to samples: caches of views, shards, or a data set that makes them."""
+"""The source of samples that training and evaluation use: caches of views, shards, or simulation on access."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,9 +14,10 @@ from lowalt.shards import ShardSet
 
 @dataclass(frozen=True)
 class Source:
-    """Where samples come from, one of three: caches of views, the index of shards, or a maker of samples.
+    """Exactly one of three sources: caches of views, the index of shards, or a function that simulates samples.
 
-    made: called as `samples`. The caller imports it, so that reading stored samples does not depend on the simulation.
+    made: the function, with the arguments of `samples`. The caller imports it, so that reading stored samples does not
+    import the simulation.
     """
 
     views: list[str | Path] | None = None
@@ -25,7 +26,7 @@ class Source:
 
     @classmethod
     def of_run(cls, index: Path, size: int) -> "Source":
-        """Return a run's caches of views of this size where every shard has one, else its shards (index)."""
+        """Return a run's caches of views of this size if every shard has one, else its shards (index)."""
         caches = sorted(index.parents[1].glob(f"views/{size}/*.npz"))
         shards = {Path(shard["name"]).stem for shard in ShardSet(index).index["shards"]}
         return cls(views=caches) if {path.stem for path in caches} == shards else cls(index=index)
@@ -33,7 +34,7 @@ class Source:
     def samples(self, columns: list[int], pairs: set[tuple[str, str]], size: int, placed: bool = False) -> Samples:
         """Return the samples of some (group, fold) pairs.
 
-        columns: views of a scheme (`Scheme.columns`); size: pixels a side; placed: whether facts carry ranges and
+        columns: views of a scheme (`Scheme.columns`); size: pixels per side; placed: whether facts carry ranges and
         aspects, which those of a cache always do.
         Raises: InputError for cached images of another size, or what the source refuses.
         """

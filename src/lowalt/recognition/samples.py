@@ -1,7 +1,7 @@
-"""Samples for the network: index images and what is known of each. A source of them is a `Samples`.
+"""Samples for the network: index images with their metadata. A `Samples` is a source of them.
 
-Sources: caches of views (`ViewSamples`, here), shards (`views.ShardSamples`), and a data set that makes samples when
-they are asked for (`made.DatasetSamples`). `sources.Source` chooses one. No torch here.
+There are three sources: caches of views (`ViewSamples`, here), shards (`views.ShardSamples`), and a data set that
+simulates samples on access (`dataset_samples.DatasetSamples`). `sample_sources.Source` chooses one. No torch here.
 
 A cache file (.npz) holds, for the samples of one shard in its order,
     views   (samples, stations spectra, size, size) uint8, station-major, index images averaged over areas
@@ -28,7 +28,7 @@ from lowalt.spectra.catalogue import LISTED
 
 @dataclass(frozen=True)
 class Facts:
-    """Known facts of each sample, one entry a sample; range_m and aspect_rad have a column a station."""
+    """Metadata of samples, one entry per sample; range_m and aspect_rad have a column per station."""
 
     key: np.ndarray
     subtype: np.ndarray
@@ -50,9 +50,9 @@ class Facts:
 
 FACTS = tuple(entry.name for entry in fields(Facts))
 OF_STATIONS = ("range_m", "aspect_rad")
-"""Facts with a column a station."""
+"""Facts with a column per station."""
 KINDS = dict(zip(FACTS, ("U", "U", "iu", "fiu", "U", "U", "iu", "f", "f"), strict=True))
-"""Kinds of numpy's types that the facts of a file may have."""
+"""Kinds of NumPy types that the facts in a file may have."""
 
 
 def joined(parts: list[Facts]) -> Facts:
@@ -61,10 +61,10 @@ def joined(parts: list[Facts]) -> Facts:
 
 
 def first_models(facts: Facts, share: float) -> np.ndarray:
-    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one a subtype.
+    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one per subtype.
 
-    Models are drawn independently of each other, so the first ones are a random sample; a smaller share lies inside a
-    larger one.
+    Models are drawn independently, so the first ones are a random sample. The models of a smaller share are a subset of
+    those of a larger one.
     """
     chosen = np.zeros(len(facts), dtype=bool)
     for subtype in np.unique(facts.subtype):
@@ -90,7 +90,7 @@ def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
 class Samples:
     """A source of samples: `facts` of each, `size` of its images, `views` of some, and `sha256` of all.
 
-    A training asks `changed`, an evaluation `inputs`; a source whose network takes more than images has its own.
+    A training calls `changed`, an evaluation `inputs`. A source whose network takes more than images overrides both.
     """
 
     facts: Facts
@@ -132,7 +132,7 @@ class ViewSamples(Samples):
         sizes = {array.shape[2:] for array in images}
         if len(sizes) > 1:
             raise InputError(f"views: image sizes {sorted(sizes)}, expected one size")
-        # Filled in place: a concatenation would hold every image twice for a while.
+        # Fill one array in place; np.concatenate would temporarily hold every image twice.
         self.images = np.empty((sum(map(len, images)), *images[0].shape[1:]), dtype=np.uint8)
         start = 0
         for number, array in enumerate(images):

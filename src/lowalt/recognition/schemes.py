@@ -1,18 +1,18 @@
 """A scheme: which stations and spectra the network sees, how they are fused, on which backbone.
 
-The paper's rows stand in `config/schemes.csv`, one line a scheme:
+`config/schemes.csv` contains the rows of the paper's tables, one line per scheme:
 
     scheme      published name, "ABC:VRP+TRP+VT"; also the key of accuracy.csv
     stations    names of stations of the run's network, joined by "+"; names of one letter may stand together, "ABC"
     spectra     spectra joined by "+"
     fusion      attention (the paper's proposal) | mean (its baseline)
     backbone    timm name, or empty for the configuration's own backbone
-    protocols   protocols of the paper's tables that hold this row, joined by "+"
+    protocols   protocols in whose tables the paper has this row, joined by "+"
 
-A table may have more columns, which a row leaves empty to take the configuration's own:
+A table may have these columns too; an empty cell means the configuration's value:
 
-    size, steps pixels a side the network sees; optimiser steps
-    share       share of the motion models of each subtype that train, 0..1 (empty: all)
+    size, steps pixels per side the network sees; optimiser steps
+    share       share of the motion models of each subtype used for training, 0..1 (empty: all)
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from lowalt.files.errors import InputError
 from lowalt.spectra.catalogue import NAMES
 
 TABLE = "config/schemes.csv"
-"""Where the table of schemes stands if a command names no other."""
+"""Default path of the table of schemes."""
 SPECTRA = tuple(name.upper() for name in NAMES)
 """Spectra as the table of schemes writes them, in the catalogue's order."""
 FUSIONS = ("attention", "mean")
@@ -70,9 +70,9 @@ class Scheme:
 
     @property
     def columns(self) -> list[int]:
-        """Numbers of the scheme's views, station-major, where every spectrum of the catalogue has a number.
+        """Numbers of the scheme's views, station-major, counting all spectra of the catalogue.
 
-        `columns_in` gives their places in a data set, which may have fewer spectra.
+        `columns_in` converts them to indices in a data set, which may have fewer spectra.
         """
         return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
 
@@ -83,7 +83,7 @@ def of_record(record: dict) -> Scheme:
 
 
 def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, where: str) -> list[int]:
-    """Return the places of views (`Scheme.columns`) among the images of a data set.
+    """Return the indices of views (`Scheme.columns`) among the images of a data set.
 
     spectra: names of the data set's spectra, in the order of its tiles; stations: how many stations it has.
     Raises: InputError naming `where` and the spectrum or the number of stations that is missing.

@@ -10,15 +10,14 @@ import numpy as np
 from lowalt.recognition.intervals import model_weights
 
 LOOKED_FOR = 0
-"""Label of the class whose detection and false alarms are counted: the first, of the default the UAVs."""
+"""Label of the target class, whose detections and false alarms are counted: the first class, by default UAV."""
 FEWEST_MISSED = 10
-"""Least number of validation samples of the class looked for that a threshold leaves undetected; the standard deviation
+"""A threshold must leave at least this many validation samples of the target class undetected. The standard deviation
 of that number is then a third of it."""
 
 
 class AlarmPart(NamedTuple):
-    """Data from which false alarms are counted, each (samples,): probability of the class looked for, label, motion
-    model, subtype."""
+    """Data for counting false alarms, each (samples,): target class's probability, label, motion model, subtype."""
 
     scores: np.ndarray
     labels: np.ndarray
@@ -62,7 +61,7 @@ def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -
 
 
 def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float:
-    """Largest threshold on the probability of the class looked for at which at least `detection` of it is detected.
+    """Largest threshold on the probability of the target class that still detects at least a share `detection` of it.
 
     scores (samples,), labels (samples,); a sample is detected where its score is at least the threshold. Set it on
     validation samples, never on the samples that it is then tested on.
@@ -74,7 +73,7 @@ def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float
 
 def measurable(labels: np.ndarray, detection: float) -> bool:
     """Whether a threshold for `detection` can be set on validation samples: at least `FEWEST_MISSED` samples of the
-    class looked for lie below it.
+    target class are below it.
 
     labels (samples,) of the validation samples. With fewer, a handful of samples would decide the threshold.
     """
@@ -95,8 +94,8 @@ def alarm_intervals(
     """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates of the other classes.
 
     validation, test: one part for each training seed, samples in the same order. Every repeat draws seeds, motion
-    models of both parts and, where `whole_subtypes`, subtypes of the test part; and sets its thresholds on the
-    validation samples drawn.
+    models of both parts and, with `whole_subtypes`, subtypes of the test part. It sets its thresholds on the drawn
+    validation samples.
     Source: `lowalt.recognition.intervals.strict_difference`.
     """
 

@@ -1,18 +1,19 @@
-"""From prediction files to the paper's tables and further ones, as CSV; no choice is made on test data.
+"""Tables (CSV) from prediction files: the paper's and further ones. Nothing is tuned on test data.
 
-Files written, each with the columns `protocol, scheme` first:
+The first columns of each file are `protocol, scheme`:
     accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, macro F1 in percent with its 95 % interval,
-                     samples, hardware; several seeds averaged, seeds says how many and spread_points their standard
-                     deviation (empty for one)
+                     samples, hardware; averages over several seeds; seeds is their number, spread_points
+                     their standard deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
-    seeds.csv        one row a training: accuracy_percent on average over the SNRs, its network, cost and hardware
+    seeds.csv        one row per training: accuracy_percent on average over the SNRs, its network, cost and hardware
     confusion.csv    category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
-    alarms.csv       detection of the first class asked for, its threshold (set on validation), detection and false
-                     alarms of the other classes on test with 95 % intervals; each model at its own threshold, means
-                     over the seeds; "not measurable" where fewer than ten validation samples would lie below it
+    alarms.csv       required detection of the first class, its threshold (set on validation), and on test the
+                     detection and the false alarms of the other classes with 95 % intervals. Each model has its own
+                     threshold; values are means over the seeds. "not measurable" where fewer than ten validation
+                     samples would be below the threshold
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
     comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the interval resamples:
                      training seeds (where there are several), subtypes (unseen protocol), motion models
@@ -31,7 +32,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition.evaluated import Evaluated, difference, whole_subtypes
 from lowalt.recognition.macro_f1 import f1_by_snr
-from lowalt.recognition.orderings import CLAIMS, ordering_rows
+from lowalt.recognition.paper_claims import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.statistics import (
     LOOKED_FOR,
@@ -51,7 +52,7 @@ TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train
             "samples_per_s", "precision", "ranks")  # fmt: skip
 """Columns that seeds.csv repeats from a training's record."""
 DETECTIONS = (0.9, 0.95, 0.99)
-"""Shares of detected samples of the first class for which a threshold is set."""
+"""Required detection rates of the first class, for each of which a threshold is set."""
 
 
 def percent(share: float) -> str:
@@ -67,8 +68,8 @@ def snr_text(snr_db: float) -> str:
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
     """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one scheme's runs.
 
-    Values are means over the runs, one a training seed; seed: of the bootstrap. Intervals of macro F1 resample whole
-    subtypes where they were not trained on.
+    Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of macro F1 resample whole
+    subtypes if these are held out from training.
     """
     parts = [run.part(part) for run in runs]
     protocol, name = runs[0].protocol, runs[0].scheme
@@ -118,7 +119,7 @@ def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
 
 
 def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float) -> Iterable[list]:
-    """Yield rows [from, to, accuracy_percent, samples] over bands of a value; samples without one are left out."""
+    """Yield rows [from, to, accuracy_percent, samples] for bands of a value; samples without the value are omitted."""
     test = runs[0].test
     numbers = values(test)
     known = ~np.isnan(numbers)
@@ -128,7 +129,7 @@ def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray]
 
 
 def _alarm_part(predictions: Predictions) -> AlarmPart:
-    """The data of predictions from which false alarms are counted."""
+    """The data of predictions for counting false alarms."""
     return AlarmPart(
         predictions.probabilities[:, LOOKED_FOR], predictions.label, predictions.motion, predictions.subtype
     )
@@ -137,8 +138,8 @@ def _alarm_part(predictions: Predictions) -> AlarmPart:
 def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
     """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false alarms of others.
 
-    In percent, with 95 % intervals; thresholds come from validation samples. A detection that too few validation
-    samples can set a threshold for is "not measurable".
+    In percent, with 95 % intervals; thresholds come from validation samples. "not measurable" where there are too few
+    validation samples to set a threshold.
     """
     classes = len(runs[0].classes)
     validations = [_alarm_part(run.part("validation")) for run in runs]
@@ -167,7 +168,7 @@ def calibration_rows(runs: list[Evaluated]) -> Iterable[list]:
 def comparison_rows(first: list[Evaluated], second: list[Evaluated], seed: int) -> Iterable[list]:
     """Yield one row [resampled, seeds, difference, low, high] of two schemes on the same samples.
 
-    Difference in percentage points, mean over the seeds; seeds: the fewer of the two schemes' trainings.
+    Difference in percentage points, mean over the seeds; seeds: the smaller number of trainings of the two schemes.
     Raises: InputError where the schemes were tested on different samples.
     """
     seeds = min(len(first), len(second))
@@ -183,7 +184,7 @@ def _write(path: Path, columns: list[str], rows: list[list]) -> None:
 
 
 def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
-    """The classes of all runs; refuses runs of several sets."""
+    """The classes that all runs share; refuses runs with different classes."""
     sets = sorted({run.classes for run in runs})
     if len(sets) != 1:
         raise InputError(f"predictions of the classes {' and '.join(map(str, sets))}, expected one set of classes")
@@ -191,9 +192,9 @@ def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
 
 
 def write(runs: list[Evaluated], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
-    """Write all tables into `folder`; schemes stand in `order`, protocols seen first.
+    """Write all tables into `folder`, sorted by protocol (seen first), then by scheme as in `order`.
 
-    published: as `orderings.read_published` gives it; seed: of the bootstrap.
+    published: as `paper_claims.read_published` gives it; seed: of the bootstrap.
     Raises: InputError for a scheme outside `order`, the same run twice, or runs with different classes.
     """
     groups: dict[tuple[str, str], list[Evaluated]] = {}

@@ -1,7 +1,7 @@
 """Training in plain torch: deterministic order, exact resume, early stopping on validation, an error at the first NaN.
 
-An exact resume needs the order of samples and every random state. A library of training loops would hide them, and the
-loop is one page without it. The settings are those of `lowalt.recognition.recipe`.
+An exact resume needs access to the order of samples and to every random state, which training libraries hide; without a
+library the loop is still one page. The settings are those of `lowalt.recognition.recipe`.
 """
 
 import math
@@ -13,20 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from timm.utils import ModelEmaV3
 from torch import nn
 
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import Reporter
 from lowalt.recognition import checkpoint, recogniser
-from lowalt.recognition.ahead import Augmented, ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks
+from lowalt.recognition.batches import Augmented, Prefetch, Unchanged, batches, epoch_order
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.light_timm import timm
 from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.objective import descent
-from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.recipe import averaging, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.statistics import cross_entropy
@@ -35,8 +34,8 @@ HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", 
 
 
 class TrainingRun(NamedTuple):
-    """A run's name and place. keys: names of its random streams; identity: what its checkpoints carry; folder: of its
-    files."""
+    """Identification of a run. keys: names of its random streams; identity: text stored in its checkpoints; folder:
+    where its files are written."""
 
     keys: tuple
     identity: str
@@ -45,7 +44,7 @@ class TrainingRun(NamedTuple):
 
 @dataclass
 class TrainingState:
-    """Where a run stands; everything in it goes into the checkpoint."""
+    """Progress of a run; all of it is stored in the checkpoint."""
 
     epoch: int = 0
     batch: int = 0
@@ -86,13 +85,13 @@ class Trainer:
         shared = as_products(shared) if plain else shared
         self.model = shared.to(machine.device, memory_format=layout)
         self.optimiser = optimiser(self.model, self.block)
-        self.average = ModelEmaV3(self.model)
+        self.average = timm.utils.ModelEmaV3(self.model)
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model).train()
-        # Readers keep their workers over all epochs and validations.
+        # Create the readers once: their workers then live through all epochs and validations.
         keys = (self.seed, *run.keys)
         augmented = Augmented(self.train, columns, settings["augmentation"], keys, machine.rank, machine.ranks)
         readers = (augmented, Unchanged(self.validation))
-        self.read, self.read_validation = (ReadAhead(read, self.block["workers"], pin=machine.gpu) for read in readers)
+        self.read, self.read_validation = (Prefetch(read, self.block["workers"], pin=machine.gpu) for read in readers)
         self.best_weights: dict = {}
         self.waited_s = 0.0
         self.metrics: Metrics | None = None
@@ -135,15 +134,15 @@ class Trainer:
 
     def _refuse_unfinite_weights(self) -> None:
         """Raise InputError naming the weights that are not finite."""
-        # A step of finite loss and gradient can overflow a weight; the next loss would show it only after a checkpoint.
+        # A weight can overflow although loss and gradient are finite; the next loss would reveal it after a checkpoint.
         for name, value in self.model.state_dict().items():
             if value.is_floating_point() and not bool(value.isfinite().all()):
                 raise InputError(f"training: weights {name} are not finite after step {self.at.steps}; {self._advice}")
 
     @property
     def _advice(self) -> str:
-        """What to do where numbers are not finite."""
-        return f"no checkpoint was written since. Try a lower training.rate than {self.block['rate']}"
+        """Advice for the error message when numbers are not finite."""
+        return f"the last checkpoint is from before. Try a lower training.rate than {self.block['rate']}"
 
     def _rate(self, step: int) -> float:
         """Learning rate of a step (1, 2, ...), before a group's factor."""
@@ -163,9 +162,9 @@ class Trainer:
             self.optimiser.step()
             self.at.skipped = 0
         else:
-            # A gradient can overflow where the loss does not. Such a step is left out; ten in a row end the training.
+            # A gradient can overflow although the loss is finite. Skip such a step; ten in a row end the training.
             self.at.skipped += 1
-            print(f"training: gradient is {float(norm)} at step {self.at.steps}, step left out", file=sys.stderr)
+            print(f"training: gradient is {float(norm)} at step {self.at.steps}, step skipped", file=sys.stderr)
             if self.at.skipped >= 10:
                 raise InputError(f"training: ten gradients in a row were not finite, last at step {self.at.steps}")
         self.optimiser.zero_grad()
@@ -196,13 +195,13 @@ class Trainer:
         self.at.done = bool(self.block["patience"]) and self.at.since_best >= self.block["patience"]
 
     def fit(self) -> TrainingState:
-        """Train to the last step or until validation stops improving; goes on from where the run stands."""
+        """Train until the last step or until validation stops improving, starting at the current state."""
         start, saved, first = time.monotonic(), time.monotonic(), self.at.steps
         report = Reporter(steps := self.block["steps"], "steps")
         while self.at.steps < steps and not self.at.done:
             order = epoch_order(self.train.facts, self.seed, self.run.keys, self.at.epoch, self.block["snrs_per_model"])
             parts = batches(order, self.block["batch"])
-            # A batch's step alone decides how its samples are augmented.
+            # Number the batches by step: the step alone determines the augmentation.
             numbered = list(enumerate(parts[self.at.batch :], start=self.at.steps))[: steps - self.at.steps]
             read = self.read(numbered)
             for _ in numbered:
@@ -226,7 +225,7 @@ class Trainer:
         return self.at
 
     def _say(self, start: float, first: int) -> None:
-        """Print the last validation and the pace; start: when the run began (s), first: the step it began at."""
+        """Print the last validation and the speed; start: when this process began (s), first: its first step."""
         if self.machine.rank:
             return
         spent = time.monotonic() - start
@@ -245,7 +244,7 @@ class Trainer:
         )  # fmt: skip
 
     def finish(self, extra: dict) -> None:
-        """Write `model.pt` (best averaged weights, `extra`) and `history.csv`, and drop the checkpoint."""
+        """Write `model.pt` (best averaged weights, `extra`) and `history.csv`, and delete the checkpoint."""
         if self.machine.rank:
             return
         folder = self.run.folder

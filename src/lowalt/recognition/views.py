@@ -1,8 +1,8 @@
-"""From shards to index images at the training size: sample by sample, or a whole shard into a cache file.
+"""Index images at the training size, read from shards one by one or cached for a whole shard.
 
-Decoding and shrinking 256 x 256 images costs more than a small network's step, so a cache pays as soon as two
-runs share it; at scale a training run reads the shards themselves, and sees the same pixels. For sizes to which the
-tiles stage has reduced its images, a cache is made without decoding.
+Decoding and shrinking 256 x 256 images takes longer than a step of a small network, so a cache pays as soon as two
+runs share it. Large trainings read the shards directly, with the same pixels. For sizes to which the tiles stage has
+reduced its images, the cache is made without decoding.
 """
 
 import json
@@ -32,13 +32,13 @@ def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
     from behind, NaN without a yaw.
     """
     motion = record["motion"]
-    # Rows without an attitude have no aspect.
+    # Without an attitude there is no aspect.
     yaw = math.nan if motion["yaw_rad"] is None else motion["yaw_rad"]
     front = np.array([-math.sin(yaw), math.cos(yaw)])
     ranges, aspects = [], []
     for station in network.stations:
         distance = record["geometry"][station.name]["range_m"]
-        # The place of a recording's target is not known.
+        # In a recording the target's position is unknown.
         if distance is None:
             ranges.append(math.nan)
             aspects.append(math.nan)
@@ -52,7 +52,7 @@ def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
 
 
 def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Facts:
-    """Return what the shards say of the samples `numbers`.
+    """Return the metadata of the samples `numbers` from the shards.
 
     placed: read ranges and aspects from the records too; without it they are NaN and only one record of each subtype is
     read, which is enough for a training on a million samples.
@@ -115,8 +115,8 @@ class Reduced:
 def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source: Reduced | None = None) -> int:
     """Write the cache file of the shard `name` and return its number of samples.
 
-    source: images of the shard's chunk at this size, where the tiles stage has made them; without, every image of the
-    shard is decoded (or rendered) and reduced. Both give the same bytes.
+    source: images of the shard's chunk at this size, if the tiles stage has made them. Otherwise every image of the
+    shard is decoded (or rendered) and reduced, with the same bytes.
     Raises: InputError where the index has no such shard, the size is wrong, or the shard is damaged.
     """
     if isinstance(size, bool) or not isinstance(size, int) or size < 8:
@@ -128,7 +128,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
     ends = np.cumsum([shard["samples"] for shard in shards.shards])
     end, count = ends[names.index(name)], shards.shards[names.index(name)]["samples"]
     numbers = np.arange(end - count, end)
-    # Decoding checks the images, so the records are read without a second check.
+    # Decoding verifies the images, so skip the check when reading the records.
     facts = facts_of(ShardSet(index, check=False), numbers)
     if source:
         views = source.images(facts, size)
@@ -141,7 +141,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
 
 
 class ShardSamples(samples.Samples):
-    """Samples read from shards as they are asked for; the same calls and pixels as `ViewSamples`."""
+    """Samples read from shards on access; same methods and pixels as `ViewSamples`."""
 
     def __init__(self, index: str | Path, columns: list[int], folds: set, size: int, placed: bool) -> None:
         """index: index file of the shards; columns: views to keep, some spectra of some stations; folds: (group, fold)
@@ -173,9 +173,9 @@ class ShardSamples(samples.Samples):
         return np.stack([self.shards.images(self.numbers[number], *chosen) for number in numbers])
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training sees of these samples; the shards' own checksums stand for images.
+        """Return the SHA-256 of all that a training uses of these samples; the shards' checksums represent the images.
 
-        Shards are checked against them as they are read. The same samples from a cache have another sum.
+        Reading checks the shards against these. The same samples from a cache have another sum.
         """
         render = {"size": self.size, "stations": self.stations, "spectra": self.spectra, **self.shards.index["render"]}
         sums = sorted(shard["table_sha256"] for shard in self.shards.shards)

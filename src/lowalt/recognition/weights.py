@@ -1,4 +1,4 @@
-"""The weights that a file brings: finite numbers that fit their network, which is built without memory first."""
+"""The weights that a file brings: finite numbers that fit their network, which is built in limited memory."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -8,6 +8,7 @@ import torch
 from torch import nn
 
 from lowalt.files.errors import InputError
+from lowalt.machine.memory import at_most
 
 
 def refuse_unfinite(weights: Any, path: str | Path) -> None:
@@ -30,17 +31,27 @@ def refuse_unfit(weights: Mapping[str, torch.Tensor], model: nn.Module, path: st
         raise InputError(f"{path}: {len(wrong)} weights do not fit its network, first {wrong[0][:80]!r}")
 
 
+ROOM_BYTES = 1_500_000_000
+"""Memory that a network of a file may take to be built and to answer once, beyond a few copies of its weights."""
+
+
 def filled(make: Callable[[], nn.Module], example: Callable[[], Any], weights: Mapping[str, torch.Tensor],
            path: str | Path) -> nn.Module:  # fmt: skip
-    """Return the network of `make` with the weights of a file.
+    """Return the network of `make` with the weights of a file, once it has answered `example`.
 
-    It is built, and answers `example`, on torch's device without memory first: a network that its weights do not fill
-    takes none. Raises: InputError naming the file where they do not fit.
+    A file of a few bytes may name a network that no machine holds, so memory is limited by what its weights take.
+    Raises: InputError naming the file where they do not fit, or its network would take more.
     """
-    with torch.device("meta"), torch.inference_mode():
-        trial = make().eval()
-        refuse_unfit(weights, trial, path)
-        trial(example())
-    model = make()
-    model.load_state_dict(weights)
+    sizes = sum(value.numel() * value.element_size() for value in weights.values())
+    try:
+        with at_most(ROOM_BYTES + 4 * sizes):
+            model = make().eval()
+            refuse_unfit(weights, model, path)
+            model.load_state_dict(weights)
+            with torch.inference_mode():
+                model(example())
+    except (MemoryError, RuntimeError, InputError) as error:
+        if isinstance(error, MemoryError) or "allocate memory" in str(error):
+            raise InputError(f"{path}: its weights do not fit its network, which needs far more memory") from error
+        raise
     return model

@@ -21,17 +21,11 @@ from lowalt.recognition.model_file import EIGHT, ModelFile
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import Trained, load
 from lowalt.recognition.samples import Samples
+from lowalt.recognition.zoo_files import ZOO, path_of
 
-ZOO = Path("results/zoo")
-"""Where entries lie, from the folder of the checkout."""
 LARGEST_BYTES = 1_000_000
 FEWER_POINTS = 0.5
 """An entry that loses more of the validation accuracy, in percentage points, is not written."""
-
-
-def names(zoo: Path = ZOO) -> list[str]:
-    """Return the names of all entries, sorted."""
-    return sorted(path.stem for path in zoo.glob("*.safetensors"))
 
 
 def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Trained, dict]:
@@ -41,11 +35,7 @@ def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Train
     FILE.py:FUNCTION for a model whose backbone is such code.
     Raises: InputError naming the entries there are, or the fault of the file.
     """
-    path = Path(model)
-    if path.suffix == "" and not path.is_file():
-        path = zoo / f"{model}.safetensors"
-        if str(model) not in names(zoo):
-            raise InputError(f"model {str(model)!r}: not a file, and {zoo} has {names(zoo)}")
+    path = path_of(model, zoo)
     if path.suffix != ".safetensors":
         return load(path, trusted), {}
     content = model_file.read(path)

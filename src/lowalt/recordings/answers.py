@@ -7,28 +7,39 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.runs import Trained
-from lowalt.recordings.presence import present
+from lowalt.recordings.files import read
+from lowalt.recordings.presence import beyond_mps, present
 from lowalt.recordings.record import Record
 from lowalt.recordings.twin import Twin, radars
 from lowalt.recordings.window_samples import Windows, facts, rendered
-from lowalt.recordings.windows import windows
+from lowalt.recordings.windows import looks
 from lowalt.tiles.image_settings import Images
-
-TRAINED_RATIO = 1.25
-"""Largest ratio of a recording's carrier and the radar's: speeds in a spectrum scale with it."""
 
 
 class Answers(NamedTuple):
-    """Of n windows: their starts (n,) s, whether each holds a target (n,) bool, class probabilities (n, classes)."""
+    """Of n windows: their starts (n,) s, whether each holds a target (n,) bool, class probabilities (n, classes),
+    whether each is clipped (n,) bool, and the speed (n,) m/s of a line beyond `fastest_mps`, NaN for none.
+
+    A window that is clipped or has such a line counts as one without a target: the network cannot know it.
+    """
 
     starts_s: np.ndarray
     present: np.ndarray
     probabilities: np.ndarray
+    clipped: np.ndarray
+    beyond_mps: np.ndarray
+    fastest_mps: float
 
-
-def _near(record: Record, twin: Twin) -> bool:
-    """Whether a network of this radar may be asked of a recording at its carrier."""
-    return 1 / TRAINED_RATIO <= record.carrier_hz / twin.carrier_hz <= TRAINED_RATIO
+    def words(self, number: int, classes: list[str]) -> str:
+        """Return what is said of one window: its class and probability, or why it has none."""
+        if self.clipped[number]:
+            return "clipped by the receiver"
+        if np.isfinite(self.beyond_mps[number]):
+            return f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g} m/s of this network"
+        if not self.present[number]:
+            return "nothing there"
+        best = int(self.probabilities[number].argmax())
+        return f"{100 * self.probabilities[number, best]:6.2f} %  {classes[best]}"
 
 
 def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
@@ -42,17 +53,25 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     if "radar" not in settings:
         raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(known)}")
     radar = Twin.from_settings(settings["radar"])
-    if not _near(record, radar):
-        near = [name for name, other in known.items() if _near(record, other)]
+    if not radar.near(record.carrier_hz):
+        near = [name for name, other in known.items() if other.near(record.carrier_hz)]
         raise InputError(
             f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
-            + (f"expected a network of {near}" if near else "expected a network of a twin at this carrier, which "
-               "`studies/twin_networks.py --twins FILE` trains; the zoo has none")
+            + (f"expected a network of {near}" if near else "expected a network of your own radar, which "
+               "`lowalt recording train` makes; the zoo has none")
         )  # fmt: skip
     twin = radar.at_carrier(record.carrier_hz)
-    intervals = windows(record, twin).astype(np.complex64)
+    baseband = read(record)
+    found = looks(record, twin, baseband)
+    intervals = found.intervals.astype(np.complex64)
     images = rendered(intervals, twin, Images.from_settings(settings["images"]), trained.size)
     count, numbers = len(intervals), np.arange(len(intervals))
     samples = Windows(images, facts(np.zeros(count, int), [record.name] * count, numbers, np.zeros(count), ""))
     shares = probabilities(trained.model, samples, numbers, Machine.here("fp32"), 64)
-    return Answers(numbers * twin.symbols * twin.symbol_interval_s, present(intervals, twin), shares)
+    values = baseband.values if twin.channel == "complex" else baseband.values.real
+    beyond = beyond_mps(values, baseband.rate_hz, twin, count)
+    there = ~found.clipped
+    there[there] = present(intervals[there], twin)
+    there &= ~np.isfinite(beyond)
+    starts = numbers * twin.symbols * twin.symbol_interval_s
+    return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps)

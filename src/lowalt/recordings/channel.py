@@ -5,19 +5,21 @@ Doppler is lost: towards and away look the same, and both sides of a rotor's spe
 
 The sampling is one of three, by name:
     anti_aliased   frequencies beyond half the symbol rate are filtered out first
-    one_sided      for a real channel, whose analytic signal has no negative frequencies: the band from 0 to the whole
-                   symbol rate is kept, so speeds up to twice the usual bound stay apart; those above the usual
-                   bound appear as negative speeds
+    one_sided      for a real channel, whose analytic signal has no negative frequencies: the band from 0 to 94 % of the
+                   symbol rate is kept, so speeds up to nearly twice the usual bound stay apart; those above the
+                   usual bound appear as negative speeds
     bare           every symbol takes the unfiltered value at its time, so faster lines fold, as in a radar that
                    measures once a symbol (the published network folds every rotor this way)
-All evaluate the recording between its samples by the same windowed sinc kernel, so any rate goes to any rate.
+All evaluate the recording between its samples by the same windowed sinc kernel, so any rate goes to any rate. The gain
+of each at every tone of its band is a table (`python benchmarks/sampling_gain.py`).
 """
 
 import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import hilbert
+from scipy.signal import firwin, hilbert, kaiserord, oaconvolve
+from scipy.signal.windows import dpss
 
 from lowalt.files.errors import InputError
 
@@ -28,6 +30,15 @@ BETA = 8.0
 """Kaiser window of the kernel: side lobes near -80 dB (Kaiser and Schafer 1980)."""
 EDGE = 0.9
 """Pass band of the anti-aliasing filter over half the symbol rate. In the last tenth the kernel falls off."""
+ONE_SIDED_EDGE = 0.94
+"""Pass band of one-sided sampling over the symbol rate. The filter falls off between here and the symbol rate itself,
+from which on a tone would fold onto a slow target."""
+STOP_DB = 80.0
+"""Attenuation of one-sided sampling from the symbol rate on."""
+FALL_CELLS = 6
+"""Doppler cells below the slowest speed over which the filter of what is slower falls off."""
+FURTHER = 7
+"""Sequences beyond the dimension of the slow band: with them the rest of its energy is below -60 dB."""
 PHASES = 1024
 """Number of places between two samples at which the kernel is tabulated. Linear interpolation between them is accurate
 to 1e-6."""
@@ -86,13 +97,30 @@ def symbol_rate(values: np.ndarray, rate_hz: float, symbol_interval_s: float, sa
         if np.iscomplexobj(values):
             raise InputError("sampling is 'one_sided' for a complex channel, which has negative frequencies; expected "
                              "anti_aliased or bare")  # fmt: skip
-        # Shift down by half a symbol rate, so that the band is symmetric about zero; filter; shift back by (-1)^n.
-        shifted = signal * np.exp(-1j * np.pi / step * np.arange(len(signal)))
-        moved = _resampled(shifted, step, EDGE / step)
-        return moved * (-1.0) ** np.arange(len(moved))
+        signal = _below(signal, rate_hz, 1 / symbol_interval_s)
     if sampling == "bare" and math.isclose(step, round(step), rel_tol=1e-12):
         return signal[:: round(step)].copy()
-    return _resampled(signal, step, EDGE / step if sampling == "anti_aliased" else 1.0)
+    if sampling == "anti_aliased":
+        return _resampled(signal, step, EDGE / step)
+    if np.iscomplexobj(values):
+        return _resampled(signal, step, 1.0)
+    # A real channel's spectrum lies between 0 and half its rate. About a quarter of the rate it is symmetric, so that
+    # the kernel, which falls off near half the rate, passes all of it.
+    turned = _resampled(signal * (-1j) ** (np.arange(len(signal)) % 4), step, 1.0)
+    return turned * np.exp(0.5j * np.pi * step * np.arange(len(turned)))
+
+
+def _below(signal: np.ndarray, rate_hz: float, symbol_rate_hz: float) -> np.ndarray:
+    """An analytic signal without what lies from the symbol rate (Hz) on; its side of negative frequencies is empty.
+
+    Source: the length of a Kaiser window's filter, Kaiser 1974 (`scipy.signal.kaiserord`).
+    """
+    if rate_hz <= 2 * symbol_rate_hz:
+        return signal
+    fall = (1 - ONE_SIDED_EDGE) * symbol_rate_hz
+    taps, beta = kaiserord(STOP_DB, fall / (rate_hz / 2))
+    kernel = firwin(taps | 1, symbol_rate_hz - fall / 2, window=("kaiser", beta), fs=rate_hz)
+    return oaconvolve(signal, kernel, mode="same")
 
 
 def _resampled(signal: np.ndarray, step: float, band: float) -> np.ndarray:
@@ -113,11 +141,23 @@ def _resampled(signal: np.ndarray, step: float, band: float) -> np.ndarray:
     return result
 
 
-def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording") -> np.ndarray:
+@lru_cache(maxsize=8)
+def _slow_sequences(symbols: int, slow: float) -> np.ndarray:
+    """Orthonormal sequences (n, symbols) that span what is slower than `slow` (cycles a symbol) less `FALL_CELLS`.
+
+    Source: Slepian 1978, Bell System Technical Journal 57(5): of length N and half-band W, some 2 N W sequences hold
+    all but a share of a band's energy that falls tenfold or more with each further one.
+    """
+    product = symbols * slow - FALL_CELLS
+    return dpss(symbols, product, int(2 * product) + FURTHER) if product >= 1 else np.empty((0, symbols))
+
+
+def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording", slow: float = 0.0) -> np.ndarray:
     """Return the coherent processing intervals (intervals, symbols) of a signal, each without its mean.
 
     No two share a symbol. The mean is the echo of everything that does not move, which is orders of magnitude above the
-    target's.
+    target's. slow: frequency, cycles a symbol, from which on a line keeps its level. More than 5 / symbols below it
+    what is slower is gone as well, by 50 dB or more.
     Raises: InputError naming the recording where it is shorter than one interval.
     """
     if len(signal) < symbols:
@@ -125,4 +165,6 @@ def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording"
     windows = signal[: len(signal) // symbols * symbols].reshape(-1, symbols)
     # Subtract the first symbol before the mean: a constant signal then becomes exactly zero.
     moved = windows - windows[:, :1]
-    return moved - moved.mean(axis=1, keepdims=True)
+    moved = moved - moved.mean(axis=1, keepdims=True)
+    sequences = _slow_sequences(symbols, slow)
+    return moved - (moved @ sequences.T) @ sequences if len(sequences) else moved

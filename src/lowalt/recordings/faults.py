@@ -20,8 +20,6 @@ ROUND_STEPS = 2.5
 """Steps of the quantiser by which a smooth wave's top may fall to the next sample."""
 ROUND_RUN = 8
 """Times that a smooth wave may stay longer at its highest level than at the next."""
-CLIPPED_SHARE = 1e-4
-"""Share of all samples in clipped peaks from which on a recording is refused."""
 MIRRORED = 0.9
 """Correlation of a spectrum with its mirror about a quarter of the rate from which on I and Q stand in turn."""
 SAME_SHARE = 0.999
@@ -59,8 +57,8 @@ def agreed_rate(
     return float(next(iter(known.values())))
 
 
-def _clipped(values: np.ndarray) -> float:
-    """Share of samples that lie in cut tops: runs of equal samples at the largest or the smallest value.
+def _cut(values: np.ndarray) -> np.ndarray:
+    """Which samples of one channel lie in cut tops: runs of equal samples at the largest or the smallest value.
 
     The rounded top of a smooth wave is no cut one. A parabola that is rounded stays at its highest level at most five
     times as long as at the next level on either side, one step below; samples in between may miss a level. A cut wave
@@ -70,13 +68,18 @@ def _clipped(values: np.ndarray) -> float:
     levels, lengths = values[starts], np.diff(starts, append=len(values))
     step = max(float(np.diff(np.unique(values)).min()), float(np.abs(values).max()) * np.finfo(np.float32).eps)
     top = np.flatnonzero((lengths >= CLIPPED_RUN) & ((levels == values.max()) | (levels == values.min())))
-    cut = np.zeros(len(top), bool)
+    cut = np.zeros(len(levels), bool)
     for side in (-1, 1):
         inside = (top + side >= 0) & (top + side < len(levels))
         beside = np.where(inside, top + side, top)
-        cut |= abs(levels[beside] - levels[top]) > ROUND_STEPS * step
-        cut |= lengths[top] > ROUND_RUN * lengths[beside]
-    return float(lengths[top][cut].sum() / len(values))
+        cut[top] |= abs(levels[beside] - levels[top]) > ROUND_STEPS * step
+        cut[top] |= lengths[top] > ROUND_RUN * lengths[beside]
+    return np.repeat(cut, lengths)
+
+
+def clipped(values: np.ndarray) -> np.ndarray:
+    """Return which samples (samples,) of a recording, real or complex, the receiver has clipped, (samples,) bool."""
+    return _cut(values.real) | _cut(values.imag) if np.iscomplexobj(values) else _cut(values)
 
 
 def _mirrored(values: np.ndarray) -> float:
@@ -108,7 +111,7 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
     """Refuse samples (samples,) that no spectrum should be made of.
 
     moves: "towards", "away" or None. Positive Doppler approaches, as everywhere in this project.
-    Raises: InputError naming the file and the fault: not finite, silent, clipped, channels swapped.
+    Raises: InputError naming the file and the fault: not finite, silent, channels swapped.
     """
     if not np.isfinite(values).all():
         place = int(np.flatnonzero(~np.isfinite(values))[0])
@@ -117,10 +120,6 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
     for name, channel in channels.items():
         if np.ptp(channel) == 0:
             raise InputError(f"{path}: silent, all {len(channel)} samples of {name} are {channel[0]}")
-        share = _clipped(channel)
-        if share > CLIPPED_SHARE:
-            raise InputError(f"{path}: clipped, {100 * share:.3g} % of the samples of {name} stick to its extremes "
-                             f"{channel.min():.6g} and {channel.max():.6g}")  # fmt: skip
     if not np.iscomplexobj(values) and _mirrored(values) > MIRRORED:
         raise InputError(f"{path}: the spectrum is mirrored about a quarter of the rate, as where I and Q stand in "
                          "turn; expected channel 'complex' with layout 'iqiq', or one real channel")  # fmt: skip
@@ -130,10 +129,18 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
         if alike > SAME_SHARE:
             raise InputError(f"{path}: I and Q hold the same signal (squared correlation {alike:.6f}), expected "
                              "in-phase and quadrature, or channel 'real'")  # fmt: skip
-        if moves is not None:
-            towards, away = _sides(values)
-            right, wrong = (towards, away) if moves == "towards" else (away, towards)
-            if wrong > SIDE_RATIO * right:
-                raise InputError(f"{path}: channels swapped, the record says the target moves {moves}, but the other "
+        refuse_swapped(path, values, moves)
+
+
+def refuse_swapped(path: Path, values: np.ndarray, moves: str | None) -> None:
+    """Refuse a complex signal (samples,) whose energy lies on the other side of the Doppler axis than `moves` says.
+
+    Raises: InputError naming the file.
+    """
+    if moves is not None:
+        towards, away = _sides(values)
+        right, wrong = (towards, away) if moves == "towards" else (away, towards)
+        if wrong > SIDE_RATIO * right:
+            raise InputError(f"{path}: channels swapped, the record says the target moves {moves}, but the other "
                                  f"side of the Doppler axis holds {wrong / max(right, 1e-300):.3g} times the energy; "
                                  "expected the two columns in the order I, Q")  # fmt: skip

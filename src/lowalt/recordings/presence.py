@@ -1,7 +1,8 @@
-"""Which windows hold a moving target: those with a line above the recording's own noise floor.
+"""Which windows hold a target: those with a line above the recording's own noise floor.
 
-The noise of a cheap receiver is not white: slow noise rises towards zero speed, coupling capacitors cut it off below.
-A line must therefore be compared with the noise at its own speed, and that floor is found in the recording.
+The noise of a cheap receiver is not white: slow noise rises towards zero speed. Where targets move, a line is therefore
+compared with the noise at its own speed, which is heard while that speed is empty. A target that hovers never leaves
+its speeds, so its lines are compared with what lies between them.
 """
 
 import math
@@ -9,7 +10,7 @@ import math
 import numpy as np
 from scipy.ndimage import maximum_filter, median_filter
 
-from lowalt.recordings.channel import EDGE
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.recordings.twin import Twin
 
 QUIET_SHARE = 0.1
@@ -18,6 +19,17 @@ FLOOR_MPS = 0.5
 """Speeds to either side over which the noise floor is smooth."""
 ENOUGH = 20
 """Least number of windows with which a constant line can be told from a target."""
+BETWEEN_SHARE = 0.25
+"""Share of the powers around a speed that is taken to lie between a target's lines."""
+AROUND = 0.25
+"""Speeds to either side of a line with which it is compared, over the whole band."""
+PASSES = 10.0
+"""How many times more than a line must a target that passes stand above the recording's quiet time, while in half of
+the windows nothing does."""
+BEYOND_DB = 10.0
+"""How far a line beyond the speeds that windows show must stand above all others there: rotors' lines do by less."""
+SLOW_CELLS = 4
+"""Doppler cells about zero speed that hold slow noise and are no line beyond a window's speeds."""
 
 
 def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
@@ -52,6 +64,20 @@ def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:
     return smooth if count < ENOUGH else np.maximum(smooth, maximum_filter(quiet, 3, mode="nearest"))
 
 
+def floor_between(power: np.ndarray) -> np.ndarray:
+    """Return the mean power of the noise (speeds,) between the lines of windows (n, speeds) over a whole Doppler band.
+
+    The least quarter of all powers of all windows within a quarter of the band to either side is noise alone, if lines
+    take up less than three quarters of it. Of exponential powers a share q lies below -ln(1 - q) times their mean.
+    Source: order statistics, Rohling 1983, IEEE Trans. Aerospace Electronic Systems 19(4).
+    """
+    count = power.shape[1]
+    reach = max(round(AROUND * count), 1)
+    wrapped = np.concatenate([power[:, -reach:], power, power[:, :reach]], axis=1)
+    least = [np.quantile(wrapped[:, place : place + 2 * reach + 1], BETWEEN_SHARE) for place in range(count)]
+    return np.array(least) / -math.log(1 - BETWEEN_SHARE)
+
+
 def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndarray]:
     """Return the powers (n, speeds) of intervals (n, symbols) at the speeds that the twin hears, and which of these
     (speeds,) a target may have; Hann window."""
@@ -59,23 +85,52 @@ def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndar
     power = np.abs(np.fft.fft(intervals * np.hanning(count), axis=1)) ** 2
     speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * twin.edge_mps
     order, meant = speeds_shown(speeds, twin.edge_mps, twin.sides)
-    # The sampling filter ends at `EDGE` of the band; beyond it there is no noise to compare with.
-    last = {"anti_aliased": EDGE, "one_sided": 1 + EDGE, "bare": 1.0}[twin.sampling] * twin.edge_mps
-    return np.fft.fftshift(power, axes=1)[:, order], (np.abs(meant) >= twin.slowest_mps) & (np.abs(meant) <= last)
+    return np.fft.fftshift(power, axes=1)[:, order], (np.abs(meant) >= twin.slowest_mps) & (
+        np.abs(meant) <= twin.fastest_mps
+    )
 
 
 def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) -> np.ndarray:
-    """Return which intervals (n, symbols) of one recording hold a moving target, (n,) bool.
+    """Return which intervals (n, symbols) of one recording hold a target, (n,) bool: a line, Hann window, that stands
+    `detect_db` above the recording's own noise floor.
 
-    The strongest line at |speed| >= slowest_mps stands `detect_db` above the recording's own noise floor at its speed,
-    Hann window: a constant false alarm rate in noise of any colour. With detect_db = 0 all intervals hold one: the
-    target never left.
+    Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other windows, and the line
+    is at or above slowest_mps. Where they may hover it is the floor between lines. A recording of `ENOUGH` windows
+    through which a target passes is judged by its quiet time as well, so that hum is no target beside it.
     noise: intervals (m, symbols) of the receiver's noise alone, where they are known, as in a simulation.
     """
-    if not twin.detect_db:
-        return np.ones(len(intervals), bool)
     power, heard = heard_powers(intervals, twin)
     quiet = heard_powers(noise, twin)[0] if noise is not None else power
-    floor = noise_floor(quiet, 2 * twin.edge_mps / intervals.shape[1])
-    over = power[:, heard] / np.maximum(floor[heard], 1e-300)
-    return over.max(axis=1) >= 10 ** (twin.detect_db / 10)
+    level, step_mps = 10 ** (twin.detect_db / 10), 2 * twin.edge_mps / intervals.shape[1]
+
+    def over(floor: np.ndarray) -> np.ndarray:
+        """How far the strongest line of each window stands above a floor (speeds,), as a ratio."""
+        return (power[:, heard] / np.maximum(floor[heard], 1e-300)).max(axis=1)
+
+    if twin.slowest_mps:
+        return over(noise_floor(quiet, step_mps)) >= level
+    found = over(floor_between(quiet)) >= level
+    if noise is None and len(power) >= ENOUGH:
+        passing = over(noise_floor(quiet, step_mps))
+        if passing.max() >= PASSES * level and np.median(passing) < level:
+            found &= passing >= level
+    return found
+
+
+def beyond_mps(values: np.ndarray, rate_hz: float, twin: Twin, count: int) -> np.ndarray:
+    """Return the speed (count,) m/s of a line of each window that lies beyond the speeds that the twin's windows show,
+    NaN where there is none.
+
+    values: samples (samples,) of a recording at `rate_hz`. The line stands `BEYOND_DB` above all that windows show.
+    """
+    long = twin.symbols * twin.symbol_interval_s * rate_hz
+    length = min(math.floor(long), len(values))
+    starts = np.minimum(np.rint(np.arange(count) * long).astype(int), len(values) - length)
+    cut = values[starts[:, None] + np.arange(length)]
+    power = np.abs(np.fft.fft((cut - cut.mean(axis=1, keepdims=True)) * np.hanning(length), axis=1)) ** 2
+    cells = np.abs(np.fft.fftfreq(length, 1 / length))
+    speeds = cells * rate_hz / length * SPEED_OF_LIGHT / twin.carrier_hz / 2
+    outside = np.where(speeds > twin.fastest_mps, power, 0.0)
+    shown = power[:, (speeds <= twin.fastest_mps) & (cells >= SLOW_CELLS)].max(axis=1)
+    far = outside.max(axis=1) > 10 ** (BEYOND_DB / 10) * shown
+    return np.where(far, speeds[outside.argmax(axis=1)], np.nan)

@@ -6,7 +6,7 @@ Its keys stand in the definition `recording` of `lowalt/config/brought.schema.ya
 from dataclasses import dataclass
 from pathlib import Path
 
-from lowalt.config.schema import check_brought
+from lowalt.config.schema import check_brought, of_brought, with_numbers
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 
@@ -18,8 +18,6 @@ class Record:
     file: Path
     carrier_hz: float
     channel: str
-    source: str
-    licence: str
     rate_hz: float | None = None
     columns: tuple[int | str, ...] | None = None
     variable: str | None = None
@@ -29,6 +27,12 @@ class Record:
     layout: str | None = None
     dtype: str | None = None
     trust: str | None = None
+    source: str | None = None
+    licence: str | None = None
+    capture: int | None = None
+    receiver: int = 0
+    chirps: dict | None = None
+    twin: dict | None = None
 
     @property
     def name(self) -> str:
@@ -41,11 +45,11 @@ def record(block: dict, folder: Path, where: str) -> Record:
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
-    block = {key: value for key, value in block.items() if value is not None}
+    block = with_numbers({key: value for key, value in block.items() if value is not None}, of_brought("recording"))
     check_brought("recording", block, where)
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":
-        for key in ("moves", "layout"):
+        for key in ("moves", "layout", "chirps"):
             if key in block:
                 raise InputError(f"{where}: {key} is {block[key]!r}, expected channel 'complex' with it: a real "
                                  "channel has no sign of Doppler and no second part")  # fmt: skip

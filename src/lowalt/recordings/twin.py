@@ -10,20 +10,24 @@ from pathlib import Path
 from lowalt.config.command import pick
 from lowalt.config.layers import load_yaml, merge
 from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.config.schema import check_brought, of_brought, with_numbers
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
-from lowalt.recordings.channel import SAMPLINGS
+from lowalt.recordings.channel import EDGE, ONE_SIDED_EDGE, SAMPLINGS
 from lowalt.spectra import Fourier, Spectra, Transfer
 
 CHANNELS = ("complex", "real")
 TWINS = "config/measured/twins.yaml"
+TRAINED_RATIO = 1.25
+"""Largest ratio of a recording's carrier and the radar's: speeds in a spectrum scale with it."""
 
 
 @dataclass(frozen=True)
 class Twin:
     """A measured radar: `rate_hz` is the rate of its receiver, `symbol_interval_s` the interval of the images' symbols.
 
-    A window holds a target where a line at or above `slowest_mps` stands `detect_db` above the noise floor (0: always).
+    A window holds a target where a line at or above `slowest_mps` (0: targets may hover) stands `detect_db` above the
+    recording's noise floor. What is slower than `slowest_mps` is taken out of windows.
     The other fields are named as in a record.
     """
 
@@ -53,10 +57,25 @@ class Twin:
         """Return the twin at a recording's own carrier; the symbol interval stays, so the speeds scale a little."""
         return replace(self, carrier_hz=carrier_hz)
 
+    def near(self, carrier_hz: float) -> bool:
+        """Whether a network of this radar may be asked of a recording at a carrier (Hz)."""
+        return 1 / TRAINED_RATIO <= carrier_hz / self.carrier_hz <= TRAINED_RATIO
+
     @property
     def edge_mps(self) -> float:
         """Largest unambiguous radial speed of the symbol rate, lambda / (4 T_r) (m/s)."""
         return SPEED_OF_LIGHT / self.carrier_hz / (4 * self.symbol_interval_s)
+
+    @property
+    def fastest_mps(self) -> float:
+        """Largest speed that the sampling keeps (m/s): its filter ends there, and a bare line beyond it folds."""
+        kept = {"anti_aliased": EDGE, "one_sided": 2 * ONE_SIDED_EDGE, "bare": 1.0}
+        return kept[self.sampling] * self.edge_mps
+
+    @property
+    def slow(self) -> float:
+        """Doppler of `slowest_mps` in cycles a symbol."""
+        return self.slowest_mps / (2 * self.edge_mps)
 
     @property
     def sides(self) -> str:
@@ -106,6 +125,11 @@ def radars(path: str | Path = TWINS) -> dict[str, Twin]:
     Raises: InputError naming the key that is missing or wrong.
     """
     try:
-        return {name: Twin.from_settings(twin["radar"]) for name, twin in settings_of(path)["twins"].items()}
+        blocks = {str(name): twin["radar"] for name, twin in settings_of(path)["twins"].items()}
     except KeyError as error:
         raise InputError(f"{path}: key {error} is missing") from None
+    except (TypeError, AttributeError):
+        raise InputError(f"{path}: expected under twins the name of each radar with a block radar") from None
+    for name, block in blocks.items():
+        check_brought("radar", with_numbers(block, of_brought("radar")), f"{path}: {name}")
+    return {name: Twin.from_settings(block) for name, block in blocks.items()}

@@ -5,6 +5,7 @@ All of them are made by the functions that simulated signals use.
 
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.motion.table import NUMBERS
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
+from lowalt.recordings.faults import clipped
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.record import Record
 from lowalt.recordings.twin import Twin
@@ -21,6 +23,8 @@ from lowalt.spectra import trp, vrp, vt
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 
+CLIPPED_SHARE = 1e-3
+"""Share of a window's samples in clipped peaks from which on it is left out."""
 SPLIT = {"by": "motion", "train": 1, "val": 0, "test": 1}
 
 
@@ -45,12 +49,38 @@ def at_symbol_rate(record: Record, twin: Twin, baseband: Baseband | None = None)
         raise InputError(f"{record.file}: {error}") from None
 
 
-def windows(record: Record, twin: Twin, baseband: Baseband | None = None) -> np.ndarray:
-    """Return a recording's windows (n, symbols) complex128: its coherent intervals at the twin's symbol rate.
+class Looks(NamedTuple):
+    """A recording's coherent intervals (n, symbols) complex128, and which of them the receiver has clipped, (n,)."""
 
-    Raises: InputError as `at_symbol_rate`, and where the recording is shorter than a window.
+    intervals: np.ndarray
+    clipped: np.ndarray
+
+
+def looks(record: Record, twin: Twin, baseband: Baseband | None = None) -> Looks:
+    """Return a recording's coherent intervals at the twin's symbol rate. A clipped stretch costs its own ones only.
+
+    Raises: InputError as `at_symbol_rate`, and where the recording is shorter than a window or clipped in all of them.
     """
-    return coherent_intervals(at_symbol_rate(record, twin, baseband), twin.symbols, name=str(record.file))
+    baseband = baseband or read(record)
+    signal = at_symbol_rate(record, twin, baseband)
+    intervals = coherent_intervals(signal, twin.symbols, str(record.file), twin.slow)
+    edges = np.arange(len(intervals) + 1) * twin.symbols * twin.symbol_interval_s * baseband.rate_hz
+    cuts = np.concatenate([[0], np.cumsum(clipped(baseband.values))])
+    share = np.diff(cuts[np.minimum(np.rint(edges).astype(int), len(cuts) - 1)]) / np.diff(edges)
+    if (share > CLIPPED_SHARE).all():
+        raise InputError(f"{record.file}: clipped, {100 * share.mean():.3g} % of the samples stick to the extremes "
+                         f"{baseband.values.real.min():.6g} and {baseband.values.real.max():.6g}, in every window of "
+                         f"{twin.symbols * twin.symbol_interval_s:.3g} s")  # fmt: skip
+    return Looks(intervals, share > CLIPPED_SHARE)
+
+
+def windows(record: Record, twin: Twin, baseband: Baseband | None = None) -> np.ndarray:
+    """Return a recording's windows (n, symbols) complex128: its coherent intervals that are not clipped.
+
+    Raises: InputError as `looks`.
+    """
+    found = looks(record, twin, baseband)
+    return found.intervals[~found.clipped]
 
 
 def spectra(intervals: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The page of all runs: it links them and shows any two of them side by side."""
+"""The page that links all runs and compares any two of them."""
 
 import json
 
@@ -6,7 +6,7 @@ from lowalt.report.page import assembled, templates
 
 
 def _text(value: object) -> str:
-    """A value of a configuration as text, equal for equal values; JSON has no infinity, so numbers are text too."""
+    """A configuration value as text, equal for equal values; numbers too, because JSON has no infinity."""
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     return value if isinstance(value, str) else json.dumps(value, sort_keys=True)

@@ -1,6 +1,6 @@
-"""The manifest of a report: where each table, picture and measurement of a run stands.
+"""The manifest of a report: the paths of all tables, pictures and measurements of a run.
 
-A JSON object with every file by its name, for example
+It is a JSON object that maps names to files, for example
 
     {"accuracy": "results/default/accuracy.csv", "clouds": ["results/default/clouds/crow.npz", ...], ...}
 
@@ -15,13 +15,13 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 
 FILES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "index")
-"""Names of which every manifest has one file."""
+"""Names that every manifest has, with one file each."""
 LISTS = ("clouds", "benchmarks")
-"""Names of which every manifest has a list of files."""
+"""Names that every manifest has, with a list of files each."""
 KEPT = {"accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv"}
-"""Tables in results/reference that the page shows where the run has none of its own: file by the own table's name."""
+"""Tables in results/reference that the page shows if the run has none: file by the name of the run's table."""
 OPTIONAL = ("published", "predictions", "transfer", *KEPT, *(f"kept_{name}" for name in KEPT))
-"""Names that a manifest leaves out where the run has no such file or files; the page then has no such section."""
+"""Optional names; without the file or files, the page has no such section."""
 
 
 class Inputs:

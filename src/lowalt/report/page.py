@@ -1,4 +1,4 @@
-"""The page: the sections in their order, each a module with its own template, put into one self-contained HTML file."""
+"""Assembles the page, one self-contained HTML file, from its sections; each is a module with its own template."""
 
 from pathlib import Path
 from types import ModuleType
@@ -46,7 +46,7 @@ PARTS = (
     PagePart("effects", "The scene", (scene_verdict,)),
     PagePart("provenance", "Provenance", (made_with,)),
 )
-"""The parts in the order of the page; one that the run has nothing for is left out."""
+"""The parts in the order of the page; parts without content are omitted."""
 
 
 def _name(module: ModuleType) -> str:
@@ -65,7 +65,7 @@ TEMPLATES = Path(__file__).parent
 
 
 def templates() -> jinja2.Environment:
-    """Return the templates, which refuse a name that nobody gave them and data that a browser cannot read."""
+    """Return the template environment, which refuses undefined names and data that a browser cannot read."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters["plotted"] = plotted

@@ -1,4 +1,4 @@
-"""Rows of the run's small tables as the page shows them: by protocol, scheme and SNR; no drawing, no HTML."""
+"""Rearranges rows of the run's tables by protocol, scheme and SNR for the page; no drawing, no HTML."""
 
 from collections import defaultdict
 from collections.abc import Iterable

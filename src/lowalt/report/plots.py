@@ -1,4 +1,4 @@
-"""Plots of the page: a figure as SVG, which stands in the page and next to it, and the rows that it shows, as CSV."""
+"""Plots of the page: a figure as SVG, in the page and as a file, and its data as CSV."""
 
 import re
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ class Plot(NamedTuple):
 
 
 def drawn(name: str, description: str, figure: Figure, rows: list[dict]) -> Plot:
-    """Return a figure as a plot. Names inside its SVG begin with the plot's, so that no two of a page share one."""
+    """Return a figure as a plot. Ids in its SVG begin with the plot's name, to be unique in a page."""
     text = re.sub(r'(id="|href="#|url\(#)', rf"\1{name}-", svg(figure))
     return Plot(name, description, text, rows)
 

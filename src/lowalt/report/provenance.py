@@ -1,4 +1,4 @@
-"""Where a run came from: revision of the code, changes of the configuration, checksums, and the commands again."""
+"""Provenance of a run: revision of the code, changes of the configuration, checksums, and commands to repeat it."""
 
 import hashlib
 import subprocess
@@ -9,17 +9,17 @@ import yaml
 
 from lowalt.config.layers import plain
 from lowalt.files.atomic import sha256
+from lowalt.files.package_plan import PACKAGE
 from lowalt.files.shipped import SHIPPED
-from lowalt.files.street import PACKAGE
 
 COUNTED = (".py", ".smk", ".yaml")
-"""Endings of the files of the package that decide a run's products."""
+"""Suffixes of the package's files that determine a run's products."""
 
 
 def revision(folder: Path = SHIPPED) -> str:
     """Return the commit of the checkout in `folder` and how many of its tracked files differ from it, or "no checkout".
 
-    A folder that is no root of a checkout has none, nor has a machine without git.
+    "no checkout" if the folder is not the root of a checkout, or git is not installed.
     """
     if not (folder / ".git").exists():
         return "no checkout"
@@ -35,9 +35,9 @@ def revision(folder: Path = SHIPPED) -> str:
 
 
 def code_sum(folder: Path = PACKAGE) -> str:
-    """Return one SHA-256 of all source files of the package, by name and content: the code without any version control.
+    """Return one SHA-256 of all source files of the package, by name and content, without using version control.
 
-    Files of machine code are no source and are left out.
+    Compiled files are excluded.
     """
     whole = hashlib.sha256()
     for path in sorted(folder.rglob("*")):
@@ -82,7 +82,7 @@ def _differing(base: dict, config: dict) -> dict:
 def checksums(files: dict[str, str | list[str]]) -> list[dict]:
     """Return path, bytes and SHA-256 of every file of a manifest except those of benchmarks and of the kept reference.
 
-    files: path or list of paths by name. Files that several names share stand once.
+    files: path or list of paths by name. Files with several names are listed once.
     """
     named = [name for name in files if name != "benchmarks" and not name.startswith("kept_")]
     paths = [path for name in named for path in ([files[name]] if isinstance(files[name], str) else files[name])]
@@ -90,7 +90,7 @@ def checksums(files: dict[str, str | list[str]]) -> list[dict]:
 
 
 def commands(commit: str, overlay: dict) -> tuple[str, str]:
-    """Return the commands that make a run again, and the text of the overlay they name, empty where there is none.
+    """Return the commands that repeat a run, and the text of the overlay they name (may be empty).
 
     commit: as `revision` gives it; overlay: as `changes` gives it.
     """

@@ -1,4 +1,4 @@
-"""A run as the sections of the page see it: its files, its configuration and its shards."""
+"""The run that the sections of the page show: its files, its configuration and its shards."""
 
 from lowalt.config.network import station_names
 from lowalt.config.plan import snrs_of
@@ -16,7 +16,7 @@ class ReportedRun:
 
     @property
     def sample_bytes(self) -> float:
-        """Bytes a sample in the shards."""
+        """Bytes per sample in the shards."""
         return sum(shard["bytes"] for shard in self.shards.shards) / len(self.shards)
 
     @property

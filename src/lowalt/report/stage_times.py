@@ -42,7 +42,7 @@ def stage_times(paths: Iterable[str | Path]) -> list[dict]:
 
 
 def write_stages(path: str | Path, run: ReportedRun) -> None:
-    """Write the times of the rules as CSV, with the number of samples, bytes a sample and the hardware."""
+    """Write the times of the rules as CSV, with the number of samples, bytes per sample and the hardware."""
     about = len(run.shards), f"{run.sample_bytes:.0f}", describe()
     write_csv(path, COLUMNS, [
         [entry["rule"], entry["jobs"], f"{entry['wall_s']:.2f}", f"{entry['cpu_s']:.2f}", f"{entry['peak_mib']:.0f}",

@@ -18,7 +18,7 @@ from lowalt.recognition import predictions
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import embedded
 from lowalt.report.figures.tile_axes import axes_of
-from lowalt.report.viewer_echoes import echoes, largest_speed
+from lowalt.report.viewer_echoes import echoes
 from lowalt.shards import ShardSet
 from lowalt.shards.remake import Remaker
 from lowalt.shards.sample_record import row_of
@@ -113,7 +113,7 @@ def panels(renderer: Renderer) -> list[dict]:
             axes = axes_of(name, station, renderer)
             low, high = sorted(axes.upwards[1:])
             (across, left, right), (upwards, first, last) = axes
-            folds = largest_speed(station.frequency_hz, renderer.network.symbol_interval_s)
+            folds = renderer.network.largest_mps(station)
             ticks = {
                 key: [float(f"{t:g}") for t in MaxNLocator(4).tick_values(*ends) if ends[0] <= t <= ends[1]]
                 for key, ends in (("x", (left, right)), ("y", (low, high)))

@@ -1,6 +1,6 @@
 """The echoes of the viewer's samples: power and phase of each station over slow time, and the speed that is shown.
 
-Both curves are kept as bytes, 0.8 kB a station: the eye sees no finer step in a panel 70 pixels high.
+Both curves are kept as bytes, 0.8 kB per station: the eye sees no finer step in a panel 70 pixels high.
 """
 
 import base64
@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import Network
 
 FLOOR_DB = 40.0
 """Powers this far below a station's largest one, or further, stand on the lower edge of their panel."""
@@ -37,21 +37,6 @@ def phase(signal: np.ndarray) -> str:
     return _bytes(np.round(np.angle(signal) / (2 * math.pi) * 256).astype(int) % 256)
 
 
-def largest_speed(frequency_hz: float, interval_s: float) -> float:
-    """Return c / (4 f T), the radial speed (m/s) beyond which speeds fold: a phase turns half a circle a symbol."""
-    return SPEED_OF_LIGHT / (4 * frequency_hz * interval_s)
-
-
-def folded(speed_mps: float, frequency_hz: float, interval_s: float) -> tuple[float, int]:
-    """Return the radial speed (m/s) at which a spectrum shows a speed, and how often it is folded.
-
-    A phase that turns once more from symbol to symbol is the same phase, so speeds repeat after c / (2 f T).
-    """
-    span = 2 * largest_speed(frequency_hz, interval_s)
-    folds = round(speed_mps / span)
-    return speed_mps - folds * span, abs(folds)
-
-
 def echoes(signals: np.ndarray, geometry: dict[str, dict[str, float]], network: Network) -> list[dict]:
     """Return the page's entries of a sample's signals (stations, symbols) complex, station by station.
 
@@ -62,7 +47,8 @@ def echoes(signals: np.ndarray, geometry: dict[str, dict[str, float]], network: 
         speed = geometry[station.name]["radial_mps"]
         entry: dict = {"power": power(signal), "phase": phase(signal)}
         if speed is not None and math.isfinite(speed):
-            shown, folds = folded(speed, station.frequency_hz, network.symbol_interval_s)
+            shown = float(network.folded_mps(speed, station))
+            folds = round(abs(speed - shown) / (2 * network.largest_mps(station)))
             entry |= {"speed": round(speed, 2), "shown": round(shown, 2), "folds": folds}
         entries.append(entry)
     return entries

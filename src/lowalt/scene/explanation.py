@@ -5,7 +5,6 @@ An effect is priced by leaving it out of the scene, or by adding it with its def
 those rooms come later.
 """
 
-import importlib
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -24,7 +23,7 @@ from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.checks import check
-from lowalt.scene.effects import PLACES, NamedEffect, called, dotted
+from lowalt.scene.effects import PLACES, NamedEffect, called, module_of
 from lowalt.scene.levels import Level, levels, table
 from lowalt.scene.observe import Scene, observe
 from lowalt.targets import occluders
@@ -56,9 +55,10 @@ class ExplainedSample(NamedTuple):
 class Finding(NamedTuple):
     """One sample at one station.
 
-    right: share of symbols whose chosen cell is within one of the target's; over_db: the target in its cell over the
-    mean power of the loudest cell of all else, behind the filters (dB, inf without anything else); otherwise: share
-    right with other detection: each of CANCELLERS where the scene has one, with and without a detector.
+    radial_mps: mean rate of the target's range over the look (m/s); right: share of symbols whose chosen cell is within
+    one of the target's; over_db: the target in its cell over the mean power of the loudest cell of all else, behind the
+    filters (dB, inf without anything else); otherwise: share right with other detection: each of CANCELLERS where the
+    scene has one, with and without a detector.
     """
 
     category: str
@@ -66,6 +66,7 @@ class Finding(NamedTuple):
     model: int
     station: str
     range_m: float
+    radial_mps: float
     right: float
     over_db: float
     otherwise: dict[str, float]
@@ -77,7 +78,8 @@ class Change(NamedTuple):
 
     signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
     more: shares of what becomes of the signals (pixels, answers) that differ; ms: processor time that the effect takes
-    a sample and station, a median; also: what else had to change for the scene to fit; refused: why it was not tried.
+    per sample and station, a median; spread_ms: standard deviation of that time over samples and stations; also: what
+    else had to change for the scene to fit; refused: why it was not tried.
     """
 
     effect: str
@@ -87,6 +89,7 @@ class Change(NamedTuple):
     cells: float = math.nan
     more: dict[str, float] = {}  # noqa: RUF012
     ms: float = math.nan
+    spread_ms: float = math.nan
     also: str = ""
     refused: str = ""
 
@@ -144,7 +147,7 @@ def finding(
     """
     cloud, row, surfaces = explained
     sample = SceneSample(scene, observe(scene, station, cloud, row, surfaces), clouds)
-    target_cell, empty = sample.true_cell(sample.view), sample.without_target()
+    target_cell, empty = sample.observed_cell(sample.view), sample.without_target()
     received, background = sample.filtered(sample.detection), empty.filtered(sample.detection)
     at_target = (received - background)[np.arange(len(target_cell)), target_cell]
     loudest = float((abs(background) ** 2).mean(axis=0).max())
@@ -159,9 +162,11 @@ def finding(
         for added in ("",) if "detector" in named else ("", "detector"):
             label = " and ".join(filter(None, (kind and f"canceller {kind}", added))) or "the same"
             otherwise[label] = _right(sample, detection + called({added: {}} if added else {}), target_cell)
-    range_m = float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m)))
+    view, range_m = sample.view, float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m)))
+    ways_m = view.ways_m(view.places.mean(axis=1))
+    radial_mps = float((ways_m[-1] - ways_m[0]) / (2 * (view.times_s[-1] - view.times_s[0])))
     return Finding(
-        row["category"], row["subtype"], row["model"], station.name, range_m,
+        row["category"], row["subtype"], row["model"], station.name, range_m, radial_mps,
         _right(sample, sample.detection, target_cell), float(over_db), otherwise,
         levels(sample.view, scene.effects, sample.power) if listed else [],
     )  # fmt: skip
@@ -184,13 +189,14 @@ def changes(
     shown: returns what becomes of the signals (K, stations, N) of all samples by name: pixels of images, answers of a
     network.
     """
-    named = [effect.name for effect in scene_of(config).effects]
+    places = {effect.name: effect.place for effect in scene_of(config).effects}
+    named = list(places)
     # A kernel's first call compiles it: the scene itself is heard twice, and a lone sample, which no median helps.
     passes = 2 if len(chosen) * len(station_names) == 1 else 1
     signals, cells, times_ms = _received(config, station_names, chosen, 2)
     before, result = shown(signals), []
     for name in [*named, *(name for name in PLACES if name not in config["effects"])]:
-        place, inside = PLACES[name], name in named
+        place, inside = places.get(name) or PLACES[name], name in named
         try:
             changed, also = _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
@@ -198,11 +204,12 @@ def changes(
             result.append(Change(name, place, inside, refused=str(error)))
             continue
         moved = np.linalg.norm(new_signals - signals, axis=2) / np.linalg.norm(signals, axis=2)
-        ms = float(np.median(new_times_ms - times_ms)) * (-1.0 if inside else 1.0)
+        cost_ms = (times_ms - new_times_ms) if inside else (new_times_ms - times_ms)
         shares = float(np.mean(moved)), float(np.mean(cells != new_cells))
         after = shown(new_signals)
         more = {kind: _differing(before[kind], after[kind]) for kind in before}
-        result.append(Change(name, place, inside, *shares, more, ms, also))
+        cost = float(np.median(cost_ms)), float(np.std(cost_ms))
+        result.append(Change(name, place, inside, *shares, more, *cost, also))
     return result
 
 
@@ -284,14 +291,20 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
             continue
         shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
         signal = f"{change.signal:.1%}" if change.signal < 10 else f"{change.signal:.0f}-fold"
-        cells = f"{signal:>8} {change.cells:>7.1%} {shares}{change.ms:>9.1f}"
+        cells = f"{signal:>8} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
         lines.append(f"{head}{cells}  {change.also}".rstrip())
     lines.append(
-        "named: without it; added: with it and its defaults. Shares of the signal's rms, of symbols, of pixels."
+        "named: without it; added: with it and its defaults. Shares of the signal's rms, of symbols, of pixels; "
+        "<: a time that the measurement cannot tell from zero."
     )
     if sources:
-        lines += [f"{change.effect}: {importlib.import_module(dotted(change.effect)).SOURCE}" for change in changes]
+        lines += [f"{change.effect}: {module_of(change.effect).SOURCE}" for change in changes]
     return lines
+
+
+def cost_text(ms: float, spread_ms: float) -> str:
+    """Return a cost in ms; where it is below its spread or negative, the larger of both magnitudes, after a `<`."""
+    return f"{ms:.1f}" if ms > spread_ms else f"<{max(spread_ms, -ms):.1f}"
 
 
 def suggested(overlay: dict, changes: Sequence[Change], least: float) -> str:

@@ -98,7 +98,7 @@ def _beside(view: View, effects: dict[str, NamedEffect], range_m: float, expecte
         result.append(Level(f"background, {_one(view)}, median of draws", dbm(usual_w), "dBm"))
     if view.station.transmitter is not None and "direct_path" in effects:
         direct = effects["direct_path"].module.scatter(effects["direct_path"].settings, view, None)
-        result.append(Level(f"direct path, {_one(view)}", dbm(float(np.mean(abs(direct) ** 2))), "dBm"))
+        result.append(Level(f"direct path, {_one(view)}", dbm(float(np.mean(abs(direct.response) ** 2))), "dBm"))
     if "transmit_leakage" in effects:
         leaked_dbm = dbm(network.power) - effects["transmit_leakage"].settings["isolation_db"]
         result.append(Level(f"transmit leakage, {_one(view)}", leaked_dbm, "dBm"))

@@ -1,4 +1,4 @@
-"""A scene, its random streams, and the motion of a target as one of its stations sees it."""
+"""A scene with its random streams, and the view of a moving target from one of its stations."""
 
 from dataclasses import dataclass, replace
 
@@ -7,16 +7,9 @@ import numpy as np
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.numerics.streams import stream
 from lowalt.scene.checks import refuse_unknown_of
-from lowalt.scene.effects import NamedEffect, offered, placed
+from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.view import Perturbations, View, located
 from lowalt.targets.cloud import Cloud
-
-SHARED_STREAMS = {"clock_offset": "oscillator", "carrier_offset": "oscillator"}
-"""Random streams of effects that draw the same error of one oscillator."""
-LOOK_WIDE = ("link_offset",)
-"""Effects past the motion whose draws are the same for all stations of a look."""
-PAIR_WIDE = ("fluctuation",)
-"""Effects whose draws are the same for both directions of a link."""
 
 
 @dataclass(frozen=True)
@@ -33,19 +26,23 @@ class Scene:
 
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
-        # Noise at one SNR does not depend on noise at another.
+        # Each SNR has a stream of its own, so its noise does not depend on the other SNRs.
         levels = [effect.settings["snr_db"] for effect in self.effects if effect.name == name == "cell_noise"]
-        return stream(self.seed, "effect", name, row["subtype"], row["model"], *ends, *filter(None, levels))
+        # The stream of a user's own effect has the name of its file, wherever that lies.
+        return stream(
+            self.seed, "effect", name.rpartition("/")[2], row["subtype"], row["model"], *ends, *filter(None, levels)
+        )
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
-        """Return the stream of an effect at a station, from its start: one for the look where its draws belong to it.
+        """Return the random stream of an effect, or of another name, at a station, from its start.
 
-        Both directions of a link share the stream of an effect whose draws belong to the pair.
+        An effect may share it (`contract`: STREAM) or draw for the whole look or the pair of a link's stations (DRAWN).
         """
-        name = SHARED_STREAMS.get(name, name)
-        if name in LOOK_WIDE:
+        module = next((effect.module for effect in self.effects if effect.name == name), None)
+        name, drawn = getattr(module, "STREAM", name), getattr(module, "DRAWN", "station")
+        if drawn == "look":
             return self.stream(name, row)
-        if name in PAIR_WIDE and station.transmitter is not None:
+        if drawn == "pair" and station.transmitter is not None:
             return self.stream(name, row, *sorted((station.transmitter.name, station.receiver.name)))
         return self.stream(name, row, station.name)
 
@@ -61,7 +58,7 @@ class Scene:
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     """Return the cloud with the cross sections that the scene gives its points."""
     wavelength_m = SPEED_OF_LIGHT / scene.network.carrier_hz
-    for cross_sections in offered(scene.effects, "cross_sections").values():
+    for cross_sections in every(scene.effects, "cross_sections").values():
         cloud = replace(cloud, rcs_m2=cross_sections(cloud, wavelength_m))
     return cloud
 
@@ -69,14 +66,14 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
 def observe(
     scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None, beside: View | None = None
 ) -> View:
-    """Return the view of a sample with the scene's motion effects drawn; their draws do not depend on the station.
+    """Return the view of a sample from a station, with the motion effects of the scene, which all stations share.
 
-    The view's cloud has the cross sections of the scene. occluders: the target's surfaces; beside: the view of the
-    labelled target, whose instants and beams a companion shares.
+    The view's cloud has the cross sections that the scene gives its points. occluders: the target's surfaces; beside:
+    of a companion, the view of the labelled target, whose instants and beams it shares.
     """
     network, cloud = scene.network, with_cross_sections(scene, cloud)
     grid_s = np.append(network.times_s, len(network.times_s) * network.symbol_interval_s)
-    perturbing = offered(placed(scene.effects, "motion"), "perturb")
+    perturbing = every(scene.effects, "perturb")
     moved = Perturbations(
         grid_s, tuple(perturb(cloud, row, grid_s, scene.stream(name, row)) for name, perturb in perturbing.items())
     )
@@ -84,18 +81,18 @@ def observe(
         motion, places = located(cloud, row, beside.times_s, moved)
         return replace(beside, cloud=cloud, row=row, motion=motion, places=places, moved=moved, occluders=occluders)
     times_s, sampling = network.times_s, None
-    for name, sample in offered(scene.effects, "sampling").items():
+    for name, sample in every(scene.effects, "sampling").items():
         sampling = sample(network, scene.stream(name, row, station.name))
         times_s = sampling.times_s
     motion, places = located(cloud, row, times_s, moved)
-    element = next((element() for element in offered(scene.effects, "element").values()), None)
+    element = only(scene.effects, "element")
     origin_m = np.array([row["x_m"], row["y_m"], row["z_m"]])
     view = View(
-        network, station, cloud, row, times_s, motion, places, moved, origin_m, element=element, occluders=occluders,
-        sampling=sampling,
+        network, station, cloud, row, times_s, motion, places, moved, origin_m, element=element() if element else None,
+        occluders=occluders, sampling=sampling,
     )  # fmt: skip
     stations = [end for end in network.stations if end.transmitter is None]
-    for name, beams in offered(scene.effects, "beams").items():
+    for name, beams in every(scene.effects, "beams").items():
         drawn = {end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations}
         view = replace(view, beams=drawn)
     return view

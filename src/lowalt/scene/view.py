@@ -29,6 +29,24 @@ class Sampling(NamedTuple):
     present: np.ndarray
 
 
+class Displacement(NamedTuple):
+    """How much later (s) and higher in frequency (Hz) an effect lets an echo appear, a number or one a symbol (N,)."""
+
+    delay_s: np.ndarray | float = 0.0
+    rise_hz: np.ndarray | float = 0.0
+
+
+class Still(NamedTuple):
+    """Echoes of something other than a target, which do not move within a symbol.
+
+    response: (N, M) complex128, in sqrt(W) a subcarrier; offset_cells: how far the echoes stand beyond the centres of
+    their range cells, in cells.
+    """
+
+    response: np.ndarray
+    offset_cells: float = 0.0
+
+
 class Perturbations(NamedTuple):
     """Changes of a target's motion by several effects, each given at grid_s (G,) s."""
 

@@ -67,6 +67,11 @@ def baseband_hz(network: Network) -> np.ndarray:
     return (np.arange(network.subcarriers) - network.subcarriers // 2) * network.subcarrier_spacing_hz
 
 
+def oscillator_hz(network: Network, station: Station) -> float:
+    """Return the frequency of a station's local oscillator, f_k + (M // 2) df (Hz)."""
+    return station.frequency_hz + network.subcarriers // 2 * network.subcarrier_spacing_hz
+
+
 def windowed(
     network: Network, prefix_s: float, response: np.ndarray, late: int, on_air: Callable[[str], np.ndarray | None]
 ) -> np.ndarray:
@@ -128,6 +133,5 @@ class Look:
 
     @property
     def oscillator_hz(self) -> float:
-        """Frequency of the local oscillator, f_k + (M // 2) df (Hz)."""
-        count = self.network.subcarriers
-        return self.station.frequency_hz + count // 2 * self.network.subcarrier_spacing_hz
+        """Frequency of the local oscillator (Hz)."""
+        return oscillator_hz(self.network, self.station)

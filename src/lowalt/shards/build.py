@@ -1,6 +1,6 @@
-"""A whole data set written from its configuration and clouds alone, without a workflow: the same bytes, one process.
+"""Writes a whole data set from its configuration and clouds in one process, with the same bytes as the workflow.
 
-`python -m lowalt.shards.build` writes clouds, motion tables and shards; the echoes stay in memory.
+`python -m lowalt.shards.build` writes clouds, motion tables and shards; echoes are only kept in memory.
 """
 
 import argparse
@@ -61,11 +61,11 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     group, _, part = chunk.partition("-")
     if chunk in plan.sources:
         write_table(folder / "motion" / f"{chunk}.csv", rows)
-    # A shard's samples are shuffled, so the echoes of all its motion models are kept until it is written.
+    # The samples of a shard are shuffled, so keep the echoes of all its motion models until it is written.
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> tuple[bytes, dict]:
-        """The data of one sample, row `number` at SNR `level` of the chunk, and what its record says of its cubes."""
+        """Data of one sample (row `number` at SNR `level` of the chunk), and the part of its record about cubes."""
         if kind == "recipe":
             return npy(maker.received(rows[number])[0]), {}
         return maker.data(kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], cells)

@@ -1,6 +1,6 @@
-"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index: the folder can be published.
+"""The data card, which makes the folder of the index publishable: README.md, samples.csv, croissant.json, SHA256SUMS.
 
-A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
+`python -m lowalt.shards.card` is a separate command, so that a change of wording does not re-pack shards.
 """
 
 import argparse
@@ -8,6 +8,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import jinja2
@@ -37,7 +38,7 @@ WHAT = {
     "cube": "all range cells of every symbol, complex, with noise",
     "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
 }
-"""Name of the data in the description, by kind of shards."""
+"""Description of the data, by kind of shards."""
 
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
@@ -86,7 +87,7 @@ def _counts(shards: ShardSet) -> str:
     sizes = [entry["bytes"] / 1e6 for entry in shards.shards]
     parts.append(
         f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, {sum(sizes) / 1e3:.3f} GB in all, "
-        f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB a sample.\n"
+        f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB per sample.\n"
     )
     return "\n".join(parts)
 
@@ -123,7 +124,7 @@ def description(shards: ShardSet) -> str:
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
     versions = shards.record(0)["versions"] if len(shards) else {"lowalt": __version__}
-    # Blocks of the template leave no lines of their own.
+    # Template blocks must not leave empty lines.
     templates = jinja2.Environment(
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined
     )
@@ -139,7 +140,8 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
     """Write README.md, samples.csv and croissant.json next to an index, and the checksums of all of it.
 
-    facts: further properties of the Croissant description, such as `url` and `datePublished`.
+    facts: further properties of the Croissant description, such as `url`; `datePublished` is the day (UTC) on which the
+    index was written where they name none.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
     """
     if license_name not in LICENSES:
@@ -154,7 +156,8 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     table = {"path": samples.name, "bytes": samples.stat().st_size, "sha256": sha256(samples)}
     known = {
         "name": name, "description": description(shards), "version": __version__,
-        "license": LICENSES[license_name], "citeAs": PAPER, **facts,
+        "license": LICENSES[license_name], "citeAs": PAPER,
+        "datePublished": f"{datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC):%Y-%m-%d}", **facts,
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
@@ -168,7 +171,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
     line.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
     line.add_argument("--url", help="where the data set will be published")
-    line.add_argument("--date", help="day of publication, YYYY-MM-DD")
+    line.add_argument("--date", help="day of publication, YYYY-MM-DD (default: the index's own)")
     options = line.parse_args(arguments)
     facts = {"url": options.url, "datePublished": options.date}
     write(options.index, options.config, options.license, **{key: text for key, text in facts.items() if text})

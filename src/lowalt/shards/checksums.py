@@ -1,8 +1,7 @@
 """SHA256SUMS in the folder of the index: one line for every other file of a data set, in the form of `sha256sum`.
 
-Each checksum stands in a file that is written later: a sample's in its shard's table, the tables' and shards' in the
-index, the index's and the data card's here. SHA256SUMS itself needs none: its text follows from the files that it
-names, so a changed byte of it contradicts one of them.
+Checksums form a chain: those of samples are in their shard's table, those of tables and shards in the index, those of
+the index and the data card here. SHA256SUMS itself needs none: any changed byte of it contradicts one of the files.
 """
 
 import re
@@ -31,7 +30,7 @@ def _text(sums: dict[str, str]) -> str:
 def write(index_path: str | Path, index: dict) -> None:
     """Write SHA256SUMS next to an index whose data card is complete.
 
-    The shards are not read again: their checksums are those of the index.
+    Shards are not read again; their checksums are taken from the index.
     """
     folder = Path(index_path).parent
     card = {name: sha256(folder / name) for name in (*CARD, Path(index_path).name)}
@@ -40,7 +39,7 @@ def write(index_path: str | Path, index: dict) -> None:
 
 
 def faults(index_path: str | Path, index: dict) -> Iterator[str]:
-    """Yield one line a fault of the index's and the data card's bytes, of SHA256SUMS, and of files that do not belong.
+    """Yield one line per fault in the index, the data card and SHA256SUMS, and per file that does not belong there.
 
     The bytes of shards and tables are not read here; `verify.shard_faults` checks them against the index.
     """

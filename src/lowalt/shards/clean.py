@@ -1,9 +1,9 @@
-"""Shards of kind `recipe`: a motion model's clean echoes once, and one record of all its SNRs; noise is drawn anew.
+"""Shards of kind `recipe`: the clean echoes of each motion model, and one record of all its SNRs. Readers add noise.
 
 A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without noise, and the record of
-the same key has lists at `snr_db` and `noise`. In a scene with effects the record also names the powers that the SNRs
-refer to, and the canceller that the noise passes. Record and signals of each sample follow from these, byte for byte
-as in a shard of signals.
+the same key has lists at `snr_db` and `noise`. In a scene with effects the record also has the reference powers of
+the SNRs and the canceller that filters the noise. Record and signals of each sample are computed from these, with the
+same bytes as in a shard of signals.
 """
 
 import functools
@@ -15,18 +15,18 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from lowalt.files.errors import InputError
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.shards.sample_record import encoded, sample_key
 
 POWER = "power_w"
-"""Field of the record for the power (W) that SNRs refer to, a number a station; absent where it is the echoes' own."""
+"""Field of the record: the power (W) that SNRs refer to, one number per station. Without it, the echoes' own power."""
 CANCELLER = "canceller"
 """Field of the record for the settings, as JSON text, of the canceller that the noise passes; absent without one."""
 
 
 def refuse(effects: dict) -> None:
-    """Refuse a scene whose noise is not added to clean echoes of one range cell.
+    """Refuse a scene in which noise is not simply added to the clean echoes of one range cell.
 
     effects: the configuration's block. Raises: InputError naming the effect.
     """
@@ -95,9 +95,9 @@ def complex_signals(stored: np.ndarray) -> np.ndarray:
 
 
 def samples(models: Iterable[dict]) -> Iterator[dict]:
-    """Yield all samples of motion models that another tool reads from recipe shards, in the form of signal shards.
+    """Yield all samples, in the form of signal shards, from motion models that another tool reads from recipe shards.
 
-    models: dicts with `json` and `clean.npy`, as bytes or decoded, as webdataset's pipelines hand them on. Yields dicts
+    models: dicts with `json` and `clean.npy`, as bytes or decoded, as in a pipeline of webdataset. Yields dicts
     with `__key__`, `json` (parsed) and `npy`, (stations, symbols, 2) float32. For example
     `webdataset.WebDataset(path, shardshuffle=False).compose(lowalt.shards.clean.samples)`.
     """

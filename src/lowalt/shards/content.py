@@ -1,4 +1,4 @@
-"""The files of a chunk from earlier stages, as a function from (motion model, SNR) to a shard member's bytes."""
+"""Turns the files of a chunk into a function from (motion model, SNR) to the bytes of a shard member."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ from lowalt.tiles.tile_files import Tiles
 def _signals(kind: str, path: str | None, network: Network, shape: tuple[int, int]) -> np.ndarray:
     """The chunk's noisy signals (models, SNRs, stations, symbols).
 
-    Raises: InputError where the option is missing, or naming the file that has not so many models and SNRs.
+    Raises: InputError if the option is missing, or naming a file with another number of models or SNRs.
     """
     if path is None:
         raise InputError(f"--signals: missing, {kind} shards are packed from them")
@@ -34,7 +34,7 @@ def noisy_content(
 ) -> Content:  # fmt: skip
     """Return the content of image or signal shards from the chunk's files.
 
-    path: of the noisy signals; shape: how many motion models and SNRs the chunk has.
+    path: of the noisy signals; shape: numbers of motion models and SNRs of the chunk.
     Raises: InputError naming the option or file that is missing or does not fit.
     """
     signals = _signals(kind, path, network, shape)

@@ -1,5 +1,6 @@
-"""Croissant metadata of a data set: its shards with checksums, and its samples as records that tools can load.
+"""Croissant metadata of a data set: its shards with checksums, and the table of its samples as records.
 
+There is no record set with images, because tools would unpack every shard before returning the first record.
 Source: Croissant format specification 1.1 (MLCommons).
 """
 
@@ -13,7 +14,7 @@ TERMS = """
     personalSensitiveInformation recordSet references regex repeated replace samplingRate separator source subField
     transform
 """
-"""Words of the format that stand for themselves."""
+"""Terms of the format whose prefixed name is cr:TERM."""
 CONTEXT = {
     "@language": "en",
     "@vocab": "https://schema.org/",
@@ -42,18 +43,38 @@ FIELDS = {
 }
 """Columns of the table of all samples: data type and meaning; the label's meaning names the classes."""
 
-ARRAY = "application/octet-stream", "sc:Text"
+ARRAY = "application/octet-stream"
 MEDIA = {
-    "image": ("image/png", "sc:ImageObject", "{} x {} palette PNG: rows are stations, columns {}."),
-    "signal": (*ARRAY, "Signals (stations, symbols, re and im), float32, as an .npy file."),
-    "cube": (*ARRAY, "Range cells with noise (stations, symbols, cells, re and im), float32 or int16 times the "
-             "record's step, as an .npy file."),
-    "recipe": (*ARRAY, "Echoes without noise of a motion model (stations, symbols, re and im), float32, as an .npy "
+    "image": ("image/png", "{} x {} palette PNG of every sample: rows are stations, columns {}."),
+    "signal": (ARRAY, "Signals of every sample (stations, symbols, re and im), float32, as an .npy file."),
+    "cube": (ARRAY, "Range cells with noise of every sample (stations, symbols, cells, re and im), float32 or int16 "
+             "times the record's step, as an .npy file."),
+    "recipe": (ARRAY, "Echoes without noise of every motion model (stations, symbols, re and im), float32, as an .npy "
                "file."),
 }  # fmt: skip
-"""Media type, Croissant's data type, and meaning of the member next to the record, by kind of shards."""
+"""Media type and meaning of the member next to the record, by kind of shards."""
 OF = {"image": "sample", "signal": "sample", "cube": "sample", "recipe": "motion model"}
-"""The set of records that one member of a shard belongs to; the SNRs of a motion model share one in recipe shards."""
+"""What one member of a shard describes; in recipe shards all SNRs of a motion model share one member."""
+RESPONSIBLE = {
+    "dataCollection": "All samples are simulated from the configuration in README.md. No radar recorded them.",
+    "dataCollectionType": ["Software Collection"],
+    "dataPreprocessingProtocol": ["README.md names the spectra, the noise and the scaling of the images."],
+    "dataAnnotationProtocol": ["The label is the class of the target that was simulated. No person annotated samples."],
+    "dataUseCases": [
+        "Training, validation and test of networks that recognise low-altitude targets in the echoes of base stations.",
+        "Not suitable alone as evidence of the accuracy of a radar in operation."],
+    "dataBiases": [
+        "Motion models are drawn from the intervals of the configuration, not from observed traffic.",
+        "Subtypes within a class are equally frequent, whatever their share among real targets."],
+    "dataLimitations": [
+        "Only the effects that the configuration names are simulated; README.md lists the known limits.",
+        "Built-in targets are parametric models with published sizes and rates, not measured objects."],
+    "dataSocialImpact": "Recognition of drones serves the safety of the low airspace. The same methods can monitor the "
+                        "movements of people.",
+    "personalSensitiveInformation": ["None is simulated. Recordings of gaits that a user adds keep their own terms."],
+    "dataReleaseMaintenancePlan": "README.md has the configuration and the versions that make the same bytes again.",
+}  # fmt: skip
+"""Properties of the responsible-AI vocabulary. Source: Croissant RAI specification 1.0 (MLCommons)."""
 
 
 def metadata(index: dict, table: dict, facts: dict) -> dict:
@@ -69,24 +90,25 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
               f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold.")
         for entry in index["shards"]
     ]  # fmt: skip
-    files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
-    mime, data_type, meaning = MEDIA[kind]
+    files.append(_file({**table, "name": table["path"]}, "text/csv", "One row per sample: key, class, SNR, shard."))
+    mime, meaning = MEDIA[kind]
     size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])
     spectra = [name.upper() for name in named(index["render"]["spectra"])]
     meaning = meaning.format(len(spectra) * size, stations * size, ", ".join(spectra))
     about = f"JSON record of every {OF[kind]}: motion, geometry, seed."
     sets = [
         _files("records", inside, "application/json", "*.json", about),
-        _files(f"{kind}s", inside, mime, f"*.{EXTENSIONS[kind]}", f"The {kind} of every {OF[kind]}."),
+        _files(f"{kind}s", inside, mime, f"*.{EXTENSIONS[kind]}", meaning),
     ]
     return {
         "@context": CONTEXT,
         "@type": "sc:Dataset",
         **facts,
-        "conformsTo": "http://mlcommons.org/croissant/1.1",
+        **{f"rai:{name}": value for name, value in RESPONSIBLE.items()},
+        "conformsTo": ["http://mlcommons.org/croissant/1.1", "http://mlcommons.org/croissant/RAI/1.0"],
         "isLiveDataset": False,
         "distribution": files + sets,
-        "recordSet": [_samples(table["path"], classes), _labelled(kind, table["path"], classes, data_type, meaning)],
+        "recordSet": [_samples(table["path"], classes)],
     }
 
 
@@ -106,39 +128,15 @@ def _files(name: str, inside: list[dict], mime: str, pattern: str, meaning: str)
     }  # fmt: skip
 
 
-def _records(name: str, meaning: str, fields: list[dict], **more: dict) -> dict:
-    """A set of records with these fields."""
-    fields = [{"@type": "cr:Field", "@id": f"{name}/{field['name']}", **field} for field in fields]
-    return {
-        "@type": "cr:RecordSet", "@id": name, "name": name, **more, "description": meaning, "field": fields,
-    }  # fmt: skip
-
-
-def _column(table: str, name: str, classes: str) -> dict:
-    """A field that is a column of the table of samples."""
-    data_type, meaning = FIELDS[name]
-    source = {"fileObject": {"@id": table}, "extract": {"column": name}}
-    return {"name": name, "description": meaning.format(classes), "dataType": data_type, "source": source}
-
-
 def _samples(table: str, classes: str) -> dict:
     """The record set with one row for each sample, from the table; classes: with their numbers, as one text."""
-    fields = [_column(table, name, classes) for name in FIELDS]
-    meaning = "All samples, without their images or signals."
-    return _records("samples", meaning, fields, key={"@id": "samples/key"})
-
-
-def _labelled(kind: str, table: str, classes: str, data_type: str, meaning: str) -> dict:
-    """The record set with one row for each sample: its image, signal or echo next to what the table says of it."""
-
-    def member(name: str) -> dict:
-        """A property of a member of the shards."""
-        return {"fileSet": {"@id": f"{kind}s"}, "extract": {"fileProperty": name}}
-
-    file = _column(table, "file", classes)
     fields = [
-        {**file, "source": member("filename"), "references": file["source"]},
-        *(_column(table, name, classes) for name in ("key", "label", "category", "snr_db")),
-        {"name": "content", "description": meaning, "dataType": data_type, "source": member("content")},
-    ]
-    return _records("labelled", f"The {kind} of every sample with its label.", fields)
+        {"@type": "cr:Field", "@id": f"samples/{name}", "name": name, "description": meaning.format(classes),
+         "dataType": data_type, "source": {"fileObject": {"@id": table}, "extract": {"column": name}}}
+        for name, (data_type, meaning) in FIELDS.items()
+    ]  # fmt: skip
+    return {
+        "@type": "cr:RecordSet", "@id": "samples", "name": "samples", "key": {"@id": "samples/key"}, "field": fields,
+        "description": "All samples with their labels, and the shard and the file that hold each. Records with images "
+                       "or signals: datasets.load_dataset, which streams the shards (README.md).",
+    }  # fmt: skip

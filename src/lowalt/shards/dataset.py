@@ -1,20 +1,21 @@
-"""A data set that makes each sample when it is asked for, with the same bytes as in the shards.
+"""A data set that simulates each sample on access, with the same bytes as in the shards.
 
-Torch is not imported: `Dataset` has a length and numbered samples, as `torch.utils.data.DataLoader` expects, and
-`Endless` is an iterable; both can be pickled, so workers of any framework make samples of their own.
+Torch is not imported: `Dataset` has a length and indexed samples, as `torch.utils.data.DataLoader` expects, and
+`Endless` is an iterable. Both can be pickled, so the workers of any framework can make samples.
 """
 
 import functools
 import itertools
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
+from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
 from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
 from lowalt.config.splits import FOLDS, fold
@@ -30,7 +31,7 @@ from lowalt.shards.remake import CloudFolder
 from lowalt.shards.sample_record import accompanied, record, sample_key
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.records import records_of
+from lowalt.targets.records import missing_inputs, records_of
 
 
 class Sample(NamedTuple):
@@ -43,7 +44,7 @@ class Sample(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The sample of a number: its group, subtype, motion model and SNR."""
+    """Identification of a sample: its group, subtype, motion model and SNR."""
 
     group: str
     subtype: str
@@ -51,24 +52,45 @@ class Place(NamedTuple):
     snr_db: float
 
 
-def made_clouds(records: dict[str, dict], seed: int, inputs: Path | None) -> dict[str, Cloud]:
-    """Return the cloud of each record by subtype, made from the sources that the records name.
+class MadeOnDemand(Mapping):
+    """What `make` makes of each target's record, by subtype: made when it is first asked for, and then kept."""
 
-    Raises: InputError where a record or an input is wrong.
+    def __init__(self, make: Callable[..., Any], records: dict[str, dict], seed: int, inputs: Path | None) -> None:
+        """make: a function of (record, inputs, seed); inputs: the user's folder of meshes and recordings, or None."""
+        self._make, self._records, self._sources = make, records, (inputs, seed)
+        self._made: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        """What is made of one target. Raises: KeyError for another; InputError where its record or input is wrong."""
+        if name not in self._made:
+            self._made[name] = self._make(self._records[name], *self._sources)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._records)
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+
+def made_cloud(record: dict, inputs: Path | None, seed: int) -> Cloud:
+    """Return the cloud of a record, made from the source that it names.
+
+    Raises: InputError where the record or an input is wrong.
     """
     from lowalt.targets.make import make
 
-    return {name: make(item, inputs, seed) for name, item in records.items()}
+    return make(record, inputs, seed)
 
 
-def made_occluders(records: dict[str, dict], seed: int, inputs: Path | None) -> dict[str, dict]:
-    """Return the surfaces of each record by subtype, made from the sources that the records name.
+def made_surfaces(record: dict, inputs: Path | None, seed: int) -> dict:
+    """Return the surfaces of a record, made from the source that it names.
 
-    Raises: InputError where a record or an input is wrong, or a target has no surfaces.
+    Raises: InputError where the record or an input is wrong, or the target has no surfaces.
     """
     from lowalt.targets.occluders import make
 
-    return {name: make(item, inputs, seed) | {"subtype": name} for name, item in records.items()}
+    return make(record, inputs, seed) | {"subtype": record["subtype"]}
 
 
 class Dataset:
@@ -94,18 +116,20 @@ class Dataset:
         groups: Iterable[str] = GROUPS,
         folds: Iterable[str] = FOLDS,
         inputs: str | Path | None = None,
-        occluders: dict | None = None,
+        occluders: Mapping[str, dict] | None = None,
         published: dict[str, dict] | None = None,
     ) -> None:
         """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and choose groups and folds.
 
         clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
-        that the configuration names and the folder `inputs` of meshes and recordings. occluders: each subtype's
-        surfaces, where the scene hides points behind them, made here where the clouds are; published: every row of
-        the table of targets by subtype, by default from the records; the classes follow from it.
+        that the configuration names and the folder `inputs` of meshes and recordings, each when it is first asked for.
+        occluders: each subtype's surfaces, where the scene hides points behind them, made where the clouds are.
+        published: every row of the table of targets by subtype, by default from the records; the classes follow.
         Raises: InputError naming the key, value or file that is wrong.
         """
-        config = check(load_yaml(config), shipped(SCHEMA)) if isinstance(config, (str, Path)) else config
+        if isinstance(config, (str, Path)):
+            path, config = config, check(load_yaml(config), shipped(SCHEMA))
+            refuse_effects(config["effects"], path)
         self.config, self.folds = config, tuple(folds)
         records = {}
         if published is None or clouds is None:
@@ -120,9 +144,11 @@ class Dataset:
         if clouds is None:
             wanted = {name: records[name] for group in self.groups for name in self.plan.groups[group]}
             sources = wanted, config["seed"], Path(inputs) if inputs else None
-            clouds = made_clouds(*sources)
+            if missing := missing_inputs(wanted, sources[-1]):
+                raise InputError("missing inputs:\n  " + "\n  ".join(missing))
+            clouds = MadeOnDemand(made_cloud, *sources)
             if occluders is None and "occlusion" in config["effects"]:
-                occluders = made_occluders(*sources)
+                occluders = MadeOnDemand(made_surfaces, *sources)
         self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
         self._masts = np.array(masts_m(config["network"]), float)
         self._corners = region_polygon(self._masts, config["motion"]["region"]["polygon_m"])
@@ -177,7 +203,7 @@ class Dataset:
         """Return the motion table's row of a sample; models beyond the configuration's count are drawn too."""
         track, look = divmod(place.model, self.plan.looks)
         name = place.subtype, track
-        # The looks of a track are drawn together, and most often asked for one after the other.
+        # All looks of a track are drawn together and usually accessed in sequence, so keep the last track.
         if self._drawn[0] != name:
             sources = self.clouds[place.subtype], self.published[place.subtype], self._masts, self._corners
             self._drawn = name, model_rows(self.plan.seed, *sources, self._motion, track, self._path)
@@ -189,7 +215,7 @@ class Dataset:
         return self.maker.signal(self.row(place), place.snr_db)
 
     def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
-        """Return the JSON record of a sample; cubes: what it says of each station's cube."""
+        """Return the JSON record of a sample; cubes: its part about each station's cube."""
         facts = place.snr_db, self._fold(place), self.plan.seed, self.maker.network, self.classes
         return record(self.row(place), *facts, cubes)
 
@@ -243,9 +269,9 @@ class Dataset:
 
 
 class Endless:
-    """An endless sequence of samples: from a first motion model on, each model number of every subtype at all SNRs.
+    """An endless sequence of samples: all subtypes at all SNRs, for increasing numbers of the motion model.
 
-    `part` of `parts` (a worker, a rank) takes every `parts`-th motion model, so no two parts make the same sample.
+    With `parts` workers or ranks, number `part` takes every `parts`-th motion model, so that no sample is made twice.
     """
 
     def __init__(self, dataset: Dataset, first: int | None = None, part: int = 0, parts: int = 1) -> None:

@@ -13,10 +13,10 @@ TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webda
 
 
 def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
-    """Return one pattern for the shards of a group and fold; their paths, if it would not match exactly these."""
+    """Return one glob pattern that matches exactly the shards of a group and fold, or else their paths."""
     names = [entry["path"] for entry in shards.shards if (entry["group"], entry["fold"]) == (group, fold)]
     usual = f"{group}-{fold}-*.tar"
-    # In a hub's pattern a star stands for no slash; to `fnmatchcase` it may.
+    # The hub's `*` does not match `/`; fnmatchcase's does.
     paths = [entry["path"] for entry in shards.shards if "/" not in entry["path"]]
     matched = [path for path in paths if fnmatchcase(path, usual)]
     return [usual] if matched == names else names
@@ -25,7 +25,7 @@ def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
 def configs(shards: ShardSet) -> list[dict]:
     """Return the protocols as a hub's configurations: for each its splits and the shards of each split.
 
-    Shards are matched by group and fold in their names, so the list stays short for thousands of them.
+    Patterns match shards by group and fold in their names, so the list is short even for thousands of shards.
     """
     present = {(entry["group"], entry["fold"]) for entry in shards.shards}
     hub = {"train": "train", "val": "validation", "test": "test"}
@@ -33,7 +33,7 @@ def configs(shards: ShardSet) -> list[dict]:
     for protocol in ("seen", "unseen"):
         files: dict[str, list[str]] = {}
         for group, fold in sorted(present, key=lambda pair: (pair[0], FOLDS.index(pair[1]))):
-            # In the unseen protocol all folds of the unseen group are tests, and the seen group has no test.
+            # In the unseen protocol all folds of the unseen group are test data, and the seen group has none.
             both = protocol == "seen" or group == "seen"
             if protocol == "unseen" and group == "seen" and fold == "test":
                 continue
@@ -48,7 +48,7 @@ def configs(shards: ShardSet) -> list[dict]:
 
 
 DTYPES = {bool: "bool", int: "int64", float: "float64", str: "string", type(None): "float64"}
-"""The hub's names of the types of a record's values; a number that is unknown is null."""
+"""The hub's type names for values of a record; an unknown number is null."""
 
 
 def features(shards: ShardSet) -> list[dict]:
@@ -64,7 +64,7 @@ def features(shards: ShardSet) -> list[dict]:
         if isinstance(value, dict):
             return {"name": name, "struct": [typed(*item) for item in value.items()]}
         if name == "others":
-            # The first sample may have no companion.
+            # The first sample may have no companion, so its list may be empty.
             return {"name": name, "list": [{"name": column, "list": "float64"} for column in TRUTH]}
         if isinstance(value, list):
             return {"name": name, "list": DTYPES[type(value[0])] if value else "string"}
@@ -73,7 +73,7 @@ def features(shards: ShardSet) -> list[dict]:
     entry = json.loads(shards.stored(0, "record"))
     data: dict = {"dtype": "image"}
     if shards.kind != "image":
-        # Numbers lie in as many lists as the array has axes.
+        # One nested list per axis of the array.
         axes = {"list": {"list": {"list": "int16" if cell_type_of(entry) == "int16" else "float32"}}}
         data = {"list": axes} if shards.kind == "cube" else axes
     return [typed("__key__", ""), typed("__url__", ""), typed("json", entry),

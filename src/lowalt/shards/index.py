@@ -1,7 +1,7 @@
 """The index of a data set: every shard with its group, fold, counts and checksums, and how signals are rendered.
 
-It merges the headers of the shards' tables; the shards themselves are not read. A sample's own offsets and
-SHA-256 stay in its shard's table, whose SHA-256 stands in the index: one checksum of the index covers everything.
+It is made from the headers of the shards' tables, without reading the shards. Offsets and SHA-256 of samples are in the
+shards' tables, and the tables' SHA-256 in the index, so one checksum of the index covers everything.
 """
 
 import hashlib
@@ -11,13 +11,14 @@ from pathlib import Path, PurePosixPath
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.schema import check_brought
-from lowalt.files.atomic import existing, replacing, sha256, text_of
+from lowalt.files.atomic import existing, replacing, sha256
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import read_object
 from lowalt.shards.sample_table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"
 READABLE = ("lowalt-shards-1", FORMAT)
-"""Formats that are read; records of the first have nulls, an SNR of \"inf\", and its signals are complex64."""
+"""Readable formats. In the first, records contain nulls and an SNR of \"inf\", and signals are complex64."""
 
 
 def build(
@@ -27,9 +28,9 @@ def build(
     """Write the index of these shards to `out` and return it.
 
     render: the settings that turn signals into tiles ({network, spectra, images}); echo: those that turn motion into
-    echoes ({tolerance, effects}), without which no sample can be made again; classes: in the order
-    of their labels; the index states them where they are not the published ones. Paths in the index are relative
-    to its folder. Raises: InputError where a table is missing, a name stands twice or the kinds differ.
+    echoes ({tolerance, effects}), needed to remake samples; classes: in the order of their labels, stored only if they
+    are not the published ones. Paths in the index are relative to its folder.
+    Raises: InputError where a table is missing, a name appears twice or the kinds differ.
     """
     entries = []
     for shard in map(Path, shards):
@@ -83,11 +84,11 @@ def load(path: str | Path) -> dict:
     Raises: InputError naming the file where it is missing or no index, or the setting in it that is wrong.
     """
     existing(path, "index")
+    index = read_object(path, "an index of shards")
     try:
-        index = json.loads(text_of(path, "index"))
         written, stated, computed = index["format"], index["sha256"], _checksum(index)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path}: not an index of shards ({error})") from error
+    except KeyError as error:
+        raise InputError(f"{path}: not an index of shards, it has no {error}") from None
     if written not in READABLE:
         raise InputError(f"{path}: format {written!r}, expected one of {READABLE}")
     if stated != computed:

@@ -1,6 +1,6 @@
-"""One sample, made from a row of the motion table and the target's cloud: echo, noise, image.
+"""Makes one sample from a row of the motion table and the target's cloud: echo, noise, image.
 
-It runs the stages' own functions on one row, so its bytes are those that the stages write.
+It applies the functions of the stages to one row, so its bytes equal those that the stages write.
 """
 
 import functools
@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.config.network import Network
 from lowalt.echo.chunk import clean_signals
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.lateness import lateness
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.shards.sample_record import npy
@@ -25,16 +25,21 @@ from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 
 KEPT = 16
-"""Motion models whose clean echoes are kept by default, 10 kB each; a model's samples differ only in their noise."""
+"""Default number of motion models whose clean echoes are cached (10 kB each), for use at all their SNRs."""
 
 
 class Maker:
-    """Makes samples of one configuration; it keeps the clean echoes of the last motion models."""
+    """Makes samples of one configuration and caches the clean echoes of the last motion models."""
 
     def __init__(
-        self, render: dict, echo: dict, seed: int, clouds: Mapping[str, Cloud], occluders: dict | None = None
+        self,
+        render: dict,
+        echo: dict,
+        seed: int,
+        clouds: Mapping[str, Cloud],
+        occluders: Mapping[str, dict] | None = None,
     ) -> None:
-        """Take the settings {network, spectra, images} and {tolerance, effects}, the root seed and clouds by subtype.
+        """Take the settings {network, spectra, images} and {tolerance, effects}, the random seed and clouds by subtype.
 
         occluders: each subtype's surfaces, where the scene hides points behind them.
         Raises: InputError naming the key and value that is missing, unknown or out of range.
@@ -48,7 +53,7 @@ class Maker:
 
     def __getstate__(self) -> dict:
         """State for pickle, without tables and kept echoes."""
-        # Workers prepare tables of their own.
+        # Each worker computes its own tables.
         kept = {name: value for name, value in self.__dict__.items() if name not in ("renderer", "_cubes")}
         return {**kept, "_received": {}}
 
@@ -59,7 +64,7 @@ class Maker:
 
     @functools.cached_property
     def _cubes(self) -> Cubes:
-        """What makes the cubes of samples."""
+        """The maker of the cubes of samples."""
         scene = {"seed": self.seed, "network": self.render["network"], **self.echo}
         return Cubes.from_settings(scene, self.clouds, self.occluders)
 
@@ -79,9 +84,9 @@ class Maker:
     def received(
         self, row: dict, snr_db: float | None = None, stations: Sequence[int] | None = None
     ) -> tuple[np.ndarray, np.ndarray | None]:  # fmt: skip
-        """Return clean echoes (stations, symbols) complex64 of a motion model, and the powers (stations, 1) W that SNRs
-        refer to, None where these are the echoes' powers. With an SNR (dB), the echoes include noise of all range
-        cells. stations: numbers of those to compute, all by default.
+        """Return a motion model's clean echoes (stations, symbols) complex64 and the reference powers (stations, 1) W
+        of SNRs, None if these are the powers of the echoes. With an SNR (dB), the echoes include the noise of all
+        range cells. stations: numbers of those to compute, all by default.
 
         Raises: InputError naming the sample that cannot be computed.
         """
@@ -115,8 +120,8 @@ class Maker:
     def signal(self, row: dict, snr_db: float, stations: Sequence[int] | None = None) -> np.ndarray:
         """Return the noisy signals of one sample, (stations, symbols) complex64.
 
-        stations: numbers of those that are asked for, rising; the others' signals are then zeros, and nothing is
-        computed for them. Raises: InputError naming the sample that cannot be computed.
+        stations: numbers of those to compute, in increasing order; the signals of the others are zeros.
+        Raises: InputError naming the sample that cannot be computed.
         """
         every = range(len(self.network.stations))
         chosen = list(every if stations is None else stations)
@@ -135,7 +140,7 @@ class Maker:
         return noisy_signals(clean[:, None], [row], self._names(stations), [snr_db], self.seed, powers, behind)[0, 0]
 
     def late(self, row: dict) -> np.ndarray | None:
-        """Return how late the symbols of a motion model are, (stations, symbols); None where images do not ask."""
+        """Return the delays of a motion model's symbols, (stations, symbols); None if images do not use them."""
         return lateness(self.render["spectra"], self.echo["effects"], self.network, self.seed, row)
 
     def tile(self, signal: np.ndarray, row: dict, snr_db: float) -> np.ndarray:

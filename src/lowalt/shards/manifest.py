@@ -1,7 +1,7 @@
 """The manifest of a run: the SHA-256 of every file that configuration and version determine.
 
-One line a file, as `sha256sum` writes and checks it, in the order of the stages; a rebuilt run is compared with it, and
-the first stage that differs is named, since all stages after it then differ too.
+One line per file in the format of `sha256sum`, in the order of the stages. The comparison of a rebuilt run names the
+first stage that differs, because all later stages then differ too.
 """
 
 import argparse
@@ -18,7 +18,7 @@ STAGES = {
     "clouds": ("clouds/*.npz",), "motion": ("motion/*.csv",), "echo": ("echo/*/*.npy",), "noise": ("noisy/*.npy",),
     "tiles": ("tiles/*.npz",), "shards": ("shards/*.tar", "shards/*.npz", "shards/index.json"),
 }  # fmt: skip
-"""Stages in pipeline order, and the files each leaves in a run's folder; tiles go into shards and are then deleted."""
+"""Stages in pipeline order, and the files each leaves in a run's folder; tiles are deleted once they are in shards."""
 
 
 def files(folder: str | Path) -> Iterator[str]:
@@ -51,7 +51,7 @@ def read(path: str | Path) -> dict[str, str]:
         if not re.fullmatch("[0-9a-f]{64}", digest) or not name:
             raise InputError(f"{path}, line {number}: {line!r}, expected a SHA-256, two spaces and a file")
         if stage_of(name) not in STAGES:
-            # No stage would compare such a file, so it would pass unseen.
+            # No stage would compare such a file, so a difference would go unnoticed.
             raise InputError(f"{path}, line {number}: {name!r}, expected a file of one of {tuple(STAGES)}")
         result[name] = digest
     return result

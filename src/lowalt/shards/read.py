@@ -1,6 +1,6 @@
-"""Access to the samples of shards by number, in any order; each access checks the sample.
+"""Random access to the samples of shards; each access verifies the sample.
 
-Torch is not imported: `len` and one of the methods below make a data set of any framework.
+Torch is not imported: `len` and one of the methods below are enough for a data set of any framework.
 """
 
 import functools
@@ -42,7 +42,8 @@ def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
 class ShardSet:
     """The samples of some groups and folds of a data set, numbered in the order of the index.
 
-    Picklable: workers map their own tables. Every access checks the sample's SHA-256 unless `check` is off.
+    It can be pickled; each worker memory-maps the tables itself. Every access checks the sample's SHA-256, unless
+    `check` is False.
     """
 
     def __init__(
@@ -110,10 +111,10 @@ class ShardSet:
         shard, place = self._locate(number)
         row, path = self._table(shard)[place], existing(self._path(shard), "shard")
         first, length = int(row[f"{member}_offset"]), int(row[f"{member}_size"])
-        # Without a check, read the member alone: a record has a hundredth of its sample's bytes.
+        # Without a check, read only the member: a record is about 1 % of its sample's bytes.
         offset, size = (int(row["offset"]), int(row["size"])) if self.check else (first, length)
-        # Open the shard for each sample: a data set may have more shards than a process may have open files, and a
-        # memory map of a file cut short would end the process.
+        # Open the shard for each access: there may be more shards than allowed open files, and a memory map of a
+        # truncated file would crash the process.
         with path.open("rb") as file:
             file.seek(offset)
             span = file.read(size)
@@ -218,15 +219,15 @@ class ShardSet:
         return cubes_of(self.record(number), self._array(number))
 
     def _array(self, number: int) -> np.ndarray:
-        """The array that a sample's data are."""
+        """The stored array of a sample."""
         return np.lib.format.read_array(io.BytesIO(self.stored(number, "data")))
 
     def _shown(self, number: int) -> list[Cube] | None:
-        """The cubes of a sample where images are made of them."""
+        """The cubes of a sample if its images need them, else None."""
         return self.cubes(number) if of_cells(self.spectra) else None
 
     def late(self, number: int) -> np.ndarray | None:
-        """Return how late the symbols of a sample are, (stations, symbols) intervals; None where images do not ask."""
+        """Return the delays of a sample's symbols, (stations, symbols) intervals; None if images do not use them."""
         render, effects = self.index["render"], (self.index.get("echo") or {}).get("effects", {})
         if render["spectra"].get("times") != "known":
             return None
@@ -251,7 +252,7 @@ class ShardSet:
     ) -> np.ndarray:
         """Return the images of a sample, (stations spectra, S, S) uint8, station by station.
 
-        size: pixels a side, by the project's one resampling kernel; stations, views: names to keep, in their own
+        size: pixels per side, by the project's one resampling kernel; stations, views: names to keep, in their own
         order (signal and recipe shards then compute nothing else).
         Raises: InputError naming an unknown station or view, or shard and sample where it is damaged.
         """

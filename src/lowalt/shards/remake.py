@@ -1,4 +1,4 @@
-"""Making a stored sample again from its record, the index and the target's cloud, and comparing every byte."""
+"""Recomputes a stored sample from its record, the index and the target's cloud, and compares every byte."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import Network
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, slug
@@ -20,7 +21,7 @@ from lowalt.targets.occluders import read_all
 
 
 class CloudFolder(Mapping):
-    """The clouds of a run's folder by subtype, each read when it is asked for first."""
+    """The clouds of a run's folder by subtype, each read on first access."""
 
     def __init__(self, folder: str | Path) -> None:
         """Name the folder; nothing is read yet."""
@@ -44,24 +45,25 @@ class CloudFolder(Mapping):
 
 
 class Remaker:
-    """Makes the samples of one data set again."""
+    """Recomputes the samples of one data set."""
 
     def __init__(self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None) -> None:
-        """Take the data set and the clouds by subtype; occluders are each subtype's surfaces, where a scene has them.
+        """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, for scenes with occlusion.
 
-        Raises: InputError where the index does not say how echoes were computed.
+        Raises: InputError where the index does not say how echoes were computed, or names code among the effects.
         """
         if not shards.index.get("echo"):
             raise InputError(
                 f"{shards.index_path}: does not say how echoes were computed, expected an index that lowalt 0.2 or "
                 f"later wrote, found format {shards.index['format']}"
             )
+        refuse_effects(shards.index["echo"]["effects"], shards.index_path)
         self.shards, self.clouds, self.occluders = shards, clouds, occluders
         self.network = Network.from_settings(shards.index["render"]["network"])
         self._makers: dict[int, Maker] = {}
 
     def _maker(self, seed: int) -> Maker:
-        """The maker of samples with a root seed."""
+        """The maker of samples with a random seed."""
         if seed not in self._makers:
             index = self.shards.index
             self._makers[seed] = Maker(index["render"], index["echo"], seed, self.clouds, self.occluders)

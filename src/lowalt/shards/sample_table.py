@@ -1,4 +1,4 @@
-"""The sample table of a shard: `{shard}.npz` next to `{shard}.tar`, one row a sample, and the shard's own header.
+"""The sample table of a shard: `{shard}.npz` next to `{shard}.tar`, one row per sample, and the shard's own header.
 
     header    str, JSON: name, kind, group, fold, samples, bytes, sha256
     samples   (n,) structured, in the order of the tar (offsets and sizes in bytes)
@@ -15,6 +15,7 @@ from lowalt.files.archives import write_arrays
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import json_object
 from lowalt.tiles.tile_files import map_array
 
 SAMPLE = np.dtype(
@@ -58,7 +59,7 @@ def read_header(path: str | Path) -> dict:
     checked_archive(path, "shard table")
     try:
         with np.load(path, allow_pickle=False) as data:
-            return json.loads(str(data["header"]))
+            return json_object(str(data["header"]), path, "a shard table")
     except UNREADABLE as error:
         raise InputError(f"{path}: not a shard table ({error})") from error
 

@@ -65,12 +65,12 @@ def of_cubes(cubes: Sequence[Cube], network: Network, cell_type: str) -> tuple[b
 
 
 def _columns(truth: np.ndarray) -> dict[str, list[float]]:
-    """The truth of one target, (N, 5), as a record keeps it."""
+    """The truth of one target, (N, 7), as a record keeps it."""
     return {name: truth[:, place].round(6).tolist() for place, name in enumerate(TRUTH)}
 
 
 def _truth(columns: dict) -> np.ndarray:
-    """The truth (N, 5) that `_columns` kept."""
+    """The truth (N, 7) that `_columns` kept."""
     return np.column_stack([columns[name] for name in TRUTH])
 
 

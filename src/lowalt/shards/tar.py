@@ -1,6 +1,6 @@
-"""The tar layer: members with fixed owner, mode and time, so that equal samples are equal bytes.
+"""Writes tar files: members have fixed owner, mode and time, so that equal samples give equal bytes.
 
-The layout is that of webdataset's `TarWriter(encoder=False, mtime=0)`: USTAR headers, members of a sample side
+The layout equals that of webdataset's `TarWriter(encoder=False, mtime=0)`: USTAR headers, members of a sample side
 by side in the order of their extensions, two empty blocks at the end, the file filled up to 10 240 bytes.
 """
 
@@ -29,7 +29,7 @@ def member(name: str, data: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Span:
-    """Where a sample stands in its shard (bytes): the whole of it and its two members' data."""
+    """Position of a sample in its shard (bytes): of the whole sample and of the data of its two members."""
 
     offset: int
     size: int
@@ -51,7 +51,7 @@ class Writer:
         self.size += len(data)
 
     def add(self, key: str, record: bytes, extension: str, data: bytes) -> Span:
-        """Append the members {key}.json and {key}.{extension}, in alphabetical order; return where they stand."""
+        """Append the members {key}.json and {key}.{extension}, in alphabetical order; return their position."""
         if "." in key or "/" in key:
             raise InputError(f"sample key {key!r}: expected no dot and no slash")
         offset, places = self.size, {}

@@ -1,4 +1,4 @@
-"""The check of every byte of every file of a data set; each fault is named."""
+"""Checks every byte of every file of a data set and names each fault."""
 
 import hashlib
 from collections.abc import Iterator
@@ -15,10 +15,10 @@ from lowalt.shards.sample_table import map_samples, table_path
 
 
 def faults(index_path: str | Path) -> Iterator[str]:
-    """Yield one line a fault of a published data set: the file, the sample where it lies in one, and what is wrong.
+    """Yield one line per fault of a published data set: the file, the sample if it is in one, and what is wrong.
 
-    First the shards and their tables against the index, then all other files of the folder against SHA256SUMS; a file
-    that no checksum covers is a fault too. Then the clouds and motion tables of the run against `frozen`.
+    It checks the shards and their tables against the index, then all other files of the folder against SHA256SUMS (a
+    file without checksum is a fault), then the clouds and motion tables of the run against `frozen`.
     Raises: InputError where the index itself cannot be read.
     """
     index = load(index_path)
@@ -36,9 +36,9 @@ def faults(index_path: str | Path) -> Iterator[str]:
 
 
 def frozen(index_path: str | Path) -> dict[str, str]:
-    """Return the checksums of the clouds and motion tables of the run whose folder holds that of the index, by file.
+    """Return the checksums, by file, of the clouds and motion tables of the run that contains the index.
 
-    The first training writes them into SHA256SUMS of the run's folder; without that file there are none.
+    The first training writes them into SHA256SUMS of the run's folder; without that file the result is empty.
     """
     path = Path(index_path).resolve().parent.parent / checksums.NAME
     lines = checksums.LINE.findall(path.read_text(errors="replace")) if path.is_file() else []
@@ -48,7 +48,7 @@ def frozen(index_path: str | Path) -> dict[str, str]:
 def shard_faults(path: Path, entry: dict) -> Iterator[str]:
     """Yield the faults of one shard and its table against the shard's entry of the index.
 
-    A shard whose SHA-256 is right has no fault; otherwise its samples are checked one by one.
+    If the SHA-256 of the shard is right, its samples are not checked one by one.
     """
     table = table_path(path)
     if not table.is_file():

@@ -23,9 +23,9 @@ Content = Callable[[int, int], tuple[bytes, dict]]
 class ChunkSamples(NamedTuple):
     """The samples of a chunk: every motion model at every SNR.
 
-    rows: the motion table; snrs: dB; split, seed: how samples fall into folds; classes: in the order of their labels;
-    powers: (stations, rows) W, the powers that SNRs refer to, None for the echoes' own; canceller: settings of the
-    canceller that the noise passes (both for kind "recipe").
+    rows: the motion table; snrs: dB; split, seed: determine each sample's fold; classes: in the order of their labels;
+    powers: (stations, rows) W, reference powers of the SNRs, None for those of the echoes; canceller: settings of the
+    canceller that filters the noise (both for kind "recipe").
     """
 
     rows: list[dict]
@@ -43,7 +43,7 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
     chosen = []
     for number, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
-            # A measured sample's row names its fold; a simulated sample's fold is drawn.
+            # The row of a measured sample names its fold; that of a simulated sample is drawn.
             dealt = row.get("fold") or fold(split, seed, row["subtype"], row.get("track", row["model"]), snr_db)
             if dealt == wanted:
                 chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
@@ -63,9 +63,9 @@ def write_shard(
     """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it; return the table's header.
 
     content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind "image") or .npy, or of
-    the row's clean echoes (kind "recipe"), and what the record tells of the sample's cubes, {} for other kinds. A
-    recipe shard holds each motion model once, at the place of its first sample; all its samples point there.
-    piece: number and count of the pieces that the fold is packed in; the samples of a motion model stay together.
+    the row's clean echoes (kind "recipe"), and the part of the record about cubes ({} for other kinds). A recipe shard
+    stores each motion model once, at the position of its first sample, to which all its samples refer.
+    piece: index and number of the pieces into which the fold is split; samples of a motion model stay together.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
     if wanted not in FOLDS or kind not in KINDS:

@@ -22,7 +22,7 @@ _FOUND = sorted(path.stem for path in (Path(__file__).parent / "kinds").glob("*.
 NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED))
 """Names of all spectra."""
 TIMES = "times"
-"""The key of the block `spectra` that is no spectrum: whether spectra know the instants of received symbols."""
+"""Key of the block `spectra` that is not a spectrum: whether spectra use the instants of received symbols."""
 INSTANTS = ("even", "known")
 
 
@@ -55,7 +55,7 @@ def named(block: Iterable[str]) -> tuple[str, ...]:
 
 
 def of_cells(block: Iterable[str]) -> list[str]:
-    """Return the names of those of a configuration's spectra that are made of all range cells."""
+    """Return the names of a configuration's spectra that are computed from all range cells."""
     return [name for name in NAMES if name in set(block) and isinstance(spectrum(name), OfCells)]
 
 
@@ -65,7 +65,7 @@ def zero_index(name: str) -> int:
 
 
 MOST_VALUES = 2**26
-"""Values of one spectrum of a signal and of its tables for all stations, each of some 16 bytes at work."""
+"""Limit on the values of a spectrum and of its tables for all stations; each takes about 16 bytes of memory."""
 
 
 class Spectra(Mapping[str, Any]):
@@ -75,7 +75,7 @@ class Spectra(Mapping[str, Any]):
         """settings: a `Settings` for each spectrum; without any, the paper's three with their defaults.
 
         times: "even", symbols are taken as evenly spaced; "known", lines are fitted at the received symbols' instants.
-        Raises: InputError for an unknown name, or one of a spectrum that knows no instants where they are to be known.
+        Raises: InputError for an unknown name, or for a spectrum that cannot use known instants.
         """
         if times not in INSTANTS:
             raise InputError(f"spectra.times is {times!r}, expected one of {INSTANTS}")
@@ -114,7 +114,7 @@ class Spectra(Mapping[str, Any]):
         return len(self._settings)
 
     def check(self, symbols: int, stations: int = 1, subcarriers: int | None = None) -> None:
-        """Refuse signals too short for a window, spectra that take gigabytes, and more range cells than a band has.
+        """Refuse signals that are too short for a window, spectra of gigabytes, and more range cells than the band has.
 
         Raises: InputError naming the spectrum whose window is no shorter than the signal, or that is too large.
         """

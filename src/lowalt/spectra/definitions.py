@@ -1,6 +1,6 @@
 """The paper's three spectra by their definitions in float64, batched over signals: for analysis and for checks.
 
-Frequencies and speeds ascend along the row axis, time along the last axis. Images turn the rows round and
+Frequencies and speeds ascend along the row axis, time along the last axis. Images reverse the rows and
 use the single-pass kernels of `lowalt.spectra.sliding`, which compute the same values.
 """
 
@@ -15,7 +15,7 @@ def vrp(signals: np.ndarray, settings: Spectra | None = None) -> np.ndarray:
     Raises: InputError where the signal is no longer than the window or is not finite.
     Source: paper, Eq. 28.
 
-    A tone of 50 Hz in looks every 2.5 ms stands an eighth of the rows above zero:
+    A tone of 50 Hz, sampled every 2.5 ms, appears an eighth of the rows above zero:
 
         >>> tone = np.exp(2j * np.pi * 50.0 * 2.5e-3 * np.arange(400))
         >>> vrp(tone).shape, int(vrp(tone)[:, 0].argmax())

@@ -1,15 +1,30 @@
-"""Short-time Fourier spectra: the functions that VRP and TRP share. They differ in their settings only."""
+"""Short-time Fourier spectra: the functions that VRP and TRP share, which differ only in their settings."""
 
 import numpy as np
 
-from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.config.network import Network, Station
+from lowalt.files.errors import InputError
 from lowalt.spectra.known_times import line_sums, shares
-from lowalt.spectra.segments import segments
-from lowalt.spectra.settings import Fourier
+from lowalt.spectra.settings import Fourier, windows
 from lowalt.spectra.sliding import fourier_magnitudes, turns
 
 SIGNED = False
 ZERO_FIRST = True
+
+
+def segments(signals: np.ndarray, window: int, hop: int, name: str, extra: int = 0) -> np.ndarray:
+    """Return segments of `window + extra` symbols, one per window, complex128: shape (..., windows, window + extra).
+
+    Raises: InputError naming the spectrum where the signal is no longer than the window or is not finite.
+    """
+    signals = np.asarray(signals)
+    if signals.ndim < 1:
+        raise InputError(f"spectrum {name}: signals has shape {signals.shape}, expected (..., symbols)")
+    if not np.isfinite(signals).all():
+        raise InputError(f"spectrum {name}: signals has a NaN or infinite value")
+    count = windows(signals.shape[-1], window, hop, name)
+    view = np.lib.stride_tricks.sliding_window_view(signals.astype(np.complex128), window + extra, axis=-1)
+    return view[..., : (count - 1) * hop + 1 : hop, :]
 
 
 def rows(settings: Fourier) -> int:
@@ -17,13 +32,13 @@ def rows(settings: Fourier) -> int:
     return settings.points
 
 
-def speeds(settings: Fourier, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
+def speeds(settings: Fourier, network: Network, station: Station) -> tuple[float, float]:
     """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`, folded.
 
     A positive Doppler frequency approaches, so the speed falls along the rows.
     """
-    fastest = SPEED_OF_LIGHT / (4 * frequency_hz * symbol_interval_s)
-    return fastest, -fastest
+    bins = network.bin_speeds_mps(settings.points, station)
+    return float(bins[-1]), float(bins[0])
 
 
 def magnitudes(signals: np.ndarray, fourier: Fourier, name: str = "stft") -> np.ndarray:

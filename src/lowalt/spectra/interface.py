@@ -33,8 +33,11 @@ class Spectrum(Protocol):
         """Return the number of rows."""
         ...
 
-    def speeds(self, settings: Any, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
-        """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`."""
+    def speeds(self, settings: Any, network: Network, station: Station) -> tuple[float, float]:
+        """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`.
+
+        They are those of an echo at the effective carrier, as on every speed axis.
+        """
         ...
 
     def definition(

@@ -1,10 +1,12 @@
-"""Spectra that know when symbols were received: a complex line fitted to each window by least squares.
+"""Spectra that use the reception times of symbols: a complex line fitted to each window by least squares.
 
-A line a exp(j 2 pi f t) is fitted to the K symbols that a window received, at their own instants t_k. Its amplitude is
-a(f) = sum_k y_k exp(-j 2 pi f t_k) / K; spectra hold L a(f), of L symbols in a window, and so keep the unit of evenly
-sampled ones. A single line has its own amplitude at its own frequency whatever is missing and however late symbols are;
-several lines disturb each other by the side lobes of the instants. A fit of all frequencies at once has fewer symbols
-than unknowns. Sums over windows are differences of sums from the look's first symbol, in double precision.
+At each frequency f, a line a exp(j 2 pi f t) is fitted to the K symbols received in a window, at their instants t_k:
+
+    a(f) = sum_k y_k exp(-j 2 pi f t_k) / K
+
+Spectra contain L a(f), with L symbols in a window, and so have the unit of evenly sampled ones. A single line has its
+true amplitude despite missing or late symbols; several lines disturb each other through side lobes. A joint fit of all
+frequencies would have fewer symbols than unknowns. Sums over windows are differences of cumulative sums, in double.
 """
 
 import numpy as np

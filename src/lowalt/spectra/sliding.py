@@ -1,16 +1,16 @@
 """Compiled kernels of the three spectra for windows that slide by one symbol.
 
-The transform of one window shares its sub-transforms with the windows after it: of a window of L = 2^a symbols,
-every level of the decimation in time needs one new sub-transform a start,
+Overlapping windows share sub-transforms. For a window of L = 2^a symbols, every level of the decimation in time needs
+only one new sub-transform per start,
     A_0[q, t] = y[t],   A_{s+1}[q, t] = A_s[q, t] + exp(-j 2 pi q d / P) A_s[q, t + d],   d = L / 2^(s+1),
 so a window costs about 2 P butterflies, not P log2 L, and every loop runs over contiguous start times.
-Only additions, products and square roots in one fixed order, never fused: float32 and float64 give the same
-bits on every machine that keeps IEEE 754. The kernels work in the precision of their arguments.
+Only additions, products and square roots are used, in a fixed order and never fused: results have the same bits on
+every machine with IEEE 754. The kernels work in the precision of their arguments.
 """
 
 import numpy as np
-from numba import njit
 
+from lowalt.machine.jit import PLAIN
 from lowalt.numerics.portable import sine_cosine_turns
 
 
@@ -20,9 +20,9 @@ def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:
     return cosine.astype(dtype), sine.astype(dtype)
 
 
-@njit(cache=True)
+@PLAIN
 def _level(re, im, stride, cosine, sine, out_re, out_im):
-    """One level of decimation in time: sub-spectra by start time become twice as many in out_re and out_im."""
+    """One level of decimation in time: out_re and out_im get twice as many sub-spectra, by start time."""
     single, points = re.shape[0] == 1, cosine.size
     rows, count = out_re.shape[0] // 2, out_re.shape[1]
     for q in range(rows):
@@ -40,7 +40,7 @@ def _level(re, im, stride, cosine, sine, out_re, out_im):
             out_im[q + rows, t] = a_im[t] - b_im
 
 
-@njit(cache=True)
+@PLAIN
 def _last(re, im, cosine, sine, out):
     """The last level (stride 1) straight to magnitudes."""
     single = re.shape[0] == 1
@@ -64,7 +64,7 @@ def _last(re, im, cosine, sine, out):
             minus[t] = np.sqrt(x * x + y * y)
 
 
-@njit(cache=True)
+@PLAIN
 def fourier_magnitudes(re, im, window, points, cosine, sine, out):
     """Fill out (points, count) with |FFT| of the windows that start at symbols 0 .. count - 1.
 
@@ -87,7 +87,7 @@ def fourier_magnitudes(re, im, window, points, cosine, sine, out):
     _last(a_re, a_im, cosine, sine, out)
 
 
-@njit(cache=True)
+@PLAIN
 def transfer(re, im, window, cosine, sine, share, out):
     """Fill out (speeds, count) with the velocity-transfer spectrum of windows starting at 0 .. count - 1.
 

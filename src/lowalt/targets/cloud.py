@@ -30,6 +30,7 @@ from lowalt.files.archives import write_arrays
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError, reading
+from lowalt.files.json_objects import json_object
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
@@ -68,12 +69,12 @@ class Cloud:
 
     @property
     def like(self) -> str:
-        """How the target is built, moves and reflects: one of the published classes."""
+        """The published class that the target is built, moves and reflects like."""
         return classes.like(self.record)
 
     @property
     def rate_factors(self) -> np.ndarray:
-        """How many times the rate of its motion model each part turns, (P,): 1 where the record says nothing else."""
+        """Rate of each part (P,) divided by the rate of its motion model; 1 unless the record states it."""
         factors = self.record.get("rate_factors", {})
         return np.array([float(factors.get(name, 1.0)) for name in self.names])
 
@@ -95,12 +96,12 @@ def check(cloud: Cloud, where: str) -> Cloud:
 
 
 def _near(places: np.ndarray) -> bool:
-    """Whether all coordinates are numbers within LARGEST_M."""
+    """Return whether all coordinates are numbers within LARGEST_M."""
     return bool((abs(places) <= LARGEST_M).all())
 
 
 def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Whether each array has its shape and its numbers are in range, and what is wrong otherwise."""
+    """Return whether each array has its shape and numbers in range, and otherwise the fault in words."""
     count, parts = len(cloud.points), len(cloud.kinds)
     yield count > 0, "points is empty, expected at least one point"
     shapes = {"points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
@@ -118,7 +119,7 @@ def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 
 
 def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Whether each part's name, kind, parent, hinge and axis are right, and what is wrong otherwise."""
+    """Return whether name, kind, parent, hinge and axis of each part are right, and otherwise the fault in words."""
     count = len(cloud.kinds)
     unique = len(set(cloud.names)) == count == len(cloud.names)
     yield unique, f"names {cloud.names}, expected {count} unique names"
@@ -133,7 +134,7 @@ def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 
 
 def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Whether the record has what all need, and a recording's track fits its nodes, and what is wrong otherwise."""
+    """Return whether the record has all required keys and a track fits its nodes, and otherwise the fault in words."""
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     yield not missing, f"record lacks {sorted(missing)}"
     classes.like(cloud.record)
@@ -199,7 +200,7 @@ def read(path: str | Path) -> Cloud:
     try:
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
-        record = json.loads(str(arrays.pop("record")))
+        record = json_object(str(arrays.pop("record")), path, "a cloud")
         kinds, names = (tuple(map(str, arrays.pop(name))) for name in ("kinds", "names"))
         cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
     except UNREADABLE as error:

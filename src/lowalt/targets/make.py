@@ -1,4 +1,4 @@
-"""A target's calibration point cloud from its record, whatever source the record names."""
+"""Make the calibration point cloud of a target from any source that its record may name."""
 
 from importlib import import_module
 from pathlib import Path
@@ -8,7 +8,7 @@ from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, check
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
-"""What clouds are made from; a source's module has `check_record(merged, where)` and `SOURCE_cloud`."""
+"""The sources of clouds. The module of a source defines `check_record(merged, where)` and `SOURCE_cloud`."""
 
 
 def source_module(source: str) -> ModuleType:

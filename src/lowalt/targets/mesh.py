@@ -1,4 +1,4 @@
-"""A user's mesh to a calibration point cloud: load, repair, cut into parts, scale to the published size, thin.
+"""Turn a user's mesh into a calibration point cloud: load, repair, cut into parts, scale to the published size, thin.
 
 These are the steps of the paper's Fig. 4. `mesh_files` reads files, `mesh_parts` cuts parts, `mesh_record` checks
 records and `mesh_size` scales; this module calls them in order and thins each part to its number of points. Body axes:
@@ -30,13 +30,13 @@ from lowalt.targets.surfaces import thin
 __all__ = ["check_record", "mesh_cloud"]
 
 DENSE = 200
-"""Dense samples of a part's surface for each point of the cloud, before regions are cut and the rest is thinned."""
+"""Number of dense surface samples per point of the cloud, before regions are cut out and the rest is thinned."""
 
 THINNED = 25
-"""Most samples for each point of the cloud that go into the thinning; its time grows with samples x points."""
+"""Largest number of samples per point of the cloud that are thinned; the time grows with samples x points."""
 
 FEWEST_SAMPLES = 100
-"""Least number of samples of a wheel that the record asks to be made."""
+"""Least number of samples of a wheel that the record describes by its diameter and width."""
 
 
 def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dict[str, Pool], float]:
@@ -94,7 +94,8 @@ def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
 
 def cloud_and_pools(record: dict, inputs_dir: str | Path, seed: int) -> tuple[Cloud, dict[str, Pool], dict[str, Pool]]:
     """Return the cloud as `mesh_cloud`, and every part's dense samples by name, as in the mesh and as in the cloud."""
-    where, rng = record["subtype"], stream(seed, "cloud", record["subtype"])
+    where, category = record["subtype"], like(record)
+    rng, files = stream(seed, "cloud", where), record_files(record)
     record = record | {"parts": ordered_parts(record["parts"])}
     kinds = {name: part["kind"] for name, part in record["parts"].items()}
     parents = {name: part["parent"] for name, part in record["parts"].items() if "parent" in part}
@@ -102,8 +103,8 @@ def cloud_and_pools(record: dict, inputs_dir: str | Path, seed: int) -> tuple[Cl
         warnings.simplefilter("always", InputWarning)
         raw, closed = pools(record, Path(inputs_dir), rng)
         count = record["published"].get("n_rotors_or_wings")
-        refuse_implausible(raw, kinds, parents, like(record), where, count)
-    scaled, facts = sized(record, raw, kinds)
+        refuse_implausible(raw, kinds, parents, category, where, count)
+    scaled, facts = sized(record, raw, kinds, category)
     for warning in caught:
         warnings.warn(warning.message, warning.category, stacklevel=3)
     doubts = list(dict.fromkeys(str(warning.message) for warning in caught if warning.category is InputWarning))
@@ -114,6 +115,6 @@ def cloud_and_pools(record: dict, inputs_dir: str | Path, seed: int) -> tuple[Cl
     counts = allot(parts, record["points"], record["moving_share"], where)
     samples = [_thinned(pool, count, f"{where}: parts.{name}", rng)
                for (name, pool), count in zip(scaled.items(), counts, strict=True)]  # fmt: skip
-    sums = {name: sha256(Path(inputs_dir) / name) for name in record_files(record)}
+    sums = {name: sha256(Path(inputs_dir) / name) for name in files}
     facts |= {"closed_share": closed, "files_sha256": sums, "checksum": checksum(sums), "seed": seed}
     return cloud_of_parts(parts, samples, record | facts | ({"warnings": doubts} if doubts else {})), raw, scaled

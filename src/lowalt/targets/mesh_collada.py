@@ -1,4 +1,5 @@
-"""What trimesh's reader of COLLADA leaves out: the stated unit, polygons with a dent, and skins, which are refused.
+"""Prepare COLLADA files for trimesh's reader, which leaves out the stated unit, dented polygons, skins and whatever has
+a missing texture. Skins are refused.
 
 Source: Khronos, COLLADA 1.4.1, elements unit, polylist, polygons and instance_controller.
 """
@@ -13,6 +14,8 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_polygons import triangulated
+
+UNUSED = ("library_images", "library_effects", "library_materials", "bind_material")
 
 
 class _Plain(ElementTree.TreeBuilder):
@@ -62,6 +65,15 @@ def stated_metres(path: Path) -> float | None:
     return None
 
 
+def stated_up(path: Path) -> str | None:
+    """Return the axis up, y or z, that a COLLADA file states, None where it says nothing or x.
+
+    Raises: InputError where the file is no XML.
+    """
+    said = {(element.text or "").strip() for element in parsed(path).iter() if _name(element) == "up_axis"}
+    return {"Y_UP": "y", "Z_UP": "z"}.get(said.pop()) if len(said) == 1 else None
+
+
 def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     """Return a COLLADA file whose polygons are triangles, cut as viewers cut them, and the names of its geometries by
     their ids: those of the nodes that show them, and their own.
@@ -69,6 +81,11 @@ def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     Raises: InputError naming the file where it is no XML or has skins; other exceptions for a damaged file.
     """
     root = parsed(path)
+    for parent in root.iter():
+        # pycollada leaves a surface out whose material names an image that it does not find; no material counts here.
+        parent.attrib.pop("material", None)
+        for child in [child for child in parent if _name(child) in UNUSED]:
+            parent.remove(child)
     elements = {element.get("id"): element for element in root.iter() if element.get("id")}
     for parent in root.iter():
         if _name(parent) == "instance_controller":

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, InputWarning, reading
 from lowalt.numerics import portable
-from lowalt.targets.mesh_collada import for_trimesh, stated_metres
+from lowalt.targets.mesh_collada import for_trimesh, stated_metres, stated_up
 from lowalt.targets.mesh_glb import read_glb
 from lowalt.targets.mesh_polygons import Piece, read_obj, read_ply, stated_unit
 from lowalt.targets.surfaces import Surface, merged
@@ -27,10 +27,10 @@ from lowalt.targets.surfaces import Surface, merged
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 LARGEST_TRIANGLES = 20_000_000
-"""Above this a file is refused: its arrays alone would take over two gigabytes."""
+"""A file with more triangles is refused, since its arrays alone would take over two gigabytes."""
 
 SAME_UNIT = 1e-6
-"""Relative difference up to which two units are the same."""
+"""Two units are the same if their relative difference is at most this."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,16 @@ def stated_unit_m(path: Path) -> float | None:
     return stated_metres(path) if kind == ".dae" else 1.0 if kind == ".glb" else None
 
 
+def stated_up_axis(path: Path) -> str | None:
+    """Return the axis that a mesh file's format or its own statement says is up, None where neither says so.
+
+    Source: glTF 2.0, section 3.4 (y up, z front); COLLADA 1.4.1, element up_axis.
+    Raises: InputError where a COLLADA file is no XML.
+    """
+    kind = path.suffix.lower()
+    return "y" if kind == ".glb" else stated_up(path) if kind == ".dae" else None
+
+
 def _scene(path: Path) -> list[Piece]:
     """The surfaces of an STL or DAE file, by trimesh."""
     import trimesh  # slow to import, and only records with a mesh need it
@@ -92,13 +102,32 @@ def _scene(path: Path) -> list[Piece]:
     return result
 
 
+def _refuse_truncated(path: Path) -> None:
+    """Refuse a binary STL file that ends before the number of triangles that its header states.
+
+    Raises: InputError naming the file and both numbers.
+    """
+    with path.open("rb") as file:
+        head = file.read(1000)
+    stated, there = int.from_bytes(head[80:84], "little"), (path.stat().st_size - 84) // 50
+    is_text = head.startswith(b"solid") and b"facet" in head
+    if not is_text and len(head) >= 84 and there < stated:
+        raise InputError(f"{path}: the header states {stated} triangles and the file ends after {there}, expected the "
+                         "whole file: copy or export it again")  # fmt: skip
+
+
 def pieces(path: Path) -> list[Piece]:
     """Return the pieces of a mesh file that have triangles.
 
-    Raises: InputError naming the file and the reason where it cannot be read.
+    Raises: InputError naming the file and the reason: no such file, another format, or it cannot be read.
     """
+    path = existing(path, "mesh")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
     read = {".obj": read_obj, ".glb": read_glb, ".ply": read_ply}.get(path.suffix.lower(), _scene)
     with reading(path, f"{path.suffix} mesh"):
+        if path.suffix.lower() == ".stl":
+            _refuse_truncated(path)
         return [piece for piece in read(path) if len(piece.faces)]
 
 
@@ -147,7 +176,7 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
     vertices, faces = _merged(vertices, faces)
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertices, faces.astype(np.int32)))
-    # Equal to a millionth of the diagonal: what single precision leaves of vertices that were one.
+    # Single precision separates equal vertices by up to a millionth of the diagonal.
     meshes.meshing_merge_close_vertices(threshold=pymeshlab.PercentageValue(1e-4))
     meshes.meshing_remove_duplicate_faces()
     meshes.meshing_remove_null_faces()
@@ -174,7 +203,9 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     closed = np.ones(int(component.max()) + 1, bool)
     _, face, uses = edges_of(faces)
     closed[component[face[uses != 2]]] = False
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    # About the middle: georeferenced coordinates of 1e6 m would drown the volume in rounding errors.
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    a, b, c = np.moveaxis(vertices[faces] - middle, 1, 0)
     volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=len(closed))
     inverted = closed & (volume < 0)
     return Mesh(vertices, np.where(inverted[component][:, None], faces[:, ::-1], faces), component, closed)
@@ -190,9 +221,7 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     triangles, no area, NaN or infinite vertices, too many triangles.
     Warns: InputWarning where the file states another unit than `unit`.
     """
-    path = existing(path, "mesh")
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
+    path = Path(path)
     pieces = selected(path, geometry)
     if not pieces:
         raise InputError(f"{path}: has no triangle, expected a surface")
@@ -204,7 +233,7 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
         warnings.warn(text, InputWarning, stacklevel=2)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
-    # By a mark a vertex, not a copy of every corner: millions of corners would double the memory.
+    # One mark per vertex: a copy of millions of corners would double the memory.
     finite = np.isfinite(vertices).all(axis=1)
     if faces.min() < 0 or faces.max() >= len(vertices) or not finite[faces].all():
         raise InputError(f"{path}: a triangle has a NaN, infinite or missing vertex, expected finite ones")

@@ -5,7 +5,6 @@ reader ends the process on a skin. Source: Khronos, glTF 2.0 (sections 3.6, 3.7,
 """
 
 import base64
-import json
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -13,13 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import json_object
 from lowalt.numerics import portable
 from lowalt.targets.mesh_polygons import Piece, stripped
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 COMPRESSED = {"KHR_draco_mesh_compression": "Draco", "EXT_meshopt_compression": "meshopt",
-              "KHR_meshopt_compression": "meshopt", "EXT_mesh_gpu_instancing": "GPU instancing"}  # fmt: skip
+              "KHR_meshopt_compression": "meshopt"}  # fmt: skip
 MOST_VALUES = 200_000_000
 
 
@@ -30,7 +30,7 @@ class _Glb:
         magic, version, _, size, kind = struct.unpack_from("<4sII I4s", data)
         if magic != b"glTF" or version != 2 or kind != b"JSON":
             raise ValueError("expected a binary glTF of version 2")
-        self.json = json.loads(data[20 : 20 + size])
+        self.json = json_object(data[20 : 20 + size].decode(), "its JSON", "glTF")
         self.binary = data[28 + size :]
 
     def list(self, name: str) -> list:
@@ -150,6 +150,19 @@ def _local(node: dict) -> np.ndarray:
     return place
 
 
+def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
+    """Return the place (4, 4) of each instance of a node's mesh in the node, one at its own place where it names none.
+
+    Source: glTF extension EXT_mesh_gpu_instancing.
+    """
+    attributes = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes", {})
+    columns = {name.lower(): glb.array(index) for name, index in attributes.items()
+               if name in ("TRANSLATION", "ROTATION", "SCALE")}  # fmt: skip
+    if not columns:
+        return [np.eye(4)]
+    return [_local(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+
+
 def read_glb(path: Path) -> list[Piece]:
     """Return each surface of the scene shown, by the names of its node and its mesh.
 
@@ -177,8 +190,13 @@ def read_glb(path: Path) -> list[Piece]:
             piece = Piece(points, glb.faces(primitive, len(points)), (*numbered, name, shape))
             if "skin" in node and "JOINTS_0" in primitive["attributes"]:
                 skin = glb.list("skins")[_natural(node["skin"])]
-                piece = replace(piece, vertices=glb.skinned(points, primitive, skin, places))
-            else:
-                piece = piece.mapped(place[:3, :3]).moved(place[:3, 3])
-            pieces.append(piece)
+                pieces.append(replace(piece, vertices=glb.skinned(points, primitive, skin, places)))
+                continue
+            instances = _instances(glb, node)
+            if len(instances) * max(piece.faces.size, piece.vertices.size) > MOST_VALUES:
+                raise ValueError(f"{len(instances)} instances of {len(piece.faces)} triangles, expected fewer")
+            for instance, within in enumerate(instances):
+                at = portable.product(place, within)
+                names = (f"{name} instance {instance}",) if len(instances) > 1 else ()
+                pieces.append(replace(piece.mapped(at[:3, :3]).moved(at[:3, 3]), names=(*names, *piece.names)))
     return pieces

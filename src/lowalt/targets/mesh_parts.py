@@ -19,7 +19,7 @@ from lowalt.targets.skeleton import rotation
 from lowalt.targets.surfaces import face_normals, sample_faces
 
 SHARED_LIMIT = 0.01
-"""Largest share of its samples that a region may have in common with another: regions that touch share a border."""
+"""Largest share of samples that two regions may have in common; regions that touch share a border."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +102,9 @@ def taken(pool: Pool, mesh: Mesh, region: dict) -> np.ndarray:
 
 
 def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) -> None:
-    """Refuse regions (by part) that take the same surface: which part got it would depend on the order of parts.
+    """Refuse regions (by part) that take the same surface, since the order of parts would decide which part gets it.
 
-    Two regions may touch: a share of SHARED_LIMIT of the smaller one's samples is no fault.
+    Two regions may touch: they may share SHARED_LIMIT of the samples of the smaller one.
     Raises: InputError naming `where` and the two parts.
     """
     masks = {name: taken(pool, mesh, region) for name, region in regions.items()}

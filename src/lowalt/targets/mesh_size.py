@@ -1,7 +1,7 @@
 """The shape and size of a user's mesh: whether its parts fit their kinds and its unit the published size, and scaling.
 
-A wrong direction, unit or hinge still gives a cloud; the geometry of the parts shows it: wheels below a car, a hub in
-the middle of its blades. Body axes: x right, y front, z up, metres.
+A wrong direction, unit or hinge still gives a cloud, but the geometry of the parts shows the mistake: wheels lie below
+a car, and a hub lies in the middle of its blades. Body axes: x right, y front, z up, metres.
 """
 
 import warnings
@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from lowalt.config.classes import like
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets import bird
@@ -19,59 +18,88 @@ from lowalt.targets.mesh_parts import Pool
 from lowalt.targets.mesh_record import ALL_AXES
 
 SMALLEST_PART = 25
-"""A moving part that is more than so many times smaller than the whole mesh is refused: its unit must be wrong."""
+"""A moving part that is smaller than the whole mesh by more than this factor is refused; its unit must be wrong."""
 
 SMALLEST_ROTOR_M = 0.01
-"""Least diameter of a rotor at the target's final size: the smallest craft sold have propellers of 25 mm."""
+"""Least diameter (m) of a rotor at the final size of the target. The smallest craft sold have propellers of 25 mm."""
 
 
 ACROSS = np.cos(np.radians(20.0))
-"""Least cosine between a wheel's axis and the car's width; models have their front wheels straight."""
+"""Least cosine of the angle between a wheel's axle and the car's width. Models have their front wheels straight."""
 ROUND = 1.1
 """Largest ratio of a wheel's width to the smaller of its two extents across the axis."""
 OFF_HUB = 1.0
-"""Largest distance from a rotor's hub to the middle of its surface, in parts of the rotor's own largest extent; a
+"""Largest distance between a rotor's hub and the middle of its surface, as a share of the rotor's largest extent. A
 single blade without its hub may have up to 1."""
 FEWEST_WHEELS = 3
+OFF_MIDDLE = 0.1
+"""A part stands on one side where it is farther from the middle than this share of its own size."""
+SPANS = (0.7, 6.0)
+"""Least and largest wing span of a bird in parts of its published length, which measures 1.2 to 5.5 in the table."""
 
 
-def _faults(kind: str, pool: Pool, body: np.ndarray) -> Iterator[str]:
-    """What of a part's place, axis or shape is not that of its kind; body (2, 3): the body's low and high corner."""
+def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
+    """Return the first cause why a part's place, axis or shape is not that of its kind, "" where there is none.
+
+    body (2, 3): the lowest and highest corner of the body, m. A wrong axis also makes a wheel wide and a wrong `up`
+    turns its axis, so only the cause is named and not what follows from it.
+    """
     low, high = pool.points.min(axis=0), pool.points.max(axis=0)
     middle, (width, length, height) = (low + high) / 2, high - low
     if kind == "wheel":
         below, above = body[:, 2]
-        if middle[2] > (below + above) / 2:
-            yield (f"its centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
-                   "high, expected the lower half: is `up` reversed?")  # fmt: skip
         if abs(pool.axis[0]) < ACROSS:
-            yield f"its axis is {np.round(pool.axis, 3).tolist()} (right, front, up), expected right or left"
-        if width > ROUND * min(length, height):
-            yield (f"it measures {width:.3g} m along its axis and {length:.3g} x {height:.3g} m across, expected a "
-                   "wheel that is thinnest along its axis")  # fmt: skip
+            way = ("right", "front", "up")[int(np.abs(pool.axis).argmax())]
+            along = np.round(np.abs(pool.axis), 3).tolist()
+            return (f"axle points {way}, {along} (right, front, up), expected right or left: is `front` (--front) or "
+                    "`up` (--up) another axis, or is it no wheel that rolls?")  # fmt: skip
+        if middle[2] > (below + above) / 2:
+            return (f"centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
+                    "high, expected the lower half: is `up` (--up) reversed?")  # fmt: skip
+        # Twin wheels on one axle are wider than high, but round about it.
+        if width > ROUND * min(length, height) and max(length, height) > ROUND * min(length, height):
+            return (f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m across, expected "
+                    "a wheel that is thinnest along its axle")  # fmt: skip
     elif kind == "rotor":
         reach, away = float((high - low).max()), float(np.linalg.norm(middle - pool.hinge))
         if away > OFF_HUB * reach:
-            yield (f"its hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
-                   "the hub")  # fmt: skip
+            return (f"hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
+                    "the hub")  # fmt: skip
     else:
         hinge, centre = (place[0] - body[:, 0].mean() for place in (pool.hinge, pool.points.mean(axis=0)))
         if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
-            yield (f"its hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected "
-                   "the hinge between body and wing")  # fmt: skip
+            return (f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected "
+                    "the hinge between body and wing")  # fmt: skip
+    return ""
 
 
 def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) -> Iterator[str]:
-    """What is unusual but possible about the parts of each kind; wings are those on the body."""
+    """Yield what is unusual but possible about the parts of each kind. Wings are those that hang on the body."""
     wheels, rotors = len(of_kind["wheel"]), len(of_kind["rotor"])
     if category == "Vehicle" and wheels < FEWEST_WHEELS:
         yield f"{wheels} wheels, expected at least {FEWEST_WHEELS}"
     if category == "UAV" and count and rotors != count:
         yield f"{rotors} rotors, expected the {count} of its row"
     for kind in ("wheel", "wing"):
-        sides = {float(np.sign(pool.points[:, 0].mean())) for pool in of_kind[kind]}
-        if len(of_kind[kind]) > 1 and len(sides) < 2:
+        offsets = np.array([pool.points[:, 0].mean() for pool in of_kind[kind]])
+        width = max((float(np.ptp(pool.points, axis=0).max()) for pool in of_kind[kind]), default=0.0)
+        # The wheels of a bicycle stand in the middle.
+        aside = np.abs(offsets) > OFF_MIDDLE * width
+        if len(offsets) > 1 and aside.all() and len(set(np.sign(offsets))) < 2:
             yield f"every {kind} is on one side of the target, expected both sides"
+
+
+def refuse_span(parts: dict[str, Pool], where: str) -> None:
+    """Refuse a bird whose wing span does not fit the length that its row states; a mesh is scaled as a whole.
+
+    Raises: InputError naming `where`, both sizes and what was expected.
+    """
+    low, high = _bounds(parts)
+    span, length, _ = high - low
+    if not SPANS[0] <= span / length <= SPANS[1]:
+        raise InputError(f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to tail, "
+                         f"expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or `up` (--up) "
+                         "another axis?")  # fmt: skip
 
 
 def refuse_implausible(
@@ -87,15 +115,19 @@ def refuse_implausible(
     points = next(pool.points for name, pool in parts.items() if kinds[name] == "body")
     body = np.stack([points.min(axis=0), points.max(axis=0)])
     of_kind: dict[str, list[Pool]] = {"rotor": [], "wheel": [], "wing": []}
-    faults = []
+    faults: dict[str, list[str]] = {}
     for name, pool in parts.items():
         kind = kinds[name]
         if kind == "body" or (kind == "wing" and name in parents):
             continue
         of_kind[kind].append(pool)
-        faults += [f"{name}: {fault}" for fault in _faults(kind, pool, body)]
-    if faults:
-        raise InputError(f"{where}: " + "; ".join(faults))
+        if fault := _fault(kind, pool, body):
+            faults.setdefault(fault, []).append(name)
+    for fault, names in faults.items():
+        listed = ", ".join(names[:4]) + f" and {len(names) - 4} more" * (len(names) > 4)
+        raise InputError(f"{where}: {listed}: its {fault}")
+    if category == "Bird":
+        refuse_span(parts, where)
     for doubt in _doubts(of_kind, category, count):
         warnings.warn(f"{where}: {doubt}", InputWarning, stacklevel=2)
 
@@ -113,7 +145,7 @@ def _refuse_size(record: dict, measure: str, size_m: float, wanted_m: float, row
     off = {name: abs(np.log(numbers * unit_m / wanted_m)) for name, unit_m in UNITS_M.items()} if size_m else {}
     best = min(off, key=off.get, default="")
     if best and off[best] <= np.log(limit):
-        way = f"write `unit: {best}`, with which it measures {numbers * UNITS_M[best]:.4g} m"
+        way = f"write `unit: {best}` (--unit {best}), with which it measures {numbers * UNITS_M[best]:.4g} m"
     else:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
         way = f"no unit fits: give it a row with its own size, `row: {{{key}: {row_m or size_m:.4g}}}`, or another file"
@@ -170,8 +202,8 @@ def _turned_radius(pool: Pool) -> float:
     return float(portable.norm(away - along * pool.axis).max())
 
 
-def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[dict[str, Pool], dict]:
-    """Return the pools scaled and centred, and the facts that the cloud's record gets.
+def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str], category: str) -> tuple[dict[str, Pool], dict]:
+    """Return the pools scaled and centred, and the facts that the cloud's record gets; category: that it is like.
 
     Wheels stay round: they are scaled about their hinge to the published diameter (or by the car's mean factor) and
     set on the ground. The origin is the middle of the extents; in plan, a multirotor's is the middle of its hubs.
@@ -200,9 +232,9 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
     if hubs:
         middle[:2] = portable.mean(np.array(hubs), 0)
-    if like(record) == "Vehicle":
+    if category == "Vehicle":
         facts["origin_height_m"] = float(middle[2] - ground)
-    if like(record) == "Bird":
+    if category == "Bird":
         facts |= {"flap": bird.FLAP | record.get("flap", {}), "wing_span_m": float(high[0] - low[0])}
     return {name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle)
             for name, pool in result.items()}, facts  # fmt: skip

@@ -23,8 +23,8 @@ SMPL = (
     "rightelbow", "leftwrist", "rightwrist",
 )  # fmt: skip
 NAMES = {
-    "root": "hips pelvis hip root", "hip": "hip upleg thigh femur upperleg",
-    "knee": "knee leg shin tibia lowleg lowerleg calf",
+    "root": "hips pelvis hip root", "hip": "hip upleg thigh femur upperleg leg",
+    "knee": "knee shin leg tibia lowleg lowerleg calf",
     "ankle": "ankle foot", "toe": "toe toebase ball forefoot foot", "shoulder": "shoulder arm uparm upperarm humerus",
     "elbow": "elbow forearm lowarm lowerarm radius", "wrist": "wrist hand", "neck": "neck neck1 lowerneck spine3",
     "head": "head",
@@ -61,17 +61,21 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
 
     places = {"root": joints[joint("root")]}
     for side in "lr":
-        ankle = joint("ankle", side)
-        toe = joint("toe", side, but=ankle)
+        ankle, knee = joint("ankle", side), joint("knee", side)
+        # A foot without a toe ends in the end of its chain.
+        toe = f"{ankle}/end" if f"{ankle}/end" in joints else joint("toe", side, but=ankle)
         elbow, wrist = joints[joint("elbow", side)], joints[joint("wrist", side)]
         toes = joints.get(f"{toe}/end", joints[toe] + 0.3 * (joints[toe] - joints[ankle]))
-        limbs = {"hipjoint": joints[joint("hip", side)], "femur": joints[joint("knee", side)], "tibia": joints[ankle],
+        limbs = {"hipjoint": joints[joint("hip", side, but=knee)], "femur": joints[knee], "tibia": joints[ankle],
                  "foot": joints[toe], "toes": toes, "clavicle": joints[joint("shoulder", side)], "humerus": elbow,
                  "radius": wrist}  # fmt: skip
         limbs |= {name: wrist + share * (wrist - elbow) for name, share in BEYOND.items()}
         places |= {side + name: place for name, place in limbs.items()}
     head = joint("head")
-    neck, skull = joints[joint("neck")], joints[head]
+    skull = joints[head]
+    neck = (places["lclavicle"] + places["rclavicle"]) / 2  # between the shoulders, where no joint is a neck
+    if any(("", word) in known for word in NAMES["neck"].split()):
+        neck = joints[joint("neck")]
     top = joints.get(f"{head}/end", skull + 0.8 * (skull - neck))
     for name, share in (("lowerback", 1 / 3), ("upperback", 2 / 3), ("thorax", 1.0)):
         places[name] = places["root"] + share * (neck - places["root"])

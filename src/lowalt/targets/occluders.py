@@ -1,8 +1,8 @@
 """Command line of an extra product of the stage: a target's opaque surfaces, for scenes with self-occlusion.
 
-A target with a surface has triangles; each vertex moves with the part that it belongs to. A recording has nodes without
-surfaces, so it gets capsules along its bones. Built-in shapes keep all their triangles, so that points lie exactly on
-them. A user's mesh is simplified, and the file holds each point's distance from the simplified surface.
+A target with a surface is stored as triangles, whose vertices move with their part. A recording has nodes without
+surfaces, so it is stored as capsules along its bones. Built-in shapes keep all their triangles, so that points lie
+exactly on them. A user's mesh is simplified, and the file holds each point's distance from the simplified surface.
 """
 
 import json
@@ -21,7 +21,7 @@ from lowalt.targets.__main__ import options
 from lowalt.targets.assemble import Part, turn
 from lowalt.targets.make import refuse_source
 from lowalt.targets.skeleton import NODES, PARENTS
-from lowalt.targets.surfaces import Surface, inside, merged
+from lowalt.targets.surfaces import GRAIN, Surface, inside, longest_edge, merged, quartered
 
 ARRAYS = ("vertices", "vertex_part", "faces", "offset_m", "closed", "bones", "radius_m")
 """vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) numbers of vertices; offset_m (L,) m, distance
@@ -36,22 +36,6 @@ RADII_M = {
 }  # fmt: skip
 """Radius of the limb round each bone of a person of STATURE_M, from girths and breadths of Gordon et al. 2014, 2012
 Anthropometric Survey of U.S. Army Personnel, men's means, rounded; torso: mean of half breadth and half depth."""
-
-GRAIN = 30
-"""Triangles across the border of a cut are divided until their edges are shorter than the part's extent / GRAIN."""
-
-
-def longest_edge(corners: np.ndarray) -> np.ndarray:
-    """Return the longest edge (F,) of triangles (F, 3, 3)."""
-    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-
-
-def quartered(corners: np.ndarray) -> np.ndarray:
-    """Return triangles (F, 3, 3) each divided into four at the middles of its edges, (4 F, 3, 3), copies in turn."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-    four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-    return np.concatenate([np.stack(three, axis=1) for three in four])
 
 
 def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:

@@ -12,15 +12,14 @@ from lowalt.targets.mesh import cloud_and_pools
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut_parts, inside
 from lowalt.targets.mesh_record import body_axes, ordered_parts
-from lowalt.targets.occluders import GRAIN, longest_edge, quartered
-from lowalt.targets.surfaces import Surface, face_normals, merged
+from lowalt.targets.surfaces import GRAIN, Surface, face_normals, longest_edge, merged, quartered
 
 TRIANGLES = 1500
-"""Most triangles a part keeps."""
+"""Largest number of triangles that a part keeps."""
 
 
 def _pool(mesh: Mesh, regions: list[dict]) -> Pool:
-    """A mesh as a pool with a "sample" a triangle, at its middle; its corners (F, 9) stand where normals do.
+    """Return a mesh as a pool of one sample per triangle, at its centre; its corners (F, 9) take the place of normals.
 
     Large triangles are divided first where `regions` cut through them, so that their middles say where they are.
     """

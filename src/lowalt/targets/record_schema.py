@@ -21,15 +21,18 @@ def schema() -> dict:
     return load_yaml(PATH)
 
 
-def check(section: str, record: dict, where: str) -> None:
-    """Refuse keys of a record that are unknown to a section, missing, or of another value than it says.
+def check(section: str, record: dict, where: str) -> dict:
+    """Return a record's keys with their numbers read as meant, if they are as a section of the schema says.
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
-    from lowalt.config.schema import faults  # slow to import, and a cloud is made without it
+    from lowalt.config.schema import faults, with_numbers  # slow to import, and a cloud is made without it
 
-    if wrong := faults(record, {"$defs": schema()["$defs"], **schema()["sources"][section]}, "record"):
+    wanted = {"$defs": schema()["$defs"], **schema()["sources"][section]}
+    record = with_numbers(record, wanted)
+    if wrong := faults(record, wanted, "record"):
         raise InputError(f"{where}: {wrong[0]}")
+    return record
 
 
 def figures(model: str) -> dict[str, str]:

@@ -168,11 +168,13 @@ def merge(row: dict, record: dict, where: str) -> dict:
         raise InputError(f"{where}: source is {source!r}, expected one of {SOURCES}")
     merged = {"rcs_m2_per_point": 1.0, "points": row["points_in_published_cloud_approx"], **record}
     merged |= {"subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row}
-    record_schema.check(record_schema.COMMON, {key: merged[key] for key in COMMON_KEYS if key in merged}, where)
+    common = {key: merged[key] for key in COMMON_KEYS if key in merged}
+    merged |= record_schema.check(record_schema.COMMON, common, where)
     _check_like(merged, where)
     if unknown := sorted(set(record.get("row_from", {})) - set(row)):
         raise InputError(f"{where}: row_from names {unknown}, expected columns of the table of targets")
-    record_schema.check(source, {key: value for key, value in record.items() if key not in COMMON_KEYS}, where)
+    own = {key: value for key, value in record.items() if key not in COMMON_KEYS}
+    merged |= record_schema.check(source, own, where)
     for name in record_files(merged):
         check_file_name(name, where)
     return source_module(source).check_record(merged, where)

@@ -15,6 +15,9 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 
+GRAIN = 30
+"""Triangles across the border of a cut are divided until their edges are shorter than the part's extent / GRAIN."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -194,6 +197,19 @@ def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
         along, across = loop[:, 0] * c - loop[:, 1] * s, loop[:, 0] * s + loop[:, 1] * c
         sections.append(np.stack([np.full(len(loop), float(x)), y + along, z + across], 1))
     return loft(np.array(sections))
+
+
+def longest_edge(corners: np.ndarray) -> np.ndarray:
+    """Return the longest edge (F,) of triangles (F, 3, 3)."""
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+
+
+def quartered(corners: np.ndarray) -> np.ndarray:
+    """Return triangles (F, 3, 3) each divided into four at the middles of its edges, (4 F, 3, 3), copies in turn."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.concatenate([np.stack(three, axis=1) for three in four])
 
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

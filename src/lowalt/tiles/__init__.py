@@ -1,7 +1,6 @@
 """Images of spectra: index images, tiles of stations by spectra, palette PNG."""
 
-from lowalt.tiles.colour import colour_map, paint
-from lowalt.tiles.image_settings import Images
+from lowalt.tiles.image_settings import Images, colour_map, paint
 from lowalt.tiles.png import decode, encode
 from lowalt.tiles.render import Renderer, join, split
 from lowalt.tiles.resample import resize, triangle

@@ -1,4 +1,4 @@
-"""`python -m lowalt.tiles`: noisy signals of a chunk in, its encoded tiles out, and reduced images where asked for."""
+"""`python -m lowalt.tiles`: renders the noisy signals of a chunk as encoded tiles and, optionally, reduced images."""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> None:
         nargs="*",
         default=[],
         metavar="SIZE=PATH",
-        help="also write the images at SIZE pixels a side (.npy)",
+        help="also write the images at SIZE pixels per side (.npy)",
     )
     line.add_argument("--motion", help="the chunk's motion table, for late symbols and range cells")
     line.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range cells")
@@ -58,7 +58,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[[int], np.ndarray | None]:
-    """How late the symbols of a chunk's models are; drawn: {seed, effects}, from which the scene draws it."""
+    """Delays of the symbols of a chunk's models; drawn: {seed, effects}, from which the scene draws them."""
     from lowalt.motion import read_table
     from lowalt.scene.lateness import lateness
 

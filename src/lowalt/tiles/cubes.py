@@ -1,6 +1,6 @@
 """The cubes of samples: the range cells of every symbol with noise, before the receiver chooses one of them.
 
-A scene's canceller has acted on it; a scene without one gives the cells as they were received.
+The scene's canceller, if any, has already been applied.
 """
 
 from collections.abc import Mapping
@@ -12,20 +12,20 @@ from lowalt.config.network import Network, Station
 from lowalt.noise.awgn import add_noise
 from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.effects import called
+from lowalt.scene.effects import called, every
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.set_noise import in_all_cells
-from lowalt.scene.view import View
+from lowalt.scene.truth import geometric
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud, cloud_of
 
 
 class Cubes:
-    """Makes the cubes of samples; it keeps the clean ones of the last `kept` motion models and stations."""
+    """Makes the cubes of samples and caches the clean ones of the last `kept` motion models and stations."""
 
     def __init__(
-        self, scene: Scene, clouds: Mapping[str, Cloud], occluders: dict | None = None, every_cell: bool = False,
-        empty: bool = False, kept: int = 3,
+        self, scene: Scene, clouds: Mapping[str, Cloud], occluders: Mapping[str, dict] | None = None,
+        every_cell: bool = False, empty: bool = False, kept: int = 3,
     ) -> None:  # fmt: skip
         """Take the scene, clouds by subtype and each subtype's surfaces, where the scene hides points behind them.
 
@@ -38,7 +38,11 @@ class Cubes:
 
     @classmethod
     def from_settings(
-        cls, settings: dict, clouds: Mapping[str, Cloud], occluders: dict | None = None, empty: bool = False
+        cls,
+        settings: dict,
+        clouds: Mapping[str, Cloud],
+        occluders: Mapping[str, dict] | None = None,
+        empty: bool = False,
     ) -> "Cubes":
         """Build from a settings object with exactly seed, network, tolerance and effects.
 
@@ -60,8 +64,8 @@ class Cubes:
         if not self.every_cell and not np.isposinf(snr_db):
             rng = stream(self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
             noise = add_noise(np.zeros(cells.shape), snr_db, rng, power_w)
-            for effect in self.scene.effects:
-                noise = effect.module.filtered(effect.settings, noise) if effect.name == "canceller" else noise
+            for filtered in every(self.scene.effects, "filtered").values():
+                noise = filtered(noise)
             cells = (clean + noise).astype(np.complex64)
         cells[chosen < 0] = 0
         if signal is not None:
@@ -85,25 +89,13 @@ class Cubes:
         sample = SceneSample(scene, view, self.clouds)
         received, sampling = sample.received(), sample.view.sampling
         there = slice(None) if sampling is None else sampling.present
-        cells = np.zeros((len(received.cell), self.scene.network.subcarriers), np.complex128)
-        seen = sample.without_target() if self.empty else sample
-        cells[there] = seen.filtered(sample.detection)
+        seen = (sample.without_target() if self.empty else sample).filtered(sample.detection)
+        cells = np.zeros((len(received.cell), seen.shape[1]), np.complex128)
+        cells[there] = seen
         truths = []
         for target in sample.targets:
-            true_cell = np.full(len(cells), -1)
-            true_cell[there] = sample.true_cell(target)
-            truths.append(np.column_stack([truth(target), true_cell]))
+            place, speed_mps = sample.observed(target)
+            known = np.full((len(cells), 2), -1.0)
+            known[there] = np.column_stack([sample.true_cell(target), place])
+            truths.append(np.column_stack([geometric(target), known, speed_mps]))
         return cells, received.cell, tuple(truths), received.power
-
-
-def truth(view: View) -> np.ndarray:
-    """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each symbol, (N, 4)."""
-    station, middle = view.station, view.places.mean(axis=1)
-    moved = np.gradient(middle, view.times_s, axis=0, edge_order=2)
-    ends = [station] if station.transmitter is None else [station, station.transmitter]
-    ways = [middle - np.asarray(end.position_m) for end in ends]
-    ranges = [np.linalg.norm(way, axis=1) for way in ways]
-    speeds = [(way * moved).sum(axis=1) / length for way, length in zip(ways, ranges, strict=True)]
-    towards = ways[0] / ranges[0][:, None]
-    cosines = towards @ np.asarray(station.horizontal), towards[:, 2]
-    return np.column_stack([np.mean(ranges, axis=0), np.mean(speeds, axis=0), *cosines])

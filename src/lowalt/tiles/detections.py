@@ -4,7 +4,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from lowalt.config.network import Network, Station
-from lowalt.scene.effects.detection.detector import DEFAULTS, exceeds
+from lowalt.scene.effects.detection.detector import DEFAULTS, check_threshold, exceeds, windowed
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.spectra.kinds import range_doppler
 
@@ -14,31 +14,36 @@ the map, and whether it is the target's."""
 
 
 def detections(
-    cube: Cube, network: Network, station: Station, false_alarm: float = 1e-4, guard: int = 2, training: int = 16
-) -> np.ndarray:
+    cube: Cube, network: Network, station: Station, false_alarm: float = 1e-4, guard: int = 2, training: int = 16,
+    cfar: str = "cell_averaging", range_window: str = "none",
+) -> np.ndarray:  # fmt: skip
     """Return the detections (`DETECTION`) of a cube, the strongest first.
 
-    A value of the range-Doppler map is detected where it is the largest of its neighbours and exceeds the mean of the
-    `training` cells on either side, beyond `guard` cells, by the factor that noise passes with probability
-    `false_alarm`. It is the target's where it is within one cell and two speeds of what is true at some symbol; for a
+    A value of the range-Doppler map is detected where it is the largest of its neighbours and exceeds its threshold,
+    which noise passes with probability `false_alarm`; `guard`, `training`, `cfar` and `range_window` are those of the
+    effect `detector`.
+    It is the target's where it is within one cell and two speeds of the observed truth at some symbol; for a
     companion give `cube._replace(truth=cube.others[0])`.
-    Source: Finn & Johnson 1968; Richards 2014, 6.5.
+    Raises: InputError for an unknown name, or for fewer than two guard cells with range_window "hann".
+    Source: Finn & Johnson 1968; Rohling 1983; Richards 2014, 6.5.
     """
     symbols, count = cube.cells.shape
     settings = range_doppler.Settings(count - 1 + count % 2, symbols)
-    power = range_doppler.definition(cube, settings) ** 2
-    passed = exceeds({**DEFAULTS, "false_alarm": false_alarm, "guard": guard, "training": training}, power.T).T
+    rule = DEFAULTS | {
+        "false_alarm": false_alarm, "guard": guard, "training": training, "cfar": cfar, "range_window": range_window,
+    }  # fmt: skip
+    check_threshold(rule)
+    power = range_doppler.definition(cube._replace(cells=windowed(rule, cube.cells)), settings) ** 2
+    passed = exceeds(rule, power.T).T
     rows, columns = np.nonzero(passed & (power == maximum_filter(power, 3, mode="wrap")))
     result = np.zeros(len(rows), DETECTION)
     result["cell"] = (cube.chosen[symbols // 2] - settings.cells // 2 + rows) % count
     result["range_m"] = result["cell"] * network.cell_m
-    (_, first, last), _ = range_doppler.axes(settings, network, station)
-    step = (last - first) / symbols
-    # The most negative frequency, -1 / (2 T_r), is the last column.
-    result["radial_mps"] = last - step * (symbols - 1 - columns)
+    result["radial_mps"] = network.bin_speeds_mps(symbols, station)[columns]
     result["over_db"] = 10 * np.log10(power[rows, columns] / power.mean())
     true = dict(zip(TRUTH, cube.truth.T, strict=True))
-    aside = (result["cell"][:, None] - true["cell"] + count / 2) % count - count / 2
-    faster = (result["radial_mps"][:, None] - true["radial_mps"] + last) % (2 * last) - last
-    result["true"] = ((abs(aside) <= 1) & (abs(faster) <= 2 * step)).any(axis=1)
+    aside = (result["cell"][:, None] - true["observed_cell"] + count / 2) % count - count / 2
+    faster = network.folded_mps(result["radial_mps"][:, None] - true["observed_mps"], station)
+    step = 2 * network.largest_mps(station) / symbols
+    result["true"] = ((abs(aside) <= 1) & (abs(faster) <= 2 * step) & (true["cell"] >= 0)).any(axis=1)
     return result[np.argsort(-result["over_db"])]

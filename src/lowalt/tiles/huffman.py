@@ -1,8 +1,8 @@
 """A DEFLATE encoder for filtered images: Huffman codes fitted to each image, matches only for runs of zeros.
 
-Filtered spectra have almost no repeated strings to find, so looking for them costs time and saves nothing: what
-remains is the entropy coder. It is integer arithmetic alone, so the same image gives the same bytes on every machine
-and with every version of every library. Any zlib reads the result.
+Filtered spectra have almost no repeated strings, so searching for them costs time and saves nothing; only the entropy
+coder remains. It uses only integer arithmetic, so equal images give equal bytes on every machine and with any library
+version. Any zlib reads the result.
 """
 
 import struct
@@ -167,7 +167,7 @@ def _encode(data, words, counts, order, out):
         _put(out, state, header_table[symbol] >> U64(16), U64(3))
     for length in lengths:
         _put_symbol(out, state, header_table, length)
-    # As typed numbers: a function that is given a plain 0 is compiled once more for it.
+    # Typed numbers, because numba would compile the function again for a plain 0.
     place, pending = np.int64(0), np.int64(0)
     while place < words.size:
         if words[place] == 0:

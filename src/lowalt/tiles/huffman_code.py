@@ -1,6 +1,6 @@
-"""Lengths and codes of a Huffman code, as DEFLATE wants them.
+"""Lengths and codes of a Huffman code for DEFLATE.
 
-In plain loops: NumPy's sorting, joining and summing take longer to compile than all the rest of the tiles stage.
+Plain loops, because NumPy's sort, concatenate and sum would take longer to compile than the rest of the stage.
 """
 
 import numpy as np

@@ -1,10 +1,11 @@
 """From the values of an image to its index values, by the tables of `lowalt.tiles.scale`."""
 
 import numpy as np
-from numba import njit
+
+from lowalt.machine.jit import PLAIN
 
 
-@njit(cache=True)
+@PLAIN
 def _peak(values):
     """The largest |value| of an image, as an array of one float32."""
     bits = values.view(np.int32)
@@ -19,7 +20,7 @@ def _peak(values):
     return peak.view(np.float32)
 
 
-@njit(cache=True)
+@PLAIN
 def index_image(values, signed, lowest, shift, base, cut, out):
     """Fill out (S, S) uint8 with the index values of one image (S, S) float32.
 

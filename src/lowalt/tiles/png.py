@@ -9,10 +9,10 @@ import struct
 
 import deflate
 import numpy as np
-from numba import njit
 from PIL.PngImagePlugin import PngImageFile
 
 from lowalt.files.errors import InputError
+from lowalt.machine.jit import PLAIN
 from lowalt.tiles.huffman import zlib_compress
 
 MOST_EXPANSION = 1032
@@ -25,7 +25,7 @@ def _chunk(name: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", deflate.crc32(name + body))
 
 
-@njit(cache=True)
+@PLAIN
 def apply_paeth(image, out):
     """Filter image (H, W) uint8 into out (H, W + 1) uint8: filter type 4, then pixel minus Paeth predictor.
 

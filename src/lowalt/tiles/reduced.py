@@ -20,7 +20,7 @@ _TARGET = re.compile(r"([1-9]\d*)=(.+)", re.DOTALL)
 
 
 def target(text: str) -> tuple[int, Path]:
-    """Return size (pixels a side) and path of a reduced file from the text "SIZE=PATH".
+    """Return size (pixels per side) and path of a reduced file from the text "SIZE=PATH".
 
     Raises: InputError where the text has another form.
     """
@@ -36,7 +36,7 @@ def writing(
 ) -> Iterator[Callable[[int, np.ndarray], None]]:
     """Open reduced files and yield a function (number, tile) that fills the place of one sample in all of them.
 
-    targets: size (pixels a side) and path of each file; a tile is (stations S, spectra S) uint8. The files appear
+    targets: size (pixels per side) and path of each file; a tile is (stations S, spectra S) uint8. The files appear
     under their names when the block ends without an error.
     """
     with contextlib.ExitStack() as stack:

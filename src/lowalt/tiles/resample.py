@@ -1,6 +1,6 @@
-"""The one resampling kernel of the project: a triangle, defined by a formula for shrinking and for enlarging.
+"""The resampling kernel of the project: a triangle, with one formula for shrinking and for enlarging.
 
-A sample i of n stands at i + 1/2, an output j of m at (j + 1/2) n / m; its weight on sample i is
+Sample i of n is at i + 1/2, output j of m at (j + 1/2) n / m. The weight of sample i in output j is
     max(0, 1 - |i + 1/2 - (j + 1/2) n / m| / max(1, n / m)),
 divided by the sum over the samples there are. It interpolates linearly where it enlarges, averages over the
 whole output pixel where it shrinks, and is the identity for n = m; constants stay constants. It is what Pillow
@@ -10,9 +10,9 @@ calls BILINEAR and what PyTorch computes with `antialias=True`.
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from lowalt.files.errors import InputError
+from lowalt.machine.jit import PLAIN
 from lowalt.numerics import portable
 
 
@@ -69,11 +69,11 @@ def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarr
     first, weights = taps(size, out)
     weights = np.pad(weights, ((0, 0), (0, weights.shape[1] % 2)))
     columns = np.minimum(first[:, None] + np.arange(weights.shape[1]), size - 1) * hop
-    # Unsigned indices spare the compiled loop the test for negative ones.
+    # Unsigned indices, so that the compiled loop does not test for negative ones.
     return np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(weights.T.astype(np.float32))
 
 
-@njit(cache=True)
+@PLAIN
 def along_rows(values, columns, shares, out):
     """The last axis: values (rows, n) -> out (rows, S).
 
@@ -89,7 +89,7 @@ def along_rows(values, columns, shares, out):
                 line[c] += shares[k, c] * row[columns[k, c]] + shares[k + 1, c] * row[columns[k + 1, c]]
 
 
-@njit(cache=True)
+@PLAIN
 def across_rows(values, source, weights, out):
     """The first axis: values (points, n) -> out (S, n); source, weights: (S, taps), summed in order."""
     for j in range(out.shape[0]):
@@ -104,14 +104,14 @@ def across_rows(values, source, weights, out):
                 line[t] += w * row[t]
 
 
-@njit(cache=True)
+@PLAIN
 def _resize(images, source, weights, columns, shares, out):
     """(n, S, S) uint8 -> out (n, size, size) uint8, rows first, rounded half up at the end."""
     between = np.empty((out.shape[1], images.shape[2]), np.float32)
     values = np.empty(out.shape[1:], np.float32)
     plain = np.empty(images.shape[1:], np.float32)
     for n in range(len(images)):
-        # In loops: assigning a whole array takes as long to compile as all the rest of the stage.
+        # Loops, because an array assignment would take as long to compile as the rest of the stage.
         for j in range(plain.shape[0]):
             for c in range(plain.shape[1]):
                 plain[j, c] = images[n, j, c]

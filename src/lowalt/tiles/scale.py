@@ -1,11 +1,11 @@
-"""From an amplitude to one of 256 index values: the scale as a list of thresholds, and tables to look them up fast.
+"""Maps amplitudes to 256 index values: the scale as a list of thresholds, and lookup tables for them.
 
 With x = value / the image's own largest |value|, and y = f(x) in [0, 1],
     linear   y = x          decibel   y = max(0, 1 + 20 log10(x) / floor_db)          power   y = x^gamma,
 a spectrum of magnitudes takes the index floor(255 y + 1/2), a signed one 128 +- floor(127 y + 1/2), exactly
-symmetric about 128. All f rise, so an index is the number of thresholds that x reaches; thresholds are computed
-once in float64, and comparing is exact: no logarithm is taken of a pixel, and none of zero.
-An image without any value but zero gets 0 (128 where signed).
+symmetric about 128. Every f increases, so an index is the number of thresholds that x reaches. Thresholds are computed
+once in float64 and comparisons are exact, so no pixel needs a logarithm.
+An image of zeros gets 0 (128 if signed).
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class Lookup:
-    """Tables that give a float32 x in [0, 1] its step by one comparison.
+    """Tables that map a float32 x in [0, 1] to its index with one comparison.
 
     A key is the leading bits of x above `lowest`; `base[key]` counts the thresholds below the key's interval and
     `cut[key]` is the one inside it (2 where there is none).
@@ -59,7 +59,7 @@ class Lookup:
 def lookup(scale: Scale, levels: int) -> Lookup:
     """Return the tables of a scale with `levels` thresholds, rounded to float32.
 
-    The mantissa bits of a key are as many as keep two thresholds out of one interval.
+    A key has enough mantissa bits that no interval contains two thresholds.
     """
     thresholds = scale.thresholds(levels).astype(np.float32)
     bits = thresholds.view(np.int32)

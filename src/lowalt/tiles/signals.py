@@ -1,4 +1,4 @@
-"""The noisy signals that tiles and shards are made from, read from their file."""
+"""Reads the noisy signals from which tiles and shards are made."""
 
 from pathlib import Path
 

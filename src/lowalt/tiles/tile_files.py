@@ -1,7 +1,6 @@
 """The tiles file of a chunk: all its PNGs one after the other, (`data` uint8, `offsets` int64) in an .npz.
 
-The archive is stored without compression, so that it is written as a stream and read image by image. Neither needs
-more memory than one sample.
+The archive is not compressed, so it can be written as a stream and read image by image, with the memory of one sample.
 """
 
 import os
@@ -105,7 +104,7 @@ class Tiles:
             raise InputError(f"{self.path}: data of {kind} parted by {ends.dtype}, expected bytes and whole numbers")
         if not len(ends) or ends[0] < 0 or (np.diff(ends) < 0).any() or ends[-1] != size:
             raise InputError(f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is damaged")
-        # Plain reads, not a map: mapped pages of gigabytes would count as this process's memory.
+        # Read instead of mapping: gigabytes of mapped pages would count as memory of this process.
         self._file = self.path.open("rb")
 
     def __len__(self) -> int:

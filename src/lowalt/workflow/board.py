@@ -1,6 +1,6 @@
-"""Progress of a run, a line a stage: jobs done and in all, rate, time left, running jobs. Counts and text only.
+"""Progress of a run, one line per stage: finished and total jobs, rate, time left, running jobs. Counts and text only.
 
-Times are seconds since the epoch, so that a board can be kept in a file and read by another process.
+Times are seconds since the epoch, so that another process can read a board from a file.
 """
 
 from collections.abc import Callable
@@ -9,15 +9,15 @@ from dataclasses import asdict, dataclass, field
 from lowalt.machine.progress import Progress
 
 Reader = Callable[[str, float], Progress | None]
-"""Reads from a job's log how much of the job is done; the log may still be that of a run before the job's start (s)."""
+"""Reads a job's progress from its log, given the job's start (s): an older log may be that of an earlier run."""
 
 LEAST_PART = 0.1
-"""Part of a job that must be done before the first estimate: a job starts with modules and machine code to compile."""
+"""Progress of a job before the first estimate of the time left, because a job first imports and compiles code."""
 
 
 @dataclass
 class Job:
-    """A job that runs: its stage, its wildcards as a label, its log and the time of its start (s)."""
+    """A running job: its stage, its wildcards as a label, its log and its start time (s)."""
 
     stage: str
     label: str
@@ -27,7 +27,7 @@ class Job:
 
 @dataclass
 class Stage:
-    """Jobs of one rule: how many there are and are done, when the first started and the last ended (s)."""
+    """Jobs of one rule: their number, how many are done, when the first started and the last ended (s)."""
 
     total: int
     done: int = 0
@@ -38,7 +38,7 @@ class Stage:
 
 @dataclass
 class Board:
-    """The stages of one run in the order they started, and the jobs that run, by their id."""
+    """The stages of one run in order of their start, and the running jobs by id."""
 
     totals: dict[str, int]
     started: float
@@ -47,7 +47,7 @@ class Board:
 
     @classmethod
     def read(cls, kept: dict) -> "Board":
-        """Return the board that `kept` holds."""
+        """Return the board from the plain values of `kept`."""
         stages = {name: Stage(**stage) for name, stage in kept["stages"].items()}
         jobs = {name: Job(**job) for name, job in kept["jobs"].items()}
         return cls(kept["totals"], kept["started"], stages, jobs)
@@ -57,7 +57,7 @@ class Board:
         return asdict(self)
 
     def start(self, job_id: object, job: Job) -> bool:
-        """Note a job that starts; return whether it is the first of its stage."""
+        """Record the start of a job; return whether it is the first of its stage."""
         new = job.stage not in self.stages
         stage = self.stages.setdefault(job.stage, Stage(self.totals.get(job.stage, 0)))
         stage.started = job.started if stage.started is None else stage.started
@@ -65,7 +65,7 @@ class Board:
         return new
 
     def finish(self, job_id: object, now: float, good: bool = True) -> str | None:
-        """Note the end of a job; return its stage if that was the stage's last job, else None."""
+        """Record the end of a job; return its stage if that was the stage's last job, else None."""
         job = self.jobs.pop(str(job_id), None)
         if job is None:
             return None
@@ -75,7 +75,7 @@ class Board:
         return job.stage if stage.done >= stage.total else None
 
     def running(self) -> list[str]:
-        """Return the stages that have a job running, in the order they started."""
+        """Return the stages with a running job, in order of their start."""
         active = {job.stage for job in self.jobs.values()}
         return [name for name in self.stages if name in active]
 

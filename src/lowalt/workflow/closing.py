@@ -1,9 +1,9 @@
-"""The last lines of a finished run: its accuracies beside the paper's, where its page lies, what to try next."""
+"""The last lines of a finished run: its accuracies next to the paper's, the path of its report, and next steps."""
 
 import sys
 from pathlib import Path
 
-from lowalt.files.csv_tables import read_csv
+from lowalt.files.csv_tables import number, read_csv
 from lowalt.files.shipped import located
 from lowalt.files.yaml_files import load_yaml
 
@@ -11,10 +11,11 @@ from lowalt.files.yaml_files import load_yaml
 def averages(path: str | Path) -> dict[tuple[str, str], float]:
     """Return accuracies over all SNRs (%) by scheme and protocol, in the order of a table of accuracies.
 
-    Raises: InputError where the file is missing or no such table.
+    Raises: InputError if the file is missing or is not such a table.
     """
     rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent")
-    return {(row["scheme"], row["protocol"]): float(row["accuracy_percent"]) for row in rows if row["snr_db"] == "avg"}
+    means = [row for row in rows if row["snr_db"] == "avg"]
+    return {(row["scheme"], row["protocol"]): number(row, "accuracy_percent", path) for row in means}
 
 
 def lines(folder: Path) -> list[str]:

@@ -1,6 +1,6 @@
-"""The files that the rules of clouds, motion, echoes, noise, tiles and shards read, by the plan of the run.
+"""Input files of the rules for clouds, motion, echoes, noise, tiles and shards, derived from the plan of the run.
 
-Each method takes the wildcards of a job and can stand in a rule's `input:`. Nothing is read here.
+Each method takes the wildcards of a job and can be used in a rule's `input:`. No file is read here.
 """
 
 from typing import Any
@@ -33,7 +33,7 @@ class DataProducts:
         return self._of_chunk("clouds", wildcards)
 
     def motion(self, wildcards: Any) -> str:
-        """The motion table of a chunk; a chunk of added SNRs uses that of the chunk that it adds to."""
+        """The motion table of a chunk; a chunk of added SNRs uses that of its source chunk."""
         return f"results/{wildcards.run}/motion/{self._source(wildcards)}.csv"
 
     def first_motion(self, wildcards: Any) -> list[str]:
@@ -42,7 +42,7 @@ class DataProducts:
         return [f"results/{wildcards.run}/motion/{name}.csv" for name in names]
 
     def _source(self, wildcards: Any) -> str:
-        """Name of the chunk whose motion and echoes a chunk uses: its own, or the one that it adds SNRs to."""
+        """Name of the source chunk, whose motion and echoes a chunk uses: itself, or the one to which it adds SNRs."""
         return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").source
 
     def track(self, wildcards: Any) -> list[str]:
@@ -50,17 +50,17 @@ class DataProducts:
         return [self._config["motion"]["track"]] if "track" in self._config["motion"] else []
 
     def scene_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of a chunk's subtypes, and of the subtypes that the scene adds to them."""
+        """Clouds of a chunk's subtypes and of the scene's companions."""
         companions = (self._config["effects"].get("companions") or {}).get("subtypes", [])
         beside = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in companions]
         return list(dict.fromkeys([*self.chunk_clouds(wildcards), *beside]))
 
     def chunk_occluders(self, wildcards: Any) -> list[str]:
-        """Surfaces of a chunk's subtypes; none where the scene hides no points behind surfaces."""
+        """Surfaces of a chunk's subtypes, if the scene has the effect `occlusion`."""
         return self._of_chunk("occluders", wildcards) if "occlusion" in self._config["effects"] else []
 
     def span(self, wildcards: Any) -> list[str]:
-        """The part of a group's motion models that one chunk holds, as words of the stage's command line."""
+        """The motion models of a chunk within its group, as command-line words."""
         first, count = self._run.plan.span(f"{wildcards.group}-{wildcards.part}")
         return ["--first", str(first), "--count", str(count)]
 
@@ -72,7 +72,7 @@ class DataProducts:
         return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
 
     def piece(self, wildcards: Any) -> list[str]:
-        """The place of a shard among those of its chunk's fold, as words of the stage's command line; none if alone."""
+        """The number of a shard among the pieces of its chunk's fold, as command-line words; empty if alone."""
         pieces = self._run.plan.pieces(f"{wildcards.group}-{wildcards.part}", wildcards.fold)
         return ["--piece", str(pieces.index(wildcards.piece)), str(len(pieces))] if len(pieces) > 1 else []
 
@@ -86,13 +86,13 @@ class DataProducts:
         return [f"{stem}/{station}.npy" for station in self._run.stations]
 
     def chunk_powers(self, wildcards: Any) -> list[str]:
-        """The powers of the targets' own echoes, to which SNRs refer in a scene with effects; none in other scenes."""
+        """Powers of the targets' own echoes, to which SNRs refer in a scene with effects; empty without effects."""
         stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
 
     def tile_content(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """What tiles are rendered from beside signals: the motion table, where spectra know the instants of late
-        symbols or show range cells, and for range cells clouds and surfaces too."""
+        """Inputs of tiles other than signals: the motion table, if spectra use known symbol instants or range cells;
+        for range cells also clouds and surfaces."""
         cells = bool(of_cells(self._config["spectra"]))
         motion = {"motion": self.motion(wildcards)} if cells or timed(self._config) else {}
         return motion | (self._scene(wildcards) if cells else {})
@@ -102,7 +102,7 @@ class DataProducts:
         return {"clouds": self.scene_clouds(wildcards), "occluders": self.chunk_occluders(wildcards)}
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that shards are packed from, by kind: noisy signals and tiles (image), noisy signals (signal), clean
+        """Files from which shards are packed, by kind: noisy signals and tiles (image), noisy signals (signal), clean
         echoes (recipe), or noisy signals, clouds and surfaces (cube)."""
         base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
         kind = self._config["shards"]["kind"]
@@ -114,7 +114,7 @@ class DataProducts:
         return {**signals, "tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else signals
 
     def reduced(self, wildcards: Any) -> dict[str, str]:
-        """Reduced images of a chunk and its motion table; nothing where the tiles stage makes none of this size."""
+        """Reduced images of a chunk and its motion table; empty if the tiles stage makes none of this size."""
         if not self._run.is_reduced(int(wildcards.size)):
             return {}
         base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"

@@ -1,8 +1,8 @@
 """Locks that end with their run: next to each pair of Snakemake's lock files, a record that the run holds locked.
 
-Snakemake locks a working directory by files that stay when it is killed. The system gives a lock on a file back when
-its holder ends, however it ends. So the next run takes the lock files of a dead run away and ends the jobs that it left
-behind, and it refuses with the name of a living one. `mends.py` puts this in the place of Snakemake's lock.
+Snakemake locks a working directory with files, which remain when it is killed. The operating system releases a file
+lock when its holder ends for any reason. The next run can therefore remove the lock files of a dead run and end its
+orphaned jobs, and it refuses to start while another run is alive. `mends.py` replaces Snakemake's lock with this.
 """
 
 import contextlib
@@ -25,12 +25,12 @@ KINDS = ("input", "output")
 TOKEN = "LOWALT_RUN"
 """Environment variable that every job of a run inherits: the token of the run."""
 GRACE_S = 10.0
-"""Time that jobs of a dead run have to end after SIGTERM before they are killed."""
+"""Seconds between SIGTERM and SIGKILL for the orphaned jobs of a dead run."""
 
 
 @dataclass(frozen=True)
 class Owner:
-    """The run that holds a lock: its process id, its host, and a token that no other run has."""
+    """The run that holds a lock: its process id, host and unique token."""
 
     pid: int = field(default_factory=os.getpid)
     host: str = field(default_factory=socket.gethostname)
@@ -47,11 +47,11 @@ class Owner:
 
     @property
     def here(self) -> bool:
-        """Whether it runs, or ran, on this host, whose system knows the locks on files."""
+        """Whether the owner is or was on this host, so that its file locks can be tested."""
         return self.host == socket.gethostname()
 
     def left_behind(self) -> list[int]:
-        """Process ids on this machine that carry the owner's token: where it is dead, jobs that outlived it."""
+        """Ids of processes on this machine with the owner's token; of a dead owner, its orphaned jobs."""
         mark, jobs = f"{TOKEN}={self.token}".encode(), []
         for folder in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
@@ -62,17 +62,17 @@ class Owner:
 
 
 def guarded(folder: Path) -> FileLock:
-    """Return the lock under which one process at a time looks at the locks of a folder and changes them."""
+    """Return the mutex for reading and changing the locks of a folder."""
     return FileLock(folder / "lowalt.guard", fallback_to_soft=False)
 
 
 def record(locks: Path, number: int) -> Path:
-    """File of a lock's owner, which the owner holds locked as long as it lives."""
+    """File with a lock's owner; the owner keeps it locked while it is alive."""
     return locks / f"{number}.owner.json"
 
 
 def numbers(locks: Path) -> list[int]:
-    """Return the numbers of all locks in a folder, with an owner or without."""
+    """Return the numbers of all locks in a folder, with or without an owner."""
     names = {path.name.partition(".")[0] for path in locks.glob("*.*") if path.is_file()}
     return sorted(int(name) for name in names if name.isdigit())
 
@@ -87,16 +87,16 @@ def held(path: Path) -> bool:
 
 
 def drop(locks: Path, number: int) -> None:
-    """Remove one lock; its owner's record goes last, so that a crash in between leaves no lock without owner."""
+    """Remove one lock, the owner's record last, so that a crash in between leaves no lock without an owner."""
     for kind in KINDS:
         (locks / f"{number}.{kind}.lock").unlink(missing_ok=True)
     record(locks, number).unlink(missing_ok=True)
 
 
 def take_over(locks: Path, say: Callable[[str], None]) -> None:
-    """Remove the locks of dead owners of this host and end the jobs that these left behind; call within `guarded`.
+    """Remove the locks of dead owners on this host and end their orphaned jobs; call within `guarded`.
 
-    say: called with one sentence for every lock taken over. Locks of other hosts stay, as do those without a record.
+    say: called with one sentence per removed lock. Locks of other hosts and locks without a record stay.
     """
     for number in numbers(locks):
         owner = Owner.read(record(locks, number))
@@ -109,7 +109,7 @@ def take_over(locks: Path, say: Callable[[str], None]) -> None:
 
 
 def end(owner: Owner) -> list[int]:
-    """End the processes that a dead run left behind, since they would write the next run's files; return their ids."""
+    """End the orphaned processes of a dead run, which would write the next run's files; return their ids."""
     ended = owner.left_behind()
     for number in (signal.SIGTERM, signal.SIGKILL):
         for pid in owner.left_behind():
@@ -122,7 +122,7 @@ def end(owner: Owner) -> list[int]:
 
 
 def holders(locks: Path, living: bool = False) -> list[str]:
-    """Return who holds the locks of a folder, a sentence each; living: only owners that are seen to live."""
+    """Return one sentence per lock about its holder; living: only holders known to be alive."""
     lines = []
     for number in numbers(locks):
         path = record(locks, number)
@@ -139,16 +139,16 @@ def holders(locks: Path, living: bool = False) -> list[str]:
 
 
 def refusal(locks: Path) -> str:
-    """Return who holds the locks of a folder, and what a person can do about it, in one line."""
+    """Return one line about the holders of the locks of a folder and what the user can do."""
     away = "if nothing of this runs any more: snakemake --unlock"
     return f"the working directory is locked: {'; '.join([*holders(locks), away])}"
 
 
 def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> tuple[int, FileLock]:
-    """Write a lock with its owner, the owner first; call within `guarded`.
+    """Write a lock, the owner's record first; call within `guarded`.
 
-    keys: the files read ("input") and written ("output") by the run. Returns the lock's number, and what holds its
-    record until it is released. Raises: OSError where a file cannot be written or the file system locks none.
+    keys: the files read ("input") and written ("output") by the run. Returns the lock's number and the file lock on its
+    record, to be released at the end. Raises: OSError where a file cannot be written or the file system locks none.
     """
     number = next(number for number in count() if number not in numbers(locks))
     holding = FileLock(record(locks, number), timeout=0, fallback_to_soft=False)

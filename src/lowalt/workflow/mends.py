@@ -1,7 +1,7 @@
-"""Mends of Snakemake and of its executor for Slurm, each with its fault, where upstream knows of it, and its cure.
+"""Workarounds for faults of Snakemake and its Slurm executor, each with the fault, the upstream issue and the cure.
 
-The rules' common file calls `install`, so that `make`, `lowalt run` and plain `snakemake` all profit. A test for each
-shows that the installed version still has the fault.
+`workflow/rules/common.smk` calls `install`, so that they apply to `make`, `lowalt run` and plain `snakemake`. For each
+a test shows that the installed version still has the fault.
 """
 
 import contextlib
@@ -20,19 +20,19 @@ from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal,
 
 
 def install() -> None:
-    """Put every mend in place for this process."""
+    """Apply all workarounds to this process."""
     end_locks()
     answer_ctrl_c()
     keep_one_timer()
     ask_slurm_sooner()
 
 
-# Fault: the lock of a run that is killed stays, and so do its jobs. github.com/snakemake/snakemake/issues/2919
-# Cure: a record of the lock's owner; the next run takes over the lock of a dead one and ends the jobs it left.
+# Fault: when a run is killed, its lock and its jobs remain. github.com/snakemake/snakemake/issues/2919
+# Cure: record the lock's owner; the next run takes over the lock of a dead run and ends its orphaned jobs.
 
 
 def end_locks() -> None:
-    """Put locks with owners in the place of those of Snakemake's file backend."""
+    """Replace the locks of Snakemake's file backend with locks that record their owner."""
     from snakemake.persistence.file import FilePersistence
 
     FilePersistence.lock, FilePersistence.lock_warn_only = _lock, _lock_warn_only
@@ -43,8 +43,8 @@ def end_locks() -> None:
 def _lock(self: Any) -> Iterator[None]:
     """Hold the lock of a working directory for the length of a block.
 
-    self: Snakemake's persistence. Raises: SystemExit after one line that names the holders, or the folder that no lock
-    can be written into.
+    self: Snakemake's persistence. Raises: SystemExit after one line that names the holders, or the folder in
+    which no lock can be written.
     """
     from snakemake.logging import logger
 
@@ -69,7 +69,7 @@ def _lock(self: Any) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _lock_warn_only(self: Any) -> Iterator[None]:
-    """Say who holds the lock and go on, as Snakemake does for runs that write nothing."""
+    """Print who holds the lock and continue, as Snakemake does for runs that write nothing."""
     from snakemake.logging import logger
 
     if self.locked:
@@ -78,7 +78,7 @@ def _lock_warn_only(self: Any) -> Iterator[None]:
 
 
 def _cleanup_locks(self: Any) -> None:
-    """Remove all locks, as `--unlock` asks. Raises: SystemExit after one line that names a holder seen to live."""
+    """Remove all locks, as `--unlock` asks. Raises: SystemExit after one line that names a living holder."""
     with refusing(), guarded(Path(self.path)):
         alive = holders(Path(self._lockdir), living=True)
         if alive:
@@ -86,16 +86,16 @@ def _cleanup_locks(self: Any) -> None:
         self.unlock()
 
 
-# Fault: a second Ctrl-C, while a run ends its jobs and removes their files, breaks that off with tracebacks.
-# No issue upstream. Cure: every Ctrl-C after the first is answered in one line.
+# Fault: a second Ctrl-C interrupts the clean-up of jobs and files, with tracebacks. No issue upstream.
+# Cure: answer every Ctrl-C after the first with one line.
 
 ANSWER = b"already ending; the same command goes on where this run stops\n"
 
 
 def answer_ctrl_c() -> None:
-    """Let the first Ctrl-C of this process act as ever, and every later one print ANSWER.
+    """Let the first Ctrl-C of this process act as usual, and later ones only print ANSWER.
 
-    Nothing happens where Ctrl-C is ignored or handled already, or outside of the main thread.
+    Does nothing if Ctrl-C is already ignored or handled, or outside the main thread.
     """
     main = threading.current_thread() is threading.main_thread()
     if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -110,7 +110,7 @@ def _first(number: int, frame: FrameType | None) -> None:
 
 # Fault: each scheduling round starts a timer that starts another round `--max-jobs-per-timespan` later (1 s), and each
 # finished job starts a round: after n jobs there are n rounds a second. github.com/snakemake/snakemake/issues/2354
-# Cure: one timer at a time. A longer timespan would be no cure: a run that has ended waits for its timers.
+# Cure: one timer at a time. A longer timespan would not help, because a finished run waits for its timers.
 
 
 def keep_one_timer() -> None:
@@ -121,25 +121,25 @@ def keep_one_timer() -> None:
 
 
 def _one_timer(self: Any, delay: float) -> None:
-    """Start a round of a scheduler after `delay` (s), unless one is already to come."""
+    """Start a scheduling round after `delay` (s), unless one is already pending."""
     timer = getattr(self, "_next_round", None)
     if timer is None or timer.finished.is_set() or not timer.is_alive():
         self._next_round = threading.Timer(delay, self._open_jobs.release)
-        # A run that has ended does not wait for its timer.
+        # A daemon timer does not delay the end of a run.
         self._next_round.daemon = True
         self._next_round.start()
 
 
-# Fault: the executor for Slurm waits 10 s longer after each question that found no job ended, up to 180 s, so it
-# notices the end of a job of 46 s after another 34 s. github.com/snakemake/snakemake-executor-plugin-slurm/issues/319
-# Cure: each wait is a fifth longer than the last, 30 s at most; the end of a job of T is noticed within T / 5.
+# Fault: after each poll that finds no finished job, the Slurm executor waits 10 s longer, up to 180 s. It notices the
+# end of a job of 46 s only 34 s later. github.com/snakemake/snakemake-executor-plugin-slurm/issues/319
+# Cure: each wait is 20 % longer than the last, at most 30 s; the end of a job of length T is noticed within T / 5.
 
 PLUGIN = "snakemake_executor_plugin_slurm"
 GROWTH, MOST_S = 1.2, 30.0
 
 
 def ask_slurm_sooner() -> None:
-    """Replace the executor's rule of waiting, once; without the plugin nothing happens."""
+    """Replace the executor's waiting times, once; without the plugin do nothing."""
     plugin = sys.modules.get(PLUGIN)
     if plugin is None:
         return
@@ -149,7 +149,7 @@ def ask_slurm_sooner() -> None:
 
 
 def _slower(executor: Any, asked_s: float | None) -> None:
-    """Set the seconds until the next question; the plugin asks for more than the last wait where no job has ended."""
+    """Set the seconds until the next poll; the plugin asks for a longer wait than the last if no job has finished."""
     last_s = executor._next_seconds_between_status_checks
     grown = last_s is not None and asked_s is not None and asked_s > last_s
     executor._next_seconds_between_status_checks = min(GROWTH * last_s, max(MOST_S, last_s)) if grown else asked_s

@@ -1,4 +1,4 @@
-"""Options of a stage's command line that depend on the job: a list of words, empty where the job lacks its input.
+"""Command-line options of a stage that depend on the job: a list of words, empty if the job lacks the input.
 
 Each function takes the wildcards and the inputs of a job and can stand in a rule's `params:`. Snakemake's format `:q`
 quotes every word of a list for the shell.
@@ -14,12 +14,12 @@ from lowalt.spectra.catalogue import of_cells
 
 
 def _option(name: str, files: str | list[str] | None) -> list[str]:
-    """An option with the files that it names, nothing where there are none."""
+    """An option with its files; empty without files."""
     return [f"--{name}", *([files] if isinstance(files, str) else files)] if files else []
 
 
 def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
-    """Return the function of the options that name these inputs of a job, as far as the job has them."""
+    """Return a function that gives the options for those of these inputs that a job has."""
 
     def words(wildcards: Any, input: Any) -> list[str]:
         """The options of one job."""
@@ -30,11 +30,11 @@ def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
 
 occluders, powers = of_inputs("occluders"), of_inputs("powers")
 scene = of_inputs("motion", "clouds", "occluders")
-"""What tiles are rendered from beside signals, where late symbols or range cells ask for it."""
+"""Further inputs of the tiles stage, needed for late symbols or range cells."""
 content = of_inputs("signals", "tiles", "echoes", "powers", "clouds", "occluders")
-"""The files that a shard is packed from, by its kind."""
+"""The files from which a shard of some kind is packed."""
 reduced_chunk = of_inputs("reduced", "motion")
-"""The reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
+"""The reduced images of a chunk and its motion table, if the tiles stage makes them at the required size."""
 samples = of_inputs("dataset", "views", "index")
 """The configuration to make samples from, the shrunk images, or the index of the shards: a job has one of them."""
 

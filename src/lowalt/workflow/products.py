@@ -1,7 +1,7 @@
-"""The files that each rule reads, by the plan of the run; those of the data stages are in `data_products`.
+"""Input files of the remaining rules, derived from the plan of the run (data stages: `data_products`).
 
-Each method takes the wildcards of a job and can stand in a rule's `input:`. Nothing is read here; a method looks
-whether a file exists only where no rule of the run can make it.
+Each method takes the wildcards of a job and can be used in a rule's `input:`. No file is read here. A method checks
+the existence of a file only if no rule of the run can make it.
 """
 
 import json
@@ -10,32 +10,32 @@ from typing import Any
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
+from lowalt.files.package_plan import PACKAGE
 from lowalt.files.shipped import shipped
-from lowalt.files.street import PACKAGE
 from lowalt.report.inputs import KEPT
 from lowalt.workflow.data_products import DataProducts
 from lowalt.workflow.sources import near
 
 PRESETS = "config/cost/presets.csv"
-"""The presets of what recognition costs, some of them trained by a study."""
+"""The presets for the cost of recognition, some of which a study trains."""
 REFERENCE = "results/reference"
 PAGE = (".html", ".css", ".js")
-"""Endings of the files that the page is put together from."""
+"""Suffixes of the templates of the report."""
 TABLES = (
     "accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv", "orderings.csv", "alarms.csv",
     "calibration.csv",
 )  # fmt: skip
 """Tables of recognition; their rows name a protocol and a scheme."""
 PAGE_TABLES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds")
-"""Those of them that the page shows."""
+"""Tables that the report shows."""
 
 
 class Products(DataProducts):
     """Paths of the products of one run: those of its data set, of its trainings and of its report."""
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files of training and evaluation, by the configuration: images shrunk to the scheme's size, the index of the
-        shards, or clouds to make samples from."""
+        """Inputs of training and evaluation as configured: images reduced to the scheme's size, the index of the
+        shards, or clouds for samples simulated on access."""
         base, scheme = f"results/{self._run.data}", self._run.schemes_by_slug[wildcards.scheme]
         if self._config["recognition"].get("input") == "dataset":
             return self._made()
@@ -45,7 +45,7 @@ class Products(DataProducts):
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
 
     def _made(self) -> dict[str, str | list[str]]:
-        """Files from which samples are made on the spot: configuration, clouds, and surfaces that hide points."""
+        """Inputs for samples simulated on access: configuration, clouds, and surfaces for the effect `occlusion`."""
         base = f"results/{self._run.data}"
         clouds = [f"{base}/clouds/{subtype}.npz" for subtype in self._run.subtypes]
         surfaces = [path.replace("/clouds/", "/occluders/") for path in clouds]
@@ -53,7 +53,7 @@ class Products(DataProducts):
         return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that one training reads: `samples`, and the user's file where a scheme's backbone is made in one."""
+        """Inputs of one training: `samples`, and the user's file if it defines the scheme's backbone."""
         name = self._run.own_backbone(self._run.schemes_by_slug[wildcards.scheme])
         return self.samples(wildcards) | ({"backbone": name.rpartition(":")[0]} if name else {})
 
@@ -68,7 +68,7 @@ class Products(DataProducts):
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
 
     def studied(self, wildcards: Any) -> list[str]:
-        """Predictions of the presets that a study trains on this run's data, one a training seed.
+        """Predictions of the presets that a study trains on this run's data, one per training seed.
 
         Raises: InputError naming the command that makes them, where one is missing.
         """
@@ -81,7 +81,7 @@ class Products(DataProducts):
         return paths
 
     def transferred(self, wildcards: Any) -> list[str]:
-        """Configurations of this run and of those whose models are tried on its test samples.
+        """Configurations of this run and of the runs whose models are tested on its samples.
 
         Raises: InputError naming a run that is missing, or has not trained what this one trains.
         """
@@ -124,7 +124,7 @@ class Products(DataProducts):
         return json.dumps(self.report(wildcards), indent=1)
 
     def prepared(self, wildcards: Any) -> list[str]:
-        """Files that the run makes without torch before its first training; none where its data are another run's."""
+        """Files made without torch before the first training; empty if the data set is another run's."""
         run, base = self._run, f"results/{self._run.name}"
         if run.data != run.name:
             return []
@@ -137,7 +137,7 @@ class Products(DataProducts):
         return near(PACKAGE / "shards/card.md.jinja")
 
     def page_templates(self, wildcards: Any) -> list[str]:
-        """The templates of the page and of its sections, its style and its scripts."""
+        """Templates, style and scripts of the report."""
         return [near(path) for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE]
 
     def data_benchmarks(self, wildcards: Any) -> list[str]:

@@ -1,7 +1,6 @@
-"""Refusals of configurations whose values contradict each other, their stations and signal, other runs or the files
-that are there.
+"""Checks that refuse a configuration whose values contradict each other, another run, or the existing files.
 
-Each function raises InputError that names key, value and what was expected. `Run.of` calls them before any job starts.
+Each function raises InputError naming the key, its value and what was expected. `Run.of` calls them before any job.
 """
 
 import contextlib
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
+from lowalt.config.named_code import own_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -27,9 +27,10 @@ TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
 
 
 def refuse_braces(config: dict, inputs: str | None) -> None:
-    """Refuse paths with braces, which Snakemake takes for a wildcard or a format."""
+    """Refuse paths with braces, which Snakemake would interpret as wildcards or format fields."""
     keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("motion", "track"))
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
+    paths |= {"effects": " ".join(own_effects(config["effects"]))}
     paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
     for name, path in paths.items():
         if path and {"{", "}"} & {*path}:
@@ -37,8 +38,7 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
 
 
 def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> None:
-    """Refuse effects that do not fit together, companions that the run does not have, and noise of added SNRs in echoes
-    that hold the noise of all."""
+    """Refuse incompatible effects, companions that are not subtypes of the run, and added SNRs with `cell_noise`."""
     links = any(station.transmitter is not None for station in network.stations)
     if config["effects"] or links or network.guard_subcarriers < 0:
         from lowalt.scene.checks import check
@@ -48,11 +48,11 @@ def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> N
     if unknown := sorted(set(companions) - set(subtypes)):
         raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
     if in_all_cells(config["effects"]) and any("snr_db" in step for step in config.get("added", [])):
-        raise InputError("added: snr_db together with effects.cell_noise, whose echoes hold the noise of all SNRs")
+        raise InputError("added: snr_db together with effects.cell_noise, whose echoes contain the noise of all SNRs")
 
 
 def refuse_contradictions(config: dict, published: dict, classes: tuple[str, ...]) -> None:
-    """Refuse values that contradict each other, and files that are not there.
+    """Refuse values that contradict each other, and missing files.
 
     published: rows of the table of targets by subtype; classes: those of the table.
     """
@@ -65,7 +65,7 @@ def refuse_contradictions(config: dict, published: dict, classes: tuple[str, ...
 
 
 def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str) -> None:
-    """Refuse ranges (m) of names that are not known, and reversed ones."""
+    """Refuse ranges (m) with an unknown name or with the larger value first."""
     if unknown := sorted(set(ranges) - set(names)):
         raise InputError(f"{key}: {unknown}, expected {expected}")
     for name, (low, high) in ranges.items():
@@ -74,7 +74,7 @@ def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str
 
 
 def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> None:
-    """Refuse sizes of unknown classes or whose range is reversed, and sizes together with effects."""
+    """Refuse sizes of unknown classes, reversed ranges, and sizes together with effects."""
     sizes = config["motion"].get("sizes_m", {})
     _refuse_ranges("motion.sizes_m", sizes, classes, f"some of the classes {list(classes)}")
     if sizes and config["effects"]:
@@ -84,17 +84,20 @@ def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> 
 
 
 def refuse_input(config: dict) -> None:
-    """Refuse a cache of images for samples made on the spot, and shards of clean echoes in scenes that have none."""
+    """Refuse an image cache for samples simulated on access, and recipe shards in scenes without clean echoes."""
     if config["shards"]["kind"] == "recipe":
         refuse(config["effects"])
     block = config["recognition"]
+    own = own_effects(config["effects"])
+    if block.get("input") == "dataset" and own:
+        raise InputError(f"recognition.input: 'dataset' together with the effects {own}, expected shards")
     if block.get("input") == "dataset" and block["cache"]:
         raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
 
 
 def refuse_cells(config: dict) -> None:
-    """Refuse spectra of range cells where shards hold signals alone, cubes of symbols that gaps interpolate, and a
-    type of cells for other shards."""
+    """Refuse three combinations: spectra of range cells with shards of signals, cubes with interpolated gaps, and
+    `shards.cells` for shards other than cubes."""
     kind, shown, cells = config["shards"]["kind"], of_cells(config["spectra"]), config["shards"].get("cells")
     if cells and kind != "cube":
         raise InputError(f"shards.cells: {cells!r} and shards.kind {kind!r}, expected kind 'cube'")
@@ -111,7 +114,7 @@ def refuse_cells(config: dict) -> None:
 
 
 def refuse_no_files(targets: dict, inputs: str | None) -> None:
-    """Refuse a folder of inputs that holds none of the named files, where built-in models would replace them all."""
+    """Refuse a folder with none of the named files if built-in models would silently replace them all."""
     if targets.get("where_missing") != "builtin":
         return
     records = records_of({**targets, "where_missing": "refuse"})
@@ -122,13 +125,13 @@ def refuse_no_files(targets: dict, inputs: str | None) -> None:
 
 
 def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:
-    """Refuse flight heights for names that are neither subtypes nor classes, and a range that is reversed."""
+    """Refuse flight heights for names that are neither subtypes nor classes, and reversed ranges."""
     known = {*published, *classes, *CATEGORIES}
     _refuse_ranges("motion.height_m", heights, known, f"subtypes, classes {list(classes)} or {list(AIRBORNE)}")
 
 
 def refuse_data(config: dict) -> None:
-    """Refuse another run's data set that is not there or was made with other settings than this configuration's."""
+    """Refuse another run's data set if it is missing or was made with settings other than this configuration's."""
     name = config.get("data", config["run"])
     if name == config["run"]:
         return
@@ -142,7 +145,7 @@ def refuse_data(config: dict) -> None:
 
 
 def refuse_missing(config: dict) -> None:
-    """Refuse a file or folder that the configuration names and that is not there: jobs ask for some of them last."""
+    """Refuse a missing file or folder that the configuration names; some are needed only by the last jobs."""
     report, network = config["report"], config["recognition"]["network"]
     backbone, colon, _ = network["backbone"].rpartition(":")
     files = {
@@ -160,7 +163,7 @@ def refuse_missing(config: dict) -> None:
 
 
 def refuse_region(config: dict) -> None:
-    """Refuse a region without an area, be it given or that between the stations."""
+    """Refuse a region with zero area, given explicitly or spanned by the stations."""
     polygon = config["motion"]["region"]["polygon_m"]
     corners = masts_m(config["network"]) if polygon is None else polygon
     sides = [(x - corners[0][0], y - corners[0][1]) for x, y in corners[1:]]
@@ -172,10 +175,10 @@ def refuse_region(config: dict) -> None:
 
 
 def refuse_speeds(config: dict) -> None:
-    """Refuse matched speeds of the VT spectrum that repeat themselves: beyond c / (4 f T_r) speeds fold."""
+    """Refuse VT speeds beyond the unambiguous speed c / (4 f T_r), where the spectrum repeats."""
     network, vt = config["network"], config["spectra"].get("vt")
     fold = SPEED_OF_LIGHT / (4 * network["carrier_hz"] * network["symbol_interval_s"])
-    # Symbols at uneven instants tell speeds beyond it apart, where their instants are known.
+    # Unevenly spaced symbols resolve higher speeds if their instants are known.
     if vt is None or config["spectra"].get("times") == "known":
         return
     low, high = vt["speed_min_mps"], vt["speed_max_mps"]
@@ -188,7 +191,7 @@ def refuse_speeds(config: dict) -> None:
 
 
 def _suited(config: dict, name: str) -> Scheme:
-    """The scheme of the table, whose stations and spectra this configuration has."""
+    """Return a scheme of the table. Raises: InputError where this configuration lacks its stations or spectra."""
     table, stations = config["recognition"]["table"], station_names(config["network"])
     scheme = scheme_named(table, name, stations)
     columns_in(scheme.columns, named(config["spectra"]), len(stations), table)
@@ -196,7 +199,7 @@ def _suited(config: dict, name: str) -> Scheme:
 
 
 def _able(config: dict) -> list[str]:
-    """Names of the table's schemes whose stations and spectra this configuration has."""
+    """Names of the table's schemes that suit the stations and spectra of this configuration."""
     suited = []
     for name in names(config["recognition"]["table"]):
         with contextlib.suppress(InputError):
@@ -207,8 +210,8 @@ def _able(config: dict) -> list[str]:
 def schemes_of(config: dict) -> dict[str, Scheme]:
     """Return the schemes that a run trains or times, by the name that the configuration gives them.
 
-    Raises: InputError for a scheme that stations and spectra do not suit, with those that they suit; for one named
-    twice; and where none trains in a protocol of the run.
+    Raises: InputError for a scheme that does not suit the stations and spectra, listing those that do; for one named
+    twice; and if no scheme trains in a protocol of the run.
     """
     block = config["recognition"]
     known, schemes = set(map(slug, names(block["table"]))), {}

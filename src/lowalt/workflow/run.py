@@ -1,4 +1,4 @@
-"""One run: the facts that follow from its checked configuration. Files and single stages have modules of their own.
+"""One run: the facts derived from its checked configuration. Other modules hold its files and its stages' settings.
 
 Every fault of a configuration is found here, before any job starts.
 """
@@ -26,7 +26,7 @@ from lowalt.workflow.launch import Launch
 class Run:
     """Records, classes, plan and schemes of one run; `inputs` is the folder of meshes and recordings, or None.
 
-    The classes are those of the whole table of targets, so that a label means the same however few are selected.
+    The classes are those of the whole table of targets, so that labels do not depend on the selection of targets.
     """
 
     config: dict
@@ -63,7 +63,7 @@ class Run:
 
     @property
     def sources(self) -> str:
-        """One line: the number of subtypes from built-in models, and the subtypes made from files of the user."""
+        """One line: the number of subtypes with built-in models, and the subtypes made from the user's files."""
         named = [name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")]
         if not named:
             return f"targets: {len(self.records)} built-in"
@@ -71,12 +71,12 @@ class Run:
 
     @property
     def name(self) -> str:
-        """Name of the run; all it makes lies in results/{name}/."""
+        """Name of the run; its files are in results/{name}/."""
         return self.config["run"]
 
     @property
     def data(self) -> str:
-        """Name of the run whose data set this run trains on: its own, unless the configuration names another."""
+        """Name of the run whose data set is used for training: this run, unless the configuration names another."""
         return self.config.get("data", self.name)
 
     @cached_property
@@ -128,7 +128,7 @@ class Run:
 
     @cached_property
     def priced(self) -> list[str]:
-        """The trainings whose accuracy is set against their cost: the unseen protocol, all training seeds."""
+        """The trainings in the comparison of accuracy and cost: unseen protocol, all training seeds."""
         seeds = self.config["recognition"]["seeds"]
         return [f"unseen/{scheme.slug}/{seed}" for scheme in self.trained for seed in seeds]
 
@@ -137,14 +137,14 @@ class Run:
         return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]
 
     def images_of_job(self, wildcards: Any) -> int:
-        """Images of one sample that the scheme of a job sees: its training takes time in proportion."""
+        """Number of images per sample in the scheme of a job; the training time is proportional to it."""
         return len(self.schemes_by_slug[wildcards.scheme].columns)
 
     @cached_property
     def image_sizes(self) -> list[int]:
-        """Pixels a side of the images that the trained schemes see."""
+        """Image sizes (pixels per side) of the trained schemes."""
         return sorted({self.pixels(scheme) for scheme in self.trained})
 
     def pixels(self, scheme: Scheme) -> int:
-        """Pixels a side that a scheme's network sees."""
+        """Image size (pixels per side) of a scheme's network."""
         return scheme.size or self.config["recognition"]["size"]

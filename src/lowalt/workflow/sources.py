@@ -1,4 +1,4 @@
-"""Which source files a module runs: its transitive imports inside the package, read from the syntax tree.
+"""The source files that a module uses: its transitive imports within the package, found by static analysis.
 
 The workflow declares them as inputs of each stage, so editing a module re-runs the stages that use it.
 """
@@ -26,7 +26,7 @@ def _file(module: str) -> Path | None:
 
 
 def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """Yield every statement of a body and of the blocks inside it. Expressions hold none, and most nodes are those."""
+    """Yield every statement of a body and of the blocks inside it. Expressions, which are most nodes, contain none."""
     for statement in body:
         yield statement
         for name in ("body", "orelse", "finalbody"):
@@ -37,10 +37,10 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 @functools.cache
 def _imports(path: Path) -> tuple[str, ...]:
-    """Modules of the package that one file imports: anywhere in it, but in a `__main__` only at its top.
+    """Modules of the package that a file imports: anywhere in the file, but in a `__main__` only at top level.
 
-    Imports inside the functions of a command belong to the subcommand asked for; the caller names those. Imports inside
-    the functions of the package's own `__init__` are for users who ask for a name there, which no stage does.
+    Imports within a function of a `__main__` belong to one subcommand; the caller names them. Those within functions of
+    the package's `__init__` serve users' attribute access, which no stage uses.
     """
     tree = ast.parse(path.read_bytes(), str(path))
     modules = []
@@ -57,12 +57,15 @@ def _imports(path: Path) -> tuple[str, ...]:
 def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     """Return the package's files that running `python -m` on these modules can import, sorted.
 
-    modules: as on the command line, then the modules that the subcommand in question imports by itself; spectra: those
-    that the configuration names, whose modules the catalogue of spectra imports by name.
+    modules: as on the command line, then the modules that the subcommand in question imports by itself, and paths of
+    the user's own effects; spectra: those that the configuration names, whose modules the catalogue of spectra imports
+    by name.
     Raises: ModuleNotFoundError where there is no such module.
     """
-    todo, seen = [], set()
-    for module in modules:
+    todo, seen, own = [], set(), [Path(name) for name in modules if name.endswith(".py")]
+    for path in own:
+        todo += _imports(path)
+    for module in filter(lambda name: not name.endswith(".py"), modules):
         if _file(module) is None:
             raise ModuleNotFoundError(module)
         todo += [module, *([f"{module}.__main__"] if _file(f"{module}.__main__") else [])]
@@ -74,11 +77,11 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
             todo += [*([parent] if parent else []), *_imports(_file(name))]
             if name == CATALOGUE:
                 todo += [f"lowalt.spectra.kinds.{spectrum}" for spectrum in spectra]
-    return tuple(sorted({_file(name) for name in seen}))
+    return tuple(sorted({*map(_file, seen), *(path.absolute() for path in own)}))
 
 
 def near(path: Path) -> str:
-    """Return a path as it is named from the working directory: relative below it, so that a checkout can move."""
+    """Return a path relative to the working directory if it is below it, so that a checkout can be moved."""
     here = Path.cwd()
     return str(path.relative_to(here) if path.is_relative_to(here) else path)
 

@@ -1,4 +1,4 @@
-"""The disk: whether it can be written, and whether a run's files fit on it.
+"""Checks whether the disk is writable and whether a run's files fit on it.
 
 The Snakefile calls `writable` when it is read and `before` when a run starts; the display names a disk that is full.
 """
@@ -23,7 +23,7 @@ SIGNAL_BYTES = 8
 
 
 def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> float:
-    """Return the bytes that a job leaves; 0 for rules that leave little or, as tiles, files that go before the end."""
+    """Return the bytes that a job leaves; 0 for rules that leave little, or temporary files such as tiles."""
     if "part" not in wildcards:
         return 0.0
     chunk = plan.chunk(f"{wildcards['group']}-{wildcards['part']}")
@@ -43,8 +43,8 @@ def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -
 
 
 def cubes_size(config: dict, plan: Plan) -> dict:
-    """Return what a data set of cubes takes: its `samples`, the bytes of one (`sample_bytes`) and of all (`bytes`), and
-    the type that its `cells` are stored as.
+    """Return the size of a data set of cubes: number of `samples`, bytes per sample (`sample_bytes`) and in all
+    (`bytes`), and the type of its stored `cells`.
 
     Empty for shards of other kinds.
     """
@@ -58,7 +58,7 @@ def cubes_sentence(size: dict) -> str:
     """Return `cubes_size` as one line."""
     sample_mb, total_gb = size["sample_bytes"] / 1e6, size["bytes"] / 1e9
     samples = f"{size['samples']} samples, {size['cells']}"
-    return f"cube shards: {sample_mb:.2f} MB a sample, {total_gb:.3f} GB in all ({samples})"
+    return f"cube shards: {sample_mb:.2f} MB per sample, {total_gb:.3f} GB in all ({samples})"
 
 
 def check(needed: float, folder: Path) -> None:
@@ -78,9 +78,9 @@ def check(needed: float, folder: Path) -> None:
 
 
 def before(workflow: Any, plan: Plan, config: dict) -> None:
-    """Say how large cubes are, and compare what a run will write with what is free, before its first job.
+    """Print the size of cubes, and compare the bytes that a run will write with the free space, before its first job.
 
-    Outputs that are there already are not counted. workflow: Snakemake's own. Raises: as `check`.
+    Existing outputs are not counted. workflow: Snakemake's workflow object. Raises: as `check`.
     """
     if size := cubes_size(config, plan):
         print(cubes_sentence(size), file=sys.stderr)
@@ -92,10 +92,10 @@ def before(workflow: Any, plan: Plan, config: dict) -> None:
 
 
 def writable(folder: Path, run: str) -> None:
-    """Write a nameless file of TRIAL_BYTES in the working directory, in `results`, in the run's folder and in the
-    folders there: Snakemake meets a full or read-only one with tracebacks.
+    """Test writing: put an unnamed file of TRIAL_BYTES into the working directory, `results`, the run's folder and its
+    subfolders. In a full or read-only one Snakemake would end with a traceback.
 
-    Raises: InputError with the reason and what is free where that fails, and where `results` is a link to nothing.
+    Raises: InputError with the reason and the free space if that fails, or if `results` is a dangling link.
     """
     results = folder / "results"
     if results.is_symlink() and not results.exists():

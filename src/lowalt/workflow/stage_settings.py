@@ -1,6 +1,6 @@
-"""The settings of every stage as one JSON text each, which holds only the values that the stage reads.
+"""The settings of each stage as one JSON text with only the values that the stage reads.
 
-Snakemake compares these texts, so a changed value re-runs the stages that read it and no others. Each method takes the
+Snakemake compares these texts, so a changed value re-runs only the stages that read it. Each method takes the
 wildcards of a job and can stand in a rule's `params:`.
 """
 
@@ -17,7 +17,7 @@ from lowalt.spectra.catalogue import of_cells
 from lowalt.workflow.run import Run
 
 MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m", "looks", "look_s", "track")
-"""Keys of the block `motion` that decide what is drawn; from `sizes_m` on they may be left out."""
+"""Keys of the block `motion` that determine the draws; those from `sizes_m` on are optional."""
 
 
 def _text(**block: Any) -> str:
@@ -42,7 +42,7 @@ class Settings:
         return {name: record["published"] for name, record in self._run.records.items()}
 
     def _chunk(self, wildcards: Any) -> Chunk:
-        """The chunk that a job is about."""
+        """The chunk of a job."""
         return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}")
 
     def _snrs(self, wildcards: Any) -> list[float]:
@@ -130,7 +130,7 @@ class Settings:
         return _text(size=size, **more)
 
     def training(self, wildcards: Any) -> str:
-        """How a network is trained: from its own seed, or from the run's where a job names no training seed."""
+        """Settings of a training, with its training seed or, if the job has none, the run's seed."""
         block = self._config["recognition"]
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
         seed = int(wildcards.get("train_seed", self._config["seed"]))
@@ -141,12 +141,12 @@ class Settings:
         return _text(**self._config["recognition"]["evaluation"])
 
     def backbone(self, wildcards: Any) -> list[str]:
-        """The words that name the code of a scheme's backbone, none where a library has it."""
+        """Command-line words that name the user's code of a scheme's backbone; empty for a library's."""
         name = self._run.own_backbone(self._run.schemes_by_slug[wildcards.scheme])
         return ["--backbone", name] if name else []
 
     def seed(self, wildcards: Any) -> str:
-        """The run's seed alone, for tables with intervals."""
+        """Only the run's seed, for tables with intervals."""
         return _text(**self._blocks("seed"))
 
     def report(self, wildcards: Any) -> str:

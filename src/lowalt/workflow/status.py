@@ -1,7 +1,7 @@
-"""The state of a run in a file, for another terminal: `lowalt status`.
+"""The state of a run in a file, which `lowalt status` shows in another terminal.
 
-Each run writes .snakemake/status/{process id}.json in its working directory. Files of runs that have ended stay until
-the next run starts there; the command shows runs that live, else the one that ended last.
+Each run writes .snakemake/status/{process id}.json in its working directory. The file of a finished run stays until
+the next run starts there. The command shows all running runs, or else the last one.
 """
 
 import json
@@ -17,14 +17,14 @@ from lowalt.workflow.board import Board, span
 
 FOLDER = Path(".snakemake/status")
 PLANNED_JOBS = "LOWALT_PLANNED_JOBS"
-"""Variable of the environment with the file to which a dry run adds each job that would run, a JSON object a line."""
+"""Environment variable: file to which a dry run appends each job that would run, one JSON object per line."""
 
 FRESH_S = 60.0
-"""A run writes its state every second; clocks and caches of machines that share a disk may differ by more."""
+"""Age (s) below which a state counts as current. A run writes every second, but clocks of other machines may differ."""
 
 
 def write(board: Board, state: str, folder: Path = FOLDER) -> None:
-    """Keep the state of this process's run: "running", "ended", "failed" or "interrupted"."""
+    """Write the state of this process's run: "running", "ended", "failed" or "interrupted"."""
     pid = os.getpid()
     kept = {
         "pid": pid, "process": started(pid), "host": socket.gethostname(), "state": state, "written": time.time(),
@@ -38,21 +38,21 @@ def write(board: Board, state: str, folder: Path = FOLDER) -> None:
 
 
 def elsewhere(kept: dict) -> str:
-    """Return the name of the other machine that a run is on, empty for this one."""
+    """Return the name of the machine that a run is on if it is another one, else an empty text."""
     here = socket.gethostname()
     host = kept.get("host", here)
     return "" if host == here else host
 
 
 def alive(kept: dict) -> bool:
-    """Return whether the process of a run lives; of one on another machine, whether it wrote within FRESH_S."""
+    """Return whether the process of a run is alive; on another machine, whether it wrote within the last FRESH_S."""
     if elsewhere(kept):
         return kept["state"] == "running" and time.time() - kept["written"] < FRESH_S
     return kept["process"] is not None and started(kept["pid"]) == kept["process"]
 
 
 def read(folder: Path = FOLDER) -> list[dict]:
-    """Return the kept states of all runs of a working directory, oldest first; damaged files are left out."""
+    """Return the stored states of all runs of a working directory, oldest first; damaged files are skipped."""
     states = []
     for path in folder.glob("*.json"):
         try:
@@ -72,7 +72,7 @@ def _sweep(folder: Path) -> None:
 def describe(kept: dict, now: float) -> str:
     """Return the lines of one run."""
     board, living = Board.read(kept["board"]), alive(kept)
-    state = kept["state"] if living or kept["state"] != "running" else "stopped without a word, killed perhaps"
+    state = kept["state"] if living or kept["state"] != "running" else "stopped unexpectedly, perhaps killed"
     host = elsewhere(kept)
     process = f"process {kept['pid']} of {host}" if host else f"process {kept['pid']}"
     head = f"{process}: {state}, {span(now - kept['written'])} ago"

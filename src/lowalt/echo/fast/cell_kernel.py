@@ -1,7 +1,7 @@
-"""The range-cell kernel as polynomials of a point's range, so that a few moments of the points give every near cell.
+"""The range-cell kernel as polynomials of a point's range, so that a few moments of the points give all near cells.
 
-With v the range on [-1, 1] and M_k the sum of z v^k, cell j is sum_k c_jk M_k. The polynomials depend on where
-between two cells the target stands; they are tabulated at fixed places and for targets of one depth.
+With v the range scaled to [-1, 1] and the moments M_k = sum z v^k, cell j is sum_k c_jk M_k. The polynomials depend on
+the target's position between two cells and on its depth; they are tabulated at fixed positions for each depth.
 """
 
 import math
@@ -13,9 +13,9 @@ import numpy as np
 from lowalt.echo.fast.polynomials import CELL_REACH, TOP, CosineSum, cell_rule, degree_for, economised, folding, tail
 
 PLACES = 32
-"""Places between two whole cells at which the kernel is tabulated."""
+"""Number of positions between two whole cells at which the kernel is tabulated."""
 SIDE = 4
-"""Cells on either side of the nearest whole cell whose sums the moments give."""
+"""The moments give the sums of this many cells on either side of the nearest whole cell."""
 
 
 class CellPolynomials(NamedTuple):
@@ -39,7 +39,7 @@ def cell_polynomials(count: int, deep: float, error: float) -> CellPolynomials |
     count: subcarriers M.
     """
     half = deep + 0.5 / PLACES
-    # Moments are computed four at a time, so a degree of one less than a multiple of four costs nothing more.
+    # Moments are computed four at a time, so round the degree up to one less than a multiple of four at no cost.
     degree = degree_for(math.pi * half, error) | 3
     if degree > TOP or SIDE + 0.5 + half > CELL_REACH or count < 2 * SIDE + 3:
         return None

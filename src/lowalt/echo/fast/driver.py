@@ -1,7 +1,7 @@
-"""The fast kernel's driver: segments of symbols, strips of points, certified strongest cells.
+"""Driver of the fast kernel: loops over segments of symbols and strips of points, and proves the strongest cells.
 
-All smooth factors are the plan's polynomials; `vector_loops` holds the loops. Everything here is compiled without
-counted references (they took a quarter of the time), so nothing here may allocate: see `workspace`.
+All smooth factors are evaluated as the plan's polynomials, in the loops of `vector_loops`. The code is compiled
+without reference counting, which took a quarter of the time, so nothing here may allocate: see `workspace`.
 """
 
 import math
@@ -58,7 +58,7 @@ def add_amplitudes(strip, share, point, plan, size):
 
 @INLINED
 def sum_points(sample, n, r, constants, degrees, plan, block, work):
-    """Fill work.moments with symbol n's moments, over lay.total / r^2; returns the sums of |z| and of |z| v^2 likewise.
+    """Fill work.moments with symbol n's moments divided by lay.total / r^2; return so divided sums of |z| and |z| v^2.
 
     r: the reference's range (m); constants: of `segment.constants`; degrees: of the gains' polynomials; block: most
     points added in the strip's type.
@@ -97,8 +97,8 @@ def precision(plan, padded, orders):
 def run(sample, symbols, approximation, final, work, found):
     """Compute the symbols into `found`.
 
-    sample: `layout.EchoSample`; symbols, approximation, work, found: the bundles of `workspace`; final: a lead that is
-    not proved is accepted, because no finer plan exists.
+    sample: `layout.EchoSample`; symbols, approximation, work, found: the bundles of `workspace`; final: accept a
+    strongest cell without proof, because there is no more precise plan.
     """
     plan, table, radar = approximation.plan, approximation.cells, sample.radar
     orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
@@ -121,7 +121,7 @@ def run(sample, symbols, approximation, final, work, found):
             place = max(0, min(int(np.rint((refs[i, REST] + 0.5) * PLACES)), PLACES))
             placed = constants(sample, refs[i], segment, place / PLACES - 0.5, half)
             total, second = sum_points(sample, n, r, placed, (degree_h, degree_v), plan, block, work)
-            # Amplitudes were relative to their sum, so that float32 neither overflows nor vanishes.
+            # Undo the division by the sum of amplitudes, which keeps float32 from overflow and underflow.
             scale = sample.lay.total / (r * r)
             for order in range(orders):
                 moments[0, order] *= scale
@@ -129,7 +129,7 @@ def run(sample, symbols, approximation, final, work, found):
             total *= scale * (1.0 + unit * (length + 20))
             second *= scale * (1.0 + unit * (length + 24))
             peaks = scale / (1.0 - extents[i, SPREAD]) ** 2
-            # The amplitudes summed are approximated ones: the sum of the true ones may be larger by their error.
+            # `total` sums approximate amplitudes; add their error to bound the sum of the true ones.
             total += total * plan.share + peaks * (plan.peak + gains)
             summed = rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
             bound = total * (plan.share + table.error) + summed + peaks * (plan.peak + gains)
@@ -150,8 +150,8 @@ def run(sample, symbols, approximation, final, work, found):
 def keep(found, n, cell, value, subcarriers, tie, lead):
     """Write symbol n's strongest cell into `found`.
 
-    cell: its number, before whole multiples of M are taken off; value: its real and imaginary part, before the cell's
-    own phase; tie, lead: of `strongest_cell.certify`.
+    cell: its number before reduction modulo M; value: its real and imaginary part before the cell's phase factor;
+    tie, lead: as returned by `strongest_cell.certify`.
     """
     found.values[n] = complex(value[0], value[1]) * cell_phase(cell, subcarriers)
     found.cells[n], found.ties[n], found.gaps[n] = cell % subcarriers, tie, max(lead, 0.0)

@@ -1,4 +1,4 @@
-"""Which precision and which polynomials a sample gets: the cheapest whose proved error bound is allowed."""
+"""Selects precision and polynomials for a sample: the cheapest ones whose proved error bound is small enough."""
 
 import math
 from typing import NamedTuple
@@ -9,13 +9,13 @@ from lowalt.echo.fast.polynomials import CosineSum, array_rule, smooth
 from lowalt.echo.radar import Radar
 
 SPREAD_LIMIT = 0.22
-"""Largest target radius over range that the fast kernel takes; nearer targets go to the pointwise kernel."""
+"""Largest ratio of target radius to range for the fast kernel; closer targets use the pointwise kernel."""
 FINEST = 1e-15
-"""Accuracy asked of every polynomial in the exact mode."""
+"""Required accuracy of every polynomial in exact mode."""
 
 
 class EchoPlan(NamedTuple):
-    """How a sample is computed. `fit`: error of gains and cell kernels; `share`, `peak`: the other errors' bound
+    """How to compute a sample. `fit`: error of gains and cell kernels; `share`, `peak`: bound of the other errors,
     relative to the sum of amplitudes and to the sum of peak amplitudes; `phase`: rounding of the phase relative to the
     sum of amplitudes times distances from the reference, per metre; `single`: float32 after the phase; `cosine`,
     `sine`: coefficients of `polynomials.smooth` in the type of the sums."""
@@ -39,10 +39,9 @@ class ArrayGains(NamedTuple):
 COSINE_DEGREES = (5, 7, 10)
 """Degrees in t^2 of cosine and sine that `vector_loops` has loops for."""
 SINGLE_BLOCK = 128
-"""Most float32 numbers added before a double takes over: longer sums round by more than a tolerance of 1e-4
-allows."""
+"""Largest number of float32 values summed before continuing in double; longer sums exceed a tolerance of 1e-4."""
 SINGLE_ERROR = 400 * 2.0**-24
-"""Bound of the error of float32 after the phase; float32 is not tried where a smaller error is asked for."""
+"""Error bound of float32 after the phase reduction; float32 is not used if a smaller error is required."""
 
 
 def array_gains(radar: Radar) -> ArrayGains:
@@ -74,8 +73,8 @@ def echo_plan(radar: Radar, points: int, error: float) -> EchoPlan:
         sine, sine_error = smooth("sine", degree)
         if cosine_error + 0.5 * sine_error <= error / 3:
             break
-    # Order k of cosine and sine rounds 2 k + 2 times: at half a turn at most 85 roundings in both; the turn itself
-    # and the products that make the amplitude another 16.
+    # Order k of cosine and sine has 2 k + 2 roundings: at half a turn at most 85 in both together. The turn itself and
+    # the products of the amplitude have another 16.
     rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + -(-points // 512) * unit
     share = cosine_error + 0.5 * sine_error + rounding
     return EchoPlan(
@@ -87,8 +86,8 @@ def echo_plan(radar: Radar, points: int, error: float) -> EchoPlan:
 def pointwise_bound(radar: Radar, size_m: float, points: int) -> tuple[float, float]:
     """Return the pointwise kernel's error bound relative to its sums of amplitudes and of risks (`terms.terms`).
 
-    Phase: a range difference carries a few roundings of the offset, whatever the range; the rest is sums. Risk: the
-    roundings of a direction cosine, as the gains and the array's phase see them.
+    Phase: a range difference has a few roundings of the offset, independent of the range; the other errors come from
+    sums. Risk: effect of the rounding of a direction cosine on the gains and the array phase.
     """
     elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
     wave = 2 * np.pi * radar.turns * 2 * size_m

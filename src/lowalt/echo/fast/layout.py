@@ -1,13 +1,13 @@
-"""How the points lie in memory for the fast kernel: by part, coordinate by coordinate, padded to whole vectors."""
+"""Memory layout of the points for the fast kernel: sorted by part, one array per coordinate, padded to full vectors."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.echo.echo_input import EchoInput
 from lowalt.echo.fast.strip import MULTIPLE, strip_size
 from lowalt.echo.radar import Radar
-from lowalt.echo.scene import EchoScene
 from lowalt.machine.jit import LEAN
 
 
@@ -29,7 +29,7 @@ class Groups(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Points sorted by part. Without rotations every point is a part of its own, and stands at its translation.
+    """Points sorted by part. Without rotations every point is its own part, and its translation is its position.
 
     coordinates: x, y, z (L + MULTIPLE,) m in the frame of the point's part, zero beyond the last point; amplitude:
     (padded L,) sqrt(rcs) times the radar's scale and the arrays' peak gain, zero in the padding; total: the sum of all
@@ -50,7 +50,7 @@ class EchoSample(NamedTuple):
     first: part (or point, without rotations) whose translation is the reference; aims: the beams' direction cosines.
     """
 
-    scene: EchoScene
+    scene: EchoInput
     lay: Layout
     radar: Radar
     first: int
@@ -59,7 +59,7 @@ class EchoSample(NamedTuple):
 
 @LEAN
 def _group(points, part, share, strip, coordinates, groups):
-    """Copy the points by coordinate and cut them into groups of one part; returns how many groups there are."""
+    """Copy the points by coordinate, split them into groups within one part, and return the number of groups."""
     x, y, z = coordinates
     starts, centres, weights, strays = groups.starts, groups.centres, groups.weights, groups.strays
     count, number = len(points), 0
@@ -86,7 +86,7 @@ def _group(points, part, share, strip, coordinates, groups):
     return number
 
 
-def layout(scene: EchoScene, peak: float) -> Layout:
+def layout(scene: EchoInput, peak: float) -> Layout:
     """Return the points' layout; `peak` multiplies the square roots of their cross sections."""
     rigid = scene.rotation.shape[0] > 0
     count = len(scene.points) if rigid else scene.translation.shape[1]
@@ -102,7 +102,7 @@ def layout(scene: EchoScene, peak: float) -> Layout:
     groups = Groups(
         np.zeros(room, np.int64), np.zeros(room + 1, np.int64), np.empty((room, 3)), *np.empty((3, room))
     )  # fmt: skip
-    # Groups are moved in whole multiples of MULTIPLE points, so the arrays go on beyond the last point.
+    # Loops process MULTIPLE points at a time, so the arrays extend beyond the last point.
     x, y, z = np.zeros((3, room + MULTIPLE))
     number = 0
     if rigid:

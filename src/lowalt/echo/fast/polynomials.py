@@ -1,7 +1,7 @@
-"""Short polynomials that replace functions, each with a bound of its error that is proved before it is used.
+"""Polynomials of low degree that replace functions, each with a proved error bound.
 
-Array gains and the range-cell kernel are finite sums of cosines, so over a short stretch their Chebyshev
-coefficients are Bessel functions, |2 J_p(B)| <= 2 (B/2)^p / p!; B is the band times half the stretch.
+Array gains and the range-cell kernel are finite sums of cosines. Over a short interval, with B the largest rate times
+half the interval, their Chebyshev coefficients are Bessel functions with |2 J_p(B)| <= 2 (B/2)^p / p!.
 """
 
 import math
@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 from lowalt.machine.jit import LEAN, VECTOR
 
 TOP = 40
-"""Highest degree of any polynomial here; a stretch that would need more goes to the pointwise kernel."""
+"""Largest degree of any polynomial here; intervals that need more use the pointwise kernel."""
 EXTRA = 8
 """Taylor orders beyond the degree that are folded back into it (economisation)."""
 
@@ -120,10 +120,10 @@ def _half(weights: np.ndarray, rates: np.ndarray) -> CosineSum:
 
 @lru_cache(maxsize=64)
 def cell_rule(count: int) -> CosineSum:
-    """Return a short cosine sum (rates in rad a cell) equal to the cell kernel of `count` subcarriers.
+    """Return a short cosine sum (rates in rad per cell) equal to the cell kernel of `count` subcarriers.
 
-    Gauss rule of the subcarriers' own uniform discrete measure (recurrence of the discrete Chebyshev polynomials):
-    32 nodes are exact to degree 63, which leaves less than 1e-17 at seven cells' distance.
+    This is the Gauss rule of the uniform discrete measure on the subcarriers (recurrence of the discrete Chebyshev
+    polynomials). 32 nodes are exact to degree 63, with an error below 1e-17 at a distance of seven cells.
     """
     nodes = min(count, 32)
     k = np.arange(1, nodes)
@@ -149,7 +149,7 @@ def array_rule(transmit: int, receive: int, kappa: float) -> CosineSum:
 def _nodes() -> tuple[np.ndarray, np.ndarray]:
     """Return the 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to Chebyshev coefficients.
 
-    Computed in extended precision where the machine has it. In double precision the transform's own rounding would
+    Computed in extended precision if the machine has it, because the rounding of a double-precision transform would
     look like coefficients.
     """
     count = 96

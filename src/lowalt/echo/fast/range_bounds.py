@@ -1,4 +1,4 @@
-"""Bounds of the places of every symbol's points, from the poses of the parts alone, before any point is computed."""
+"""Bounds of the points' positions at every symbol, from the poses of the parts alone, before any point is computed."""
 
 import math
 
@@ -8,12 +8,12 @@ from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
 from lowalt.machine.jit import LEAN
 
 PSI, OMEGA, SPREAD, SIZE, MEAN = range(5)
-"""Columns of the table of extents: direction cosines of the reference, and the largest distance of a point from the
-reference, over the range and in metres, and a bound of its mean weighted with the amplitudes (m)."""
+"""Columns of the table of extents: two direction cosines of the reference; the largest distance of a point from the
+reference, relative to the range and in metres; and a bound of the amplitude-weighted mean distance (m)."""
 START, END, PSI_CENTRE, PSI_HALF, OMEGA_CENTRE, OMEGA_HALF = range(6)
 """Columns of the table of segments: first symbol, end, centre and half-width of the points' direction cosines."""
 DRIFT = 1.0
-"""Radians of gain phase by which a segment may be wider than the target itself."""
+"""Radians of gain phase by which a segment may be wider than the target."""
 
 
 @LEAN
@@ -73,7 +73,7 @@ def norm(rotation, n, p):
 
 @LEAN
 def cut_segments(extents, rate_h, rate_v, longest, out):
-    """Cut the symbols into segments over which the array gains stay short polynomials.
+    """Split the symbols into segments over which polynomials of low degree represent the array gains.
 
     Fills the table of segments out (N, 6) and returns how many segments there are. rate_h, rate_v: largest rate of the
     gains (rad per unit of direction cosine); longest: most symbols of a segment. A single symbol may be wider than the
@@ -92,7 +92,7 @@ def cut_segments(extents, rate_h, rate_v, longest, out):
             l0, l1 = min(low_h, a - turn), min(low_v, b - turn)
             h0, h1 = max(high_h, a + turn), max(high_v, b + turn)
             if end == n:
-                # A wider segment shares its polynomials among more symbols, but they need a higher degree.
+                # Trade-off: a wider segment needs fewer polynomials, but of a higher degree.
                 room_h = 1.2 * (h0 - l0) * rate_h + DRIFT
                 room_v = 1.2 * (h1 - l1) * rate_v + DRIFT
             elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v:

@@ -1,6 +1,6 @@
-"""The inputs of one symbol: its segment's gain polynomials, its own constants, and its points, a strip at a time.
+"""The inputs of one symbol: the gain polynomials of its segment, its constants, and its points, one strip at a time.
 
-A segment is a number of successive symbols over which the array gains are short polynomials (`range_bounds`).
+A segment is a run of successive symbols that share polynomials for the array gains (`range_bounds`).
 """
 
 import numpy as np
@@ -90,7 +90,7 @@ def fill_offsets(sample, n, r, first, size, placing, offsets):
         vector_loops.place_nodes(translation, n, q, first, end - first, (cosine, sine, scale), placing, offsets)
     else:
         end = min(first + size, groups.starts[len(groups.parts)])
-        # Unsigned indices, as in `vector_loops`: a signed one costs a test for a negative value at every access.
+        # Unsigned indices, as in `vector_loops`: signed ones would be tested for negative values at every access.
         at, none, one, two = np.uint64(n), np.uint64(0), np.uint64(1), np.uint64(2)
         for group in range(len(groups.parts)):
             low, high = groups.starts[group], groups.starts[group + 1]

@@ -1,6 +1,6 @@
-"""A strip of one symbol's points, on which the fast kernel works at a time: its arrays, its constants and its length.
+"""A strip: the points of one symbol that the fast kernel processes together. Its arrays, constants and length.
 
-A strip's arrays stay in the first-level cache.
+The arrays of a strip fit into the first-level cache.
 """
 
 from typing import NamedTuple
@@ -10,12 +10,12 @@ import numpy as np
 from lowalt.machine.jit import LEAN
 
 STRIP = 256
-"""Most points worked on at a time: a dozen arrays of 2 kB stay in the nearest cache."""
+"""Largest number of points in a strip: a dozen arrays of 2 kB fit into the first-level cache."""
 MULTIPLE = 16
 """Strips hold whole multiples of this many points; the padding has no amplitude."""
 STRIP_ROOM = STRIP + MULTIPLE + 8
-"""Length of a work array: a strip, and room for the last group of a part, which may write beyond it. It is no power of
-two: arrays a whole 4096 bytes apart would make loads wait for unrelated stores."""
+"""Length of a work array: a strip plus room for a part's last group, which may write beyond it. It is not a power of
+two, because with arrays a multiple of 4096 bytes apart loads wait for unrelated stores (4K aliasing)."""
 
 
 class Placing(NamedTuple):

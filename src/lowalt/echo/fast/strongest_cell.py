@@ -1,4 +1,4 @@
-"""The strongest cell with a proof: near cells are computed from the points' moments, a bound excludes the others."""
+"""The proved strongest cell: near cells are computed from the points' moments, and a bound excludes all others."""
 
 import math
 
@@ -70,7 +70,7 @@ def far_limit(far, distance, half, count):
 def certify(table, place, size, totals, error, bound, count, work):
     """Return (state, row in `sums`, near-tie, lead) of one symbol's strongest cell.
 
-    The cells about the target are computed first. All 2 SIDE + 1 follow if the bound cannot exclude the others. table:
+    The cells around the target are computed first, then all 2 SIDE + 1 if the bound cannot exclude the others. table:
     `cell_kernel.CellPolynomials`; place: row of its tables; size: largest distance of a point from the reference
     (cells); totals: sums of |z| and of |z| v^2; error: relative to them, of the sums in `far_moments`; bound: of the
     error of any cell's sum; work: `workspace.Workspace`, which holds the moments.

@@ -1,9 +1,8 @@
 """The fast kernel's loops over a strip of one symbol's points, which the compiler turns into vector instructions.
 
-Every smooth factor is a polynomial whose degree the plan has chosen
-by its bound, so that the same loops serve the exact mode and every tolerance, in float64 or float32.
-Sums may be reordered and products fused: no bound here depends on the order of roundings. Indices are unsigned: a
-signed one may be negative, and Python's meaning of negative indices would keep the loops from becoming vectors.
+Every smooth factor is a polynomial whose degree the plan chose by its error bound, so the same loops serve exact mode
+and every tolerance, in float64 or float32. The compiler may reorder sums and fuse products, since no bound depends on
+the order of roundings. Indices are unsigned, because Python's negative indices would prevent vectorisation.
 """
 
 import math
@@ -50,8 +49,8 @@ def place_part(coordinates, low, size, pose, placing, offsets, at):
     """Fill the offsets from `at` with `size` points of a part from `low`, and with up to MULTIPLE - 1 beyond.
 
     coordinates: those of all points in their parts' frames (m); pose: rows of the part's matrix and its offset from the
-    reference, in the array's axes (normal, horizontal, up), over r_ref. The loop takes whole vectors: single steps
-    would cost more.
+    reference, in the array's axes (normal, horizontal, up), over r_ref. The loop processes full vectors, because
+    a scalar remainder loop would be slower.
     """
     px, py, pz = coordinates
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz), (x0, y0, z0) = pose

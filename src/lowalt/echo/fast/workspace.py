@@ -1,6 +1,6 @@
-"""Bundles of the inputs and of the work arrays of the fast kernel's driver.
+"""Tuples of inputs and work arrays for the driver of the fast kernel.
 
-The driver is compiled without counted references, so it cannot allocate; all its arrays are made here.
+The driver is compiled without reference counting and cannot allocate, so all its arrays are allocated here.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from lowalt.echo.fast.strip import STRIP_ROOM, Offsets, Strip
 
 
 class Approximation(NamedTuple):
-    """Everything that replaces a function: the plan's polynomials, the array gains as sums of cosines, the cell
+    """All approximations: the plan's polynomials, the array gains as sums of cosines, the cell
     kernels, and the weights of `polynomials.folding`."""
 
     plan: EchoPlan
@@ -73,8 +73,8 @@ class Workspace(NamedTuple):
 def workspace(approximation: Approximation, amplitude: np.ndarray) -> Workspace:
     """Return work arrays for an approximation and the points' amplitudes (padded L,).
 
-    The strip's arrays are separate and of odd length. Rows of one array would lie a whole 4096 bytes apart, and
-    loads would then wait for unrelated stores.
+    The strip's arrays are separate allocations of odd length, because rows of one array would be a multiple of 4096
+    bytes apart, and loads would wait for unrelated stores (4K aliasing).
     """
     kind = np.float32 if approximation.plan.single else np.float64
     gains = approximation.gains

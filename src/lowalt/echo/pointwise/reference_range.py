@@ -1,7 +1,7 @@
 """Range of one reference point for each symbol, in double-double arithmetic.
 
-Every other point's range is this one plus a difference that a double holds to its last digit, so phase errors do not
-grow with range. The functions are compiled without fast-math flags, which would simplify the corrections away.
+The range of any other point is this one plus a difference that a double represents accurately, so phase errors do not
+grow with range. Compiled without fast-math flags, which would optimise the corrections away.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Results of the pointwise kernel for a whole sample: the strongest cell's signal, all cells, or the subcarriers.
 
-The strongest cell is the arg max over all M cells: cells that are not computed are excluded by a bound.
+The strongest cell is the arg max over all M cells; a bound excludes those that are not computed.
 """
 
 import math
@@ -53,7 +53,7 @@ def far_bound(z, u, low, high, count):
 def strongest(z, u, base, count, sums):
     """Return (value, cell, near-tie, lead) of one symbol's strongest cell.
 
-    lead: its |sum| less any other cell's, roundings not counted; base: the reference's cell; sums (M, 2): work array.
+    lead: its |sum| minus any other, ignoring rounding; base: the reference's cell; sums (M, 2): work array.
     """
     low, high = math.floor(u.min()), math.ceil(u.max())
     far = 0.0
@@ -91,7 +91,7 @@ def symbol(scene, radar, ref, n, aims, paths, out):
     path_count = paths.delays.shape[0]
     if fault or path_count == 0:
         return fault
-    # The paths go in reverse: the first L entries hold the direct path, from which the others are made.
+    # Go through the paths in reverse: the first L entries hold the direct path, which all others need.
     for k in range(path_count - 1, -1, -1):
         for l in range(count):  # noqa: E741
             delay = paths.delays[k, n % paths.delays.shape[1], l % paths.delays.shape[2]]

@@ -1,6 +1,6 @@
 """The pointwise kernel: every point's complex amplitude and range at one symbol, whatever the geometry or arrays.
 
-It serves the signal, all range cells, the subcarriers, extra paths, and the symbols that the fast kernel leaves.
+Used for all range cells, subcarriers, extra paths, and for symbols that the fast kernel cannot decide.
 """
 
 import math
@@ -13,7 +13,7 @@ from lowalt.machine.jit import LEAN, PLAIN
 
 
 class PointTerms(NamedTuple):
-    """What all points give at one symbol: places `e` (L, 3) m from the reference's point; complex amplitudes `z`
+    """Values of all points at one symbol: places `e` (L, 3) m from the reference's point; complex amplitudes `z`
     without the cell's own phase, ranges `u` in cells from the reference's cell, and risks (`terms`), each (L,), or
     (paths * L,) with further paths."""
 
@@ -25,7 +25,7 @@ class PointTerms(NamedTuple):
 
 @PLAIN
 def sin_pi(x):
-    """Return sin(pi x); the argument is reduced before pi comes in, so whole x give exactly zero."""
+    """Return sin(pi x), exactly zero for integer x: the argument is reduced before the product with pi."""
     k = np.rint(x)
     s = math.sin(math.pi * (x - k))
     return -s if int(k) & 1 else s
@@ -35,7 +35,7 @@ def sin_pi(x):
 def dirichlet(x, count):
     """Return U_{count-1}(cos(pi x)) = sin(pi count x) / sin(pi x), with its limits at whole x.
 
-    This is the definition for compiled doubles. Double-doubles, torch tensors and slow references have their own.
+    For compiled doubles; double-doubles, torch tensors and slow references have their own versions.
     """
     k = np.rint(x)
     f = x - k

@@ -1,7 +1,7 @@
-"""Where an error bound does not decide the nearest complex64, the value is computed again (Ziv's strategy).
+"""Correct rounding to complex64 (Ziv's strategy): recompute values whose error bound does not decide the rounding.
 
-The second computation is in double-double. After it the conversion of a signal to complex64 rounds the true values
-correctly, and so does not depend on the processor, nor on the kernel that computed them. Source: Ziv 1991, "Fast
+The second computation uses double-double arithmetic. The complex64 signal is then the correctly rounded true value and
+depends neither on the processor nor on the kernel that computed it. Source: Ziv 1991, "Fast
 evaluation of elementary mathematical functions with correctly rounded last bit", ACM TOMS 17.
 """
 
@@ -29,10 +29,10 @@ def same_single(x, error):
 
 @LEAN
 def doubtful(values, bounds, totals, gaps, out):
-    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds leave open.
+    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds do not decide.
 
-    Returns how many these are, and how many of them lack a proved strongest cell. A symbol is exactly zero where all
-    its amplitudes are zero.
+    Returns their number, and how many of them lack a proved strongest cell. A symbol whose amplitudes are all zero is
+    exactly zero.
     """
     count, unproved = 0, 0
     for n in range(len(values)):
@@ -48,8 +48,8 @@ def doubtful(values, bounds, totals, gaps, out):
 def to_odd(high, low, bits):
     """Return a double that rounds to the same float32 as the double-double (high, low).
 
-    A sum that is not a double is replaced by the neighbour whose last bit is one (rounding to odd); more than one bit
-    lies between the two formats, so the second rounding cannot go wrong. bits (1,) int64: work array.
+    Rounding to odd: a sum that is not a double becomes the neighbouring double whose last bit is one. The two
+    formats differ by more than one bit, so the second rounding is then correct. bits (1,) int64: work array.
     """
     if low == 0.0 or high == 0.0:
         return high
@@ -63,8 +63,8 @@ def to_odd(high, low, bits):
 def compute_again(sample, symbols, found, work, bits):
     """Replace the values of `symbols` (K,) in their strongest cells by sums in double-double.
 
-    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols whose nearest complex64 the
-    error of these sums still leaves open.
+    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols whose nearest complex64 is
+    still undecided.
     """
     still = 0
     for n in symbols:
@@ -78,7 +78,7 @@ def compute_again(sample, symbols, found, work, bits):
 @INLINED
 def same_double(x, error, bits):
     """Return whether all numbers within `error` of a double-double have the same nearest float32; bits: work array."""
-    # Rounded to a double first, both ends could fall on the very tie that lies between them.
+    # Rounding to double first could move both ends onto the tie between them.
     least, below = two_sum(x[0], x[1] - error)
     most, above = two_sum(x[0], x[1] + error)
     return np.float32(to_odd(least, below, bits)) == np.float32(to_odd(most, above, bits))
@@ -89,8 +89,8 @@ def correct(
 ) -> tuple[int, int]:  # fmt: skip
     """Make every value of `found` round to the complex64 nearest to the true value, in the truly strongest cell.
 
-    Returns how many symbols were computed again, and how many that leaves open. Cells whose strengths differ by less
-    than its error count as equal: the lowest index wins.
+    Returns the number of recomputed symbols and how many of them remain undecided. Cells whose strengths differ by less
+    than the error count as equal, and the lowest index wins.
     """
     open_ones = np.empty(len(refs), np.int64)
     count, unproved = doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)

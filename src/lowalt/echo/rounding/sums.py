@@ -1,7 +1,7 @@
-"""One range cell of one symbol in double-double: the sum of the paper over all points, to 2^-64 of its terms.
+"""One range cell of one symbol in double-double: the paper's sum over all points, with an error of 2^-64 of its terms.
 
-Points are worked on in short loops without fast-math flags: vector instructions of any width may do them, since
-only the last loop adds over points, and it keeps their order.
+The loops are compiled without fast-math flags. Vector instructions of any width give equal results, because only the
+last loop sums over points, in a fixed order.
 """
 
 import numpy as np
@@ -40,7 +40,7 @@ def place(sample, n, work):
             a, b, c = scene.rotation[n, p, axis, 0], scene.rotation[n, p, axis, 1], scene.rotation[n, p, axis, 2]
             origin = two_sum(scene.translation[n, p, axis], -station[axis])
             row, below = np.uint64(2 * axis), np.uint64(2 * axis + 1)
-            # Whole vectors of four are written: the next group overwrites the surplus, and the padding has no weight.
+            # Write full vectors of four. The next group overwrites the surplus, and the padding has zero amplitude.
             for i in range(low, low + (high - low + np.uint64(3)) // np.uint64(4) * np.uint64(4)):
                 at = add(add(product(a, x[i]), product(b, y[i])), product(c, z[i]))
                 work[row, i], work[below, i] = add(at, origin)

@@ -1,1 +1,1 @@
-"""Figures of the report, one a module: from plain numbers to PNG bytes."""
+"""Figures of the report, one per module: from plain numbers to PNG bytes."""

@@ -1,4 +1,4 @@
-"""Plots of what the networks recognise: over SNR, and by true and recognised class."""
+"""Plots of accuracy over SNR, and confusion matrices."""
 
 import math
 
@@ -15,7 +15,7 @@ SOURCES = {"this run": "-", "paper": "--"}
 
 
 def over_snr(ours: dict, published: dict) -> Plot:
-    """Return accuracy over SNR, a panel a protocol; dashed is the published value on the paper's own data.
+    """Return accuracy over SNR, one panel per protocol; dashed: the published values on the paper's data.
 
     ours, published: protocol -> scheme -> SNR label -> percent.
     """
@@ -53,9 +53,9 @@ def over_snr(ours: dict, published: dict) -> Plot:
 
 
 def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
-    """Return row-normalised confusion matrices, one a (protocol, scheme); counts as `pivots.confusion` gives them.
+    """Return row-normalised confusion matrices, one per (protocol, scheme); counts as returned by `pivots.confusion`.
 
-    A class without samples has dashes in its row. The more classes, the fewer matrices stand side by side.
+    A class without samples has dashes in its row. With more classes, fewer matrices are placed side by side.
     """
     count = len(categories)
     columns = max(1, min(len(counts), PAGE_WIDTH // (CELL * count + 40)))

@@ -1,4 +1,4 @@
-"""Plots of what accuracy costs in time: of the networks and of the echo.
+"""Plots of accuracy against computing time, for networks and the echo.
 
 python -m lowalt.report.figures.cost_plots echo --table cost.csv --figure cost.svg
 """
@@ -18,11 +18,11 @@ RECOGNITION = ("scheme", "kind", "unseen_percent", "low", "high", "core_s_data",
 PRESET = ("preset", "command", "macro_f1_low", "macro_f1_high")
 ECHO = ("method", "tolerance", "points", "seconds", "relative_error")
 STORED = 2.0**-24
-"""Half a unit of the last place of a stored value (complex64), relative to it."""
+"""Relative rounding error of a stored value (complex64): half a unit in the last place."""
 
 
 def _rows(rows: list[dict[str, str]]) -> list[dict]:
-    """The trained rows of accuracy_cost.csv as numbers, by their time; the first of the table is the default."""
+    """The trained rows of accuracy_cost.csv as numbers, sorted by time; the first row of the table is the default."""
     base = next(row for row in rows if row["kind"] == "trained")
     first, data = float(base["unseen_percent"]), []
     for row in sorted((row for row in rows if row["kind"] == "trained"), key=seconds):
@@ -36,10 +36,10 @@ def _rows(rows: list[dict[str, str]]) -> list[dict]:
 
 
 def recognition(rows: list[dict[str, str]]) -> Plot:
-    """Return unseen accuracy over the time of data and training, the front joined and named, the first scheme ringed.
+    """Plot unseen accuracy against the time for data and training, with Pareto front and a ring on the first scheme.
 
-    rows: of accuracy_cost.csv (keys RECOGNITION), trained ones are drawn. Bars are 95 % intervals of the difference to
-    the first; where they hold zero the point is grey. The band spans all points that cannot be told apart from it.
+    rows: of accuracy_cost.csv (keys RECOGNITION); trained ones are drawn. Bars are 95 % intervals of the difference to
+    the first scheme; if they contain zero the point is grey. The band spans all points not significantly different.
     """
     data = _rows(rows)
     figure = Figure(figsize=(9.4, 6), layout="constrained")
@@ -56,7 +56,7 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
     panel.plot(base["core_s"], base["accuracy_percent"], "o", markersize=13, fillstyle="none", color=COLOURS[0])
     front = [row for row in data if row["front"] == "yes"]
     panel.step([row["core_s"] for row in front], [row["accuracy_percent"] for row in front], where="post", color="0.5")
-    # Left of a point of the front and above it no point lies, so that names that rise from left to right meet nothing.
+    # There is no point to the upper left of a front point, so names placed there do not overlap points.
     least = min(row["low"] for row in data)
     level = 0.0
     for row in front:
@@ -81,7 +81,7 @@ def seconds(row: dict[str, str]) -> float:
 
 
 def echo(measured: list[dict[str, str]]) -> Plot:
-    """Return the error of a signal over its time, a line a method and tolerance through the numbers of points.
+    """Plot the error of a signal against its time, one line per method and tolerance through the numbers of points.
 
     measured: rows of cost.csv (keys ECHO).
     """
@@ -120,7 +120,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--figure", required=True, help="picture to write (.svg)")
     options = line.parse_args(arguments)
     draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[options.plot]
-    # A document has no colour behind the picture that suits its letters.
+    # A document may have any background colour.
     text = draw(read_csv(options.table, *columns)).svg.replace("<svg", '<svg style="background: white"', 1)
     with replacing(options.figure) as temporary:
         temporary.write_text(text)

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib import pyplot as plt
 
+from lowalt.drafting.inspection import Inspection
 from lowalt.report.figures.style import png
-from lowalt.targets.inspection import Inspection
 
 DIRECTIONS = ((0, 1), (1, 2), (0, 2))
 

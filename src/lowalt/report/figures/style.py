@@ -1,4 +1,4 @@
-"""Helpers of all figures: PNG bytes that repeat, and pictures as parts of the page."""
+"""Helpers for figures: reproducible PNG bytes, and pictures embedded in the page."""
 
 import base64
 import io
@@ -10,7 +10,7 @@ from PIL import Image
 
 from lowalt.numerics.picture_layout import settle
 
-matplotlib.use("Agg")  # no screen on a cluster node
+matplotlib.use("Agg")  # cluster nodes have no display
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -66,5 +66,5 @@ def svg(figure: Figure) -> str:
 
 
 def embedded(data: bytes) -> str:
-    """Return PNG bytes as a data URL, so that the page holds the picture itself."""
+    """Return PNG bytes as a data URL, which embeds the picture in the page."""
     return "data:image/png;base64," + base64.b64encode(data).decode()

@@ -1,17 +1,13 @@
 """Pictures of one target: points by part with hinges, axes and normals, motion over a cycle, the three spectra."""
 
-import io
-import math
 from pathlib import Path
 
 import numpy as np
 from matplotlib import pyplot as plt
-from PIL import Image
 
 from lowalt.config.layers import load_yaml
 from lowalt.config.network import Network, masts_m
 from lowalt.echo import Rigid, echo_signal
-from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.motion import poses, positions
 from lowalt.motion.drawing import draw, region_polygon
@@ -27,7 +23,8 @@ DIRECTIONS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0,
 AXES = ("right x (m)", "front y (m)", "up z (m)")
 NORMALS = 150
 """Normals drawn at most: more would hide the points."""
-FRAMES, MOST_FRAMES = 24, 96
+STEPS = 48
+"""Steps of a cycle at which the paths of tips are drawn; a multiple of eight."""
 FLOOR_DB = -40.0
 CONFIG = SHIPPED / "config/default.yaml"
 
@@ -35,10 +32,8 @@ CONFIG = SHIPPED / "config/default.yaml"
 def _colours(cloud: Cloud) -> np.ndarray:
     """RGBA colour of each point (L, 4), by its part."""
     table = plt.get_cmap("tab20")
-    parts = np.array(
-        [(0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20) for i, kind in enumerate(cloud.kinds)]
-    )
-    return parts[cloud.part]
+    parts = [(0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20) for i, kind in enumerate(cloud.kinds)]
+    return np.array(parts)[cloud.part]
 
 
 def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
@@ -91,11 +86,9 @@ def _motion_row(cloud: Cloud, config: dict, seed: int) -> dict:
 def _decibel(values: np.ndarray) -> np.ndarray:
     """Magnitudes relative to their largest, in dB, at least FLOOR_DB."""
     top = float(values.max())
-    return (
-        20 * np.log10(np.maximum(values, top * 10 ** (FLOOR_DB / 20)) / top)
-        if top > 0
-        else np.full(values.shape, FLOOR_DB)
-    )
+    if top == 0:
+        return np.full(values.shape, FLOOR_DB)
+    return 20 * np.log10(np.maximum(values, top * 10 ** (FLOOR_DB / 20)) / top)
 
 
 def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
@@ -114,7 +107,7 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
         values = values if kind.SIGNED else _decibel(values)
         half = windows.window / 2
         times = network.symbol_interval_s * np.array([half, half + windows.hop * values.shape[1]])
-        speeds = kind.speeds(windows, *of_station)
+        speeds = kind.speeds(windows, network, station)
         scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
         if kind.SIGNED:
             top = float(abs(values).max()) or 1.0
@@ -126,55 +119,61 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
         panel.figure.colorbar(picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05)
 
 
+def most_moved(cloud: Cloud, frames: np.ndarray) -> np.ndarray:
+    """Return the numbers of the points whose paths are drawn, of frames (T, L, 3) m: the point of each moving part that
+    travels farthest, or the four nodes of a recording that do. Empty where nothing moves."""
+    travelled = np.linalg.norm(np.diff(frames, axis=0), axis=2).sum(axis=0)
+    if len(cloud.track):
+        return np.argsort(-travelled, kind="stable")[:4]
+    parts = [np.flatnonzero(cloud.part == part) for part, kind in enumerate(cloud.kinds) if kind != "body"]
+    return np.array([part[travelled[part].argmax()] for part in parts if len(part)], int)
+
+
+def _instants(panels, cloud: Cloud, row: dict) -> None:
+    """The target at four instants of a cycle, and the paths of the tips of its moving parts over the whole cycle.
+
+    A part that turns is seen along its axis, wings from behind, and a recording from the right.
+    """
+    length = cycle_s(cloud, row)
+    frames = positions(cloud, still_row(row), np.linspace(0, length, STEPS + 1))
+    tips = most_moved(cloud, frames)
+    along = np.array([1.0, 0, 0])
+    if not len(cloud.track):  # the axes of larger parts count more
+        sizes = [np.ptp(cloud.points[cloud.part == part], axis=0).max() for part in range(len(cloud.kinds))]
+        along = np.array(sizes) @ np.abs(np.nan_to_num(cloud.axes))
+    view = {2: DIRECTIONS[0], 0: DIRECTIONS[1], 1: DIRECTIONS[2]}[int(along.argmax())]
+    _, across, up = view
+    middle, half = _limits(frames)
+    for panel, step in zip(panels, (np.arange(len(panels)) * STEPS) // len(panels), strict=True):
+        # Two blades look the same after half a turn, so an eighth of the cycle is added in each panel.
+        step = int(step / 2) if "rotor" in cloud.kinds or "wheel" in cloud.kinds else int(step)
+        _view(panel, cloud, frames[step], view, middle, half)
+        panel.plot(frames[:, tips, across], frames[:, tips, up], color="tab:red", linewidth=0.7)
+        panel.plot(frames[step, tips, across], frames[step, tips, up], "o", color="tab:red", markersize=4)
+        panel.set(title=f"{view[0]}, {1000 * step / STEPS * length:.4g} of {1000 * length:.4g} ms")
+
+
 def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:
-    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, and one motion model's spectra.
+    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, the target at four instants of a
+    cycle with the paths of its tips, and one motion model's spectra.
 
     The motion model is drawn as the workflow draws them, for the network of the configuration.
     Raises: InputError where there is no such configuration, or the target's motion cannot be drawn.
     """
     config = load_yaml(config_path)
     row = _motion_row(cloud, config, seed)
-    figure, panels = plt.subplots(2, 3, figsize=(14, 8.6))
+    figure = plt.figure(figsize=(14, 13), layout="constrained")
+    views, instants, spectra = (row_of.subplots(1, count)
+                                for row_of, count in zip(figure.subfigures(3, 1), (3, 4, 3), strict=True))  # fmt: skip
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
-    for panel, view in zip(panels[0], DIRECTIONS, strict=True):
+    for panel, view in zip(views, DIRECTIONS, strict=True):
         _view(panel, cloud, points, view, middle, half)
         _marks(panel, cloud, view, middle, half)
-    _spectra(panels[1], cloud, row, config)
+    _instants(instants, cloud, row)
+    _spectra(spectra, cloud, row, config)
     size = " x ".join(f"{value:.3g}" for value in np.ptp(points, axis=0))
     doubts = "".join(f"\nwarning: {text}" for text in cloud.record.get("warnings", []))
     about = f"{cloud.subtype} ({cloud.category}, {cloud.record['source']})"
     figure.suptitle(f"{about}: {len(points)} points, {len(cloud.kinds)} parts, {size} m{doubts}", fontsize=11)
-    figure.tight_layout()
     return png(figure)
-
-
-def target_animation(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1, count: int = FRAMES) -> bytes:
-    """Return a GIF of `count` frames of one cycle of a target's own motion, from above, from the right and from behind.
-
-    Where a rotor turns at several times the target's rate there are as many times the frames, at most MOST_FRAMES.
-    Raises: as `target_picture`; also where nothing of the target moves.
-    """
-    row = _motion_row(cloud, load_yaml(config_path), seed)
-    if not len(cloud.track) and all(kind == "body" for kind in cloud.kinds):
-        raise InputError(f"{cloud.subtype}: no part moves, expected rotors, wings, wheels or a recording to animate")
-    length = cycle_s(cloud, row)
-    count = min(MOST_FRAMES, count * max(1, math.ceil(cloud.rate_factors.max())))
-    frames = positions(cloud, still_row(row), np.arange(count) / count * length)
-    middle, half = _limits(frames)
-    pictures = []
-    for number, points in enumerate(frames):
-        figure, panels = plt.subplots(1, 3, figsize=(10, 3.9))
-        for panel, view in zip(panels, DIRECTIONS, strict=True):
-            _view(panel, cloud, points, view, middle, half)
-        figure.suptitle(
-            f"{cloud.subtype}: {1000 * number / count * length:.4g} ms of a cycle of {1000 * length:.4g} ms"
-        )
-        figure.tight_layout()
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=70)
-        plt.close(figure)
-        pictures.append(Image.open(buffer).convert("RGB"))
-    result = io.BytesIO()
-    pictures[0].save(result, format="GIF", save_all=True, append_images=pictures[1:], duration=80, loop=0)
-    return result.getvalue()

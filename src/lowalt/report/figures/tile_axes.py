@@ -23,7 +23,7 @@ def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
     settings, network, kind = renderer.spectra[name], renderer.network, spectrum(name)
     if isinstance(kind, OfCells):
         return Axes(*kind.axes(settings, network, station))
-    first, last = kind.speeds(settings, station.frequency_hz, network.symbol_interval_s)
+    first, last = kind.speeds(settings, network, station)
     seconds = (network.symbols - settings.window) * network.symbol_interval_s
     return Axes(("time (s)", 0.0, seconds), ("radial speed (m/s)\nreceding upwards", first, last))
 

@@ -1,1 +1,1 @@
-"""Sections of the report, one a module: from tables to the values that the page shows."""
+"""Sections of the report, one per module: from tables to the values that the page shows."""

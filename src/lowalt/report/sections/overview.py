@@ -22,7 +22,7 @@ def verdict(here: float, paper: float | None, classes: int, seeds: int) -> str:
 
 
 def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]], classes: int) -> list[dict]:
-    """Return one entry a protocol: the scheme of highest average, its accuracy, interval of macro F1 and a verdict."""
+    """Return one entry per protocol: scheme of highest average, its accuracy, interval of macro F1, and a verdict."""
     ours, paper, intervals = by_scheme(rows), by_scheme(published), macro_f1(rows)
     entries = []
     for protocol, schemes in ours.items():

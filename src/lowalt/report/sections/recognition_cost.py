@@ -1,4 +1,4 @@
-"""Section: recognition accuracy over its time, from this run's table or the kept reference."""
+"""Section: recognition accuracy against computing time, from this run's table or the stored reference."""
 
 from lowalt.report.figures import cost_plots
 from lowalt.report.reported_run import ReportedRun

@@ -1,5 +1,6 @@
 """Section: a viewer of some samples: echoes, tile with axes, probabilities of the networks, motion in 3-D."""
 
+from lowalt.config.named_code import own_effects
 from lowalt.report import viewer, viewer_echoes
 from lowalt.report.reported_run import ReportedRun
 from lowalt.shards.remake import opened
@@ -14,7 +15,9 @@ def values(run: ReportedRun) -> dict:
     network, pixels = run.shards.renderer.network, run.config["recognition"]["size"]
     panels = viewer.panels(run.shards.renderer)
     size = run.shards.index["render"]["images"]["size"]
-    remaker = opened(run.inputs.path("index")) if run.shards.index.get("echo") else None
+    echo = run.shards.index.get("echo")
+    # The effects of a stranger's run may be code, so no page runs them.
+    remaker = opened(run.inputs.path("index")) if echo and not own_effects(echo["effects"]) else None
     return {
         "data": viewer.samples(run.shards, remaker, clouds, files, groups, pixels), "panels": panels, "size": size,
         "shown": min(size, viewer.PIXELS), "rows": panels[-1]["row"] + 1, "columns": panels[-1]["column"] + 1,

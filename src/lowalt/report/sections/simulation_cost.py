@@ -1,4 +1,4 @@
-"""Section: the echo's error over its time, from the table of `make cost`."""
+"""Section: the echo's error against computing time, from the table of `make cost`."""
 
 from lowalt.report.figures import cost_plots
 from lowalt.report.reported_run import ReportedRun

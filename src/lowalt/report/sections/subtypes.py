@@ -26,7 +26,7 @@ FEWEST, CHANCE = 5, 0.05
 
 
 def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
-    """Return (columns, rows) of accuracy by subtype: a column a protocol and scheme, a row a subtype."""
+    """Return (columns, rows) of accuracy by subtype: one column per protocol and scheme, one row per subtype."""
     columns: dict[str, None] = {}
     table: dict[tuple[str, str], dict[str, str]] = {}
     for row in rows:
@@ -39,7 +39,7 @@ def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str
 def reasons(
     predictions: Predictions, classes: tuple[str, ...], traits: Mapping[str, dict[str, float]]
 ) -> dict[str, str]:
-    """Return by subtype what its wrong samples have in common, in a sentence; subtypes without any are left out.
+    """Return for each subtype with wrong samples what these have in common, in one sentence.
 
     traits: numbers of TRAITS by the name of a motion model, as `Predictions.motion` gives it.
     """

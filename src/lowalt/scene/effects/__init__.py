@@ -1,38 +1,6 @@
-"""The effects of a scene, one file each in the folder of its place: what such a file offers, and the order of all.
+"""The effects of a scene, one file each in the folder of its place, and the order of all.
 
-An effect `effects/PLACE/NAME.py` defines SOURCE, where its law comes from, and DEFAULTS, every parameter with its
-value. All that it does is one or more of the functions below. IDLE, which may be left out, lists settings that change
-nothing: where all values of an entry are set, the effect is dropped. `check(settings, scene)` raises InputError where
-settings contradict the rest of a scene (`checks.CheckedScene`).
-
-| place | function | returns |
-|---|---|---|
-| motion | `perturb(settings, cloud, row, times_s, rng)` | `Perturbation` of the motion of `row` at `times_s` (N,) |
-| transmitter | `sampling(settings, network, rng)` | `Sampling`: when symbols are sent, which are received |
-| | `regridded(settings, signal, timing, network)` | even signal (N,) of the received symbols |
-| | `data(settings, symbols, subcarriers, rng)` | data (N, M) of mean power one |
-| | `aired(settings, data)` | subcarriers (N, M) on the air for these data |
-| | `range_cells(settings, response)` | range cells of responses (N, M) whose subcarriers are known in part |
-| channel | `beams(settings, view, rng)` | `Beams`: where both beams point, and from when on |
-| | `element(settings)` | `Element` of the antennas |
-| | `cross_sections(settings, cloud, wavelength_m)` | mean cross section (L,) m2 of each point |
-| | `visible(settings, view, rng)` | real factor on each point's two-way amplitude, (N, L) or (N, 1) |
-| | `paths(settings, view)` | list of `ImagePath`: waves go out by any path and come back by any |
-| | `routes(settings, view, paths, weight)` | factors (R, R, N, L) by the way out and the way back, direct first |
-| | `companions(settings, cloud, row, clouds, rng)` | clouds and rows of other targets, alike for all stations |
-| | `instants(settings, view)` | instants (Q,) s within a symbol, and their weights (Q, M) in its M samples |
-| | `late_samples(settings, view)` | how many samples (N, L) of each point are the previous symbol's |
-| | `convolved(settings, network, response, on_air, offset_cells)` | time samples (N, M) of still echoes with that |
-| | `scatter(settings, view, rng)` | response (N, M) of something other than a target, in sqrt(W) a subcarrier |
-| | `offset_cells(settings, view)` | how far those echoes stand beyond their range cells' centres, in cells |
-| | `heard(settings, sample)` | time samples (N, M) of signals that the receiver does not know |
-| receiver | `receive(settings, samples, look, rng)` | time samples (N, M) after the effect |
-| detection | `process(settings, cells, look, rng)` | range cells (N, M) after the effect |
-| | `choose(settings, chosen, cells, look, rng)` | chosen cells (N,) of range cells (N, M) |
-
-N symbols, L points, M subcarriers or range cells; arrays are float64 or complex128. `settings` holds every key of
-DEFAULTS. `rng` is the effect's own stream of this sample and station, so no effect moves another's draws. A module is
-imported when a scene names it, and never otherwise.
+What such a file offers: `lowalt.scene.contract`. An effect is imported when a scene names it, and never otherwise.
 """
 
 import importlib
@@ -42,65 +10,38 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from lowalt.files.errors import InputError
+from lowalt.config.named_code import own_effects
+from lowalt.files.errors import InputError, instead
+from lowalt.scene.contract import OFFERS, PLACE_ORDER
+from lowalt.scene.own_effect import checked, loaded, place_of
 
-PLACE_ORDER = ("motion", "transmitter", "channel", "receiver", "detection")
-"""The places where effects act, in the order of the chain."""
-LISTED = (
-    "motion/rotor_spread",
-    "motion/gusts",
-    "transmitter/slow_time",
-    "transmitter/data_symbols",
-    "transmitter/power_amplifier",
-    "transmitter/comb_pilots",
-    "channel/pointing_error",
-    "channel/element_pattern",
-    "channel/mean_cross_section",
-    "channel/fluctuation",
-    "channel/cross_sections",
-    "channel/occlusion",
-    "channel/line_of_sight",
-    "channel/ground_reflection",
-    "channel/walls",
-    "channel/reflected_aspect",
-    "channel/squint",
-    "channel/wavefront",
-    "channel/symbol_motion",
-    "channel/cyclic_prefix",
-    "channel/companions",
-    "channel/direct_path",
-    "channel/interference",
-    "channel/clutter",
-    "channel/background_channel",
-    "receiver/receiver_noise",
-    "receiver/cell_noise",
-    "receiver/link_offset",
-    "receiver/timing_offset",
-    "receiver/clock_offset",
-    "receiver/carrier_offset",
-    "receiver/phase_noise",
-    "receiver/transmit_leakage",
-    "receiver/iq_imbalance",
-    "receiver/adc",
-    "detection/canceller",
-    "detection/detector",
-    "detection/cell_error",
-)
-"""Place and name of the effects whose order within their place matters, in the order of the chain."""
+LISTED = {
+    "motion": "rotor_spread gusts",
+    "transmitter": "slow_time data_symbols power_amplifier comb_pilots",
+    "channel": (
+        "pointing_error element_pattern mean_cross_section fluctuation cross_sections occlusion line_of_sight "
+        "ground_reflection walls reflected_aspect squint wavefront symbol_motion cyclic_prefix companions direct_path "
+        "interference clutter background_channel"
+    ),
+    "receiver": (
+        "receiver_noise cell_noise link_offset timing_offset clock_offset carrier_offset phase_noise transmit_leakage "
+        "iq_imbalance adc"
+    ),
+    "detection": "canceller detector cell_error",
+}
+"""Names of the effects whose order within their place matters, in the order of the chain."""
 
 
-def _every_effect() -> tuple[str, ...]:
-    """LISTED, each place followed by the effects in its folder that are not listed, in alphabetical order."""
-    folder, result = Path(__file__).parent, []
+def _places() -> dict[str, str]:
+    """The place of every effect: in each place those LISTED, then the others of its folder in alphabetical order."""
+    folder, result = Path(__file__).parent, {}
     for place in PLACE_ORDER:
-        listed = [entry for entry in LISTED if entry.startswith(f"{place}/")]
-        files = sorted(f"{place}/{path.stem}" for path in (folder / place).glob("*.py"))
-        new = [entry for entry in files if entry not in listed]
-        result += listed + [entry for entry in new if "\nDEFAULTS" in (folder / f"{entry}.py").read_text()]
-    return tuple(result)
+        files = sorted(path.stem for path in (folder / place).glob("*.py") if path.stem != "__init__")
+        result |= dict.fromkeys((*LISTED[place].split(), *files), place)
+    return result
 
 
-PLACES = {name: place for place, _, name in (entry.partition("/") for entry in _every_effect())}
+PLACES = _places()
 """Place of every effect by its name, in the order of the chain."""
 
 
@@ -120,42 +61,64 @@ class NamedEffect(NamedTuple):
 
 
 def dotted(name: str) -> str:
-    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc.
+    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc, or the path of the user's own.
 
     Raises: InputError for a name that belongs to no effect.
     """
+    if own_effects([name]):
+        return name
     if name not in PLACES:
-        raise InputError(f"effects: unknown effect {name!r}, expected some of {sorted(PLACES)}")
+        known = f"{instead([name], sorted(PLACES))}, or the path of an effect's Python file"
+        raise InputError(f"effects: unknown effect {name!r}, expected {known}")
     return f"{__name__}.{PLACES[name]}.{name}"
+
+
+def module_of(name: str) -> ModuleType:
+    """Return the module of an effect, loaded. Raises: InputError where there is none."""
+    return loaded(name) if own_effects([name]) else importlib.import_module(dotted(name))
 
 
 def called(block: dict[str, dict | None]) -> list[NamedEffect]:
     """Return the effects of a scene's `effects` block in the chain's order, without those that are idle.
 
-    Raises: InputError for an unknown effect or parameter.
+    Raises: InputError for an unknown effect or parameter, or two effects that offer a function of which a scene has
+    one (`contract.OFFERS`).
     """
-    modules = {name: importlib.import_module(dotted(name)) for name in block}
-    result = []
-    for name in filter(block.__contains__, PLACES):
+    modules = {name: module_of(name) for name in block}
+    own, result = own_effects(block), []
+    if len({Path(name).name for name in own}) < len(own):
+        raise InputError(f"effects: {own}, expected files of different names, after which random streams are called")
+    for name in (*filter(block.__contains__, PLACES), *own):
         module, changed = modules[name], block[name] or {}
         unknown = sorted(set(changed) - set(module.DEFAULTS))
         if unknown:
             raise InputError(
                 f"effects.{name}: unknown parameter(s) {unknown}, expected some of {list(module.DEFAULTS)}"
             )
-        result.append(NamedEffect(name, PLACES[name], module, {**module.DEFAULTS, **changed}))
-    return [effect for effect in result if not effect.idle]
+        settings = checked(name, module, changed) if name in own else {**module.DEFAULTS, **changed}
+        result.append(NamedEffect(name, place_of(name, module) if name in own else PLACES[name], module, settings))
+    result.sort(key=lambda effect: PLACE_ORDER.index(effect.place))
+    acting = [effect for effect in result if not effect.idle]
+    for function in OFFERS:
+        only(acting, function)
+    return acting
 
 
-def placed(effects: Iterable[NamedEffect], *places: str) -> list[NamedEffect]:
-    """Return the effects of these places, order kept."""
-    return [effect for effect in effects if effect.place in places]
-
-
-def offered(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[..., Any]]:
+def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[..., Any]]:
     """Return the functions of this name that effects offer, with their settings, by effect in the order given."""
     return {
         effect.name: partial(getattr(effect.module, function), effect.settings)
         for effect in effects
         if hasattr(effect.module, function)
     }
+
+
+def only(effects: Iterable[NamedEffect], function: str) -> Callable[..., Any] | None:
+    """Return the function of this name that one of the effects offers, with its settings, None where none does.
+
+    Raises: InputError where several effects offer a function of which a scene has one.
+    """
+    found = every(effects, function)
+    if len(found) > 1 and OFFERS[function].one:
+        raise InputError(f"effects: {' and '.join(found)} both offer {function}, expected one of them in a scene")
+    return next(iter(found.values()), None)

@@ -1,6 +1,6 @@
 """HRRP: the range profile over slow time, range cells around the chosen one by symbols.
 
-It is made of the cube (`lowalt.tiles.cubes`), not of a station's signal, which holds one cell alone.
+It is computed from the cube (`lowalt.tiles.cubes`), not from a station's signal, which contains only one cell.
 """
 
 import numpy as np

@@ -1,13 +1,13 @@
 """Range-Doppler map: the range cells of a look against radial speed, by one Fourier transform over all its symbols.
 
-It is made of the cube (`lowalt.tiles.cubes`), not of a station's signal, which holds one cell alone.
+It is computed from the cube (`lowalt.tiles.cubes`), not from a station's signal, which contains only one cell.
 """
 
 import numpy as np
 from scipy import fft
 from scipy.signal.windows import hann
 
-from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.files.errors import InputError
 from lowalt.spectra.cube import Cube
 from lowalt.spectra.settings import Doppler as Settings
@@ -37,17 +37,17 @@ def axes(settings: Settings, network: Network, station: Station) -> tuple[tuple[
     """Return name, first and last value of the columns (radial speed, m/s) and of the rows (range, m).
 
     Ranges count from the cell that the receiver chose in the middle of the look; speeds are positive away from the
-    station.
+    station, at the effective carrier.
     """
-    fold = SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s)
+    speeds = network.bin_speeds_mps(settings.points, station)
     reach = settings.cells // 2 * network.cell_m
-    return ("radial speed (m/s)", -fold, fold), ("range (m from the chosen cell)", -reach, reach)
+    return ("radial speed (m/s)", speeds[0], speeds[-1]), ("range (m from the chosen cell)", -reach, reach)
 
 
 def definition(cube: Cube, settings: Settings) -> np.ndarray:
     """Return magnitudes (ranges, speeds) of a cube, both ascending.
 
-    The look is weighted with a Hann window, whose sum makes an echo that stands still as large as in one symbol.
+    The look is weighted with a Hann window of sum one, so a static echo has the same magnitude as in a single symbol.
     Raises: InputError where the look has more symbols than there are speeds.
     """
     cells, chosen = cube.cells, cube.chosen
@@ -56,7 +56,7 @@ def definition(cube: Cube, settings: Settings) -> np.ndarray:
     near = cells[:, np.arange(middle - reach, middle + reach + 1) % cells.shape[1]].astype(np.complex128)
     weights = hann(len(cells), sym=False)
     spectrum = fft.fftshift(fft.fft(near * (weights / weights.sum())[:, None], count, axis=0), axes=0)
-    # An echo that recedes turns backwards: the most negative frequency is the largest speed.
+    # A receding echo has a negative frequency, so the most negative frequency is the largest speed.
     turned = spectrum[::-1].T
     return np.sqrt(turned.real**2 + turned.imag**2)
 

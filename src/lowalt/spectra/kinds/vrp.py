@@ -1,6 +1,6 @@
 """VRP: the short-time Fourier spectrum whose long window prefers resolution in velocity."""
 
-# Both short-time Fourier spectra share everything that does not stand below.
+# Both short-time Fourier spectra share all other functions.
 from lowalt.spectra.fourier import (  # noqa: F401
     SIGNED,
     ZERO_FIRST,

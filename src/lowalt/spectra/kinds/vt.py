@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.numerics.portable import sine_cosine
+from lowalt.spectra.fourier import segments
 from lowalt.spectra.known_times import line_sums, shares
-from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Transfer
 from lowalt.spectra.sliding import transfer
 
@@ -22,9 +22,14 @@ def rows(settings: Transfer) -> int:
     return len(settings.speeds_mps)
 
 
-def speeds(settings: Transfer, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
-    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`."""
-    return settings.speeds_mps[0], settings.speeds_mps[-1]
+def speeds(settings: Transfer, network: Network, station: Station) -> tuple[float, float]:
+    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`.
+
+    The filters are matched at f_k, as in the paper's Eq. 32, but the Doppler frequency is that at the effective carrier
+    f_e. The filter of speed v therefore responds to an echo of speed v f_k / f_e.
+    """
+    ratio = station.frequency_hz / network.effective_hz(station)
+    return float(settings.speeds_mps[0] * ratio), float(settings.speeds_mps[-1] * ratio)
 
 
 def definition(
@@ -35,7 +40,7 @@ def definition(
     Raises: InputError where the signal is no longer than the window or is not finite.
     """
     length = settings.window
-    # The published count of windows is that of the shorter segment less one, so each has one more symbol behind it.
+    # The published number of windows is one less than the shorter segment allows, so each window can be one longer.
     parts = segments(signals, length, settings.hop, name, extra=1)
     steps = np.arange(length + 1)
     phase = 4 * np.pi * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * np.outer(settings.speeds_mps, steps)

@@ -1,7 +1,8 @@
-"""Echoes of the surroundings, drawn as 3GPP's background channel of a station that hears itself.
+"""Echoes of the surroundings: the background channel of 3GPP for a monostatic station.
 
-Three points of reference stand round the station, a third of a turn apart. To each there is a link without line of
-sight, whose rays the station sends and receives in the same directions. Nothing moves, so a canceller removes it.
+Three reference points stand around the station, 120 degrees apart. Each has a link without line of sight to the
+station, which sends and receives the rays of the link in the same directions. Nothing moves, so a canceller removes
+these echoes.
 """
 
 import numpy as np
@@ -12,9 +13,9 @@ from lowalt.echo.radar import radar
 from lowalt.scene.antenna import gain
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.crossing import toward
-from lowalt.scene.effects.channel import fast_fading
-from lowalt.scene.effects.channel.fast_fading import Link
-from lowalt.scene.view import View
+from lowalt.scene.laws import fast_fading
+from lowalt.scene.laws.fast_fading import Link
+from lowalt.scene.view import Still, View
 
 SOURCE = (
     "3GPP TR 38.901 V19.4, clause 7.9.4.2 (TRP monostatic, Table 7.9.4.2-1, Eq. 7.9.4-15), steps 3 to 12 of clause 7.5 "
@@ -83,11 +84,11 @@ def _directions(azimuth: np.ndarray, zenith: np.ndarray) -> np.ndarray:
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(zenith)], axis=1)
 
 
-def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the frequency response (N, M) of the surroundings, the same in all symbols.
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
+    """Return the echoes of the surroundings, the same in all symbols.
 
-    Each ray has both array sums and the element's gain in its direction; independent from sample to sample and station
-    to station.
+    Each ray is weighted by both array sums and the element's gain in its direction. Samples and stations have
+    independent draws.
     """
     network, station = view.network, view.station
     ghz = radar(network, station).centre_hz / 1e9
@@ -98,13 +99,13 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     sums = np.bincount(number, amplitude.real) + 1j * np.bincount(number, amplitude.imag)
     steps = np.arange(network.subcarriers) * network.subcarrier_spacing_hz
     turned = np.exp(-2j * np.pi * late[:, None] * steps)
-    return np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy()
+    return Still(np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy())
 
 
 def usual_power(settings: dict, view: View) -> float:
     """Return the mean power (W) of a subcarrier of the surroundings' echoes, the median of `USUAL` draws."""
     drawn = [scatter(settings, view.at(view.times_s[:1]), np.random.default_rng(number)) for number in range(USUAL)]
-    return float(np.median([np.mean(abs(response) ** 2) for response in drawn]))
+    return float(np.median([np.mean(abs(still.response) ** 2) for still in drawn]))
 
 
 def _antennas(view: View, direction: np.ndarray) -> np.ndarray:

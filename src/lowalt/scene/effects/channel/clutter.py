@@ -1,9 +1,9 @@
-"""Echoes of the ground: a patch of land in every range cell, still as a whole and stirred by the wind.
+"""Clutter: the echo of a patch of land in every range cell, part of which the wind moves.
 
-A cell's mean power follows from its area under both beams, with a reflectivity gamma sin(grazing angle) (`land`). Its
-amplitude is compound Gaussian: a texture, drawn once and correlated between neighbours, times speckle whose still part
-stays and whose moving part has Billingsley's exponential Doppler spectrum (`windblown`). On a link cells are of the
-range sum, and Doppler is that along the bisector.
+The mean power of a cell follows from its area under both beams and a reflectivity of gamma sin(grazing angle) (`land`).
+The amplitude is compound Gaussian, texture times speckle. The texture is drawn once and correlated between neighbouring
+cells. The speckle has a constant part and a moving part with Billingsley's exponential Doppler spectrum (`windblown`).
+On a link, range cells are those of the range sum, and the Doppler frequency is that along the bisector.
 """
 
 import numpy as np
@@ -16,8 +16,8 @@ from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
 from lowalt.scene import land
 from lowalt.scene.checks import CheckedScene, above_ground
-from lowalt.scene.effects.channel.windblown import speckle, windblown
-from lowalt.scene.view import View
+from lowalt.scene.laws.windblown import speckle, windblown
+from lowalt.scene.view import Still, View
 
 SOURCE = (
     "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "
@@ -40,16 +40,11 @@ def check(settings: dict, scene: CheckedScene) -> None:
         raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
 
 
-def offset_cells(settings: dict, view: View) -> float:
-    """Return how far all echoes of the land stand beyond the centres of their range cells."""
-    return land.OFFSET
-
-
 def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
-    """Return uniforms (2, cells) of which neighbours are alike: their normal scores correlate by `correlation`^lag.
+    """Return uniforms (2, cells) whose normal scores have the correlation `correlation`^lag between cells.
 
-    Each keeps its law, so textures made from them do too. Source: memoryless non-linear transform, Tough & Ward, The
-    correlation properties of gamma and other non-Gaussian processes, J. Phys. D 32, 1999.
+    Each stays uniform, so textures made from them keep their distribution. Source: memoryless non-linear transform,
+    Tough & Ward, The correlation properties of gamma and other non-Gaussian processes, J. Phys. D 32, 1999.
     """
     if correlation == 0:
         return uniform
@@ -59,7 +54,7 @@ def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
 
 
 def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
-    """Return positive textures (cells,) of mean 1 from uniforms (2, cells); sqrt(texture) times speckle has the law.
+    """Return textures (cells,) of mean 1 from uniforms (2, cells); sqrt(texture) times speckle has the law.
 
     rayleigh: 1; k: gamma variates of order `shape`; weibull: a Weibull power of shape c/2 is an exponential over a
     positive stable variate of index c/2 (Kanter 1975). Amplitudes, not powers, have the Weibull shape c.
@@ -76,13 +71,13 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
 
 
 def mean_power(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean power (cells,) (W) of the land in every slant-range cell, and how much its Doppler is slowed."""
+    """Return the mean power (cells,) W of the land in each slant-range cell, and the factor on its Doppler."""
     aims_m = np.stack([view.aim_of(view.station.transmitter or view.station), view.aim_m])
     return land.cell_power(settings, view.network, view.station, aims_m, view.element)
 
 
-def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
+    """Return the echoes of the land; samples and stations have independent draws."""
     network, frequency = view.network, radar(view.network, view.station).centre_hz
     power, slow = mean_power(settings, view)
     correlation = np.exp(-network.cell_m / settings["correlation_m"]) if settings["correlation_m"] > 0 else 0.0
@@ -93,4 +88,4 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
         SPEED_OF_LIGHT / frequency, slow if view.station.transmitter else 1.0,
     )  # fmt: skip
     cells = land.folded(lit[:, None] * waves, network.subcarriers)
-    return fft.fft(cells, axis=0, overwrite_x=True).T * land.ramp(network.subcarriers)
+    return Still(fft.fft(cells, axis=0, overwrite_x=True).T * land.ramp(network.subcarriers), land.OFFSET)

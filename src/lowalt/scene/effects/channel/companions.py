@@ -1,10 +1,10 @@
-"""Other targets in the beam: a flock, a bird next to a drone, a car under it. The label stays the primary target's.
+"""Other targets in the beam, such as a flock, or a bird next to a drone. The label is that of the primary target.
 
-Companions stand around the target at the first symbol, with a standard deviation of `spread_m` on each axis, and move
-on; in a flock their speeds differ from the target's by a standard deviation of `speed_mps`. Each is a target of its
-own: points, moving parts, cross sections, motion effects and paths as the scene gives them. Their complex echoes add to
-the target's before the strongest range cell is chosen, which may be a companion's. Beams point at the primary target,
-and set SNRs refer to its echo alone. Records of samples name the companions' subtypes.
+At the first symbol, companions stand around the target with a standard deviation of `spread_m` on each axis. Members of
+a flock have the target's velocity plus a normal error of standard deviation `speed_mps`. Each companion is a complete
+target with its own points, moving parts, cross sections, motion effects and paths. Its complex echo adds to the
+target's before a range cell is chosen, so the chosen cell may be that of a companion. Beams point at the primary
+target, and the SNRs of the configuration refer to its echo alone. The record of a sample lists the companions.
 """
 
 import math
@@ -59,10 +59,10 @@ def listed(settings: dict, seed: int, row: dict) -> list[str]:
 def companions(
     settings: dict, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud], rng: np.random.Generator
 ) -> list[tuple[Cloud, dict]]:
-    """Return the companions of the motion model `row`: their clouds, and rows as of the motion table.
+    """Return the companions of the motion model `row`: their clouds, and their rows as in the motion table.
 
-    clouds: those of the other subtypes, by name. Raises: InputError naming a subtype without a cloud, or a spread in
-    which the targets do not find room.
+    clouds: the clouds of the other subtypes, by name. Raises: InputError naming a subtype without a cloud, or a spread
+    that leaves no room for the targets.
     """
     taken, result = [(_place(row), _reach(cloud))], []
     for number, name in enumerate(named(settings, row["subtype"], rng)):

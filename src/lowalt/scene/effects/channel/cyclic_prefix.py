@@ -1,9 +1,13 @@
 """Echoes later than the cyclic prefix: the receive window then begins with the end of the previous symbol.
 
-Symbols follow each other without a pause. An echo of delay tau has its own symbol from tau - T_cp on; before that it
-still carries the previous one, whose data are random too. The echo loses a share e = (tau - T_cp) / T_u of its window:
-its amplitude falls to 1 - e, and 1 - (1 - e)^2 of its power becomes interference, spread over all range cells. Every
-point is cut at its direct delay, on the reflected paths too; other echoes are cut at the delay of their range cell.
+Symbols follow each other without a pause. In the receive window, an echo of delay tau > T_cp carries the previous
+symbol, with other random data, until tau - T_cp, and its own symbol from then on. It loses a share
+
+    e = (tau - T_cp) / T_u
+
+of the window: its amplitude falls to 1 - e, and 1 - (1 - e)^2 of its power becomes interference in all range cells.
+Each point of a target is cut at its direct delay, on reflected paths too; still echoes are cut at the delay of their
+range cell.
 """
 
 from collections.abc import Callable
@@ -27,8 +31,13 @@ def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.n
     return np.clip((delay_s - prefix_s) * network.subcarrier_spacing_hz, 0.0, 1.0)
 
 
+def prefix_s(settings: dict, network: Network) -> float:
+    """Return the prefix's length (s)."""
+    return prefix_length_s(settings["prefix_s"], network)
+
+
 def late_samples(settings: dict, view: View) -> np.ndarray:
-    """Return the number (N, L) of each point's samples, at the window's start, that carry the previous symbol."""
+    """Return how many samples (N, L) of each point's echo, at the start of the window, carry the previous symbol."""
     network = view.network
     late_s = view.ways_m(view.places) / SPEED_OF_LIGHT - prefix_length_s(settings["prefix_s"], network)
     rate_hz = network.subcarriers * network.subcarrier_spacing_hz
@@ -38,7 +47,7 @@ def late_samples(settings: dict, view: View) -> np.ndarray:
 def convolved(
     settings: dict, network: Network, response: np.ndarray, on_air: Callable[[str], np.ndarray], offset_cells: float
 ) -> np.ndarray:  # fmt: skip
-    """Return the time samples (N, M) of echoes in range cells: the linear convolution of the sent stream with them.
+    """Return the time samples (N, M) of still echoes: the linear convolution of the sent stream with the range cells.
 
     response: (N, M) of all echoes; on_air: subcarriers (N, M) on the air in the "waveform" and the "previous waveform";
     offset_cells: distance of the echoes beyond their cells' centres. The prefix counts in whole samples.

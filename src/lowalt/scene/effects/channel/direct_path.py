@@ -1,8 +1,8 @@
 """The direct path of a link between two stations: the sent signal reaches the receiving station without the target.
 
-It stands still, at the delay of the masts' distance, and enters by both arrays' side lobes, since their beams point at
-the target. Stations that receive their own signal have none; their leakage is `transmit_leakage`. A scene with links
-names this effect, without loss or with it; everything physical that is not modelled between two stations is refused.
+It has the delay of the distance between the masts and no Doppler shift, and it enters through the side lobes of both
+arrays, whose beams point at the target. A station that receives its own signal has `transmit_leakage` instead. A scene
+with links must name this effect; effects that are not modelled between two stations are refused (`checks`).
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
-from lowalt.scene.view import View
+from lowalt.scene.view import Still, View
 
 SOURCE = (
     "H. T. Friis, A note on a simple transmission formula, Proc. IRE 34, 1946; N. J. Willis, Bistatic Radar, 2nd ed. "
@@ -26,14 +26,8 @@ def check(settings: dict, scene: CheckedScene) -> None:
         raise InputError("effects.direct_path: no station of the network is a link, expected {transmit, receive}")
 
 
-def offset_cells(settings: dict, view: View) -> float:
-    """Return how far a link's direct path stands beyond the centre of a range cell, -1/2 to 1/2; 0 for a station."""
-    cells = float(np.linalg.norm(np.subtract(*view.masts_m))) / (2 * view.network.cell_m)
-    return cells - round(cells)
-
-
-def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the frequency response (N, M) of the direct path, zero for a station that receives its own signal.
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
+    """Return the direct path, zero for a station that receives its own signal.
 
     Both array sums toward the other mast, in the units of the echo: the amplitude is sqrt(P / elements) lambda /
     (4 pi d) times both sums. Source: Friis 1946. Nothing is drawn.
@@ -41,6 +35,7 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     network, hears, sends = view.network, view.station, view.station.transmitter
     shape = len(view.times_s), network.subcarriers
     if sends is None:
-        return np.zeros(shape, np.complex128)
+        return Still(np.zeros(shape, np.complex128))
     turned = crossing(view, sends, hears)[0] * 10 ** (-settings["loss_db"] / 20)
-    return np.broadcast_to(turned, shape).copy()
+    cells = float(np.linalg.norm(np.subtract(*view.masts_m))) / (2 * network.cell_m)
+    return Still(np.broadcast_to(turned, shape).copy(), cells - round(cells))

@@ -1,6 +1,6 @@
-"""Antenna elements with a front and a back: every echo is weighted by the element's gain, out and back.
+"""The gain pattern of the antenna elements, which weights every echo on the way out and on the way back.
 
-Without this effect elements are isotropic. Reflected paths and the land get the gain of their own direction.
+Without this effect elements are isotropic. Reflected paths and the land have the gain in their own direction.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 """Fluctuation of a target's cross section: an angular pattern (B1) and a log-normal factor (B2) on its mean (A).
 
-Both act on all points alike. The log-normal factor is drawn once a look and station; both directions of a link share
-one draw. The pattern follows the direction of the station in the body's frame; TR 38.901 gives none to small UAVs,
-people and birds. On a link it is that at the bisector of both ends, less a loss by the bistatic angle, which all
-classes have.
+Both act on all points alike. The log-normal factor is drawn once per look and station; both directions of a link share
+one draw. The pattern depends on the direction of the station in the frame of the body; TR 38.901 has none for small
+UAVs, people and birds. On a link, the pattern is taken at the bisector of both ends. All classes then also have a loss
+that depends on the bistatic angle.
 """
 
 import numpy as np
@@ -20,6 +20,7 @@ SOURCE = (
     "(reciprocity): estimates; birds take the small UAV's spread and loss: estimate"
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
+DRAWN = "pair"
 IDLE = [{"pattern": False, "spread_db": 0}]
 
 CUT = 3.0
@@ -112,7 +113,7 @@ def pattern(view: View) -> np.ndarray:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: the root of B1 B2; one draw a sample and station or pair of stations.
+    """Return the factor (N, 1) on all amplitudes: the root of B1 B2, with one draw per look and station or pair.
 
     B2 is log-normal with mean one: its mean in dB is -ln(10) / 20 times its variance (Eq. 7.9.2-1).
     """

@@ -1,7 +1,7 @@
-"""A second path by the ground: the wave reflected by a flat, possibly rough plane z = 0 (two-ray model).
+"""Ground reflection: a second path by the flat, possibly rough plane z = 0 (two-ray model).
 
-The station sees every point's image below the ground, weighted with the complex Fresnel coefficient. There and
-back by either path gives four echoes; the response forms them. Points are taken to be above the ground.
+The station sees the image of every point below the ground, weighted by the complex Fresnel coefficient. The direct and
+the reflected path, out and back, give four echoes, which the response adds. Points are assumed to be above the ground.
 """
 
 import numpy as np

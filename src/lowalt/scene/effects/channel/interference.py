@@ -1,10 +1,10 @@
-"""Other stations' signals in a receiver: from mast to mast and by the target, with data that the receiver lacks.
+"""Interference: the signals of other stations, from mast to mast and by the target, with data unknown to the receiver.
 
-A station hears every other one. Where sub-bands overlap (`guard_subcarriers` below 0) the other station's subcarriers
-arrive at their full level, elsewhere its leakage does. Division by the receiver's own data makes both noise: of the
-powers |Y_m|^2 of M subcarriers every range cell gets sum_m |Y_m|^2 / M^2. All beams point at the same target. Symbols
-follow each other without a pause; a signal later than the cyclic prefix, or early by a clock's error, brings part of
-another symbol.
+A station hears every other station: its subcarriers at full level where sub-bands overlap (`guard_subcarriers` below
+0), and its leakage elsewhere. The receiver divides both by its own data, which makes them noise: subcarriers of power
+|Y_m|^2 give every range cell a noise power of sum_m |Y_m|^2 / M^2. All beams point at the same target. Symbols follow
+each other without a pause, so a signal that is later than the cyclic prefix, or early by the error of a clock, contains
+part of another symbol.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
-from lowalt.scene.effects.receiver.offsets import of_stations
+from lowalt.scene.laws.offsets import of_stations
 from lowalt.scene.set_noise import white
 from lowalt.scene.waveform import baseband_hz, windowed
 
@@ -37,9 +37,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def arrivals(settings: dict, sample: SceneSample, sends: Station) -> list[tuple[np.ndarray, float]]:
-    """Return the ways of a station's signal to the receiver: from mast to mast, and by the target.
+    """Return both ways of a station's signal to the receiver, from mast to mast and by the target.
 
-    Each is its response (N or 1, M) on the receiver's subcarriers, as if the whole sub-band were the sender's, and its
+    A way is a pair: its response (N or 1, M) on the receiver's subcarriers, as if the sender used all of them, and its
     delay (s).
     """
     view, hears = sample.view, sample.view.station
@@ -53,11 +53,11 @@ def arrivals(settings: dict, sample: SceneSample, sends: Station) -> list[tuple[
 def heard(settings: dict, sample: SceneSample) -> np.ndarray:
     """Return the time samples (N, M) of all other stations' signals.
 
-    Their data and leakage are drawn by receiver, their clocks and oscillators by look.
+    Data and leakage are drawn per receiver; errors of clocks and oscillators are drawn per look.
     """
     view, network = sample.view, sample.view.network
     total = np.zeros((network.symbols, network.subcarriers), np.complex128)
-    errors = of_stations(settings, network, sample.draws("link_offset"))
+    errors = of_stations(settings, network, sample.scene.stream("link_offset", view.row))
     step_hz, middle, count = network.subcarrier_spacing_hz, network.subcarriers // 2, network.subcarriers
     number, rate_hz = np.arange(count), count * step_hz
     for sends in network.stations:

@@ -1,8 +1,8 @@
 """Blocked line of sight: buildings hide a target from a station with the probability of a 3GPP environment.
 
-One draw a sample and station decides for the whole look. A blocked echo loses `blocked_db` on the way out and again on
-the way back. What hides a target from a station's own look hides it on that station's way of every link. Set SNRs refer
-to the echo as it arrives: against noise at a set SNR a blocked echo is as strong as any.
+One draw per sample and station decides for the whole look. A blocked echo loses `blocked_db` on the way out and again
+on the way back. A target that is hidden from a station is also hidden on that station's way of every link. The SNRs of
+the configuration refer to the echo as it arrives, so blocking does not change the ratio of echo to noise at a set SNR.
 """
 
 import math
@@ -49,7 +49,7 @@ def _falling(flat_m: float, near_m: float, decay_m: float) -> float:
     return near_m / flat_m + math.exp(-flat_m / decay_m) * (1 - near_m / flat_m)
 
 
-def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+def visible_one_way(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 10) for two blocked ways; one draw."""
     x, y, height = (view.row[f"{axis}_m"] for axis in "xyz")
     place = view.station.position_m

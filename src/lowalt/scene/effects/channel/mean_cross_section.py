@@ -1,8 +1,8 @@
-"""Absolute mean cross sections: every target gets its class's and size's, spread over its points.
+"""Absolute mean cross sections: a target has the mean cross section of its class and size, shared by its points.
 
-The paper gives every point 1 m2, so a sparrow of 158 points has 158 m2. Here the points share the target's mean
-cross section instead: blades together lie `blades_db` below everything else, and within each group points keep their
-ratios. One factor for all points makes the mean power over aspects and motion, phases included, the target's mean.
+The paper gives every point 1 m2, so a sparrow of 158 points has 158 m2. With this effect, the points share the target's
+mean cross section: all blades together are `blades_db` below the rest, and the points of each group keep their ratios.
+A common factor makes the power of their coherent sum, averaged over aspects and motion, equal to the stated mean.
 """
 
 import hashlib

@@ -5,13 +5,12 @@ of a station at the mirror image's place. Out by one path and back by another, e
 two-way factor. Without this effect all paths have the direct one's aspect and shadows.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects import PLACES
 from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
@@ -37,16 +36,14 @@ def check(settings: dict, scene: CheckedScene) -> None:
         raise InputError(f"effects.reflected_aspect: no side to follow, expected one of {list(FOLLOWED)} in the scene")
 
 
-def routes(
-    settings: dict, view: View, paths: list[ImagePath], weight: Callable[[View, Collection[str] | None], np.ndarray]
-) -> np.ndarray:
+def routes(settings: dict, view: View, paths: list[ImagePath], weight: Callable[..., np.ndarray]) -> np.ndarray:
     """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the direct one first.
 
-    weight(view, names): product (N, L) of the amplitude factors of the named effects as `view` sees them. On a link,
+    weight(view, names, but): product (N, L) of the effects' amplitude factors as `view` sees them. On a link,
     both ways by the same kind of path are the link between both images. A path without an image of the station shows
     the direct one's side.
     """
-    rest, ends = weight(view, PLACES.keys() - set(FOLLOWED)), view.ends()
+    rest, ends = weight(view, but=FOLLOWED), view.ends()
     heard = [None, *(path.station_m for path in paths)]
     sent = [None, *(path.outward.station_m for path in paths)]
 

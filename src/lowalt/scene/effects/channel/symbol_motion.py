@@ -10,7 +10,7 @@ import numpy as np
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.scene.response import ERROR
 from lowalt.scene.series import chebyshev_points, interpolation, orders_of
-from lowalt.scene.view import View
+from lowalt.scene.view import Displacement, View
 
 SOURCE = (
     "Robertson and Kaiser, The effects of Doppler spreads in OFDM(A) mobile radio systems, Proc. IEEE VTC Fall, 1999; "
@@ -32,3 +32,18 @@ def instants(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
     needed = orders_of(2.0 * np.pi * highest_hz / SPEED_OF_LIGHT * float(moved_m), ERROR)
     delays_s = 0.5 * useful_s * (chebyshev_points(needed) + 1.0)
     return delays_s, interpolation(needed, 2.0 * np.arange(count) / count - 1.0)
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return how late an FMCW echo appears by the range-Doppler coupling, f tau' sweep_s / sweep_hz.
+
+    The frequency f is that at the end of the sweep, since f(t) tau(t) grows with tau' both by f and by its own slope.
+    Source: Stove 1992.
+    """
+    network = view.network
+    if network.sweep_s is None:
+        return Displacement()
+    way_mps = np.gradient(view.ways_m(view.places.mean(axis=1)), view.times_s, edge_order=2)
+    sweep_hz = network.subcarriers * network.subcarrier_spacing_hz
+    last_hz = view.station.frequency_hz + sweep_hz
+    return Displacement(delay_s=way_mps / SPEED_OF_LIGHT * last_hz * network.sweep_s / sweep_hz)

@@ -6,3 +6,8 @@ where a scene names this effect.
 
 SOURCE = "Balanis, Antenna Theory, 4th ed., 2016, section 4.4.1 (phase error of the far-field approximation)"
 DEFAULTS: dict[str, float] = {}
+
+
+def waves(settings: dict) -> dict[str, bool]:
+    """Return how arrays are summed."""
+    return {"wavefront": True}

@@ -3,8 +3,9 @@
 `mean` and `pulse` cancel what stands still; land that the wind moves passes them. `clutter` is made for the spectrum of
 windblown land at one carrier and symbol interval: of the covariance that land has over the symbols, it removes every
 component that lies less than `depth_db` below the land's power, and leaves all else as it is. What it costs a target
-follows from the target's radial speed alone. All filters are scaled to unit noise gain, so that a set SNR means the
-same before and behind them.
+follows from the target's radial speed alone. `pulse` and `clutter` are scaled to unit noise gain, so that a set SNR
+means the same before and behind them. `mean` is not scaled: of N symbols it takes one part in N of the noise's power,
+0.01 dB of 400.
 """
 
 import math
@@ -16,8 +17,7 @@ from scipy.linalg import eigh, toeplitz
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.channel.windblown import windblown
-from lowalt.scene.waveform import Look
+from lowalt.scene.laws.windblown import windblown
 
 SOURCE = (
     "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, their response and "
@@ -47,11 +47,6 @@ def check(settings: dict, scene: CheckedScene) -> None:
                 f"effects.canceller.{key}: {settings[key]:g}, expected the network's {getattr(scene.network, key):g}, "
                 "for which kind 'clutter' is made"
             )
-
-
-def process(settings: dict, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return the range cells (N, M) behind the filter; nothing is drawn."""
-    return filtered(settings, cells)
 
 
 def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:

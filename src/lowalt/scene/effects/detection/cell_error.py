@@ -1,4 +1,4 @@
-"""Wrong range cell: the detector takes another cell than the strongest, now and then."""
+"""Wrong range cells: with a given probability, the detector takes a cell near the chosen one."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def choose(settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return chosen cells (N,) int64, each wrong with `probability`; cells (N, M) wrap around as ranges do.
 
-    A wrong one is off by a whole number, uniform on -spread .. spread without 0. 2 N draws.
+    A wrong cell is off by a whole number, uniform on -spread .. spread without 0. 2 N draws.
     """
     wrong, place = rng.random((2, len(chosen)))
     reach = settings["spread_cells"]

@@ -1,10 +1,10 @@
 """Gusts: Dryden turbulence pushes a flying target, which leans against the push to keep its place and course.
 
-Turbulence is a field frozen into the mean wind; the target meets it at its airspeed. Drag carries the target along
-with the air. Its control asks for a thrust against speed and displacement, and the attitude follows with a lag: a
-multirotor tilts by atan(a / g) towards the acceleration a of its thrust alone, a bird banks. Drag tilts nothing.
-Turbulence, velocity, place and thrust are one linear process, discretised exactly. `wind_mps` is the mean wind 20 ft
-(6 m) above ground.
+Turbulence is a frozen field that moves with the mean wind, and the target flies through it at its airspeed. Drag
+accelerates the target along with the air. Its controller commands a thrust against the velocity and the displacement,
+and the attitude follows with a lag: a multirotor tilts by atan(a / g), where a is the acceleration by its thrust; a
+bird banks. Turbulence, velocity, displacement and thrust form one linear process, which is discretised exactly.
+`wind_mps` is the mean wind 20 ft (6 m) above ground.
 """
 
 from functools import lru_cache
@@ -14,8 +14,8 @@ import numpy as np
 from lowalt.motion.poses import Perturbation
 from lowalt.motion.rotations import attitude
 from lowalt.numerics import portable
-from lowalt.scene.effects.motion import flight
-from lowalt.scene.effects.motion.markov import Steps, root_of, stationary, step_s, steps, walk
+from lowalt.scene.laws import flight
+from lowalt.scene.laws.markov import Steps, root_of, stationary, step_s, steps, walk
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (

@@ -8,7 +8,7 @@ Ornstein-Uhlenbeck process whose integral is the added phase.
 import numpy as np
 
 from lowalt.motion.poses import Perturbation
-from lowalt.scene.effects.motion.markov import step_s, steps, walk
+from lowalt.scene.laws.markov import step_s, steps, walk
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (

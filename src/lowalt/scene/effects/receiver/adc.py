@@ -1,4 +1,10 @@
-"""Analogue-to-digital converter: a uniform mid-rise quantiser with clipping, on I and Q alike."""
+"""Analogue-to-digital converter: a uniform mid-rise quantiser with clipping, on I and Q alike.
+
+The gain is set once per look, by the look's root mean square. A look whose level changes from symbol to symbol has
+symbols far above it, which clip: where a twentieth of the symbols is 6 dB stronger, 8 bits at the default back-off of
+12 dB give 29 dB of signal to error instead of the 41 dB of quantisation alone. A larger `backoff_db` removes the
+clipping and costs 1 dB of quantisation per dB: at 18 dB the same look has 35 dB.
+"""
 
 import numpy as np
 

@@ -10,7 +10,8 @@ from scipy import fft
 
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.laws import offsets
+from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 
 SOURCE = (
@@ -18,6 +19,7 @@ SOURCE = (
     "IEEE GLOBECOM 1994; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
+STREAM = "oscillator"
 IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
 
 ROUNDING = 1e-14
@@ -45,15 +47,15 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return samples (N, M) of the same band-limited signal, taken at t / (1 + e) instead of t.
 
-    Every sample is the exact sum of the symbol's M subcarriers at its own instant, in the symbol's cyclic extension. A
-    fast clock is early ever more, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994; one draw a sample and
-    station.
+    Each sample is the exact sum of the symbol's M subcarriers at its own instant, in the symbol's cyclic extension. A
+    fast clock samples earlier from symbol to symbol, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994. One
+    draw per sample and station.
     """
-    rate = 1e-6 * (settings["fixed_ppm"] + settings["sigma_ppm"] * offsets.drawn(rng))
+    rate = _rate(settings, rng)
     early = -rate / (1 + rate)
     middle = samples.shape[1] // 2
     shift_hz = early * fft.ifftshift(look.baseband_hz)
-    # The whole symbol moves with its middle sample, and a series in time about that stretches it.
+    # The shift of the middle sample moves the whole symbol; a Taylor series about that sample stretches it.
     instants = look.times_s + look.within_s[middle]
     term = offsets.turned(fft.fft(samples, axis=-1), np.outer(instants, shift_hz))
     result = fft.ifft(term, axis=-1)
@@ -68,3 +70,17 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
         order += 1
         size *= reach / order
     return result
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return how late all echoes appear at each symbol: ever later with a fast clock.
+
+    Lines move by at most e df / 2, a thousandth of a speed while the window stays in its prefix, which is left out.
+    """
+    rate = _rate(settings, rng)
+    return Displacement(delay_s=rate / (1 + rate) * view.times_s)
+
+
+def _rate(settings: dict, rng: np.random.Generator) -> float:
+    """The clock's relative error e, positive where it is fast."""
+    return 1e-6 * (settings["fixed_ppm"] + settings["sigma_ppm"] * offsets.drawn(rng))

@@ -1,15 +1,18 @@
-"""Offsets between two stations' oscillators and clocks, in the links between them and nowhere else.
+"""Offsets between the oscillators and clocks of two stations, on the links between them.
 
-Every station's oscillator and clock have one error each in a look. A link from A to B has A's less B's, and the link
-from B to A the opposite. A station that receives its own signal has no offset.
+During a look, the oscillator and the clock of each station have one error each. The offsets of the link from A to B are
+the errors of A minus those of B, so the link from B to A has the opposite offsets. A station that receives its own
+signal has none.
 """
 
 import numpy as np
 
+from lowalt.config.network import Network, Station
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver.offsets import delayed, of_stations, risen
-from lowalt.scene.waveform import Look
+from lowalt.scene.laws.offsets import delayed, of_stations, risen
+from lowalt.scene.view import Displacement, View
+from lowalt.scene.waveform import Look, oscillator_hz
 
 SOURCE = (
     "P. H. Moose, IEEE Trans. Commun. 42(10), 1994 (carrier); M. Speth et al., IEEE Trans. Commun. 47(11), 1999 "
@@ -17,6 +20,7 @@ SOURCE = (
     "satellites: estimate"
 )
 DEFAULTS = {"sigma_ppm": 0.017, "sigma_s": 2e-8}
+DRAWN = "look"
 IDLE = [{"sigma_ppm": 0, "sigma_s": 0}]
 
 
@@ -27,14 +31,25 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) of a link, turned by the carriers' difference and moved by the clocks'; others as they are.
+    """Return the samples (N, M) of a link, shifted by both offsets in frequency and in delay.
 
-    A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late makes echoes late.
-    rng: the look's stream, the same for all stations.
+    A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late makes all echoes late.
+    The samples of a station that receives its own signal stay as they are.
     """
-    sends, hears = look.station.transmitter, look.station.receiver
-    if sends is None:
-        return samples
-    errors = of_stations(settings, look.network, rng)
+    late_s, rise_hz = _of(settings, look.network, look.station, rng)
+    return samples if look.station.transmitter is None else risen(delayed(samples, late_s, look), rise_hz, look)
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return the offsets of a link in delay and frequency, drawn as `receive` draws them."""
+    return _of(settings, view.network, view.station, rng)
+
+
+def _of(settings: dict, network: Network, station: Station, rng: np.random.Generator) -> Displacement:
+    """The errors of the sender minus those of the receiver; zero for a station that receives its own signal."""
+    sends, hears = station.transmitter, station.receiver
+    if sends is None or hears is None:
+        return Displacement()
+    errors = of_stations(settings, network, rng)
     ppm, late_s = (theirs - ours for theirs, ours in zip(errors[sends.name], errors[hears.name], strict=True))
-    return risen(delayed(samples, late_s, look), 1e-6 * ppm * look.oscillator_hz, look)
+    return Displacement(late_s, 1e-6 * ppm * oscillator_hz(network, station))

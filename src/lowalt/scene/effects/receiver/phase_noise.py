@@ -16,7 +16,7 @@ from scipy.linalg import toeplitz
 
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver.offsets import turned
+from lowalt.scene.laws.offsets import turned
 from lowalt.scene.waveform import Look
 
 SOURCE = (

@@ -17,17 +17,16 @@ BOLTZMANN = 1.380649e-23
 
 
 def variance(settings: dict, bandwidth_hz: float) -> float:
-    """Return the noise power k T B F of one subcarrier (W); a range cell, the mean of M subcarriers, has 1/M of it."""
+    """Return the noise power k T B F (W) of one subcarrier; a range cell, the mean of M of them, has 1/M of it."""
     return BOLTZMANN * settings["temperature_k"] * bandwidth_hz * 10 ** (settings["noise_figure_db"] / 10)
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) plus circular white Gaussian noise, k T df F a subcarrier.
+    """Return the samples (N, M) plus circular white Gaussian noise of power k T df F per subcarrier.
 
-    A subcarrier is the sum of M samples and a range cell the mean of M subcarriers: both a sample and a cell have 1/M
-    of a subcarrier's noise. A sample of an FMCW sweep takes a subcarrier's place, and the sample rate that of df.
-    Unit-norm receive weights leave one antenna's noise; the link budget's power is the network's `power_w` a
-    subcarrier. Source: Friis 1944 (noise figure).
+    A subcarrier is the sum of M samples, and a range cell is the mean of M subcarriers, so a sample and a cell both
+    have 1/M of the noise of a subcarrier. In an FMCW sweep a sample takes the place of a subcarrier, and the sample
+    rate that of df. The receive weights have unit norm, so the noise is that of one antenna. Source: Friis 1944.
     """
     power = variance(settings, look.network.noise_bandwidth_hz) / look.network.subcarriers
     return samples + white(rng, power, samples.shape)

@@ -1,13 +1,14 @@
 """Timing offset: the receive window starts late or early, and every echo seems nearer or farther.
 
-A window inside the cyclic prefix still holds one whole period, so the slip is exactly a linear phase over subcarriers.
-Past the prefix it would take in the neighbouring symbol, whose data no scene states: such a scene is refused.
+A window that starts within the cyclic prefix holds one whole period, so its offset is exactly a phase that is linear
+over the subcarriers. A scene in which the window can leave the prefix is refused.
 """
 
 import numpy as np
 
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.laws import offsets
+from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 
 SOURCE = (
@@ -27,8 +28,17 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return samples (N, M) of a window that starts late by d: subcarrier m turns by exp(j 2 pi (m - M // 2) df d).
 
-    A late window makes all echoes seem nearer by c d / 2. The oscillator's own phase runs on and is not touched.
-    Source: Speth et al. 1999; one draw a sample and station.
+    A late window makes all echoes appear nearer by c d / 2. The phase of the oscillator does not change.
+    Source: Speth et al. 1999. One draw per sample and station.
     """
-    late_s = settings["fixed_s"] + settings["sigma_s"] * offsets.drawn(rng)
-    return offsets.delayed(samples, -late_s, look)
+    return offsets.delayed(samples, -_late_s(settings, rng), look)
+
+
+def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
+    """Return how early all echoes appear."""
+    return Displacement(delay_s=-_late_s(settings, rng))
+
+
+def _late_s(settings: dict, rng: np.random.Generator) -> float:
+    """How late the window starts (s)."""
+    return settings["fixed_s"] + settings["sigma_s"] * offsets.drawn(rng)

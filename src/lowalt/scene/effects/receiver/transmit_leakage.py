@@ -34,7 +34,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return samples (N, M) plus the sent waveform, `isolation_db` below its power, with a drawn constant phase.
 
-    Every subcarrier leaks with the power that the network gives it. One draw a sample and station.
+    The leakage of a subcarrier is `isolation_db` below its transmit power. One draw per sample and station.
     """
     level = np.sqrt(look.network.power) * 10 ** (-settings["isolation_db"] / 20)
     leaked = level * np.exp(2j * np.pi * (float(rng.random()) - look.baseband_hz * settings["delay_s"]))

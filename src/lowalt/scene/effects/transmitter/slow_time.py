@@ -1,9 +1,9 @@
 """Slow time as real frames have it: symbols in downlink slots only, some missing, none exactly on time.
 
-A station sends sensing symbols in the downlink part of each TDD period. Some of these symbols carry something else, and
-each may be sent up to `jitter_s` later than its nominal instant. `regrid` names how the received symbols become
-the evenly spaced signal that the spectra expect. Late symbols spread lines beyond half the symbol rate, which would
-fold. The land and phase noise keep the nominal instants.
+A station sends sensing symbols in the downlink part of each TDD period. Some of them are missing, and each may be sent
+up to `jitter_s` later than its nominal instant. `regrid` says how the received symbols become the evenly spaced signal
+that the spectra expect. Jitter spreads lines beyond half the symbol rate, which would otherwise fold. The land and
+phase noise keep the nominal instants.
 """
 
 import numpy as np

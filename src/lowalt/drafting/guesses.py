@@ -1,0 +1,349 @@
+"""Guesses on a mesh that the file does not state: its unit, its axes, and what its connected components may be."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial import cKDTree
+
+from lowalt.targets.mesh_files import UNITS_M, Mesh, edges_of
+
+USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
+"""Usual range (m) of the largest extent of a whole target, by category."""
+
+OTHER_SIZES_M = {"Vehicle": ((1.4, 2.7), (1.0, 4.0))}
+"""Usual ranges (m) of the two other extents, the larger first, where they have such ranges."""
+
+UNUSUAL = 20
+"""A target with its own table row may differ from USUAL_M by at most this factor."""
+
+ALIKE = 0.1
+"""Two pieces are alike if their extents differ by at most this share, as the four propellers of a craft do."""
+
+WIDE_ROTOR = 0.5
+"""A rotor wider than this share of the craft is no propeller of a plane but lifts a helicopter."""
+
+FLAT = 0.35
+"""Largest thickness of a propeller divided by its length."""
+
+SMALLEST_ROTOR = 0.15
+"""Least width of a rotor as a share of the craft's largest extent; screws and motor caps are smaller."""
+
+OFF_CENTRE = 0.3
+"""Largest distance between the centroid of a rotor's surface and the centre of its bounding box, as a share of its
+radius. Three blades have 0.25."""
+
+SYMMETRIC = 0.02
+"""A body is symmetric if the mean distance from its mirror image is at most this share of its size."""
+
+ASYMMETRIC = 0.01
+"""A body has only one mirror plane if this distance is at least this share along the other level axis."""
+
+IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
+"""One half of a target ends in a plane. IN_PLANE is the largest distance of its end points from that plane, AT_ZERO
+that of the plane from the origin of the file, both as shares of the size. CUT and OPEN_CUT are the least area that the
+end spans, as a share of the bounding box: CUT for a plane at the origin, OPEN_CUT for an open end anywhere."""
+
+SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
+"""An arm is slender (its spread across is at most SLENDER times that along), points at the middle of the craft (cosine
+at least RADIAL) and reaches near it (its inner end is at most INWARD times as far out as its own middle)."""
+
+IN_LINE = 0.9
+"""Least cosine of the angle between a blade and the line to the other blade of the same rotor."""
+
+LONG = 0.75
+"""Largest ratio of width to length of a blade's bounding box. A blade at 30 degrees to the axes has 0.6, a disc 1."""
+
+TOUCH = 0.1
+"""Two blades may be apart by at most twice this share of the longer one, since the hub lies between them."""
+
+ROUND = 0.12
+"""The two extents of a wheel across its axis differ by at most this share."""
+
+_ROTOR = r"(?:(?<![a-z])|main|tail)(?:rotor(?!craft)|prop(?!ul|ert)|blade|fan(?![a-z])|puller|pusher)"
+TURNING = {
+    "rotor": re.compile(_ROTOR + r"(?!.*(?:guard|duct|mount|shroud))", re.I),
+    "wheel": re.compile(r"wheel|tyre|tire(?!d)", re.I),
+    "wing": re.compile(r"wing", re.I),
+}
+"""Words in the names of joints and links, and of pieces of meshes, that say what a part is."""
+
+TAIL = re.compile(r"(?<![a-z])tail", re.I)
+FIXED = re.compile(r"(?<![a-z])(motor|mount|arm(?![a-z])|leg|skid|land|frame|guard|duct)", re.I)
+"""Words in the names of pieces that do not turn."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """A connected component: `low` and `high` (3,) m along the file's axes, its triangles, whether it is closed, the
+    names of the piece it belongs to, the kind of part that it may be (rotor, wheel, or an empty text), the `middle`
+    (3,) of its surface and its `area` (m2); `along` (3,) the direction in which it is longest, `slender` its spread
+    across by that along."""
+
+    number: int
+    low: np.ndarray
+    high: np.ndarray
+    triangles: int
+    closed: bool
+    piece: str
+    guess: str = ""
+    middle: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    area: float = 1.0
+    along: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    slender: float = 1.0
+
+    @property
+    def extent(self) -> np.ndarray:
+        """Size (3,) in m along the file's axes."""
+        return self.high - self.low
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle (3,) in m of the extents."""
+        return (self.low + self.high) / 2
+
+
+class Group(tuple[Component, ...]):
+    """Components that may be one moving part, such as the blades of a rotor; sizes as those of a component."""
+
+    low = property(lambda self: np.min([part.low for part in self], axis=0))
+    high = property(lambda self: np.max([part.high for part in self], axis=0))
+    extent = property(lambda self: self.high - self.low)
+    centre = property(lambda self: (self.low + self.high) / 2)
+    triangles = property(lambda self: sum(part.triangles for part in self))
+    area = property(lambda self: sum(part.area for part in self))
+    middle = property(lambda self: sum(part.area * part.middle for part in self) / self.area)
+
+
+def guessed_unit(extents: np.ndarray, category: str, wanted_m: float | None = None) -> str:
+    """Return the unit of UNITS_M in which the extents (3,) of a file fit a target best.
+
+    wanted_m: the target's largest extent where it is known. Otherwise the unit is chosen in which the extents exceed
+    the category's usual ranges least (sum of the logarithms of the factors), and of several such units the one whose
+    largest extent is nearest to the geometric mean of USUAL_M.
+    """
+    sizes, usual = np.sort(extents)[::-1], (USUAL_M[category], *OTHER_SIZES_M.get(category, ()))
+    middle = wanted_m or float(np.sqrt(np.prod(USUAL_M[category])))
+
+    def misfit(unit: str) -> tuple[float, float]:
+        """How far the extents lie outside their ranges, and the largest one from the middle."""
+        lengths = sizes * UNITS_M[unit]
+        outside = [max(low / size, size / high, 1.0) for size, (low, high) in zip(lengths, usual, strict=False)]
+        return 0.0 if wanted_m else float(np.log(outside).sum().round(6)), abs(np.log(lengths[0] / middle))
+
+    return min(UNITS_M, key=misfit)
+
+
+def off_mirror(points: np.ndarray) -> np.ndarray:
+    """Mean distance (3,) of a body of points (N, 3) from its mirror image along each axis, in parts of its size."""
+    tree, off = cKDTree(points), []
+    for axis in range(3):
+        mirrored = points.copy()
+        mirrored[:, axis] = points[:, axis].min() + points[:, axis].max() - points[:, axis]
+        off.append(float(np.mean(tree.query(mirrored)[0])))
+    return np.array(off) / max(float(np.ptp(points, axis=0).max()), 1e-300)
+
+
+def mirror_axis(points: np.ndarray) -> int | None:
+    """Return the only axis along which a body of points (N, 3) is its own mirror image: left and right of a bird.
+
+    Return None where there is no such axis or more than one."""
+    off = off_mirror(points)
+    best, second = np.sort(off)[:2]
+    return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
+
+
+def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
+    """Return which of the axes a half of a target is cut along, None where it seems whole.
+
+    points: (N, 3) m on its surface. One half of a target ends flat in one plane, which is open or passes through the
+    origin of the file, and is not its own mirror image along that axis.
+    """
+    edges, _, uses = edges_of(mesh.faces)
+    ends, extent = mesh.vertices[edges], np.ptp(mesh.vertices, axis=0)
+    off, size = off_mirror(points), extent.max()
+    for axis in axes:
+        for limit in (mesh.vertices[:, axis].min(), mesh.vertices[:, axis].max()):
+            there = (np.abs(ends[:, :, axis] - limit) < IN_PLANE * size).all(axis=1)
+            if off[axis] < SYMMETRIC or not there.any():
+                continue
+            span = np.prod(np.delete(np.ptp(ends[there].reshape(-1, 3), axis=0) / extent, axis))
+            if (span > CUT and abs(limit) < AT_ZERO * size) or (span > OPEN_CUT and (uses[there] == 1).all()):
+                return axis
+    return None
+
+
+def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
+    """Return the axes of the file that may point up and to the front, without signs, from the extents (3,) alone.
+
+    A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
+    across. `up` and `right` are the numbers of axes that are known otherwise.
+    """
+    order = [axis for axis in np.argsort(extent, kind="stable") if axis not in (up, right)]
+    order = order if up is None else [up, *order]
+    if right is not None:
+        order = [*order, right]
+        return "xyz"[order[0]], "xyz"[order[1]]
+    front = int(order[2] if category == "Vehicle" else order[1])
+    if category == "UAV" and abs(extent[order[1]] / extent[order[2]] - 1) < ALIKE:
+        front = next(axis for axis in range(3) if axis != order[0])
+    return "xyz"[order[0]], "xyz"[front]
+
+
+def alike(first: Component | Group, second: Component | Group) -> bool:
+    """Return whether two have the same three sizes in any order, to within ALIKE, or as many triangles and as large a
+    surface: propellers at other angles have other boxes."""
+    a, b, areas = np.sort(first.extent), np.sort(second.extent), (first.area, second.area)
+    copies = first.triangles == second.triangles and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
+    return copies or bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
+
+
+def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bool:
+    """Return whether two components turn about one hub: one lies about the middle of the other, as a spinner does, and
+    they are no pair of coaxial rotors. `touching`: whether long blades that touch, not discs, are of one rotor too."""
+    away, radius = np.abs(first.centre - second.centre), max(first.extent.max(), second.extent.max()) / 2
+    same = alike(first, second)
+    if same and away[up] > 2 * max(first.extent[up], second.extent[up]):
+        return False
+    slack = TOUCH * 2 * radius
+    near = bool((np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack).all())
+    long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (first, second))
+    # Two slender blades in one line, nearer than their length, whatever their angle to the axes of the file.
+    between, length = second.centre - first.centre, float(np.linalg.norm(first.extent))
+    in_line = abs(float(between @ first.along)) > IN_LINE * float(np.linalg.norm(between))
+    if same and in_line and max(first.slender, second.slender) < SLENDER and np.linalg.norm(between) < length:
+        return True
+    away[up] = 0
+    return near and (float(np.linalg.norm(away)) <= radius / 2 or (touching and same and long))
+
+
+def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list[Group]:
+    """Return components about one hub as one group each, such as the two blades of a propeller (`_one_hub`)."""
+    groups: list[Group] = []
+    for part in parts:
+        near = [group for group in groups if any(_one_hub(part, other, up, touching) for other in group)]
+        groups = [group for group in groups if group not in near] + [Group((part, *chain.from_iterable(near)))]
+    return groups
+
+
+def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
+    """Return whether a group is flat along one of the axes, wide enough, and lies about one hub."""
+    # By their names a helicopter's main rotor may be as wide as all of it, and its tail rotor small.
+    least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
+    for axis in axes:
+        across = np.delete(group.extent, axis).max()
+        off = np.linalg.norm(np.delete(group.middle - group.centre, axis))
+        flat, wide = group.extent[axis] < FLAT * across, least * whole.max() <= across < most * whole.max()
+        if flat and wide and not off > OFF_CENTRE * across / 2:  # a middle that is not known is no fault
+            return True
+    return False
+
+
+def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
+    """Return the axis of the file about which a rotor or wheel turns: the one along which it is thinnest.
+
+    Two blades may be thinner along their chord, which a helicopter tells: a rotor wider than half the craft, whose
+    corners are `low` and `high` (3,) m, turns about the axis `up`; a tail rotor's axis is level and across the tail.
+    """
+    order, extent = np.argsort(group.extent, kind="stable"), high - low
+    if up in order[:2] and group.extent.max() > WIDE_ROTOR * extent.max():
+        return up
+    if TAIL.search(group[0].piece):
+        away = np.abs(group.centre - (low + high) / 2)
+        across = min((axis for axis in range(3) if axis != up), key=lambda axis: away[axis])
+        return across if across in order[:2] else int(order[0])
+    return int(order[0])
+
+
+def rotors(
+    parts: Sequence[Component], ups: Sequence[int], whole: np.ndarray, count: int | None
+) -> tuple[int, list[Group]]:
+    """Return the axis upwards and the groups of components that may be rotors: `count` of them, or none.
+
+    Pieces that their names call rotors come first, whatever their axes, then sets of alike flat groups that lie about
+    a hub each, of which the set farthest out is taken: motors stand at the ends of arms. `ups` are the axes that may
+    point up, the likeliest first; at least three alike groups are needed where no name tells.
+    """
+    named = [part for part in parts if TURNING["rotor"].search(part.piece)]
+    for groups in _grouped(named, ups[0], count):
+        good = [group for group in groups if _is_rotor(group, range(3), whole)]
+        if good and (count is None or len(good) == count):
+            return ups[0], good
+    several = len({part.piece for part in parts}) > 1
+    able = [part for part in parts if not (several and FIXED.search(part.piece))]
+    for up in ups if count is None or count > 2 else ():  # two alike pieces may be two blades, or skids
+        across = [np.delete(part.extent, up).max() for part in able]
+        flat = [part for part, width in zip(able, across, strict=True)
+                if part.extent[up] < FLAT * width and width > 0.04 * whole.max()]  # fmt: skip
+        sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in _grouped(flat, up, count)]
+        best = _alike_set(sets, up, whole, count)
+        if len(best) > 2:
+            return up, best
+    return ups[0], []
+
+
+def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[list[Group]]:
+    """Return the ways to group components about hubs: those near one another, and where the number is known also
+    `count` groups of as many alike blades each, those whose middles are nearest."""
+    # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
+    ways = [clusters(parts, up, touching=not count)]
+    for index, part in enumerate(parts if count else ()):
+        same = [other for other in parts if alike(part, other)]
+        blades, odd = divmod(len(same), count)
+        if odd or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
+            continue
+        places = np.delete(np.array([other.centre for other in same]), up, axis=1)
+        label = fcluster(linkage(places, "average"), count, "maxclust")
+        groups = [Group(other for other, at in zip(same, label, strict=True) if at == hub) for hub in np.unique(label)]
+        if [len(group) for group in groups] == [blades] * count:
+            ways.append(groups)
+    return ways
+
+
+def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: int | None) -> list[Group]:
+    """The set of alike groups at one height that is farthest out, of `count` groups or of several, without arms."""
+    best: tuple[float, list[Group]] = (0.0, [])
+    for groups in choices:
+        for group in groups:
+            same = [other for other in groups if alike(group, other)]
+            level = [other for other in same if abs(other.centre[up] - group.centre[up]) < 0.1 * whole.max()]
+            for able in (level, same) if count else (level,):
+                away = np.delete(np.array([member.centre for member in able]), up, axis=1)
+                reach = np.linalg.norm(away - away.mean(axis=0), axis=1)
+                enough = len(able) == count if count else len(able) >= 2
+                if enough and reach.mean() > best[0] and not _are_arms(able, up):
+                    best = float(reach.mean()), able
+    return best[1]
+
+
+def _are_arms(groups: list[Group], up: int) -> bool:
+    """Whether all groups are slender pieces that point at the middle between them and reach near it."""
+    centres, extents = (np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1)
+                        for name in ("centre", "extent"))  # fmt: skip
+    away = centres - centres.mean(axis=0)
+    reach = np.linalg.norm(away, axis=1)
+    along = np.array([np.delete(group[0].along, up) for group in groups])
+    radial = np.abs((along * away).sum(axis=1)) > RADIAL * reach
+    slender = [len(group) == 1 and group[0].slender < SLENDER for group in groups]
+    return bool((radial & slender & (reach - np.linalg.norm(extents, axis=1) / 2 < INWARD * reach)).all())
+
+
+def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
+    """Return the groups of components that may be wheels: those that their names call so, else the largest set of at
+    least two alike round ones."""
+    named = [part for part in parts if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I)]
+    groups = [group for group in clusters(named, int(whole.argmin()), False) if _round(group.extent, whole)]
+    if len(groups) >= 2:
+        return groups
+    able = [Group([part]) for part in parts if _round(part.extent, whole)]
+    best = max(([other for other in able if alike(group, other)] for group in able), key=len, default=[])
+    return best if len(best) >= 2 else []
+
+
+def _round(extent: np.ndarray, whole: np.ndarray) -> bool:
+    """Whether extents (3,) are those of a wheel."""
+    small, *large = np.sort(extent)
+    return bool(large[0] > (1 - ROUND) * large[1] and small < 0.8 * large[0] and 0.08 < large[1] / whole.max() < 0.3)

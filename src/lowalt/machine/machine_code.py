@@ -1,0 +1,89 @@
+"""Machine code of kernels by numba: compiled for the options of each, and kept by the digest of all that it runs.
+
+Whether products are fused and sums reordered is said for every kernel, and numba's own parts, such as the product of
+complex numbers, are compiled for each set of options by themselves: otherwise the first kernel of a process to call a
+function would decide how that function rounds in all others.
+"""
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
+from numba.core.targetconfig import ConfigStack
+
+from lowalt.machine.jit import digest
+
+
+def _fields(kind) -> tuple:
+    """Return the names of the fields of a named tuple's type, of those inside it, and so on, in their order."""
+    return (getattr(kind, "fields", ()), *map(_fields, getattr(kind, "types", ())))
+
+
+class _PartsByOptions(dict):
+    """numba's own parts of kernels by their names, types, and how freely the kernel that asks for one may round."""
+
+    def _key(self, key):
+        """The key together with the options of the kernel that is being compiled."""
+        stack = ConfigStack()
+        return key, str(stack.top().fastmath) if stack else ""
+
+    def get(self, key, default=None):
+        """Return the part that was compiled for these options, or `default`."""
+        return super().get(self._key(key), default)
+
+    def __getitem__(self, key):
+        return super().__getitem__(self._key(key))
+
+    def __setitem__(self, key, value):
+        super().__setitem__(self._key(key), value)
+
+
+cpu_target.target_context.cached_internal_func = _PartsByOptions()
+
+
+class _DigestCache(FunctionCache):
+    """Numba's cache on disk, with the digest of everything compiled in its keys."""
+
+    options: dict[str, Any] | None = None
+    """How the function is compiled."""
+
+    def _index_key(self, sig, codegen):
+        """Numba's key, the digest of code and options, and the fields of named tuples among the arguments."""
+        return *super()._index_key(sig, codegen), digest(self._py_func, self.options), tuple(map(_fields, sig))
+
+    def load_overload(self, sig, target_context):
+        """Return finished machine code for a signature, or None where none is kept."""
+        # numba's method first loads everything that a compilation may need, scipy.linalg included, which takes a third
+        # of a job's start. Finished machine code needs at most the runtime of counted references; compilation loads
+        # the rest.
+        if self.options["_nrt"]:
+            rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            try:
+                if (kept := self._load_overload(sig, target_context)) is not None:
+                    return kept
+            except (ImportError, AttributeError):
+                # The list of kept code names types of arguments; it is unreadable once one of them has moved.
+                self.flush()
+        say_once()
+        return None
+
+
+@functools.cache
+def say_once() -> None:
+    """Say on the error stream that kernels are being compiled."""
+    print("lowalt: compiling for this machine; the machine code is kept for later calls", file=sys.stderr, flush=True)
+
+
+def dispatcher(function: Callable, options: dict[str, Any]) -> Dispatcher:
+    """Return numba's dispatcher of a function, with the cache of this module. options: those of `njit`."""
+    compiled = njit(**options)(function)
+    compiled._cache = _DigestCache(function)
+    compiled._cache.options = options
+    return compiled

@@ -1,0 +1,100 @@
+"""The contract of effects: the functions that an effect may offer, each with its place, arguments, result and owners.
+
+An effect is a module `effects/PLACE/NAME.py`, or a file of the user's own that a configuration names by its path. It
+defines SOURCE, where its law comes from; DEFAULTS, every parameter with its value; and one or more of the functions
+`OFFERS`. Each takes `settings`, which hold every key of DEFAULTS, and then the arguments that `takes` lists.
+It may also define
+
+- IDLE, a list of settings that change nothing: where all values of an entry are set, the effect is dropped;
+- `check(settings, scene)`, which raises InputError where settings contradict the rest of a `checks.CheckedScene`;
+- STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the same numbers;
+- DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of a link's stations.
+
+N symbols, M subcarriers or range cells, L points of a target; arrays are float64 or complex128.
+"""
+
+from typing import NamedTuple
+
+PLACE_ORDER = ("motion", "transmitter", "channel", "receiver", "detection")
+"""The places where effects act, in the order of the chain."""
+
+ARGUMENTS = {
+    "sent": "(N, M) complex128, data or what earlier amplifiers made of them, of mean power one",
+    "cells": "(N, M) complex128, range cells",
+    "chosen": "(N,) int64, range cells chosen so far",
+    "cloud": "`Cloud` of the target",
+    "clouds": "clouds of all subtypes by name",
+    "network": "`Network`",
+    "on_air": "function of a symbol's name, see `SceneSample.on_air`, that returns its subcarriers (N, M) on the air",
+    "look": "`Look`, what the receiver knows",
+    "offset_cells": "how far still echoes stand beyond their range cells' centres, in cells",
+    "paths": "list of P `ImagePath`, the direct path not among them",
+    "response": "(N, M) complex128, frequency response in sqrt(W) a subcarrier",
+    "rng": "Generator of the effect's own stream (STREAM, DRAWN), from its start",
+    "row": "row of the motion table",
+    "sample": "`SceneSample`",
+    "samples": "(N, M) complex128, time samples",
+    "signal": "(K,) complex128, the signal of the K symbols that were received",
+    "subcarriers": "M",
+    "symbols": "N",
+    "times_s": "(N,) s",
+    "timing": "`Sampling`",
+    "view": "`View` of the target at the station",
+    "wavelength_m": "wavelength of the carrier (m)",
+    "weight": "`SceneSample.weight`, product of the amplitude factors of all effects, of some, or of all but some",
+}
+"""What functions take, with shapes and units."""
+
+
+class Offer(NamedTuple):
+    """A function that an effect may offer.
+
+    place: where effects that offer it act, "" for any place; one: whether a scene has one owner at most, else many act
+    in the order of the chain; takes: names of ARGUMENTS behind `settings`; returns: its result.
+    """
+
+    place: str
+    one: bool
+    takes: tuple[str, ...]
+    returns: str
+
+
+ONE, MANY = True, False
+OFFERS = {
+    "perturb": Offer("motion", MANY, ("cloud", "row", "times_s", "rng"), "`Perturbation` of the motion at these times"),
+    "sampling": Offer("transmitter", ONE, ("network", "rng"), "`Sampling`: when symbols are sent, which are received"),
+    "regridded": Offer("transmitter", ONE, ("signal", "timing", "network"), "(N,) evenly spaced signal"),
+    "data": Offer("transmitter", ONE, ("symbols", "subcarriers", "rng"), "(N, M) data of mean power one"),
+    "aired": Offer("transmitter", MANY, ("sent",), "(N, M) subcarriers on the air"),
+    "range_cells": Offer("transmitter", ONE, ("response",), "(N, cells) of a response whose pilots alone are known"),
+    "beams": Offer("channel", ONE, ("view", "rng"), "`Beams`: where both beams of a station point, and from when on"),
+    "element": Offer("channel", ONE, (), "`Element` of the antennas"),
+    "cross_sections": Offer("channel", MANY, ("cloud", "wavelength_m"), "(L,) m2, mean cross section of each point"),
+    "visible": Offer("channel", MANY, ("view", "rng"), "(N, L) or (N, 1), real factor on two-way amplitudes"),
+    "visible_one_way": Offer(
+        "channel", MANY, ("view", "rng"),
+        "as `visible` for a station; on a link asked for at either end, whose factors count with their roots",
+    ),
+    "paths": Offer("channel", MANY, ("view",), "list of `ImagePath`: waves go out by any path and come back by any"),
+    "routes": Offer(
+        "channel", ONE, ("view", "paths", "weight"),
+        "(P + 1, P + 1, N, L) factors by the way out and the way back, the direct one first",
+    ),
+    "waves": Offer("channel", MANY, (), "keywords of `response.response`, the physics of arrays, each with True"),
+    "companions": Offer(
+        "channel", MANY, ("cloud", "row", "clouds", "rng"), "(cloud, row) of each other target, alike for all stations"
+    ),
+    "instants": Offer("channel", ONE, ("view",), "(Q,) s within a symbol, and their weights (Q, M) in its samples"),
+    "prefix_s": Offer("channel", ONE, ("network",), "length of the cyclic prefix (s)"),
+    "late_samples": Offer("channel", ONE, ("view",), "(N, L) int64, samples of a point that are the previous symbol's"),
+    "convolved": Offer(
+        "channel", ONE, ("network", "response", "on_air", "offset_cells"), "(N, M) time samples of still echoes"
+    ),
+    "scatter": Offer("channel", MANY, ("view", "rng"), "`Still`: the echoes of something other than a target"),
+    "heard": Offer("channel", MANY, ("sample",), "(N, M) time samples of signals that the receiver does not know"),
+    "displaced": Offer("", MANY, ("view", "rng"), "`Displacement` of the target's echo by the effect"),
+    "receive": Offer("receiver", MANY, ("samples", "look", "rng"), "(N, M) time samples after the effect"),
+    "filtered": Offer("detection", MANY, ("cells",), "(N, M) range cells behind a linear filter"),
+    "choose": Offer("detection", MANY, ("chosen", "cells", "look", "rng"), "(N,) chosen range cells"),
+}  # fmt: skip
+"""All functions by name, in the order in which the chain asks for them."""

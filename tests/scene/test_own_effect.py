@@ -1,0 +1,140 @@
+"""A user's own effect acts in its place with its settings, an overlay alone may name it, and edits re-run its jobs."""
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+import lowalt
+from lowalt.config.layers import overlaid
+from lowalt.files.errors import InputError
+from lowalt.scene.chain import SceneSample
+from lowalt.scene.effects import called
+from lowalt.scene.observe import observe
+from lowalt.shards.remake import Remaker
+from lowalt.workflow import options, sources
+from scenes import network, scene, target
+
+HALF = """
+from pathlib import Path
+Path("ran").touch()
+SOURCE = "a test"
+DEFAULTS = {"share": 0.5, "names": [], "on": True, "any": None}
+IDLE = [{"share": 1}]
+def visible(settings, view, rng):
+    return settings["share"] * rng.random() + 0 * view.places[..., 0]
+"""
+
+
+@pytest.fixture
+def half(tmp_path, monkeypatch):
+    """The effect's file in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    Path("half.py").write_text(HALF)
+    return tmp_path
+
+
+def test_it_acts_behind_the_shipped_effects_of_its_place_with_a_stream_of_its_file_s_name(half):
+    named = {"half.py": {"share": "28e-2"}, "adc": {}, "clutter": {}, "fluctuation": {}}
+    found = called(named)
+    assert [effect.name for effect in found] == ["fluctuation", "clutter", "half.py", "adc"]
+    assert found[2].place == "channel" and found[2].settings == {"share": 0.28, "names": [], "on": True, "any": None}
+    assert not called({"half.py": {"share": 1}})
+    shutil.copytree(half, half / "elsewhere", ignore=shutil.ignore_patterns("elsewhere"))
+    cloud, row = target(np.random.default_rng(1))
+    heard = []
+    for effects in ({}, {"half.py": {}}, {"elsewhere/half.py": {}}):
+        asked = scene(effects, network())
+        heard.append(SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived())
+    assert (heard[1] == heard[2]).all()
+    drawn = asked.stream("half.py", row, "A").random()
+    np.testing.assert_allclose(heard[1], 0.5 * drawn * heard[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ({"gone.py": {}}, "no file 'gone.py'"),
+        ({"half.py": {"shares": 1}}, r"half.py: unknown parameter\(s\) \['shares'\], expected some of"),
+        ({"half.py": {"share": "much"}}, "half.py.share: 'much', expected a number as its default 0.5"),
+        ({"half.py": {"share": True}}, "half.py.share: 'True', expected a number"),
+        ({"half.py": {"share": float("nan")}}, "half.py.share: 'nan', expected a finite number"),
+        ({"half.py": {"names": "x"}}, "half.py.names: 'x', expected a list"),
+        ({"half.py": {"on": 1}}, "half.py.on: '1', expected true or false"),
+        ({"half.py": {}, "b/half.py": {}}, "expected files of different names"),
+        ({"halve": {}}, "unknown effect 'halve', expected .*Python file"),
+    ],
+)
+def test_settings_of_other_types_and_unknown_ones_are_refused_in_one_sentence(half, block, said):
+    Path("b").mkdir()
+    Path("b/half.py").write_text(HALF)
+    with pytest.raises(InputError, match=said) as refused:
+        called(block)
+    assert len(str(refused.value)) <= 400
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("DEFAULTS =", "OTHERS =", "DEFAULTS is None, expected every parameter"),
+        ("SOURCE =", "ORIGIN =", "no SOURCE, expected a text"),
+        ("def visible", "def seen", r"offers \[\], expected functions of one place"),
+        ("(settings, view, rng)", "(settings, view)", r"expected visible\(settings, view, rng\)"),
+        ("IDLE", "def receive(settings, samples, look, rng): pass\nIDLE", "expected functions of one place"),
+        ("SOURCE =", "1 / 0\nSOURCE =", "half.py: ZeroDivisionError: division by zero"),
+        ("SOURCE =", "SOURCE ==", "NameError"),
+        ("SOURCE =", "SOURCE = =", "SyntaxError"),
+    ],
+)
+def test_a_file_that_does_not_keep_the_contract_is_refused_in_one_sentence(half, old, new, said):
+    Path("half.py").write_text(HALF.replace(old, new))
+    with pytest.raises(InputError, match=said) as refused:
+        called({"half.py": {}})
+    assert len(str(refused.value)) <= 400
+
+
+def test_an_edited_file_is_loaded_again_and_leaves_no_byte_code_beside_it(half):
+    for share in (0.5, 0.7):
+        Path("half.py").write_text(HALF.replace("0.5", str(share)))
+        assert called({"half.py": {}})[0].settings["share"] == share
+    assert sorted(path.name for path in half.iterdir()) == ["half.py", "ran"]
+
+
+def test_an_overlay_names_it_and_no_folder_of_a_run_or_data_set_runs_it(half):
+    Path("half.py").write_text(HALF + "# Run once for each of its contents.\n")
+    Path("mine.yaml").write_text("targets: {select: [Owl]}\neffects: {half.py: {share: 0.5}}\n")
+    Path("without.yaml").write_text("effects: {half.py: null}\n")
+    config = overlaid(["config/tiny.yaml", "mine.yaml"])
+    assert config["effects"] == {"half.py": {"share": 0.5}}
+    assert overlaid(["config/tiny.yaml", "mine.yaml", "without.yaml"])["effects"] == {}
+    assert not Path("ran").exists()
+    data = lowalt.Dataset(config)
+    row = data.row(data.place(0))
+    plain = lowalt.Dataset({**config, "effects": {}}, data.clouds)
+    heard, whole = (each.maker.received(row)[0] for each in (data, plain))
+    assert 0 < abs(heard).max() < 0.5 * abs(whole).max()
+    Path("ran").unlink()
+    Path("half.py").write_text(HALF + "# Of a stranger.\n")
+    Path("config.yaml").write_text(yaml.safe_dump(config))
+    said = "its effect 'half.py' is code, which a file may not choose; expected an overlay of your own"
+    with pytest.raises(InputError, match=f"config.yaml: {said}"):
+        lowalt.Dataset("config.yaml")
+    held = SimpleNamespace(index={"echo": {"tolerance": None, "effects": config["effects"]}}, index_path="index.json")
+    with pytest.raises(InputError, match=f"index.json: {said}"):
+        Remaker(held, {})
+    assert not Path("ran").exists()
+
+
+def test_its_file_is_an_input_of_the_jobs_that_use_it_alone(half):
+    Path("half.py").write_text(HALF + "\nfrom lowalt.measure import fifty_digits\n")
+    config = {"effects": {"half.py": {}, "canceller": {}}, "shards": {"kind": "cube"}, "spectra": {"vt": {}}}
+    echo = sources.code("lowalt.scene", *map(options.dotted, config["effects"]))
+    assert "half.py" in echo and any(name.endswith("measure/fifty_digits.py") for name in echo)
+    assert "half.py" in sources.code("lowalt.shards", *options.shard_modules(config))
+    for modules in (options.noise_modules(config), options.tile_modules(config)):
+        assert "half.py" not in sources.code("lowalt.tiles", *modules)
+    cells = config | {"spectra": {"range_doppler": {}}}
+    assert "half.py" in sources.code("lowalt.tiles", *options.tile_modules(cells))
