@@ -16,7 +16,7 @@ from lowalt.config.splits import fold
 from lowalt.echo.chunk import clean_signals
 from lowalt.files.atomic import replacing
 from lowalt.machine.hardware import describe
-from lowalt.noise.noisy_signals import noisy_signals
+from lowalt.noise.awgn import noisy_signals
 from lowalt.recognition import predictions, runs, samples
 from lowalt.recognition.protocols import evaluated_folds, folds
 from lowalt.recognition.samples import Facts, ViewSamples
