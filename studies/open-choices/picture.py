@@ -52,7 +52,7 @@ def main(arguments: list[str]) -> None:
                     axis.set_title(f"{name}\n{kind}" if column == 0 else kind, fontsize=7, loc="left")
                 if place == column == 0:
                     axis.set_ylabel(target, fontsize=7)
-    figure.savefig(given.out, dpi=110)
+    figure.savefig(given.out, dpi=75)
 
 
 if __name__ == "__main__":

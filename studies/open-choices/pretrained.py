@@ -1,4 +1,4 @@
-"""What ImageNet's weights bring: `python studies/open-choices/pretrained.py [--size 64]`.
+"""What ImageNet's weights bring: `python studies/open-choices/pretrained.py [--weights FILE.pth]`.
 
 EfficientNet-Lite0 as a frozen backbone, with ImageNet's weights and with random ones, and a linear classifier on the
 features of all images, on samples as those of the row `base` of `choices.yaml`. Both protocols share one extraction.
@@ -69,9 +69,8 @@ def imagenet_weights() -> dict[str, torch.Tensor]:
     return dict(zip(ours, theirs.values(), strict=True))
 
 
-def weights_file() -> Path:
-    """Return the path of a .pth file that `recognition.network.weights` takes, written where there is none."""
-    path = OUT / f"{BACKBONE}.pth"
+def write_weights(path: Path) -> Path:
+    """Write a .pth file that `recognition.network.weights` takes, unless it is there; return its path."""
     if not path.is_file():
         with replacing(path) as temporary:
             torch.save(imagenet_weights(), temporary)
@@ -133,7 +132,10 @@ def rows_of(run: Run, base: dict) -> list[list]:
     """Return a row for each number of stations, protocol and kind of weights of a run."""
     every, name, config = samples_of(run, base)
     right: dict[tuple[str, str, str], list[np.ndarray]] = {}
-    kinds = [("ImageNet", str(weights_file()), 0), *(("random", "none", seed) for seed in run.random)]
+    kinds = [
+        ("ImageNet", str(write_weights(OUT / f"{BACKBONE}.pth")), 0),
+        *(("random", "none", seed) for seed in run.random),
+    ]
     for words, weights, seed in kinds:
         kept = OUT / f"features/{name}-{words}-{seed}.npy"
         if not kept.is_file():
@@ -162,7 +164,11 @@ def main(arguments: list[str]) -> None:
     """Extract features, train the classifiers and write the table after each run."""
     line = argparse.ArgumentParser("pretrained.py", description=__doc__.splitlines()[0])
     line.add_argument("--out", type=Path, default=HERE / "results/pretrained.csv", help="table to write (.csv)")
+    line.add_argument("--weights", type=Path, help="write ImageNet's weights into this file (.pth), and nothing else")
     given = line.parse_args(arguments)
+    if given.weights:
+        print(f"{write_weights(given.weights)}: weights of {BACKBONE}")
+        return
     base, rows = load_yaml(HERE / "choices.yaml")["base"], []
     for one in RUNS:
         rows += rows_of(one, base)
