@@ -167,6 +167,14 @@ def made_rotors(kept):
     return dict(zip(module.COLUMNS, row, strict=True))
 
 
+def gain(kept):
+    module = program("benchmarks/sampling_gain.py")
+    tone_hz, names = float(kept["tone_hz"]), [name for name in kept if name.startswith("gain_") and kept[name]]
+    rates_hz = (float(name.split("_")[1]) for name in names)
+    found = (module.gain(kept["sampling"], kept["channel"], rate_hz, tone_hz) for rate_hz in rates_hz)
+    return dict(zip(names, (f"{value:z.2f}" for value in found), strict=True))
+
+
 REMADE = {
     "results/reference/scene_cells.csv": cells, "results/reference/scale.csv": scale,
     "results/reference/observed_truth.csv": truth,
@@ -174,7 +182,9 @@ REMADE = {
     "results/benchmarks/planted_faults.csv": fault, "results/benchmarks/rounding.csv": rounding,
     "results/benchmarks/scene_levels.csv": scene_level, "results/benchmarks/target_levels.csv": target_level,
     "results/benchmarks/training_memory.csv": memory, "studies/detection/results/detection.csv": looks,
-    "studies/detection/results/neighbours.csv": neighbours, "studies/rotors/results/made.csv": made_rotors,
+    "results/benchmarks/sampling_gain.csv": gain,
+    "studies/detection/results/neighbours.csv": neighbours,
+    "studies/rotors/results/made.csv": made_rotors,
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import freeze, order, protocols, samples, schemes
+from lowalt.recognition import batches, freeze, protocols, samples, schemes
 from lowalt.spectra import NAMES
 from made_predictions import SNRS, SUBTYPES, facts
 
@@ -161,24 +161,24 @@ def test_damaged_or_foreign_views_are_refused_by_name(tmp_path):
 @given(st.integers(0, 3), st.integers(0, 50))
 def test_an_epoch_visits_each_motion_model_as_often_as_asked(snrs, epoch):
     found = facts(models=7)
-    drawn = order.epoch_order(found, 5, ("seen", "A"), epoch, snrs)
+    drawn = batches.epoch_order(found, 5, ("seen", "A"), epoch, snrs)
     motion = np.char.add(found.subtype, found.model.astype(str))
     assert len(set(drawn.tolist())) == len(drawn)
     _, counts = np.unique(motion[drawn], return_counts=True)
     assert len(counts) == 7 * len(SUBTYPES)
     assert (counts == (snrs or len(SNRS))).all()
-    assert (drawn == order.epoch_order(found, 5, ("seen", "A"), epoch, snrs)).all()
-    assert (drawn != order.epoch_order(found, 5, ("seen", "A"), epoch + 1, snrs)).any()
+    assert (drawn == batches.epoch_order(found, 5, ("seen", "A"), epoch, snrs)).all()
+    assert (drawn != batches.epoch_order(found, 5, ("seen", "A"), epoch + 1, snrs)).any()
     # Full batches, in the epoch's order; fewer samples than a batch are one.
-    parts = order.batches(drawn, 5)
+    parts = batches.batches(drawn, 5)
     assert {len(part) for part in parts} == {5} and len(parts) == len(drawn) // 5
     assert np.concatenate(parts).tolist() == drawn[: 5 * len(parts)].tolist()
-    assert [part.tolist() for part in order.batches(drawn[:3], 5)] == [drawn[:3].tolist()]
+    assert [part.tolist() for part in batches.batches(drawn[:3], 5)] == [drawn[:3].tolist()]
 
 
 def test_every_snr_is_drawn_evenly_over_epochs():
     found = facts()
-    drawn = np.concatenate([order.epoch_order(found, 5, (), epoch, 1) for epoch in range(60)])
+    drawn = np.concatenate([batches.epoch_order(found, 5, (), epoch, 1) for epoch in range(60)])
     _, counts = np.unique(found.snr_db[drawn], return_counts=True)
     share = counts / counts.sum()
     assert np.abs(share - 1 / 3).max() < 4 * np.sqrt(2 / 9 / counts.sum())
@@ -205,7 +205,7 @@ def test_frozen_inputs_are_held_to_their_checksums(tmp_path):
 
 
 def test_commands_for_data_do_not_import_torch():
-    names = ("__main__", "sample_sources", "evaluated", "tables", "freeze", "score", "augment", "order")
+    names = ("__main__", "sample_sources", "evaluated", "tables", "freeze", "score", "augment")
     lines = "; ".join(f"import lowalt.recognition.{name}" for name in names)
     code = f"{lines}; import sys; assert not any(name.split('.')[0] in ('torch', 'timm') for name in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -44,7 +44,8 @@ def run(options: argparse.Namespace) -> Answer:
     record = _record(options.input) if options.input.suffix == ".yaml" else None
     config = overlaid(options.overlay) if options.overlay else {}
     # What can be refused without torch has been refused: it takes seconds to import.
-    print("lowalt predict: loading the network", file=sys.stderr, flush=True)
+    if sys.stderr.isatty():
+        print("lowalt predict: loading the network", file=sys.stderr, flush=True)
     from lowalt.recognition.predict_sample import predict
     from lowalt.recognition.zoo import opened
 

@@ -201,7 +201,7 @@ def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
 
 def longest_edge(corners: np.ndarray) -> np.ndarray:
     """Return the longest edge (F,) of triangles (F, 3, 3)."""
-    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    return portable.norm(corners - np.roll(corners, 1, axis=1)).max(axis=1)
 
 
 def quartered(corners: np.ndarray) -> np.ndarray:
