@@ -7,18 +7,20 @@ from lowalt.report.figures.tiles import example_tiles
 from lowalt.report.pivots import by_scheme, macro_f1
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections.accuracy import COLUMNS
+from lowalt.spectra.catalogue import named
 
 TILES = 4
 """Most tiles at the top of the page."""
 
 
-def verdict(here: float, paper: float | None, classes: int, seeds: int) -> str:
-    """Return in a sentence whether an average accuracy (percent) is good; paper: the published one, or None."""
-    words = f"chance is {100 / classes:.0f} %"
+def verdict(paper: float | None, classes: int, seeds: int) -> str:
+    """Return sentences that help to judge an average accuracy (percent); paper: the published one, or None."""
+    words = [f"Chance level is {100 / classes:.0f} %."]
     if paper is not None:
-        words += f"; the paper prints {paper:.1f} % of its own data, which nobody else has"
-        words += ", so the two may be compared in kind alone" if abs(here - paper) < 2 else ""
-    return words + ("; one training seed: another moves this by about a point" if seeds < 3 else "")
+        words.append(f"The paper reports {paper:.1f} %; its data are not public, so the figures are not comparable.")
+    if seeds < 3:
+        words.append("One training seed; another seed changes this by about one point.")
+    return " ".join(words)
 
 
 def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]], classes: int) -> list[dict]:
@@ -31,7 +33,7 @@ def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]], clas
         seeds = max(int(row["seeds"]) for row in rows)
         entries.append({
             "protocol": protocol, "scheme": scheme, "percent": here, "paper": there,
-            "interval": intervals.get(protocol, {}).get(scheme, ""), "words": verdict(here, there, classes, seeds),
+            "interval": intervals.get(protocol, {}).get(scheme, ""), "words": verdict(there, classes, seeds),
         })  # fmt: skip
     return entries
 
@@ -41,9 +43,11 @@ def values(run: ReportedRun) -> dict:
     published = read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     tiles = [(caption, embedded(data)) for caption, data in example_tiles(run.shards)[:TILES]]
+    spectra = named(run.config["spectra"])
     return {
         "seed": run.config["seed"], "stations": len(run.stations), "snrs": len(run.snr_labels),
         "models": len(run.shards) // len(run.snr_labels), "subtypes": len(run.inputs.paths("clouds")),
         "samples": len(run.shards), "kind": run.shards.kind, "sample_bytes": run.sample_bytes,
-        "hardware": describe(), "accuracies": accuracies(measured, published, len(run.shards.classes)), "tiles": tiles,
+        "hardware": describe(), "station_names": run.stations,
+        "spectra": [name.upper() for name in spectra], "accuracies": accuracies(measured, published, len(run.shards.classes)), "tiles": tiles,
     }  # fmt: skip
