@@ -20,6 +20,7 @@ from lowalt.echo import Rigid, echo_signal
 from lowalt.files.atomic import slug
 from lowalt.motion import poses, read_table
 from lowalt.targets.cloud import read
+from lowalt.workflow.closing import averages
 from snakemake_runs import run
 from snakemake_texts import MODULE, RULES, SPY, declared
 
@@ -101,6 +102,16 @@ def test_no_job_asks_for_the_network(finished):
                     "r.urlopen('http://localhost:9')"):  # fmt: skip
         asked = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
         assert asked.returncode and "a job asked for the network" in asked.stderr
+
+
+@pytest.mark.slow
+def test_the_first_run_of_a_new_user_recognises_far_more_than_chance(tmp_path):
+    """Four classes: chance is 25 %, and the sampling error of 16 test samples of the seen protocol is some 11 points."""
+    folder = workplace(tmp_path)
+    shutil.copy(folder / "config/tiny.yaml", folder / "overlay.yaml")
+    snakemake(folder)
+    found = averages(folder / "results/tiny/accuracy.csv")
+    assert {protocol for _, protocol in found} == {"seen", "unseen"} and min(found.values()) > 60.0
 
 
 @pytest.mark.slow

@@ -49,5 +49,6 @@ def values(run: ReportedRun) -> dict:
         "models": len(run.shards) // len(run.snr_labels), "subtypes": len(run.inputs.paths("clouds")),
         "samples": len(run.shards), "kind": run.shards.kind, "sample_bytes": run.sample_bytes,
         "hardware": describe(), "station_names": run.stations,
-        "spectra": [name.upper() for name in spectra], "accuracies": accuracies(measured, published, len(run.shards.classes)), "tiles": tiles,
+        "spectra": [name.upper() for name in spectra],
+        "accuracies": accuracies(measured, published, len(run.shards.classes)), "tiles": tiles,
     }  # fmt: skip
