@@ -106,7 +106,7 @@ def test_no_job_asks_for_the_network(finished):
 
 @pytest.mark.slow
 def test_the_first_run_of_a_new_user_recognises_far_more_than_chance(tmp_path):
-    """Four classes: chance is 25 %, and the sampling error of 16 test samples of the seen protocol is some 11 points."""
+    """Four classes: chance is 25 %, and the sampling error of the 16 test samples of `seen` is some 11 points."""
     folder = workplace(tmp_path)
     shutil.copy(folder / "config/tiny.yaml", folder / "overlay.yaml")
     snakemake(folder)
