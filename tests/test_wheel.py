@@ -80,4 +80,6 @@ def test_a_file_of_the_working_directory_comes_before_the_package_s(tmp_path, mo
     (tmp_path / "config/targets.csv").write_text("own")
     assert shipped("config/targets.csv") == Path("config/targets.csv")
     assert located({"targets": {"table": "config/targets.csv"}})["targets"]["table"] == "config/targets.csv"
+    for name in ("9" * 5000, "a\0b"):
+        assert located({"targets": {"table": name}})["targets"]["table"] == name
     assert shipped("config/none.yaml") == Path("config/none.yaml")

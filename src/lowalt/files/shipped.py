@@ -20,10 +20,18 @@ KEYS = (
 """Block and key of every file, or list or mapping of files, that a configuration names and the package brings."""
 
 
+def _exists(path: str | Path) -> bool:
+    """Whether a file or folder is there; a name that no file can have is nowhere."""
+    try:
+        return Path(path).exists()
+    except (OSError, ValueError):
+        return False
+
+
 def shipped(name: str | Path) -> Path:
     """Return `name` where the working directory has it, else the package's file of this name, if there is one."""
     path = SHIPPED / name
-    return path if path.exists() and not Path(name).exists() else Path(name)
+    return path if _exists(path) and not _exists(name) else Path(name)
 
 
 def located(config: dict, folder: Path = SHIPPED) -> dict:
@@ -34,7 +42,7 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
 
     def packaged(name: str) -> str:
         """The path in `folder` of a file that only it has, else the name."""
-        return str(folder / name) if not Path(name).exists() and (folder / name).exists() else name
+        return str(folder / name) if not _exists(name) and _exists(folder / name) else name
 
     return _renamed(config, packaged)
 

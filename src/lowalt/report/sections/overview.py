@@ -43,12 +43,11 @@ def values(run: ReportedRun) -> dict:
     published = read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     tiles = [(caption, embedded(data)) for caption, data in example_tiles(run.shards)[:TILES]]
-    spectra = named(run.config["spectra"])
     return {
         "seed": run.config["seed"], "stations": len(run.stations), "snrs": len(run.snr_labels),
         "models": len(run.shards) // len(run.snr_labels), "subtypes": len(run.inputs.paths("clouds")),
         "samples": len(run.shards), "kind": run.shards.kind, "sample_bytes": run.sample_bytes,
         "hardware": describe(), "station_names": run.stations,
-        "spectra": [name.upper() for name in spectra],
+        "spectra": [name.upper() for name in named(run.config["spectra"])],
         "accuracies": accuracies(measured, published, len(run.shards.classes)), "tiles": tiles,
     }  # fmt: skip
