@@ -1,4 +1,4 @@
-"""All range cells of one sample: the echo engine beside one non-uniform FFT (FINUFFT) a symbol, in the same run.
+"""All range cells of one sample: the echo engine compared with one non-uniform FFT (FINUFFT) per symbol, in one run.
 
     python benchmarks/all_cells.py [--points 300] [--out all_cells.csv]
 

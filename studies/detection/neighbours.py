@@ -1,4 +1,4 @@
-"""Whether a weaker target beside a stronger one of the same speed is detected: neighbours.csv and neighbours.png.
+"""Whether a weaker target near a stronger one of the same speed is detected: neighbours.csv and neighbours.png.
 
     python studies/detection/neighbours.py --out studies/detection/results
 

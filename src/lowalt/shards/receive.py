@@ -112,7 +112,7 @@ def receive(
 
 
 def alone(configuration: dict | str | Path | Iterable[str | Path | dict], subtype: str) -> Dataset:
-    """Return the data set of one subtype, with those that the scene puts beside it, and without any other target.
+    """Return the data set of one subtype and its companions in the scene, without any other target.
 
     Raises: InputError naming the key, value or file that is wrong.
     """
