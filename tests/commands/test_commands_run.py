@@ -6,8 +6,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import yaml
 
+from lowalt.__main__ import main as lowalt_command
 from lowalt.commands import explain, target, workflow
+from lowalt.config.layers import overlaid
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 
@@ -70,3 +73,16 @@ def test_a_sample_to_explain_is_a_subtype_and_a_number_and_a_unit_a_name_or_metr
     for wrong in ("yard", "0", "-1", "1000001", "nan"):
         with pytest.raises(argparse.ArgumentTypeError, match="or metres"):
             target._unit(wrong)
+
+
+def test_the_page_of_a_run_is_refused_where_its_folder_names_code(tmp_path, monkeypatch, capsys):
+    config = overlaid([])
+    config["recognition"]["network"]["backbone"] = "evil.py:f"
+    folder = tmp_path / "results/copied"
+    folder.mkdir(parents=True)
+    (folder / "config.yaml").write_text(yaml.safe_dump(config | {"run": "copied"}))
+    monkeypatch.chdir(tmp_path)
+    started = []
+    monkeypatch.setattr(workflow, "ended", lambda options: started.append(options) or {"status": 0})
+    assert lowalt_command(["report", "results/copied"]) == 2
+    assert "evil.py:f" in capsys.readouterr().err and not started
