@@ -101,14 +101,20 @@
   function places() {
     const links = new Map([...document.querySelectorAll("nav a")].map((link) => [link.getAttribute("href").slice(1), link]));
     const seen = new Set();
+    const mark = (place) => {
+      for (const [name, link] of links) {
+        if (name === place) link.setAttribute("aria-current", "true");
+        else link.removeAttribute("aria-current");
+      }
+    };
     const watch = new IntersectionObserver((entries) => {
       for (const entry of entries) seen[entry.isIntersecting ? "add" : "delete"](entry.target.id);
       const first = [...links.keys()].find((name) => seen.has(name));
-      if (!first) return;
-      for (const link of links.values()) link.removeAttribute("aria-current");
-      links.get(first).setAttribute("aria-current", "true");
+      if (first) mark(first);
     }, { rootMargin: "-80px 0px -60% 0px" });
     for (const name of links.keys()) watch.observe(document.getElementById(name));
+    // The observer reports with the first frame, which a busy machine draws late.
+    mark(links.keys().next().value);
   }
 
   document.querySelectorAll("main table:not(.plain)").forEach(equip);
