@@ -82,10 +82,9 @@ def _train(arguments: list[str]) -> None:
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
     options = line.parse_args(arguments)
-    source = _source(options)
     scheme, settings = with_scheme(options.settings)
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
-    samples = source.for_training(scheme, options.protocol, settings["size"])
+    samples = _source(options).for_training(scheme, options.protocol, settings["size"])
     train(samples, scheme, options.protocol, settings, Path(options.out), options.tensorboard)
 
 

@@ -120,10 +120,7 @@ def _number(value: float) -> str:
 def write(
     path: str | Path, table: Predictions, classes: tuple[str, ...] = CATEGORIES, protocol: str | None = None
 ) -> None:
-    """Write a prediction file; equal predictions give equal bytes.
-
-    protocol: where it is one of the two, the column `part` says the part of each sample.
-    """
+    """Write a prediction file, with the column `part` for one of the protocols; equal predictions give equal bytes."""
     parts = {pair: part for part, pairs in FOLDS.get(protocol or "", {}).items() for pair in pairs}
     part_column = ("part",) if parts else ()
     rows = (

@@ -133,9 +133,8 @@ class Settings:
         """Settings of a training with its scheme, and its training seed or, if the job has none, the run's seed."""
         block, scheme = self._config["recognition"], self._run.schemes_by_slug[wildcards.scheme].record
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
-        seed = int(wildcards.get("train_seed", self._config["seed"]))
-        colours, classes = self._config["images"]["colour_map"], self._run.classes
-        return _text(scheme=scheme, seed=seed, colour_map=colours, classes=classes, **kept)
+        kept |= {"scheme": scheme, "colour_map": self._config["images"]["colour_map"], "classes": self._run.classes}
+        return _text(seed=int(wildcards.get("train_seed", self._config["seed"])), **kept)
 
     def evaluation(self, wildcards: Any) -> str:
         """Settings with which a network predicts."""

@@ -28,9 +28,9 @@ def _rows(rows: list[dict[str, str]]) -> list[dict]:
     for row in sorted((row for row in rows if row["kind"] == "trained"), key=seconds):
         low, high = float(row["low"]), float(row["high"])
         data.append({
-            "scheme": row["scheme"], "name": row["preset"] or row["scheme"], "core_s": seconds(row), "accuracy_percent": float(row["unseen_percent"]),
-            "low": first + low, "high": min(first + high, 100.0), "front": row["front"],
-            "same": low <= 0 <= high, "first": row is base,
+            "scheme": row["scheme"], "name": row["preset"] or row["scheme"], "core_s": seconds(row),
+            "accuracy_percent": float(row["unseen_percent"]), "low": first + low, "high": min(first + high, 100.0),
+            "front": row["front"], "same": low <= 0 <= high, "first": row is base,
         })  # fmt: skip
     return data
 
