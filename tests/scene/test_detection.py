@@ -93,7 +93,7 @@ def test_the_clutter_filter_spares_targets_beyond_its_notch_which_grows_with_win
 def test_noise_behind_a_canceller_is_that_of_its_cell():
     noise = normals(4, 200)
     for changes in KINDS:
-        found = set_noise.behind_canceller(noise, changes)
+        found = set_noise.behind(noise, {"canceller": changes})
         np.testing.assert_array_equal(found, filtered(changes, noise[:, None])[:, 0])
     assert set_noise.in_all_cells({"cell_noise": None}) and not set_noise.in_all_cells({"cell_noise": {"snr_db": 3.0}})
 

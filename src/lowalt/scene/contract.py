@@ -7,6 +7,9 @@ It may also define
 
 - IDLE, a list of settings that change nothing: where all values of an entry are set, the effect is dropped;
 - `check(settings, scene)`, which raises InputError where settings contradict the rest of a `checks.CheckedScene`;
+- UNMODELLED, what the effect is not modelled with: "links" between two stations, the waveforms "fmcw" and "cw";
+- STILL, whether it adds echoes that stand still, which a canceller removes;
+- SET_SNR, the setting that holds an SNR of noise.snr_db: where it is null, the echo stage makes a signal for each SNR;
 - STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the same numbers;
 - DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of a link's stations.
 
@@ -93,6 +96,11 @@ OFFERS = {
     "scatter": Offer("channel", MANY, ("view", "rng"), "`Still`: the echoes of something other than a target"),
     "heard": Offer("channel", MANY, ("sample",), "(N, M) time samples of signals that the receiver does not know"),
     "displaced": Offer("", MANY, ("view", "rng"), "`Displacement` of the target's echo by the effect"),
+    "noise_w": Offer("receiver", ONE, ("network",), "mean power (W) of the receiver's noise in a subcarrier"),
+    "levels": Offer(
+        "", MANY, ("view",),
+        'list of lines of the link budget, (name, value, unit): a power in "W", or a ratio of powers, unit "1"',
+    ),
     "receive": Offer("receiver", MANY, ("samples", "look", "rng"), "(N, M) time samples after the effect"),
     "filtered": Offer("detection", MANY, ("cells",), "(N, M) range cells behind a linear filter"),
     "choose": Offer("detection", MANY, ("chosen", "cells", "look", "rng"), "(N,) chosen range cells"),

@@ -13,7 +13,7 @@ from lowalt.echo.chunk import clean_signals
 from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.lateness import lateness
-from lowalt.scene.set_noise import behind_canceller, in_all_cells
+from lowalt.scene.set_noise import behind, filters, in_all_cells
 from lowalt.shards.sample_record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.spectra import Spectra
@@ -138,13 +138,13 @@ class Maker:
 
     def _noisy(self, row: dict, snr_db: float, stations: Sequence[int]) -> np.ndarray:
         """The noisy signals of one sample at some stations."""
-        effects, behind = self.echo["effects"], None
+        effects = self.echo["effects"]
         if in_all_cells(effects):
             return self.received(row, snr_db, stations)[0]
-        if "canceller" in effects:
-            behind = functools.partial(behind_canceller, canceller=effects["canceller"] or {})
+        passed = filters(effects)
+        filtered = functools.partial(behind, filters=passed) if passed else None
         clean, powers = self.received(row, None, stations)
-        return noisy_signals(clean[:, None], [row], self._names(stations), [snr_db], self.seed, powers, behind)[0, 0]
+        return noisy_signals(clean[:, None], [row], self._names(stations), [snr_db], self.seed, powers, filtered)[0, 0]
 
     def late(self, row: dict) -> np.ndarray | None:
         """Return the delays of a motion model's symbols, (stations, symbols); None if images do not use them."""

@@ -24,6 +24,7 @@ SOURCE = (
     "Residual ISI cancellation for OFDM with applications to HDTV broadcasting, IEEE J. Sel. Areas Commun. 16(8), 1998"
 )
 DEFAULTS = {"prefix_s": None}
+UNMODELLED = ("fmcw", "cw")
 
 
 def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.ndarray | float:
@@ -34,6 +35,13 @@ def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.n
 def prefix_s(settings: dict, network: Network) -> float:
     """Return the prefix's length (s)."""
     return prefix_length_s(settings["prefix_s"], network)
+
+
+def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
+    """Return what the echo of the target's middle keeps of its power."""
+    delay_s = float(view.ways_m(view.origin_m)) / SPEED_OF_LIGHT
+    kept = 1 - float(lost(delay_s, prefix_s(settings, view.network), view.network))
+    return [("loss beyond the cyclic prefix", kept**2, "1")]
 
 
 def late_samples(settings: dict, view: View) -> np.ndarray:
