@@ -8,7 +8,7 @@ from lowalt.machine.jit import INNER_VECTOR, VECTOR, kernel
 from lowalt.scene.phasor import phasor
 
 CHUNK = 128
-"""Points whose polynomials are held together, so that they stay in the nearest cache."""
+"""Points per chunk, so few that their polynomials fit into the first-level cache."""
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 
 
@@ -46,7 +46,8 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
     """
     for i in range(np.uint64(len(gain))):
         turns = 0.25 * (kappa * cosine[i] - beam * aim)
-        # Off the nearest grating lobe both sines keep all their digits; in an even row every second lobe is negative.
+        # Both sines keep all their digits if the angle counts from the nearest grating lobe. In an even row every
+        # second lobe is negative.
         lobe = np.rint(2.0 * turns)
         sign = 1.0 - 2.0 * ((count - 1) % 2) * abs(lobe - 2.0 * np.rint(0.5 * lobe))
         off = turns - 0.5 * lobe
@@ -123,7 +124,7 @@ def _add_moments(factors, strength, excess, reach, table, parts, result):
             for i in range(np.uint64(count)):
                 a, b, c, d = out_re[first + i], out_im[first + i], back_re[first + i], back_im[first + i]
                 real[i], imag[i] = strength[first + i] * (a * c - b * d), strength[first + i] * (a * d + b * c)
-            # Two orders share a pass over the points; a last one without a partner passes with itself.
+            # Two orders share a pass over the points; an odd last order is paired with itself.
             for p in range(0, orders, 2):
                 even, odd = table[p], table[min(p + 1, orders - 1)]
                 a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -143,9 +144,9 @@ def _add_moments(factors, strength, excess, reach, table, parts, result):
 def moments(out, back, same, strength, reach, result):
     """Fill result (A, B, N, Q, 2, P) with the moments of every way out by path a and back by path b.
 
-    out, back: `End`; same: whether both are one array, so that a, b holds b, a too and only b >= a is filled; strength:
-    (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges. Returns the number of the
-    first symbol with a point in a station plus one, 0 for none.
+    out, back: `End`; same: whether both are the same array; then a, b also stands for b, a, and only b >= a is filled;
+    strength: (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges. Returns 1 plus the
+    number of the first symbol with a point in a station, 0 for none.
     """
     ways_out, ways_back, symbols, nodes, _, orders = result.shape
     points = strength.shape[3]
