@@ -11,8 +11,7 @@ from scipy import fft
 
 from lowalt.machine.jit import INNER_VECTOR
 from lowalt.numerics.chebyshev_series import chebyshev_points, orders_of
-from lowalt.scene.phasor import phasor
-from lowalt.scene.response_loops import CHUNK, LOOPS, End
+from lowalt.scene.response_loops import CHUNK, LOOPS, End, phasor
 
 SYMBOLS = 600
 """Largest number of symbols that share a box."""
