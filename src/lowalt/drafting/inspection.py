@@ -149,11 +149,10 @@ def inspect_mesh(
     up, up_from, groups = _upright(parts, points, (low, high), category, row.get("n_rotors_or_wings"), axes, path)
     if path.suffix.lower() == ".glb" and up == "y":
         usual = "z"
-    height = "xyz".index(up[-1])
-    upward = np.eye(3)[height] * (-1 if up[0] == "-" else 1)
-    hubs = [
-        Turning(group[0].piece, group.centre, np.eye(3)[turning_axis(group, height, low, high)]) for group in groups
-    ]
+    height, unit_vectors = "xyz".index(up[-1]), np.eye(3)
+    upward = unit_vectors[height] * (-1 if up[0] == "-" else 1)
+    hubs = [Turning(group[0].piece, group.centre, unit_vectors[turning_axis(group, height, low, high)])
+            for group in groups]  # fmt: skip
     shape = Shape(category, upward, points, _places(parts, named), hubs)
     front = front_of(shape, axes[1], usual, guessed_axes(high - low, category, height)[1])
     sides_seen = category != "Bird" or None not in axes or front.words != NOTHING_TELLS

@@ -115,9 +115,8 @@ def cosines(station: Station, places: np.ndarray) -> np.ndarray:
 
 
 def _end(
-    view: View, station: Station, counts: tuple[int, int], paths: Sequence[ImagePath],
-    physics: tuple[bool, bool],
-) -> response_loops.End:  # fmt: skip
+    view: View, station: Station, counts: tuple[int, int], paths: Sequence[ImagePath], physics: tuple[bool, bool]
+) -> response_loops.End:
     """One end's array and paths as the loops take them; physics: squint and wavefront."""
     network, (squint, wavefront) = view.network, physics
     # On a link, all frequencies are those of the signal, which is the transmitter's.
@@ -125,9 +124,9 @@ def _end(
     # Rounding must not put the instant of a beam update before that update.
     current = np.searchsorted(beams.starts_s, view.times_s + 1e-9, side="right") - 1
     images = np.stack([np.ascontiguousarray(path.places.swapaxes(1, 2), np.float64) for path in paths])
-    coefficient = np.stack([
-        np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths
-    ])  # fmt: skip
+    coefficient = np.stack(
+        [np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths]
+    )
     mast_m = np.array(station.position_m, np.float64)
     end = response_loops.End(
         mast_m, station.horizontal[:2].copy(), np.array(counts), SPEED_OF_LIGHT / (2.0 * network.carrier_hz),

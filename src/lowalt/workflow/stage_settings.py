@@ -68,7 +68,7 @@ class Settings:
             masts_m=masts_in_reach(masts_m(self._config["network"]), **block["region"]),
             motion={key: block[key] for key in MOTION if key in block},
             published={name: self._run.records[name]["published"] for name in members},
-        )  # fmt: skip
+        )
 
     def echo(self, wildcards: Any) -> str:
         """The network as far as it decides the job's station, and the echo's tolerance."""

@@ -27,9 +27,7 @@ SOURCE = (
     "(sin psi_1 sin psi_2)^(1/2), Willis, Bistatic Radar, 2nd ed. 1995, ch. 9, measured in the plane of both grazing "
     "rays; at other angles out of plane, and the spectrum narrowed by cos(beta / 2): estimates"
 )
-DEFAULTS = {
-    "gamma": 0.03, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5, "correlation_m": 20.0,
-}  # fmt: skip
+DEFAULTS = {"gamma": 0.03, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5, "correlation_m": 20.0}
 IDLE = [{"gamma": 0}]
 UNMODELLED = ("cw",)
 STILL = True

@@ -54,7 +54,7 @@ def late_samples(settings: dict, view: View) -> np.ndarray:
 
 def convolved(
     settings: dict, network: Network, response: np.ndarray, on_air: Callable[[str], np.ndarray], offset_cells: float
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return the time samples (N, M) of still echoes: the linear convolution of the sent stream with the range cells.
 
     response: (N, M) of all echoes; on_air: subcarriers (N, M) on the air in the "waveform" and the "previous waveform";
