@@ -173,9 +173,7 @@ def test_the_ordered_threshold_passes_noise_as_an_integral_over_the_order_statis
 
 @pytest.mark.parametrize("cfar, window", THRESHOLDS)
 def test_a_threshold_is_that_of_the_cells_about_it_one_by_one(cfar, window):
-    settings = detector.DEFAULTS | {
-        "guard": 2, "training": 7, "false_alarm": 0.1, "cfar": cfar, "range_window": window,
-    }  # fmt: skip
+    settings = detector.DEFAULTS | {"guard": 2, "training": 7, "false_alarm": 0.1, "cfar": cfar, "range_window": window}
     steps = range(3, 10) if window == "none" else (3, 6, 9)
     power = abs(normals(8, 6, 64)) ** 2
     found = detector.exceeds(settings, power)
