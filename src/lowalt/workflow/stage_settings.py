@@ -130,11 +130,11 @@ class Settings:
         return _text(size=size, **more)
 
     def training(self, wildcards: Any) -> str:
-        """Settings of a training, with its training seed or, if the job has none, the run's seed."""
-        block = self._config["recognition"]
+        """Settings of a training with its scheme, and its training seed or, if the job has none, the run's seed."""
+        block, scheme = self._config["recognition"], self._run.schemes_by_slug[wildcards.scheme].record
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
-        seed = int(wildcards.get("train_seed", self._config["seed"]))
-        return _text(seed=seed, colour_map=self._config["images"]["colour_map"], classes=self._run.classes, **kept)
+        kept |= {"scheme": scheme, "colour_map": self._config["images"]["colour_map"], "classes": self._run.classes}
+        return _text(seed=int(wildcards.get("train_seed", self._config["seed"])), **kept)
 
     def evaluation(self, wildcards: Any) -> str:
         """Settings with which a network predicts."""
