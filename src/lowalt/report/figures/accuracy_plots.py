@@ -87,3 +87,39 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
     for panel in panels[len(counts) :]:
         panel.set_axis_off()
     return drawn("confusion", "confusion matrices in percent of the true class", figure, rows)
+
+
+def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) -> Plot:
+    """Return what each class is taken for at each SNR: a row of panels per protocol, a panel per true class, and in it
+    a bar per SNR of the shares (percent) of all answers; rows: those of confusion_by_snr.csv, one scheme per protocol.
+    """
+    counts = {(row["protocol"], row["snr_db"], row["category"], row["predicted"]): int(row["samples"]) for row in rows}
+    schemes = {row["protocol"]: row["scheme"] for row in rows}
+    levels = sorted({row["snr_db"] for row in rows}, key=float)
+    places = [(protocol, true) for protocol in schemes for true in categories]
+    columns = min(len(categories), 4)
+    height = math.ceil(len(places) / columns)
+    figure = Figure(figsize=(3.2 * columns, 2.4 * height + 0.5), layout="constrained")
+    panels = plain(figure.subplots(height, columns, sharex=True, sharey=True, squeeze=False))
+    shown: list[dict] = []
+    for panel, (protocol, true) in zip(panels, places, strict=False):
+        totals = [sum(counts.get((protocol, snr, true, answer), 0) for answer in categories) for snr in levels]
+        below = [0.0] * len(levels)
+        for number, answer in enumerate(categories):
+            samples = [counts.get((protocol, snr, true, answer), 0) for snr in levels]
+            shares = [100 * part / max(total, 1) for part, total in zip(samples, totals, strict=True)]
+            panel.bar(range(len(levels)), shares, bottom=below, color=COLOURS[number % len(COLOURS)], label=answer)
+            below = [low + share for low, share in zip(below, shares, strict=True)]
+            shown += [{"protocol": protocol, "scheme": schemes[protocol], "snr_db": snr, "true": true,
+                       "recognised_as": answer, "samples": part, "percent": round(share, 2)}
+                      for snr, part, share in zip(levels, samples, shares, strict=True)]  # fmt: skip
+        panel.set(title=f"{true}, {protocol} subtypes", ylim=(0, 100))
+        panel.set_xticks(range(len(levels)), [SNR_LABELS.get(snr, snr) for snr in levels])
+        panel.grid(visible=False)
+    for panel in panels[len(places) :]:
+        panel.set_axis_off()
+    figure.supxlabel("SNR (dB)")
+    figure.supylabel("recognised as (%)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=8, frameon=False)
+    words = "what each class is taken for at each SNR, in percent of its samples"
+    return drawn("confusion_by_snr", words, figure, shown)
