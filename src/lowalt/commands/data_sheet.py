@@ -63,5 +63,8 @@ def _draft(options: argparse.Namespace) -> Answer:
     stated = {word: getattr(options, word) for word in {**kind.cells, **kind.figures}}
     text, lender = draft_target(options.kind, options.out, subtype=options.subtype, frame=options.frame,
                                 about=options.about, **stated)  # fmt: skip
-    said = f"{options.out}: what the data sheet does not say is {lender}'s, scaled" if options.out else text
+    if options.out is None:
+        return Answer({"file": None, "text": text}, text)
+    name = options.subtype or options.out.stem
+    said = f"{options.out}: {name!r}; what the data sheet does not say is {lender}'s, scaled"
     return Answer({"file": options.out, "text": text}, said)
