@@ -70,7 +70,10 @@ def test_a_room_that_hums_is_empty_where_the_record_says_when_it_was(tmp_path, c
     assert len(starts["unknown"]) == 25 and min(starts["known"]) == pytest.approx(4.0) and len(starts["known"]) == 15
     path.write_text(yaml.safe_dump(about | {"empty_s": [1, 1.3]}))
     assert lowalt(["predict", "bird_drone_10ghz", str(path)]) == 2
-    assert "empty_s is [1, 1.3], expected a stretch that holds at least one window of 0.4 s" in capsys.readouterr().err
+    assert (
+        "empty_s is [1, 1.3], expected a stretch that holds at least one of the 25 windows of 0.4 s"
+        in capsys.readouterr().err
+    )
 
 
 def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path, capsys):

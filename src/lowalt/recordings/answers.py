@@ -76,20 +76,20 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
     starts, there = numbers * twin.symbols * twin.symbol_interval_s, ~found.clipped
-    empty = _empty(record, starts, twin, where) & there if record.empty_s else None
-    there[there] = present(intervals[there], twin, None if empty is None else intervals[empty])
+    empty = intervals[_empty(record, starts, twin, where, there)] if record.empty_s else None
+    there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
     return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps, _notes(record, radar, there.any()))
 
 
-def _empty(record: Record, starts_s: np.ndarray, twin: Twin, where: str) -> np.ndarray:
-    """Which windows (n,) bool, by their starts (n,) s, lie in the stretch that the record says holds no target."""
+def _empty(record: Record, starts_s: np.ndarray, twin: Twin, where: str, sound: np.ndarray) -> np.ndarray:
+    """Which of the sound windows (n,) bool, by their starts (n,) s, lie where the record says that nothing was."""
     first, last = record.empty_s
     window_s = twin.symbols * twin.symbol_interval_s
-    inside = (starts_s >= first) & (starts_s + window_s <= last)
+    inside = sound & (starts_s >= first) & (starts_s + window_s <= last)
     if not inside.any():
-        raise InputError(f"{where}: empty_s is {record.empty_s}, expected a stretch that holds at least one window of "
-                         f"{window_s:.3g} s of the {len(starts_s)} windows")  # fmt: skip
+        raise InputError(f"{where}: empty_s is {record.empty_s}, expected a stretch that holds at least one of "
+                         f"the {len(starts_s)} windows of {window_s:.3g} s, not clipped")  # fmt: skip
     return inside
 
 
