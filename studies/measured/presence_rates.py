@@ -3,7 +3,8 @@
 Every row is of simulated recordings of `WINDOWS` windows through a twin, judged by `presence.present` as recordings
 are, from their own noise alone.
     radar, scene     white: white noise alone; receiver: the noise, leak and hum of receivers drawn as for training;
-                     empty: the same recordings where the first `EMPTY` windows are known to hold no target;
+                     empty: the same recordings where the first `EMPTY` windows are known to hold no target
+                     (radars whose targets may hover);
                      a category: its scenes, each at a receiver from the middle of the ranges, with the echo snr_db over
                      the white noise of the receiver's band
     windows          with a target (a category) or without one (white, receiver)
@@ -64,7 +65,9 @@ def noise_rows(name: str, library: Library, count: int) -> list[list]:
     samples_of_window = math.ceil(twin.symbols * twin.symbol_interval_s * twin.rate_hz)
     margin = math.ceil(2 * MARGIN * twin.symbol_interval_s * twin.rate_hz)
     for kind in ("white", "receiver"):
-        taken: dict[str, list[np.ndarray]] = {kind: []} | ({"empty": []} if kind == "receiver" else {})
+        taken: dict[str, list[np.ndarray]] = {kind: []} | (
+            {"empty": []} if kind == "receiver" and not twin.slowest_mps else {}
+        )
         for number in range(count):
             rng = stream(library.seed, "presence", name, kind, number)
             drawn = {key: value(item, rng) for key, item in scenes[number % len(scenes)]["receiver"].items()}

@@ -32,7 +32,8 @@ def one_of_each():
     ours = by_scheme(table("accuracy"))
     return [
         accuracy_plots.over_snr(ours, by_scheme(read_csv("config/published_accuracy.csv"))),
-        accuracy_plots.confusion(confusion(table("confusion")), CLASSES), accuracy_plots.confusion_by_snr(answers(), CLASSES),
+        accuracy_plots.confusion(confusion(table("confusion")), CLASSES),
+        accuracy_plots.confusion_by_snr(answers(), CLASSES),
         cost_plots.recognition(table("accuracy_cost")), cost_plots.echo(table("cost")),
     ]  # fmt: skip
 

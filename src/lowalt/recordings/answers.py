@@ -76,7 +76,7 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
     starts, there = numbers * twin.symbols * twin.symbol_interval_s, ~found.clipped
-    empty = intervals[_empty(record, starts, twin, where, there)] if record.empty_s else None
+    empty = intervals[_empty(record, starts, twin, where, there)] if record.empty_s and not twin.slowest_mps else None
     there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
     return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps, _notes(record, radar, there.any()))
