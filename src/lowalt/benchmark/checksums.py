@@ -1,0 +1,96 @@
+"""Checksums of the benchmark's bytes: of whole parts, and of a few samples that a test makes again.
+
+Kept are `checksums.txt`, with a line "SHA-256  PART/FILE" for each file of signals and the files they come from and for
+the images of each shard, and `samples.csv`, with one sample of each subtype. Records are hashed without the version of
+this package, which they name.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.benchmark.definition import PARTS, REFERENCE, config_of, run_name
+from lowalt.files.atomic import replacing, sha256, text_of
+from lowalt.files.csv_tables import read_csv, write_csv
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.shards.dataset import Dataset
+
+FILES = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy", "views/*/*.npz")
+"""Files of a part's run, in the order in which each makes the next."""
+WHOLE, SAMPLES = "checksums.txt", "samples.csv"
+FEW = {"town": 8}
+"""Number of subtypes of which a sample is kept, where making one of each would take too long."""
+
+
+def _digest(path: Path) -> str:
+    """SHA-256 of a file; of a cache of views that of its images alone, in their order."""
+    if path.parts[-3] != "views":
+        return sha256(path)
+    with np.load(path, allow_pickle=False) as data:
+        return hashlib.sha256(data["key"].tobytes() + np.ascontiguousarray(data["views"]).tobytes()).hexdigest()
+
+
+def of_part(part: str, folder: str | Path) -> dict[str, str]:
+    """Return the checksums of a part's files by PART/FILE; folder: where the runs' folders are.
+
+    Raises: InputError where the part has no data.
+    """
+    run = Path(folder) / run_name(part)
+    paths = [path for pattern in FILES for path in sorted(run.glob(pattern))]
+    if not paths:
+        raise InputError(f"{run}: no data, expected those of `lowalt benchmark make`")
+    return {f"{part}/{path.relative_to(run).as_posix()}": _digest(path) for path in paths}
+
+
+def kept() -> dict[str, str]:
+    """Return the kept checksums by PART/FILE, of all parts."""
+    lines = text_of(shipped(f"{REFERENCE}/{WHOLE}"), "checksums").splitlines()
+    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+
+
+def faults(part: str, folder: str | Path) -> list[str]:
+    """Return one line for each file of a part that is missing, differs or is not kept; an empty list: all are equal.
+
+    The first line names the earliest stage that differs. Raises: as `of_part`.
+    """
+    found = of_part(part, folder)
+    wanted = {name: digest for name, digest in kept().items() if name.startswith(f"{part}/")}
+    words = {name: "is missing" for name in wanted if name not in found}
+    words |= {name: "differs" for name, digest in found.items() if wanted.get(name, digest) != digest}
+    words |= {name: "is not among the kept files" for name in found if name not in wanted}
+    return [f"{name} {words[name]}" for name in {**wanted, **found} if name in words]
+
+
+def write(folder: str | Path, out: str | Path) -> None:
+    """Write the checksums of all parts, and those of the samples, into the folder `out`."""
+    with replacing(Path(out) / WHOLE) as temporary:
+        lines = [f"{digest}  {name}\n" for part in PARTS for name, digest in of_part(part, folder).items()]
+        temporary.write_text("".join(lines))
+    rows = [(part, *sample) for part in PARTS for sample in samples(part)]
+    write_csv(Path(out) / SAMPLES, ("part", "key", "sha256"), rows)
+
+
+def samples(part: str) -> Iterator[tuple[str, str]]:
+    """Make one sample of each subtype of a part (or of some, FEW) and yield its key and its SHA-256.
+
+    The checksum covers the record without the package's version, the signals and the tile.
+    """
+    data = Dataset(config_of(part))
+    names, snrs = [name for members in data.plan.groups.values() for name in members], data.plan.snrs
+    step = -(-len(names) // FEW.get(part, len(names)))
+    for number, name in list(enumerate(names))[::step]:
+        place = data.place_of(name, number % data.plan.models, snrs[number % len(snrs)])
+        image, signal, record = data.made(place)
+        record.pop("versions")
+        text = json.dumps(record, sort_keys=True).encode()
+        yield record["key"], hashlib.sha256(text + signal.tobytes() + image.tobytes()).hexdigest()
+
+
+def kept_samples(part: str) -> list[tuple[str, str]]:
+    """Return keys and checksums of a part's kept samples."""
+    rows = read_csv(shipped(f"{REFERENCE}/{SAMPLES}"), "part", "key", "sha256")
+    return [(row["key"], row["sha256"]) for row in rows if row["part"] == part]
