@@ -47,7 +47,8 @@ def dataset(track: Track, seed: int) -> Dataset:
     Subtypes are those that the track tests on; they and the scene are the benchmark's, clouds and motion are new.
     """
     count = MODELS.get(track.part, USUAL) * (2 if track.whole else 1)
-    more = {"seed": seed, "motion": {"models": count, "models_per_chunk": count}}
+    every = {"train": 1, "val": 0, "test": 0}
+    more = {"seed": seed, "motion": {"models": count, "models_per_chunk": count}, "split": every}
     return Dataset(merge(config_of(track.part), more), groups=("unseen",) if track.whole else ("seen", "unseen"))
 
 

@@ -11,10 +11,11 @@ from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.recognition.samples import Samples, ViewSamples, fingerprint
+from lowalt.recognition.schemes import Scheme
 from lowalt.tiles.signals import load_signals
 
-VIEWS = 3
-"""Images of each station: VRP, TRP and VT."""
+VIEWS = (0, 1, 2)
+"""Numbers of the images of each station among the known spectra: VRP, TRP and VT."""
 
 
 class TrackSamples(Samples):
@@ -57,7 +58,7 @@ class TrackSamples(Samples):
     def images(self) -> np.ndarray:
         """Index images (n, stations * 3, size, size) uint8. Raises: InputError where a sample has none."""
         pairs = set(zip(self.facts.group.tolist(), self.facts.fold.tolist(), strict=True))
-        columns = [VIEWS * station + view for station in self.track.stations for view in range(VIEWS)]
+        columns = Scheme("all spectra", self.track.stations, VIEWS).columns
         stored = [path for path in (self.run / f"views/{self.size}").glob("*.npz")
                   if tuple(path.stem.split("-")[:2]) in pairs]  # fmt: skip
         found = ViewSamples(stored, columns, pairs)
@@ -69,10 +70,9 @@ class TrackSamples(Samples):
     @cached_property
     def signals(self) -> np.ndarray:
         """Noisy signals (n, stations, symbols) complex64. Raises: InputError where a sample has none."""
-        network, result = Network.from_settings(self.config["network"]), None
-        wanted = {(name, model): [] for name, model in zip(self.facts.subtype, self.facts.model, strict=True)}
-        for number, pair in enumerate(zip(self.facts.subtype, self.facts.model, strict=True)):
-            wanted[pair].append(number)
+        network, wanted = Network.from_settings(self.config["network"]), {}
+        for number, pair in enumerate(zip(self.facts.subtype.tolist(), self.facts.model.tolist(), strict=True)):
+            wanted.setdefault(pair, []).append(number)
         levels = {float(snr): place for place, snr in enumerate(self.config["noise"]["snr_db"])}
         level = np.array([levels[snr] for snr in self.facts.snr_db.tolist()])
         result = np.empty((len(self), len(self.track.stations), network.symbols), np.complex64)
