@@ -66,10 +66,14 @@ def faults(part: str, folder: str | Path) -> list[str]:
 
 
 def write(folder: str | Path, out: str | Path) -> None:
-    """Write the checksums of all parts, and those of the samples, into the folder `out`."""
+    """Write the checksums of all parts into the folder `out`; folder: where the runs' folders are."""
     with replacing(Path(out) / WHOLE) as temporary:
         lines = [f"{digest}  {name}\n" for part in PARTS for name, digest in of_part(part, folder).items()]
         temporary.write_text("".join(lines))
+
+
+def write_samples(out: str | Path) -> None:
+    """Make the samples of all parts and write their checksums into the folder `out`."""
     rows = [(part, *sample) for part in PARTS for sample in samples(part)]
     write_csv(Path(out) / SAMPLES, ("part", "key", "sha256"), rows)
 

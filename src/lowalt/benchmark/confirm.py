@@ -20,7 +20,6 @@ from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
 from lowalt.recognition.dataset_samples import DatasetSamples
 from lowalt.recognition.intervals import Interval
-from lowalt.recognition.protocols import FOLDS
 from lowalt.recognition.zoo_files import path_of
 from lowalt.shards.dataset import Dataset
 
@@ -75,8 +74,9 @@ def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
             f"{path}: classes {list(trained.classes)} and stations {list(trained.scheme.stations)}, expected the "
             f"classes {list(classes)} and some of the stations {list(track.stations)}"
         )
-    pairs = set().union(*FOLDS["seen"].values())
-    samples = DatasetSamples(dataset(track, seed), trained.scheme.columns, pairs, trained.size, placed=False)
+    data = dataset(track, seed)
+    pairs = {(group, "train") for group in data.groups}
+    samples = DatasetSamples(data, trained.scheme.columns, pairs, trained.size, placed=False)
     settings = {"batch": 64, "threads": 1, "precision": "auto", "mirror": True}
     answers = runs.answers(trained, samples, settings, Machine.here("auto"))
     part = tested(track, samples.facts, np.asarray(answers))

@@ -35,7 +35,7 @@ class TrackSamples(Samples):
         every, self.classes = track.truth(source)
         self.facts, self.config = every.take(track.numbers(part)), config_of(source)
         self.run, self.size = Path(folder) / run_name(source), self.config["recognition"]["size"]
-        if not (self.run / "config.yaml").is_file():
+        if not self.run.is_dir():
             raise InputError(
                 f"{self.run}: no data, expected those that `lowalt benchmark make --track {track.name}` makes "
                 f"({' and '.join(overlays(source))})"
