@@ -1,12 +1,12 @@
 """The baselines by name: each trains on a track's samples and returns a function from samples to probabilities.
 
-    majority class                  the class with the most training samples, always
-    nearest centroid on moments     distance to each class's mean of the power spectrum's moments
-    ... on features                 classical methods on the physical features of `features.py` (`classical.py`)
-    small CNN on images             the default's network: the reference
-    mean fusion, soft voting, ...   the same backbone with other fusions (`fusions.py`)
-    ... on signals                  networks on the stations' complex signals (`signal_networks.py`)
-    audio-spectrogram transformer, transformer behind convolutions    on images (`backbones.py`)
+majority class                  the class with the most training samples, always
+nearest centroid on moments     distance to each class's mean of the power spectrum's moments
+... on features                 classical methods on the physical features of `features.py` (`classical.py`)
+small CNN on images             the default's network: the reference
+mean fusion, soft voting, ...   the same backbone with other fusions (`fusions.py`)
+... on signals                  networks on the stations' complex signals (`signal_networks.py`)
+audio-spectrogram transformer, transformer behind convolutions    on images (`backbones.py`)
 """
 
 from collections.abc import Callable

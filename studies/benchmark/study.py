@@ -9,7 +9,6 @@ every call, of the methods that are finished on all tracks of the table; `--tabl
 
 import argparse
 import json
-import os
 import time
 from collections.abc import Iterator
 from copy import copy
@@ -116,7 +115,11 @@ def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], grou
     found = scoring.scores(track, [part.probabilities for part in parts], {})
     names = ("percent", "low", "high"), ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
     values = found["percent"], found["macro_f1_percent"]
-    cells = {name: value for keys, interval in zip(names, values, strict=True) for name, value in zip(keys, interval, strict=True)}
+    cells = {
+        name: value
+        for keys, interval in zip(names, values, strict=True)
+        for name, value in zip(keys, interval, strict=True)
+    }
     test_s = np.mean([one["test_core_s"][track.name] for one in about])
     return {
         "track": track.name, "method": method, "seeds": len(parts), **cells, "group": group,

@@ -93,7 +93,7 @@ def test_score_prints_intervals_and_every_baseline(small, capsys):
     benchmark.write("mine.csv", test, np.eye(4)[test.labels])
     assert main(["benchmark", "score", "mine.csv", "mine.csv", "--track", "unseen"]) == 0
     text = capsys.readouterr().out
-    assert "16 samples, 2 training seeds" in text and "accuracy 100.0 (100.0 to 100.0)" in text
+    assert "16 samples, training seeds: 2" in text and "accuracy 100.0 (100.0 to 100.0)" in text
     assert main(["benchmark", "score", "absent.csv", "--track", "unseen"]) == 2
     assert main(["benchmark", "score", "mine.csv", "--track", "unsen"]) == 2
 
@@ -126,7 +126,12 @@ def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeyp
     # Another seed gives other motion of the same subtypes.
     rows = [confirm.dataset(track, seed).record(0)["motion"] for seed in (first.seed, first.seed + 1)]
     assert rows[0] != rows[1]
-    assert set(confirm.dataset(track, 1).plan.groups["unseen"]) == {"DJI Mini 4 Pro", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"}
+    assert set(confirm.dataset(track, 1).plan.groups["unseen"]) == {
+        "DJI Mini 4 Pro",
+        "Owl",
+        "NIO ET5T 2023",
+        "Walking Pedestrian 5",
+    }
     with pytest.raises(InputError, match="stations"):
         confirm.confirm(ZOO, TRACKS["one-station"])
     with pytest.raises(InputError, match="cannot be confirmed"):

@@ -45,23 +45,27 @@ def test_a_submission_comes_back_in_the_order_of_the_samples(tmp_path):
     assert np.allclose(read(path, UNSEEN), shares)
 
 
-KEY = "owl-000000-snr003"
+def last(shares):
+    """A change of the last row: its key with other probabilities."""
+    return lambda rows: [*rows[:-1], f"{rows[-1].split(',')[0]},{shares}"]
+
+
 FAULTS = {
     "missing": (lambda rows: rows[:-2], "2 of the 6000 test samples of the track unseen are missing, the first is"),
     "twice": (lambda rows: [*rows, rows[7]], "line 6002: key .* stands twice"),
-    "unknown": (lambda rows: [*rows, "owl-000999-snr003,1,0,0,0"], "owl-000999-snr003' is no sample of the track unseen"),
-    "nan": (lambda rows: [*rows[:-1], rows[-1].split(",")[0] + ",0.5,nan,0.5,0"], "line 6001: p_bird is 'nan'"),
-    "words": (lambda rows: [*rows[:-1], rows[-1].split(",")[0] + ",0.5,half,0.5,0"], "p_bird is 'half', expected a number"),
-    "negative": (lambda rows: [*rows[:-1], rows[-1].split(",")[0] + ",1.5,-0.5,0,0"], "p_uav is '1.5'"),
-    "sum": (lambda rows: [*rows[:-1], rows[-1].split(",")[0] + ",0.5,0.4,0,0"], "sum to 0.9, expected 1"),
+    "unknown": (lambda rows: [*rows, "owl-000999-snr003,1,0,0,0"], "owl-000999-snr003' is no sample of the track"),
+    "nan": (last("0.5,nan,0.5,0"), "line 6001: p_bird is 'nan'"),
+    "words": (last("0.5,half,0.5,0"), "p_bird is 'half', expected a number"),
+    "negative": (last("1.5,-0.5,0,0"), "p_uav is '1.5'"),
+    "sum": (last("0.5,0.4,0,0"), "sum to 0.9, expected 1"),
     "cells": (lambda rows: [*rows, "owl,1"], "2 cells, expected 5"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_wrong_submission_is_refused_in_one_sentence(tmp_path, fault):
     change, sentence = FAULTS[fault]
-    path = submission(tmp_path / "a.csv", UNSEEN, answers(UNSEEN, 0).round(4) / answers(UNSEEN, 0).round(4).sum(1, keepdims=True))
+    path = submission(tmp_path / "a.csv", UNSEEN, answers(UNSEEN, 0))
     head, *rows = path.read_text().splitlines()
     path.write_text("\n".join([head, *change(rows)]) + "\n")
     with pytest.raises(InputError, match=sentence) as caught:
@@ -77,7 +81,7 @@ def test_samples_that_are_not_tested_may_stand_in_a_submission(tmp_path):
 
 
 def test_headline_and_f1_are_those_of_the_definitions():
-    shares, (facts, classes) = answers(UNSEEN, 1), facts_of(UNSEEN)
+    shares, (facts, _) = answers(UNSEEN, 1), facts_of(UNSEEN)
     found = scoring.scores(UNSEEN, [shares], {})
     guesses = shares.argmax(1)
     assert found["percent"].value == pytest.approx(100 * np.mean(guesses == facts.label))
@@ -99,7 +103,8 @@ def test_auroc_is_the_area_under_the_curve_and_its_interval_covers_it():
     # Samples are independent here, so Hanley and McNeil's standard error of AUROC holds (Radiology 143, 1982).
     share, known, other = area / 100, (~held_out).sum(), held_out.sum()
     first, second = share / (2 - share), 2 * share**2 / (1 + share)
-    variance = (share * (1 - share) + (other - 1) * (first - share**2) + (known - 1) * (second - share**2)) / known / other
+    spread = share * (1 - share) + (other - 1) * (first - share**2) + (known - 1) * (second - share**2)
+    variance = spread / known / other
     width = found["percent"].high - found["percent"].low
     assert width == pytest.approx(2 * 1.96 * 100 * variance**0.5, rel=0.25)
 

@@ -1,4 +1,4 @@
-"""A small benchmark: the frozen definition with few subtypes, motion models and SNRs, and its data as a run leaves them."""
+"""A small benchmark: the frozen definition with few subtypes, motion models and SNRs, and its data."""
 
 from pathlib import Path
 
@@ -35,7 +35,7 @@ def resized(data: Dataset, number: int) -> np.ndarray:
 
 
 def write(folder: Path, part: str = definition.MAIN) -> Path:
-    """Write the data of a part of the (small) benchmark below a folder, as the workflow does; return its run's folder."""
+    """Write the data of a part below a folder, as the workflow does; return its run's folder."""
     config, run = definition.config_of(part), folder / definition.run_name(part)
     data = Dataset(config)
     index = write_run(data, run, "signal" if config["effects"] else "recipe")

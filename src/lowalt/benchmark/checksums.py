@@ -1,8 +1,8 @@
 """Checksums of the benchmark's bytes: of whole parts, and of a few samples that a test makes again.
 
-Kept are `checksums.txt`, with a line "SHA-256  PART/FILE" for each file of signals and the files they come from and for
-the images of each shard, and `samples.csv`, with one sample of each subtype. Records are hashed without the version of
-this package, which they name.
+Kept are `checksums.txt`, with a line "SHA-256  PART/FILE" for each file of signals and the files they come from, and
+`samples.txt`, with one sample of each subtype, "SHA-256  PART/KEY". Records are hashed without the version of this
+package, which they name.
 """
 
 import hashlib
@@ -10,28 +10,17 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
 from lowalt.benchmark.definition import PARTS, REFERENCE, config_of, run_name
 from lowalt.files.atomic import replacing, sha256, text_of
-from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.shards.dataset import Dataset
 
-FILES = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy", "views/*/*.npz")
-"""Files of a part's run, in the order in which each makes the next."""
-WHOLE, SAMPLES = "checksums.txt", "samples.csv"
+FILES = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy")
+"""Files of a part's run, in the order in which each makes the next. Images follow from the signals."""
+WHOLE, SAMPLES = "checksums.txt", "samples.txt"
 FEW = {"town": 8}
 """Number of subtypes of which a sample is kept, where making one of each would take too long."""
-
-
-def _digest(path: Path) -> str:
-    """SHA-256 of a file; of a cache of views that of its images alone, in their order."""
-    if path.parts[-3] != "views":
-        return sha256(path)
-    with np.load(path, allow_pickle=False) as data:
-        return hashlib.sha256(data["key"].tobytes() + np.ascontiguousarray(data["views"]).tobytes()).hexdigest()
 
 
 def of_part(part: str, folder: str | Path) -> dict[str, str]:
@@ -43,13 +32,24 @@ def of_part(part: str, folder: str | Path) -> dict[str, str]:
     paths = [path for pattern in FILES for path in sorted(run.glob(pattern))]
     if not paths:
         raise InputError(f"{run}: no data, expected those of `lowalt benchmark make`")
-    return {f"{part}/{path.relative_to(run).as_posix()}": _digest(path) for path in paths}
+    return {f"{part}/{path.relative_to(run).as_posix()}": sha256(path) for path in paths}
+
+
+def _read(name: str) -> dict[str, str]:
+    """A kept file of checksums: SHA-256 by name."""
+    lines = text_of(shipped(f"{REFERENCE}/{name}"), "checksums").splitlines()
+    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
 
 
 def kept() -> dict[str, str]:
     """Return the kept checksums by PART/FILE, of all parts."""
-    lines = text_of(shipped(f"{REFERENCE}/{WHOLE}"), "checksums").splitlines()
-    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+    return _read(WHOLE)
+
+
+def _write(path: Path, sums: dict[str, str]) -> None:
+    """Write checksums by name."""
+    with replacing(path) as temporary:
+        temporary.write_text("".join(f"{digest}  {name}\n" for name, digest in sums.items()))
 
 
 def faults(part: str, folder: str | Path) -> list[str]:
@@ -67,15 +67,12 @@ def faults(part: str, folder: str | Path) -> list[str]:
 
 def write(folder: str | Path, out: str | Path) -> None:
     """Write the checksums of all parts into the folder `out`; folder: where the runs' folders are."""
-    with replacing(Path(out) / WHOLE) as temporary:
-        lines = [f"{digest}  {name}\n" for part in PARTS for name, digest in of_part(part, folder).items()]
-        temporary.write_text("".join(lines))
+    _write(Path(out) / WHOLE, {name: digest for part in PARTS for name, digest in of_part(part, folder).items()})
 
 
 def write_samples(out: str | Path) -> None:
     """Make the samples of all parts and write their checksums into the folder `out`."""
-    rows = [(part, *sample) for part in PARTS for sample in samples(part)]
-    write_csv(Path(out) / SAMPLES, ("part", "key", "sha256"), rows)
+    _write(Path(out) / SAMPLES, {f"{part}/{key}": digest for part in PARTS for key, digest in samples(part)})
 
 
 def samples(part: str) -> Iterator[tuple[str, str]]:
@@ -96,5 +93,5 @@ def samples(part: str) -> Iterator[tuple[str, str]]:
 
 def kept_samples(part: str) -> list[tuple[str, str]]:
     """Return keys and checksums of a part's kept samples."""
-    rows = read_csv(shipped(f"{REFERENCE}/{SAMPLES}"), "part", "key", "sha256")
-    return [(row["key"], row["sha256"]) for row in rows if row["part"] == part]
+    return [(name.removeprefix(f"{part}/"), digest) for name, digest in _read(SAMPLES).items()
+            if name.startswith(f"{part}/")]  # fmt: skip

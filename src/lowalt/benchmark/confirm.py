@@ -31,7 +31,7 @@ CONFIRMED = tuple(name for name, track in TRACKS.items() if track.headline == "a
 
 
 class Confirmed(NamedTuple):
-    """A confirmed result: the track, accuracy in percent, samples and root seed of its test set, SHA-256 of the model."""
+    """A confirmed result: accuracy in percent, samples and root seed of the test set, SHA-256 of the model."""
 
     track: str
     percent: Interval

@@ -69,9 +69,10 @@ def truth(part: str) -> Truth:
     published = {name: record["published"] for name, record in records_of(config["targets"]).items()}
     plan, classes = Plan.of(config, published), classes_of(published)
     rows = [
-        (sample_key(name, model, snr), name, model, snr, group, of_model, label(classes, {"subtype": name, **published[name]}))
+        (sample_key(name, model, snr), name, model, snr, group, of_model, number)
         for group, names in plan.groups.items()
         for name in names
+        for number in [label(classes, {"subtype": name, **published[name]})]
         for model in range(plan.models)
         for of_model in [fold(plan.split, plan.seed, name, model)]
         for snr in plan.snrs

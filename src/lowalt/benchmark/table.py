@@ -41,7 +41,9 @@ def write(rows: list[dict], folder: str | Path) -> None:
     """Write the table, rows as dicts of COLUMNS, sorted by track and then by percent."""
     order = list(TRACKS)
     rows = sorted(rows, key=lambda row: (order.index(row["track"]), -row["percent"], row["method"]))
-    plain = [{name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()} for row in rows]
+    plain = [
+        {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()} for row in rows
+    ]
     write_csv(Path(folder) / TABLE, COLUMNS, plain)
 
 
@@ -64,7 +66,9 @@ def _costs(rows: list[dict]) -> tuple[str, str]:
     means = []
     for name in ("train_core_s", "test_core_s_per_1000"):
         found = [number(row, name, TABLE) for row in rows if row[name]]
-        means.append(f"{np.mean(found):.2g}" if found and np.mean(found) < 10 else f"{np.mean(found):.0f}" if found else "-")
+        means.append(
+            f"{np.mean(found):.2g}" if found and np.mean(found) < 10 else f"{np.mean(found):.0f}" if found else "-"
+        )
     return means[0], means[1]
 
 

@@ -1,4 +1,4 @@
-"""The command `lowalt benchmark`: make the data, list the tracks, score a submission, confirm a model, show the table."""
+"""The command `lowalt benchmark`: data, tracks, scores of submissions, confirmed results, the table of baselines."""
 
 import argparse
 import shutil
@@ -10,6 +10,7 @@ from lowalt.benchmark.definition import MAIN, VERSION, overlays, run_name
 from lowalt.benchmark.tracks import TRACKS, Track, named
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.commands.command_table import COMMANDS
 from lowalt.config.command import name_backbone
 from lowalt.files.errors import InputError
 from lowalt.recognition.intervals import Interval
@@ -19,15 +20,15 @@ EXAMPLE = "lowalt benchmark score predictions.csv --track unseen"
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `benchmark` and its own commands to a parser's commands."""
-    own = commands.add_parser(name, help=f"{VERSION}: data, tracks, scores of submissions, table of baselines",
+    own = commands.add_parser(name, help=COMMANDS[name].meaning,
                               epilog=f"example: {EXAMPLE}").add_subparsers(metavar="COMMAND", required=True)  # fmt: skip
     add_command(own, "tracks", tracks, "the tracks: whom each serves, and how many samples it has",
                 "lowalt benchmark tracks")  # fmt: skip
     line = add_command(own, "make", make, "make the data of tracks and compare them with the kept checksums",
                        "lowalt benchmark make --track unseen town")  # fmt: skip
-    line.add_argument("--track", nargs="+", default=["unseen"], help="tracks to make the data of (default: unseen)")
+    line.add_argument("--track", nargs="+", default=["unseen"], help="tracks whose data to make (default: unseen)")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
-    line = add_command(own, "score", score, "score a submission and compare it with every baseline", EXAMPLE)
+    line = add_command(own, "score", score, "score a submission and compare it with each baseline", EXAMPLE)
     line.add_argument("predictions", type=Path, nargs="+", help="columns key and p_CLASS (.csv); one per training seed")
     line.add_argument("--track", required=True, help="the track, such as unseen")
     line = add_command(own, "confirm", confirmed, "test a model on a set whose root seed follows from its file",
@@ -46,8 +47,8 @@ def tracks(options: argparse.Namespace) -> Answer:
          **{use: len(track.numbers(use)) for use in ("train", "validation", "test")}}
         for track in TRACKS.values()
     ]  # fmt: skip
-    lines = [f"{one['track']:12} {one['train']:6} train {one['validation']:6} validate {one['test']:6} test  {one['serves']}"
-             for one in facts]  # fmt: skip
+    counts = [f"{one['train']:6} train {one['validation']:6} validate {one['test']:6} test" for one in facts]
+    lines = [f"{one['track']:12} {count}  {one['serves']}" for one, count in zip(facts, counts, strict=True)]
     return Answer(facts, "\n".join(lines))
 
 
@@ -94,7 +95,8 @@ def score(options: argparse.Namespace) -> Answer:
 
 def _report(track: Track, facts: dict) -> str:
     """The scores as text."""
-    lines = [f"{VERSION}, track {track.name}, {facts['samples']} samples, {facts['seeds']} training seeds; percent, with 95 % intervals",
+    counts = f"{facts['samples']} samples, training seeds: {facts['seeds']}"
+    lines = [f"{VERSION}, track {track.name}, {counts}; percent, with 95 % intervals",
              f"{facts['headline']} {_words(facts['percent'])}, macro F1 {_words(facts['macro_f1_percent'])}"]  # fmt: skip
     if "rejected_percent" in facts:
         lines.append(f"rejected of the held-out class at 95 % acceptance: {facts['rejected_percent']:.1f}")
@@ -104,7 +106,10 @@ def _report(track: Track, facts: dict) -> str:
     width = max(map(len, facts["differences"]), default=0)
     if facts["differences"]:
         lines.append("against the baselines, paired difference:")
-    lines += [_against(name, lead, width) for name, lead in sorted(facts["differences"].items(), key=lambda pair: -pair[1].value)]
+    lines += [
+        _against(name, lead, width)
+        for name, lead in sorted(facts["differences"].items(), key=lambda pair: -pair[1].value)
+    ]
     return "\n".join(lines)
 
 
