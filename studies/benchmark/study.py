@@ -10,7 +10,7 @@ every call, of the methods that are finished on all tracks of the table; `--tabl
 import argparse
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -164,6 +164,15 @@ def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
             if (row["track"], row["method"]) in kept else row for row in rows]  # fmt: skip
 
 
+def each(call: Callable, jobs: list, workers: int | None) -> None:
+    """Do all jobs, one after the other in this process or several side by side."""
+    if workers == 1:
+        for job in jobs:
+            call(job)
+    else:
+        trainings.side_by_side(call, jobs, workers)
+
+
 def main(arguments: list[str]) -> None:
     """Train what is missing, and write the table, what is kept and the document."""
     line = argparse.ArgumentParser("study.py", description=__doc__.splitlines()[0])
@@ -179,9 +188,10 @@ def main(arguments: list[str]) -> None:
             if seed == 0 or method not in SEEDLESS]  # fmt: skip
     if not given.table:
         chunks = sorted(path for part in PARTS for path in Path(given.data, run_name(part), "noisy").glob("*.npy"))
-        for told_of in (spectral_moments, features) if any("on " in method for method in given.methods) else ():
-            trainings.side_by_side(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
-        trainings.side_by_side(partial(one, data=given.data), jobs, given.workers)
+        for word, told_of in (("moments", spectral_moments), ("features", features)):
+            if any(word in method for method in given.methods):
+                each(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
+        each(partial(one, data=given.data), jobs, given.workers)
     out = Path(REFERENCE)
     rows = with_confirmed(tables(out), out)
     baseline_table.write(rows, out)
