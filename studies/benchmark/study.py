@@ -76,7 +76,7 @@ def one(job: tuple[str, str, int], data: str) -> Path:
     """Train a method for a track, test it on all tracks that this serves, and keep its answers."""
     method, name, seed = job
     folder, track = place(method, name, seed), named(name)
-    if (folder / "run.json").is_file():
+    if (folder / "tested.json").is_file():
         return folder
     parts = [closed(TrackSamples(track, part, data)) for part in ("train", "validation")]
     given = Given(*parts, parts[0].classes, seed, folder, OUT / "features", config_of(MAIN))
@@ -93,7 +93,7 @@ def one(job: tuple[str, str, int], data: str) -> Path:
         found[tested.name] = opened(samples, shares).astype(np.float32)
     with replacing(folder / "answers.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **found)
-    with replacing(folder / "run.json") as temporary:
+    with replacing(folder / "tested.json") as temporary:
         temporary.write_text(json.dumps(facts, indent=1) + "\n")
     print(f"{folder}: {trained_s:.0f} core-s", flush=True)
     return folder
@@ -105,10 +105,10 @@ def finished(method: str, track: Track) -> Iterator[tuple[dict, Predictions]]:
     facts = every.take(track.numbers("test"))
     for seed in range(100):
         folder = place(method, track.trains_as, seed)
-        if (folder / "run.json").is_file():
+        if (folder / "tested.json").is_file():
             with np.load(folder / "answers.npz", allow_pickle=False) as data:
                 shares = data[track.name].astype(float)
-            yield json.loads((folder / "run.json").read_text()), scoring.tested(track, facts, shares)
+            yield json.loads((folder / "tested.json").read_text()), scoring.tested(track, facts, shares)
 
 
 def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], group: int) -> dict:
@@ -131,7 +131,7 @@ def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], grou
 def tables(out: Path) -> list[dict]:
     """Write what is kept of all finished trainings, and return the rows of the table."""
     rows, complete = [], [
-        method for method in METHODS if all(place(method, track.trains_as, 0).joinpath("run.json").is_file()
+        method for method in METHODS if all(place(method, track.trains_as, 0).joinpath("tested.json").is_file()
                                             for track in shown_tracks())
     ]  # fmt: skip
     for track in shown_tracks():
@@ -152,7 +152,7 @@ def tables(out: Path) -> list[dict]:
 def shown_tracks() -> list[Track]:
     """Return the tracks of the table: those on which the first method is finished."""
     return [track for track in TRACKS.values()
-            if (place(FIRST, track.trains_as, 0) / "run.json").is_file()]  # fmt: skip
+            if (place(FIRST, track.trains_as, 0) / "tested.json").is_file()]  # fmt: skip
 
 
 def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
