@@ -18,9 +18,8 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from features import features, spectral_moments
-from methods import METHODS, SEEDLESS, Given
-from signals import told
+from methods import METHODS, SEEDLESS, TOLD, Given
+from signals import cost_s, told
 
 import trainings
 from lowalt.benchmark import baseline_table, baselines, scoring
@@ -72,6 +71,12 @@ def place(method: str, name: str, seed: int) -> Path:
     return OUT / f"{slug(method)}/{name}/{seed}"
 
 
+def told_s(method: str, samples: TrackSamples) -> float:
+    """Return the core-seconds per sample of what a method sees of its signals, where that is kept; else 0."""
+    kept = (told_of for word, told_of in TOLD if method.endswith(word))
+    return sum(cost_s(OUT / "features", told_of, samples.run.name) for told_of in kept)
+
+
 def one(job: tuple[str, str, int], data: str) -> Path:
     """Train a method for a track, test it on all tracks that this serves, and keep its answers."""
     method, name, seed = job
@@ -82,14 +87,15 @@ def one(job: tuple[str, str, int], data: str) -> Path:
     given = Given(*parts, parts[0].classes, seed, folder, OUT / "features", config_of(MAIN))
     begun = time.process_time()
     answer = METHODS[method](given)
-    trained_s = time.process_time() - begun
+    trained_s = time.process_time() - begun + len(parts[0]) * told_s(method, parts[0])
     facts = {"method": method, "seed": seed, "train_core_s": trained_s, "hardware": describe(), "test_core_s": {}}
     found = {}
     for tested in served(name):
         samples = TrackSamples(tested, "test", data)
         begun = time.process_time()
         shares = answer(closed(samples))
-        facts["test_core_s"][tested.name] = time.process_time() - begun
+        spent = time.process_time() - begun + len(samples) * told_s(method, samples)
+        facts["test_core_s"][tested.name] = spent
         found[tested.name] = opened(samples, shares).astype(np.float32)
     with replacing(folder / "answers.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **found)
@@ -188,8 +194,8 @@ def main(arguments: list[str]) -> None:
             if seed == 0 or method not in SEEDLESS]  # fmt: skip
     if not given.table:
         chunks = sorted(path for part in PARTS for path in Path(given.data, run_name(part), "noisy").glob("*.npy"))
-        for word, told_of in (("moments", spectral_moments), ("features", features)):
-            if any(word in method for method in given.methods):
+        for word, told_of in TOLD:
+            if any(method.endswith(word) for method in given.methods):
                 each(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
         each(partial(one, data=given.data), jobs, given.workers)
     out = Path(REFERENCE)
