@@ -28,8 +28,8 @@ from lowalt.shards.read import ShardSet
 from lowalt.shards.sample_record import DATA_VERSION
 from lowalt.shards.sample_table import EXTENSIONS
 
-FROZEN = re.compile(r"lowalt-.+-v(\d+)")
-"""Name of a run that makes a frozen data set, which only a new version may change."""
+FROZEN = re.compile(r"lowalt-\d+-v(\d+)")
+"""Name of a run that makes the data set of a benchmark, which only a new version may change."""
 SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
 LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
@@ -132,7 +132,7 @@ def rules(shards: ShardSet) -> str:
 def identity(run_name: str, shards: ShardSet) -> tuple[str, str]:
     """Return name and version of the data set of a run.
 
-    A run whose name ends with -vN makes version N of a frozen data set; any other has the version of its rules.
+    The data set of a benchmark has the benchmark's version; any other has the version of its rules.
     """
     frozen = FROZEN.fullmatch(run_name)
     name = run_name if run_name.startswith("lowalt-") else f"lowalt-{run_name}"
@@ -150,7 +150,7 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
         description=description(shards), counts=_counts(shards), config=config.strip(), images=len(shards.columns()),
         spectra=", ".join(spectrum.upper() for spectrum in shards.spectra), extension=EXTENSIONS[shards.kind],
         example=shards.shards[0]["path"] if shards.shards else "SHARD.tar", license=license_name,
-        license_address=LICENSES[license_name], package=__version__,
+        license_address=LICENSES[license_name], package=__version__, frozen=FROZEN.fullmatch(name),
         versions=_table(("rules of", "version"), [("lowalt", rules(shards))]),
     )  # fmt: skip
 
