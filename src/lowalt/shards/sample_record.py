@@ -19,7 +19,7 @@ from lowalt.tiles.tile_files import npy_header
 
 NAMES = ("subtype", "category", "group", "model")
 DATA_VERSION = "0.2.0"
-"""Version of the rules by which a configuration becomes bytes. It changes when a byte of the default's data set changes.
+"""Version of the rules by which a configuration becomes bytes. A change of the default's bytes changes the rules.
 
 It is not the version of the package: a release that changes no rule makes the same shards as the release before it.
 """
