@@ -15,7 +15,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 DOCS := .venv/set-up-docs
 
-.PHONY: all default data real measured cost accuracy-cost study test test-slow fuzz lint docs check-bytes reference help
+.PHONY: all default data real measured cost accuracy-cost benchmark study test test-slow fuzz lint docs check-bytes reference help
 
 all: default
 
@@ -122,6 +122,13 @@ cost: $(SETUP)  ## error of the echo over its time: results/default/cost.csv and
 accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings per row: results/default/accuracy_cost.csv and .svg
 	$(MAKE) --no-print-directory study NAME=heights
 	$(SNAKEMAKE) --configfile config/cost/accuracy.yaml -- accuracy_cost
+
+BENCHMARK := lowalt-40-v1
+SUBMITTED := results/$(BENCHMARK)/predictions/unseen/abc-vrp-trp-vt/0.csv
+benchmark: $(SETUP)  ## the benchmark: its data compared with the kept checksums, the reference baseline trained and scored
+	$(BIN)/lowalt benchmark make --cores $(CORES)
+	$(SNAKEMAKE) --configfile config/$(BENCHMARK).yaml -- $(SUBMITTED)
+	$(BIN)/lowalt benchmark score $(SUBMITTED) --track unseen
 
 study:  ## a study of studies/: make study NAME=rotors
 	$(MAKE) --no-print-directory -C studies/$(NAME)

@@ -15,8 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import small_benchmark
 from dataset import build, publish
 from lowalt.__main__ import main
+from lowalt.benchmark import checksums, definition
+from lowalt.commands import workflow
 from lowalt.config.layers import load
 
 ROOT = Path(__file__).parent.parent
@@ -81,6 +84,7 @@ def test_every_tutorial_is_followed_here():
     pages = {path.stem for path in FOLDER.glob("*.md")}
     assert pages == {
         "first_data_set", "trajectory", "target", "effect", "backbone", "pytorch", "hugging_face", "recording",
+        "benchmark",
     }  # fmt: skip
 
 
@@ -90,6 +94,17 @@ def test_a_first_data_set(checkout, capsys, monkeypatch):
     assert capsys.readouterr().out.startswith("80 ")
     # The overlay of the last step is a whole configuration's overlay.
     names["load"](["config/default.yaml", "first.yaml"], SCHEMA)
+
+
+def test_a_submission_to_the_benchmark(checkout, monkeypatch):
+    """On a small copy of the benchmark; its data come from the test, so that no workflow starts and no byte is kept."""
+    small_benchmark.shrink(monkeypatch)
+    monkeypatch.setattr(workflow, "ended", lambda options: {"status": small_benchmark.write(Path("results")) is None})
+    monkeypatch.setattr(checksums, "faults", lambda part, folder: [])
+    printed, _ = followed("benchmark", checkout, monkeypatch)
+    assert "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
+    assert float(re.search(r"accuracy ([\d.]+)", printed)[1]) > 35
+    definition.truth.cache_clear()
 
 
 def test_a_trajectory(checkout, monkeypatch):
