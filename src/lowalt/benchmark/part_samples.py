@@ -22,7 +22,7 @@ class TrackSamples(Samples):
     """The samples of one part of a track, also a source for trainings of `lowalt.recognition`.
 
     `key`, `labels` (n,) and `classes`; `images` (n, stations * 3, 24, 24) uint8 index values, station by station,
-    each VRP, TRP, VT; `signals` (n, stations, 400) complex64.
+    each VRP, TRP, VT; `signals` (n, stations, 400) complex64, the mean power of each station's is one.
     """
 
     def __init__(self, track: Track, part: str, folder: str | Path) -> None:
@@ -69,7 +69,10 @@ class TrackSamples(Samples):
 
     @cached_property
     def signals(self) -> np.ndarray:
-        """Noisy signals (n, stations, symbols) complex64. Raises: InputError where a sample has none."""
+        """Noisy signals (n, stations, symbols) complex64 of mean power one. Raises: InputError where a sample has none.
+
+        The level is taken out because it counts the points of the target's cloud; see docs/benchmark-rules.md.
+        """
         network, wanted = Network.from_settings(self.config["network"]), {}
         for number, pair in enumerate(zip(self.facts.subtype.tolist(), self.facts.model.tolist(), strict=True)):
             wanted.setdefault(pair, []).append(number)
@@ -81,7 +84,9 @@ class TrackSamples(Samples):
             for row, entry in enumerate(read_table(self.run / f"motion/{path.stem}.csv")):
                 numbers = wanted.pop((entry["subtype"], entry["model"]), [])
                 for number in numbers:
-                    result[number] = chunk[row, level[number]][list(self.track.stations)]
+                    signal = chunk[row, level[number]][list(self.track.stations)]
+                    power = np.mean(np.abs(signal).astype(float) ** 2, axis=-1, keepdims=True)
+                    result[number] = signal / np.sqrt(np.where(power > 0, power, 1))
         if wanted:
             raise InputError(f"{self.run}/noisy: no signal of {next(iter(wanted))}, expected one of every sample")
         return result
