@@ -67,11 +67,6 @@ def encoded(content: dict) -> bytes:
     return ("{" + ",".join(f'"{name}":{texts[name]}' for name in content) + "}").encode()
 
 
-def versions() -> dict[str, str]:
-    """Return the versions that decide a sample's bytes: that of this package's rules alone."""
-    return {"lowalt": DATA_VERSION}
-
-
 def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
     """Return range, direction and speed of the target's reference point from each station at the first symbol.
 
@@ -135,7 +130,7 @@ def record(
             for station, seen in geometry(row, network).items()
         },
         **({"cube": cubes} if cubes else {}),
-        "versions": versions(),
+        "versions": {"lowalt": DATA_VERSION},
     }
     return encoded(content)
 
