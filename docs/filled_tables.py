@@ -9,7 +9,7 @@ next to the paper's, and which orderings hold; `presets`: those of `make accurac
 
 from pathlib import Path
 
-from lowalt.benchmark import table
+from lowalt.benchmark import baseline_table
 from lowalt.config.command import run
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.csv_tables import read_csv
@@ -77,10 +77,10 @@ TRACKS = (("seen", "unseen", "one-station", "few-shot-1", "few-shot-5", "few-sho
 
 def benchmark(prefix: str) -> str:
     """Return the tables of the benchmark's baselines from {prefix}table.csv."""
-    rows = table.read(prefix)
+    rows = baseline_table.read(prefix)
     has = {row["track"] for row in rows}
     shown = [[track for track in tracks if track in has] for tracks in TRACKS]
-    text = "\n\n".join(table.markdown(rows, tracks) for tracks in shown if tracks)
+    text = "\n\n".join(baseline_table.markdown(rows, tracks) for tracks in shown if tracks)
     return f"{text}\n\nMeasured on {'; and '.join(dict.fromkeys(row['hardware'] for row in rows))}.\n"
 
 

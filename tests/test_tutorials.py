@@ -18,7 +18,7 @@ import pytest
 import small_benchmark
 from dataset import build, publish
 from lowalt.__main__ import main
-from lowalt.benchmark import checksums, definition
+from lowalt.benchmark import definition, frozen_bytes
 from lowalt.commands import workflow
 from lowalt.config.layers import load
 
@@ -100,7 +100,7 @@ def test_a_submission_to_the_benchmark(checkout, monkeypatch):
     """On a small copy of the benchmark; its data come from the test, so that no workflow starts and no byte is kept."""
     small_benchmark.shrink(monkeypatch)
     monkeypatch.setattr(workflow, "ended", lambda options: {"status": small_benchmark.write(Path("results")) is None})
-    monkeypatch.setattr(checksums, "faults", lambda part, folder: [])
+    monkeypatch.setattr(frozen_bytes, "faults", lambda part, folder: [])
     printed, _ = followed("benchmark", checkout, monkeypatch)
     assert "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
     assert float(re.search(r"accuracy ([\d.]+)", printed)[1]) > 35

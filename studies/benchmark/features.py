@@ -33,11 +33,11 @@ def power_spectrum(signals: np.ndarray, interval_s: float) -> tuple[np.ndarray, 
     return np.fft.fftfreq(POINTS, interval_s), power / np.where(total > 0, total, 1)
 
 
-def spectral_moments(signals: np.ndarray, interval_s: float) -> np.ndarray:
+def spectral_moments(signals: np.ndarray, frequency_hz: float, interval_s: float) -> np.ndarray:
     """Return mean size, deviation, skewness and kurtosis (B, 4) of the Doppler frequency, weighted by power.
 
-    The mean is the size of the folded frequency; the other three are about the mean, and the sign of the skewness is
-    dropped, since a target turned by 180 degrees has the opposite one.
+    frequency_hz: of the station, not used; interval_s: T_r. The mean is the size of the folded frequency; the other
+    three are about the mean. The skewness has no sign, since a target turned by 180 degrees has the opposite one.
     """
     frequency, power = power_spectrum(signals, interval_s)
     mean = power @ frequency

@@ -52,25 +52,20 @@ def majority(given: Given) -> Answer:
 
 def centroid(given: Given) -> Answer:
     """Answer by the distance to the mean of each class's moments, in units of their deviations."""
-    told = moments_of(given.train)
+    told = features_of(given.train, given.features, spectral_moments)
     mean, scale = told.mean(0), np.maximum(told.std(0), 1e-9)
     told = (told - mean) / scale
     centres = np.array([told[given.train.labels == label].mean(0) for label in range(len(given.classes))])
 
     def answer(samples: TrackSamples) -> np.ndarray:
         """Probabilities that fall off with the squared distance."""
-        away = (((moments_of(samples) - mean) / scale)[:, None] - centres) ** 2
+        asked = (features_of(samples, given.features, spectral_moments) - mean) / scale
+        away = (asked[:, None] - centres) ** 2
         logits = -0.5 * away.sum(-1)
         shares = np.exp(logits - logits.max(1, keepdims=True))
         return shares / shares.sum(1, keepdims=True)
 
     return answer
-
-
-def moments_of(samples: TrackSamples) -> np.ndarray:
-    """Moments of the power spectrum of all stations' signals, (samples, stations * 4)."""
-    interval_s = samples.config["network"]["symbol_interval_s"]
-    return np.concatenate([spectral_moments(one, interval_s) for one in samples.signals.swapaxes(0, 1)], axis=1)
 
 
 def on_features(method: str, given: Given) -> Answer:

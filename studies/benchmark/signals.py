@@ -1,14 +1,17 @@
 """Samples of methods that see slow-time signals or their physical features instead of images."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from features import features
 
+from lowalt.benchmark.definition import PARTS, config_of, run_name
 from lowalt.benchmark.part_samples import TrackSamples
 from lowalt.config.network import Network
 from lowalt.files.atomic import replacing
 from lowalt.recognition.samples import Samples, fingerprint
+from lowalt.tiles.signals import load_signals
 
 BLOCK = 256
 """Signals whose spectra are in memory at a time."""
@@ -52,20 +55,28 @@ class Signals(Samples):
         return fingerprint(self.facts, np.ascontiguousarray(self.values).view(np.uint8).data)
 
 
-def features_of(samples: TrackSamples, folder: Path) -> np.ndarray:
-    """Return the physical features (samples, stations * features) float32 of a track's part.
+def told(path: Path, folder: Path, told_of: Callable[[np.ndarray, float, float], np.ndarray]) -> np.ndarray:
+    """Return numbers (models, SNRs, stations, numbers) float32 of all signals of a chunk; made once, then kept.
 
-    folder: where the features of all three stations are kept by the part's keys, so that tracks share them.
+    path: the chunk's noisy signals; folder: where the numbers are kept; told_of: a function of signals (B, N), the
+    station's frequency (Hz) and the symbol interval (s), as `features.features`.
     """
-    kept = folder / f"{samples.run.name}-{fingerprint(samples.facts)[:16]}-{len(samples.track.stations)}.npy"
+    run = path.parents[1].name
+    kept = folder / told_of.__name__ / run / path.name
     if not kept.is_file():
-        network = Network.from_settings(samples.config["network"])
-        columns = []
-        for place, station in enumerate(samples.track.stations):
-            own, frequency_hz = samples.signals[:, place], network.stations[station].frequency_hz
-            blocks = [features(own[start : start + BLOCK], frequency_hz, network.symbol_interval_s)
+        part = next(part for part in PARTS if run_name(part) == run)
+        network, columns = Network.from_settings(config_of(part)["network"]), []
+        chunk = load_signals(path, network)
+        for place, station in enumerate(network.stations):
+            own = chunk[:, :, place].reshape(-1, network.symbols)
+            blocks = [told_of(own[start : start + BLOCK], station.frequency_hz, network.symbol_interval_s)
                       for start in range(0, len(own), BLOCK)]  # fmt: skip
-            columns.append(np.concatenate(blocks))
+            columns.append(np.concatenate(blocks).reshape(*chunk.shape[:2], -1))
         with replacing(kept) as temporary, temporary.open("wb") as file:
-            np.save(file, np.concatenate(columns, axis=1))
-    return np.load(kept)
+            np.save(file, np.stack(columns, axis=2).astype(np.float32))
+    return np.load(kept, mmap_mode="r")
+
+
+def features_of(samples: TrackSamples, folder: Path, told_of: Callable = features) -> np.ndarray:
+    """Return the features (samples, stations * features) float32 of a track's part, side by side; as `told`."""
+    return samples.of_chunks(lambda path: told(path, folder, told_of)).reshape(len(samples), -1)

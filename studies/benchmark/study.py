@@ -10,7 +10,7 @@ every call, of the methods that are finished on all tracks of the table; `--tabl
 import argparse
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -18,21 +18,23 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from features import features, spectral_moments
 from methods import METHODS, SEEDLESS, Given
+from signals import told
 
 import trainings
-from lowalt.benchmark import baselines, scoring, table
-from lowalt.benchmark.definition import MAIN, REFERENCE, RUN, config_of
+from lowalt.benchmark import baseline_table, baselines, scoring
+from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
+from lowalt.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
 from lowalt.benchmark.part_samples import TrackSamples
-from lowalt.benchmark.tracks import TRACKS, UNKNOWN, Track, named
 from lowalt.config.command import run
 from lowalt.files.atomic import replacing, slug
 from lowalt.machine.hardware import describe
 from lowalt.recognition.predictions import Predictions
 
 OUT = Path(f"results/{RUN}-baselines")
-REFERENCE_METHOD = "small CNN on images"
-"""The table has the tracks on which this method is finished."""
+FIRST = "majority class"
+"""The table has the tracks on which this method is finished, and the methods that are finished on all of them."""
 
 
 def closed(samples: TrackSamples) -> TrackSamples:
@@ -115,11 +117,9 @@ def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], grou
     found = scoring.scores(track, [part.probabilities for part in parts], {})
     names = ("percent", "low", "high"), ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
     values = found["percent"], found["macro_f1_percent"]
-    cells = {
-        name: value
-        for keys, interval in zip(names, values, strict=True)
-        for name, value in zip(keys, interval, strict=True)
-    }
+    cells = {}
+    for columns, interval in zip(names, values, strict=True):
+        cells |= dict(zip(columns, interval, strict=True))
     test_s = np.mean([one["test_core_s"][track.name] for one in about])
     return {
         "track": track.name, "method": method, "seeds": len(parts), **cells, "group": group,
@@ -141,7 +141,8 @@ def tables(out: Path) -> list[dict]:
         if not found:
             continue
         first = next(iter(found.values()))
-        numbers = table.groups(track, first.weight, first.subtypes, {name: one.values for name, one in found.items()})
+        values = {name: one.values for name, one in found.items()}
+        numbers = baseline_table.groups(track, first.weight, first.subtypes, values)
         rows += [row_of(track, method, one, numbers[method]) for method, one in runs.items()]
         arrays = {name: baselines.packed(track, [part for _, part in one], classes) for name, one in runs.items()}
         baselines.write(track, arrays, out)
@@ -149,17 +150,27 @@ def tables(out: Path) -> list[dict]:
 
 
 def shown_tracks() -> list[Track]:
-    """Return the tracks of the table: those on which the reference is finished."""
+    """Return the tracks of the table: those on which the first method is finished."""
     return [track for track in TRACKS.values()
-            if (place(REFERENCE_METHOD, track.trains_as, 0) / "run.json").is_file()]  # fmt: skip
+            if (place(FIRST, track.trains_as, 0) / "run.json").is_file()]  # fmt: skip
 
 
 def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
     """Return the rows with the confirmed results that the table has already."""
-    kept = {(row["track"], row["method"]): row for row in (table.read(out) if (out / table.TABLE).is_file() else [])}
+    rows_kept = baseline_table.read(out) if (out / baseline_table.TABLE).is_file() else []
+    kept = {(row["track"], row["method"]): row for row in rows_kept}
     names = ("confirmed_percent", "confirmed_low", "confirmed_high")
     return [row | {name: kept[row["track"], row["method"]][name] for name in names}
             if (row["track"], row["method"]) in kept else row for row in rows]  # fmt: skip
+
+
+def each(call: Callable, jobs: list, workers: int | None) -> None:
+    """Do all jobs, one after the other in this process or several side by side."""
+    if workers == 1:
+        for job in jobs:
+            call(job)
+    else:
+        trainings.side_by_side(call, jobs, workers)
 
 
 def main(arguments: list[str]) -> None:
@@ -176,11 +187,15 @@ def main(arguments: list[str]) -> None:
     jobs = [(method, track, seed) for seed, method, track in product(given.seeds, given.methods, given.tracks)
             if seed == 0 or method not in SEEDLESS]  # fmt: skip
     if not given.table:
-        trainings.side_by_side(partial(one, data=given.data), jobs, given.workers)
+        chunks = sorted(path for part in PARTS for path in Path(given.data, run_name(part), "noisy").glob("*.npy"))
+        for word, told_of in (("moments", spectral_moments), ("features", features)):
+            if any(word in method for method in given.methods):
+                each(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
+        each(partial(one, data=given.data), jobs, given.workers)
     out = Path(REFERENCE)
     rows = with_confirmed(tables(out), out)
-    table.write(rows, out)
-    print(f"{out / table.TABLE}: {len(rows)} rows")
+    baseline_table.write(rows, out)
+    print(f"{out / baseline_table.TABLE}: {len(rows)} rows")
 
 
 if __name__ == "__main__":

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import yaml
 
-from lowalt.benchmark import checksums, definition
+from lowalt.benchmark import definition, frozen_bytes
+from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN
 from lowalt.benchmark.definition import MAIN, PARTS, VERSION, config_of, truth
-from lowalt.benchmark.tracks import TRACKS, UNKNOWN
 from lowalt.commands.compare import leaves
 from lowalt.config.layers import SCHEMA
 from lowalt.files.shipped import as_named
@@ -38,9 +38,9 @@ def test_the_definition_takes_nothing_that_decides_bytes_from_the_default():
 @pytest.mark.parametrize("part", PARTS)
 def test_samples_made_again_are_those_that_are_kept(part):
     """Every subtype, in the town a few: a change of targets, motion, echo, noise, spectra or effects is seen here."""
-    kept = checksums.kept_samples(part)
-    assert len(kept) == checksums.FEW.get(part, 40)
-    assert list(checksums.samples(part)) == kept
+    kept = frozen_bytes.kept_samples(part)
+    assert len(kept) == frozen_bytes.FEW.get(part, 40)
+    assert list(frozen_bytes.samples(part)) == kept
 
 
 def test_keys_and_folds_are_those_of_the_workflow():

@@ -13,8 +13,8 @@ import pytest
 import small_benchmark
 from lowalt import benchmark
 from lowalt.__main__ import main
-from lowalt.benchmark import checksums, confirm, definition
-from lowalt.benchmark.tracks import TRACKS
+from lowalt.benchmark import confirm, definition, frozen_bytes
+from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
 from lowalt.files.errors import InputError
 
@@ -102,9 +102,9 @@ def test_score_prints_intervals_and_every_baseline(small, capsys):
 
 def test_make_compares_with_the_kept_checksums(small, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(workflow, "ended", lambda options: {"status": 0})
-    monkeypatch.setattr(checksums, "REFERENCE", str(tmp_path))
-    monkeypatch.setattr(checksums, "PARTS", ("main",))
-    checksums.write("results", tmp_path)
+    monkeypatch.setattr(frozen_bytes, "REFERENCE", str(tmp_path))
+    monkeypatch.setattr(frozen_bytes, "PARTS", ("main",))
+    frozen_bytes.write("results", tmp_path)
     assert main(["benchmark", "make"]) == 0
     assert "are equal to the kept checksums" in capsys.readouterr().out
     table = next(Path("results/lowalt-40-v1/motion").glob("*.csv"))
@@ -147,7 +147,6 @@ def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatc
 
     monkeypatch.setattr(study, "OUT", tmp_path / "out")
     monkeypatch.setattr(study, "REFERENCE", str(tmp_path))
-    monkeypatch.setattr(study, "REFERENCE_METHOD", "majority class")
     for method in ("majority class", "nearest centroid on moments", "logistic regression on features"):
         for track in ("unseen", "open-set", "one-station"):
             study.one((method, track, 0), "results")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from sklearn.metrics import f1_score, roc_auc_score
 
-from lowalt.benchmark import baselines, scoring, table
+from lowalt.benchmark import baseline_table, baselines, scoring
+from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN
 from lowalt.benchmark.submission import read
-from lowalt.benchmark.tracks import TRACKS, UNKNOWN
 from lowalt.files.errors import InputError
 from lowalt.recognition.predictions import probability_columns
 
@@ -134,5 +134,5 @@ def test_a_group_ends_where_a_difference_is_certain():
     draw = np.random.default_rng(0).random((4, 1000))
     levels = {"best": 0.92, "near": 0.915, "worse": 0.7, "also worse": 0.69}
     values = {name: (draw[number] < level)[None].astype(float) for number, (name, level) in enumerate(levels.items())}
-    found = table.groups(UNSEEN, np.ones(1000), subtypes, values)
+    found = baseline_table.groups(UNSEEN, np.ones(1000), subtypes, values)
     assert found == {"best": 1, "near": 1, "worse": 2, "also worse": 2}

@@ -35,11 +35,16 @@ def test_record_tells_motion_geometry_and_versions():
 
 
 def test_a_record_does_not_depend_on_the_version_of_the_package():
-    made = (
-        "import sys, lowalt; {}; sys.path[:0] = ['tests/support']; import dataset; "
-        "from lowalt.config.network import Network; from lowalt.shards.sample_record import record; network = Network.from_settings(dataset.NETWORK); "
-        "print(record(dataset.motion_rows('seen')[0], 3.0, 'val', 1, network).decode())"
-    )
+    made = """
+import sys, lowalt
+{}
+sys.path[:0] = ["tests/support"]
+from dataset import NETWORK, motion_rows
+from lowalt.config.network import Network
+from lowalt.shards.sample_record import record
+
+print(record(motion_rows("seen")[0], 3.0, "val", 1, Network.from_settings(NETWORK)).decode())
+"""
     here, later = printed([made.format("pass"), made.format("lowalt.__version__ = '9.9.9'")])
     assert here == later and f'"versions":{{"lowalt":"{DATA_VERSION}"}}' in here
 

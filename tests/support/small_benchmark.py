@@ -24,7 +24,7 @@ LESS = {
 def shrink(monkeypatch) -> None:
     """Let every part of the definition be small for the rest of a test."""
     small = lambda part: overlaid([*definition.overlays(part), LESS])  # noqa: E731
-    for module in ("definition", "part_samples", "checksums", "confirm"):
+    for module in ("definition", "part_samples", "frozen_bytes", "confirm"):
         monkeypatch.setattr(f"lowalt.benchmark.{module}.config_of", small)
     definition.truth.cache_clear()
 

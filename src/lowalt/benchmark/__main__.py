@@ -2,7 +2,7 @@
 
 import argparse
 
-from lowalt.benchmark import checksums
+from lowalt.benchmark import frozen_bytes
 from lowalt.benchmark.definition import REFERENCE
 from lowalt.config.command import run, warn_in_one_line
 
@@ -15,9 +15,9 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", default=REFERENCE, help=f"folder to write into (default: {REFERENCE})")
     options = line.parse_args(arguments)
     warn_in_one_line()
-    checksums.write_samples(options.out)
+    frozen_bytes.write_samples(options.out)
     if not options.samples:
-        checksums.write(options.results, options.out)
+        frozen_bytes.write(options.results, options.out)
 
 
 if __name__ == "__main__":

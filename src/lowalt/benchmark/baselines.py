@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.benchmark.benchmark_tracks import Track
 from lowalt.benchmark.definition import REFERENCE
 from lowalt.benchmark.scoring import Values, values_of
-from lowalt.benchmark.tracks import Track
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError

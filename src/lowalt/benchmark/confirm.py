@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.benchmark.benchmark_tracks import TRACKS, Track
 from lowalt.benchmark.definition import VERSION, config_of, root_seed
 from lowalt.benchmark.scoring import headline, tested, values_of
-from lowalt.benchmark.tracks import TRACKS, Track
 from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
 from lowalt.recognition.dataset_samples import DatasetSamples

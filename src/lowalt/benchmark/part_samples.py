@@ -1,12 +1,13 @@
 """The samples of a track's part as arrays: images and complex signals, read from the runs that made the data."""
 
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.benchmark.benchmark_tracks import Track, named
 from lowalt.benchmark.definition import MAIN, config_of, overlays, run_name
-from lowalt.benchmark.tracks import Track, named
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
@@ -16,6 +17,12 @@ from lowalt.tiles.signals import load_signals
 
 VIEWS = (0, 1, 2)
 """Numbers of the images of each station among the known spectra: VRP, TRP and VT."""
+
+
+def _of_unit_power(signals: np.ndarray) -> np.ndarray:
+    """Signals (..., symbols) complex64 divided by the root of their mean power; signals of zeros stay zeros."""
+    power = np.mean(np.abs(signals).astype(float) ** 2, axis=-1, keepdims=True)
+    return (signals / np.sqrt(np.where(power > 0, power, 1))).astype(np.complex64)
 
 
 class TrackSamples(Samples):
@@ -73,21 +80,29 @@ class TrackSamples(Samples):
 
         The level is taken out because it counts the points of the target's cloud; see docs/benchmark-rules.md.
         """
-        network, wanted = Network.from_settings(self.config["network"]), {}
+        network = Network.from_settings(self.config["network"])
+        return self.of_chunks(lambda path: _of_unit_power(load_signals(path, network)))
+
+    def of_chunks(self, values: Callable[[Path], np.ndarray]) -> np.ndarray:
+        """Return for each sample and each of the track's stations what `values` has of it, (n, stations, ...).
+
+        values: from a chunk's noisy signals (.npy) to an array (models, SNRs, stations, ...).
+        Raises: InputError where a sample has no signal.
+        """
+        wanted: dict[tuple, list[int]] = {}
         for number, pair in enumerate(zip(self.facts.subtype.tolist(), self.facts.model.tolist(), strict=True)):
             wanted.setdefault(pair, []).append(number)
         levels = {float(snr): place for place, snr in enumerate(self.config["noise"]["snr_db"])}
-        level = np.array([levels[snr] for snr in self.facts.snr_db.tolist()])
-        result = np.empty((len(self), len(self.track.stations), network.symbols), np.complex64)
+        level = [levels[snr] for snr in self.facts.snr_db.tolist()]
+        result: np.ndarray | None = None
         for path in sorted((self.run / "noisy").glob("*.npy")):
-            chunk = load_signals(path, network)
+            chunk = values(path)
+            if result is None:
+                result = np.empty((len(self), len(self.track.stations), *chunk.shape[3:]), chunk.dtype)
             for row, entry in enumerate(read_table(self.run / f"motion/{path.stem}.csv")):
-                numbers = wanted.pop((entry["subtype"], entry["model"]), [])
-                for number in numbers:
-                    signal = chunk[row, level[number]][list(self.track.stations)]
-                    power = np.mean(np.abs(signal).astype(float) ** 2, axis=-1, keepdims=True)
-                    result[number] = signal / np.sqrt(np.where(power > 0, power, 1))
-        if wanted:
+                for number in wanted.pop((entry["subtype"], entry["model"]), []):
+                    result[number] = chunk[row, level[number]][list(self.track.stations)]
+        if wanted or result is None:
             raise InputError(f"{self.run}/noisy: no signal of {next(iter(wanted))}, expected one of every sample")
         return result
 

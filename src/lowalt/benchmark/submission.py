@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lowalt.benchmark.tracks import Track
+from lowalt.benchmark.benchmark_tracks import Track
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError, shown
 from lowalt.recognition.predictions import probability_columns

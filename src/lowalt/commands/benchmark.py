@@ -4,10 +4,10 @@ import argparse
 import shutil
 from pathlib import Path
 
-from lowalt.benchmark import checksums, table
+from lowalt.benchmark import baseline_table, frozen_bytes
 from lowalt.benchmark.baselines import kept
+from lowalt.benchmark.benchmark_tracks import TRACKS, Track, named
 from lowalt.benchmark.definition import MAIN, VERSION, overlays, run_name
-from lowalt.benchmark.tracks import TRACKS, Track, named
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
@@ -20,8 +20,8 @@ EXAMPLE = "lowalt benchmark score predictions.csv --track unseen"
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `benchmark` and its own commands to a parser's commands."""
-    own = commands.add_parser(name, help=COMMANDS[name].meaning,
-                              epilog=f"example: {EXAMPLE}").add_subparsers(metavar="COMMAND", required=True)  # fmt: skip
+    about = commands.add_parser(name, help=COMMANDS[name].meaning, epilog=f"example: {EXAMPLE}")
+    own = about.add_subparsers(metavar="COMMAND", required=True)
     add_command(own, "tracks", tracks, "the tracks: whom each serves, and how many samples it has",
                 "lowalt benchmark tracks")  # fmt: skip
     line = add_command(own, "make", make, "make the data of tracks and compare them with the kept checksums",
@@ -66,8 +66,8 @@ def make(options: argparse.Namespace) -> Answer:
         ended = workflow.ended(words)
         if ended["status"]:
             return Answer({"parts": facts}, f"{run_name(part)}: the workflow failed", ended["status"])
-        facts[part] = checksums.faults(part, "results")
-        count = sum(name.startswith(f"{part}/") for name in checksums.kept())
+        facts[part] = frozen_bytes.faults(part, "results")
+        count = sum(name.startswith(f"{part}/") for name in frozen_bytes.kept())
         lines += facts[part][:5] or [f"results/{run_name(part)}: all {count} files are equal to the kept checksums"]
     return Answer({"parts": facts}, "\n".join(lines), int(any(facts.values())))
 
@@ -96,8 +96,10 @@ def score(options: argparse.Namespace) -> Answer:
 def _report(track: Track, facts: dict) -> str:
     """The scores as text."""
     counts = f"{facts['samples']} samples, training seeds: {facts['seeds']}"
-    lines = [f"{VERSION}, track {track.name}, {counts}; percent, with 95 % intervals",
-             f"{facts['headline']} {_words(facts['percent'])}, macro F1 {_words(facts['macro_f1_percent'])}"]  # fmt: skip
+    lines = [
+        f"{VERSION}, track {track.name}, {counts}; percent, with 95 % intervals",
+        f"{facts['headline']} {_words(facts['percent'])}, macro F1 {_words(facts['macro_f1_percent'])}",
+    ]
     if "rejected_percent" in facts:
         lines.append(f"rejected of the held-out class at 95 % acceptance: {facts['rejected_percent']:.1f}")
     lines.append("by SNR: " + ", ".join(f"{snr} dB {share:.1f}" for snr, share in facts["by_snr_percent"].items()))
@@ -126,9 +128,9 @@ def confirmed(options: argparse.Namespace) -> Answer:
 def shown(options: argparse.Namespace) -> Answer:
     """Show the kept table. Raises: InputError for an unknown track."""
     names = [named(name).name for name in options.track]
-    rows = [row for row in table.read() if row["track"] in names]
+    rows = [row for row in baseline_table.read() if row["track"] in names]
     if not rows:
-        raise InputError(f"{table.TABLE}: no row of {names}, expected a track with baselines")
+        raise InputError(f"{baseline_table.TABLE}: no row of {names}, expected a track with baselines")
     wide = shutil.get_terminal_size().columns
     lines = [f"{row['track']:12} {row['method'][: wide - 50]:40} {float(row['percent']):5.1f} "
              f"({float(row['low']):.1f} to {float(row['high']):.1f})" for row in rows]  # fmt: skip

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.benchmark.benchmark_tracks import TRACKS, Track
 from lowalt.benchmark.definition import REFERENCE
 from lowalt.benchmark.scoring import Values, difference
-from lowalt.benchmark.tracks import TRACKS, Track
 from lowalt.files.csv_tables import number, read_csv, write_csv
 from lowalt.files.shipped import shipped
 
