@@ -120,7 +120,7 @@ cost: $(SETUP)  ## error of the echo over its time: results/default/cost.csv and
 	$(SNAKEMAKE) -- cost
 
 accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings per row: results/default/accuracy_cost.csv and .svg
-	$(MAKE) --no-print-directory study NAME=heights
+	$(MAKE) --no-print-directory study NAME=heights ONLY=--for-cost
 	$(SNAKEMAKE) --configfile config/cost/accuracy.yaml -- accuracy_cost
 
 BENCHMARK := lowalt-40-v1
