@@ -16,7 +16,7 @@ from typing import Any
 
 import classical
 import numpy as np
-from features import spectral_moments
+from features import features, spectral_moments
 from signals import Signals, features_of
 
 from lowalt.benchmark.part_samples import TrackSamples
@@ -136,5 +136,7 @@ METHODS: dict[str, Callable[[Given], Answer]] = {
     "CNN on images, soft voting": lambda given: on_images("voting", "", given),
 }
 """In the order in which a study trains them."""
+TOLD = (("moments", spectral_moments), ("features", features))
+"""What methods whose name ends so see of each signal; it is computed once and kept, so its time is added to theirs."""
 SEEDLESS = ("majority class", "nearest centroid on moments")
 """Methods that draw nothing, so that one seed is enough."""

@@ -1,5 +1,7 @@
 """Samples of methods that see slow-time signals or their physical features instead of images."""
 
+import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -65,6 +67,7 @@ def told(path: Path, folder: Path, told_of: Callable[[np.ndarray, float, float],
     kept = folder / told_of.__name__ / run / path.name
     if not kept.is_file():
         part = next(part for part in PARTS if run_name(part) == run)
+        begun = time.process_time()
         network, columns = Network.from_settings(config_of(part)["network"]), []
         chunk = load_signals(path, network)
         for place, station in enumerate(network.stations):
@@ -74,7 +77,16 @@ def told(path: Path, folder: Path, told_of: Callable[[np.ndarray, float, float],
             columns.append(np.concatenate(blocks).reshape(*chunk.shape[:2], -1))
         with replacing(kept) as temporary, temporary.open("wb") as file:
             np.save(file, np.stack(columns, axis=2).astype(np.float32))
+        seconds = (time.process_time() - begun) / (chunk.shape[0] * chunk.shape[1])
+        with replacing(kept.with_suffix(".json")) as temporary:
+            temporary.write_text(json.dumps({"core_s_per_sample": seconds}) + "\n")
     return np.load(kept, mmap_mode="r")
+
+
+def cost_s(folder: Path, told_of: Callable, run: str) -> float:
+    """Return the mean core-seconds that `told` took per sample of a run."""
+    paths = (folder / told_of.__name__ / run).glob("*.json")
+    return float(np.mean([json.loads(path.read_text())["core_s_per_sample"] for path in paths]))
 
 
 def features_of(samples: TrackSamples, folder: Path, told_of: Callable = features) -> np.ndarray:

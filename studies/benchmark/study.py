@@ -18,9 +18,8 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from features import features, spectral_moments
-from methods import METHODS, SEEDLESS, Given
-from signals import told
+from methods import METHODS, SEEDLESS, TOLD, Given
+from signals import cost_s, told
 
 import trainings
 from lowalt.benchmark import baseline_table, baselines, scoring
@@ -72,28 +71,35 @@ def place(method: str, name: str, seed: int) -> Path:
     return OUT / f"{slug(method)}/{name}/{seed}"
 
 
+def told_s(method: str, samples: TrackSamples) -> float:
+    """Return the core-seconds per sample of what a method sees of its signals, where that is kept; else 0."""
+    kept = (told_of for word, told_of in TOLD if method.endswith(word))
+    return sum(cost_s(OUT / "features", told_of, samples.run.name) for told_of in kept)
+
+
 def one(job: tuple[str, str, int], data: str) -> Path:
     """Train a method for a track, test it on all tracks that this serves, and keep its answers."""
     method, name, seed = job
     folder, track = place(method, name, seed), named(name)
-    if (folder / "run.json").is_file():
+    if (folder / "tested.json").is_file():
         return folder
     parts = [closed(TrackSamples(track, part, data)) for part in ("train", "validation")]
     given = Given(*parts, parts[0].classes, seed, folder, OUT / "features", config_of(MAIN))
     begun = time.process_time()
     answer = METHODS[method](given)
-    trained_s = time.process_time() - begun
+    trained_s = time.process_time() - begun + len(parts[0]) * told_s(method, parts[0])
     facts = {"method": method, "seed": seed, "train_core_s": trained_s, "hardware": describe(), "test_core_s": {}}
     found = {}
     for tested in served(name):
         samples = TrackSamples(tested, "test", data)
         begun = time.process_time()
         shares = answer(closed(samples))
-        facts["test_core_s"][tested.name] = time.process_time() - begun
+        spent = time.process_time() - begun + len(samples) * told_s(method, samples)
+        facts["test_core_s"][tested.name] = spent
         found[tested.name] = opened(samples, shares).astype(np.float32)
     with replacing(folder / "answers.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **found)
-    with replacing(folder / "run.json") as temporary:
+    with replacing(folder / "tested.json") as temporary:
         temporary.write_text(json.dumps(facts, indent=1) + "\n")
     print(f"{folder}: {trained_s:.0f} core-s", flush=True)
     return folder
@@ -105,10 +111,10 @@ def finished(method: str, track: Track) -> Iterator[tuple[dict, Predictions]]:
     facts = every.take(track.numbers("test"))
     for seed in range(100):
         folder = place(method, track.trains_as, seed)
-        if (folder / "run.json").is_file():
+        if (folder / "tested.json").is_file():
             with np.load(folder / "answers.npz", allow_pickle=False) as data:
                 shares = data[track.name].astype(float)
-            yield json.loads((folder / "run.json").read_text()), scoring.tested(track, facts, shares)
+            yield json.loads((folder / "tested.json").read_text()), scoring.tested(track, facts, shares)
 
 
 def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], group: int) -> dict:
@@ -131,7 +137,7 @@ def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], grou
 def tables(out: Path) -> list[dict]:
     """Write what is kept of all finished trainings, and return the rows of the table."""
     rows, complete = [], [
-        method for method in METHODS if all(place(method, track.trains_as, 0).joinpath("run.json").is_file()
+        method for method in METHODS if all(place(method, track.trains_as, 0).joinpath("tested.json").is_file()
                                             for track in shown_tracks())
     ]  # fmt: skip
     for track in shown_tracks():
@@ -152,7 +158,7 @@ def tables(out: Path) -> list[dict]:
 def shown_tracks() -> list[Track]:
     """Return the tracks of the table: those on which the first method is finished."""
     return [track for track in TRACKS.values()
-            if (place(FIRST, track.trains_as, 0) / "run.json").is_file()]  # fmt: skip
+            if (place(FIRST, track.trains_as, 0) / "tested.json").is_file()]  # fmt: skip
 
 
 def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
@@ -188,8 +194,8 @@ def main(arguments: list[str]) -> None:
             if seed == 0 or method not in SEEDLESS]  # fmt: skip
     if not given.table:
         chunks = sorted(path for part in PARTS for path in Path(given.data, run_name(part), "noisy").glob("*.npy"))
-        for word, told_of in (("moments", spectral_moments), ("features", features)):
-            if any(word in method for method in given.methods):
+        for word, told_of in TOLD:
+            if any(method.endswith(word) for method in given.methods):
                 each(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
         each(partial(one, data=given.data), jobs, given.workers)
     out = Path(REFERENCE)

@@ -26,6 +26,8 @@ def shrink(monkeypatch) -> None:
     small = lambda part: overlaid([*definition.overlays(part), LESS])  # noqa: E731
     for module in ("definition", "part_samples", "frozen_bytes", "confirm"):
         monkeypatch.setattr(f"lowalt.benchmark.{module}.config_of", small)
+    # What is kept of the baselines belongs to all motion models.
+    monkeypatch.setattr("lowalt.benchmark.baselines.path_of", lambda track: Path("none"))
     definition.truth.cache_clear()
 
 

@@ -100,19 +100,20 @@ def _few(shots: int, serves: str) -> Track:
 TRACKS = {
     track.name: track
     for track in (
-        Track("seen", "For operators who know every type that will fly: new flights of known types."),
-        Track("unseen", "For surveillance: types that no training has seen.", "unseen"),
-        Track("one-station", "For operators of a single radar: unseen types from station A alone.", "unseen",
+        Track("seen", "Serves operators who know every type that will fly."),
+        Track("unseen", "Serves surveillance: no training has seen these types.", "unseen"),
+        Track("one-station", "Serves operators of a single radar: unseen types, station A alone.", "unseen",
               stations=(0,)),
-        _few(1, "For whoever has a single recorded flight of each new type."),
-        _few(5, "For whoever has an afternoon with each new type: five recorded flights."),
-        _few(20, "For whoever has a measurement campaign with each new type: twenty recorded flights."),
-        Track("open-set", f"For alarms: is this one of the trained classes at all? {UNKNOWN}s are held out.",
+        _few(1, "Serves whoever has one recorded flight of each new type."),
+        _few(5, "Serves whoever has five recorded flights of each new type."),
+        _few(20, "Serves whoever has twenty recorded flights of each new type."),
+        Track("open-set", "Serves operators who need an alarm instead of a wrong class: birds are held out.",
               headline="AUROC"),
-        Track("forty", "For forensics: which of the forty types was it?", subtypes=True),
-        Track("low-snr", "For small and distant targets: 3 dB down to -10 dB.", part="low-snr"),
-        Track("town", "For deployment in a town: trained in the paper's scene, tested between buildings.", part="town"),
-        Track("fr2", "For another band: trained at 4.9 GHz, tested at 28 GHz.", part="fr2"),
+        Track("forty", "Serves forensics: which of the forty types was it?", subtypes=True),
+        Track("low-snr", "Serves the detection of small and distant targets: 3 dB down to -10 dB.", part="low-snr"),
+        Track("town", "Serves deployment between buildings: trained in the paper's scene, tested in a town.",
+              part="town"),
+        Track("fr2", "Serves operators of another band: trained at 4.9 GHz, tested at 28 GHz.", part="fr2"),
     )
 }  # fmt: skip
 

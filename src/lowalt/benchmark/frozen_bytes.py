@@ -19,8 +19,8 @@ from lowalt.shards.dataset import Dataset
 FILES = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy")
 """Files of a part's run, in the order in which each makes the next. Images follow from the signals."""
 WHOLE, SAMPLES = "checksums.txt", "samples.txt"
-FEW = {"town": 8}
-"""Number of subtypes of which a sample is kept, where making one of each would take too long."""
+FEW = {"low-snr": 8, "town": 8, "fr2": 8}
+"""Number of subtypes of which a sample is kept, where it is not one of each: two of each class."""
 
 
 def of_part(part: str, folder: str | Path) -> dict[str, str]:
