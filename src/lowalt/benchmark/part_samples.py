@@ -19,11 +19,17 @@ VIEWS = (0, 1, 2)
 """Numbers of the images of each station among the known spectra: VRP, TRP and VT."""
 
 
+def _of_unit_power(signals: np.ndarray) -> np.ndarray:
+    """Signals (..., symbols) complex64 divided by the root of their mean power; signals of zeros stay zeros."""
+    power = np.mean(np.abs(signals).astype(float) ** 2, axis=-1, keepdims=True)
+    return (signals / np.sqrt(np.where(power > 0, power, 1))).astype(np.complex64)
+
+
 class TrackSamples(Samples):
     """The samples of one part of a track, also a source for trainings of `lowalt.recognition`.
 
     `key`, `labels` (n,) and `classes`; `images` (n, stations * 3, 24, 24) uint8 index values, station by station,
-    each VRP, TRP, VT; `signals` (n, stations, 400) complex64.
+    each VRP, TRP, VT; `signals` (n, stations, 400) complex64, the mean power of each station's is one.
     """
 
     def __init__(self, track: Track, part: str, folder: str | Path) -> None:
@@ -70,9 +76,12 @@ class TrackSamples(Samples):
 
     @cached_property
     def signals(self) -> np.ndarray:
-        """Noisy signals (n, stations, symbols) complex64. Raises: InputError where a sample has none."""
+        """Noisy signals (n, stations, symbols) complex64 of mean power one. Raises: InputError where a sample has none.
+
+        The level is taken out because it counts the points of the target's cloud; see docs/benchmark-rules.md.
+        """
         network = Network.from_settings(self.config["network"])
-        return self.of_chunks(lambda path: load_signals(path, network))
+        return self.of_chunks(lambda path: _of_unit_power(load_signals(path, network)))
 
     def of_chunks(self, values: Callable[[Path], np.ndarray]) -> np.ndarray:
         """Return for each sample and each of the track's stations what `values` has of it, (n, stations, ...).
