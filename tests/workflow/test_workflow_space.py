@@ -1,5 +1,6 @@
 """Disk: a run's bytes follow from its arrays, what is there already is not counted, a full disk is named."""
 
+import contextlib
 import errno
 import os
 import subprocess
@@ -8,6 +9,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
+from test_workflow import checksums, snakemake, workplace
+from test_workflow_extension import BASE
 
 from lowalt.config.layers import load_yaml
 from lowalt.config.plan import Plan
@@ -72,14 +76,22 @@ def test_a_run_is_refused_where_its_new_bytes_do_not_fit_and_started_when_told(t
         space.before(workflow, PLAN, CONFIG)
 
 
+@contextlib.contextmanager
+def mounted(folder):
+    """Mount a disk of 2 MB at a folder, where this user may."""
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "lowalt", folder], capture_output=True).returncode:
+        pytest.skip("mounting a file system needs root")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
 @pytest.fixture
 def small_disk(tmp_path):
-    """A disk of 2 MB of its own, where this user may mount one."""
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "lowalt", tmp_path], capture_output=True)
-    if mounted.returncode:
-        pytest.skip("mounting a file system needs root")
-    yield tmp_path
-    subprocess.run(["umount", tmp_path], check=True)
+    """A disk of 2 MB of its own."""
+    with mounted(tmp_path):
+        yield tmp_path
 
 
 def written(path, size):
@@ -147,6 +159,31 @@ def test_other_errors_pass_unchanged(tmp_path):
     assert not isinstance(caught.value, SpaceError)
     with pytest.raises(RuntimeError, match="plain"), replacing(tmp_path / "x"):
         raise RuntimeError("plain")
+
+
+@pytest.mark.slow
+@pytest.mark.workflow
+def test_a_run_that_met_a_full_disk_twice_has_the_bytes_of_an_undisturbed_one(tmp_path, monkeypatch):
+    """Two megabytes end in the noise and four in the shards; the same command continues once there is room."""
+    overlay = yaml.safe_dump(BASE | {"motion": BASE["motion"] | {"models": 40}})
+    whole, disturbed = workplace(tmp_path / "whole"), workplace(tmp_path / "disturbed")
+    for folder in (whole, disturbed):
+        (folder / "overlay.yaml").write_text(overlay)
+    snakemake(whole, "--", "data")
+    results = disturbed / "results"
+    results.mkdir()
+    monkeypatch.setenv(space.VARIABLE, "off")
+    with mounted(results):
+        for size, stage in (("2m", "noisy/"), ("4m", "shards/")):
+            subprocess.run(["mount", "-o", f"remount,size={size}", results], check=True)
+            said = snakemake(disturbed, "--", "data", status=1)
+            sentences = [line for line in said.splitlines() if "the disk is full; the file needs" in line]
+            assert sentences and all(stage in line for line in sentences), said[-3000:]
+            assert said.count("MB are free in") == 1
+            assert not list(results.rglob("*.part*"))
+        subprocess.run(["mount", "-o", "remount,size=64m", results], check=True)
+        snakemake(disturbed, "--", "data")
+        assert checksums(disturbed) == checksums(whole)
 
 
 @pytest.mark.parametrize("place", ["results", "results/a", "results/a/echo"])
