@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import re
+import sys
 import threading
 from collections.abc import Iterator
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -53,3 +54,10 @@ def serving(folder: Path, answers: dict | None = None) -> Iterator[ThreadingHTTP
     yield server
     server.shutdown()
     server.server_close()
+
+
+if __name__ == "__main__":
+    # python range_server.py FOLDER: print the folder's address, and serve until this process is ended.
+    with serving(Path(sys.argv[1])) as running:
+        print(running.address, flush=True)
+        threading.Event().wait()
