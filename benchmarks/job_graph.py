@@ -84,7 +84,8 @@ def graph(models_per_chunk: int, chunks: int) -> Graph:
         groups = GroupSettings(overwrite_groups=profile["groups"], group_components=components)
         made.execute_workflow(executor="dryrun", group_settings=groups)
         dag = workflow._workflow.dag
-        jobs = [job for job in dag.jobs if not job.is_local]
+        # A dry run takes all jobs for local ones; those that the profile sends to the queue have a group.
+        jobs = [job for job in dag.jobs if job.group is not None]
         number = {}
         for place, unit in enumerate(dag.get_jobs_or_groups()):
             number |= dict.fromkeys(unit.jobs if unit.is_group() else [unit], place)
@@ -95,7 +96,7 @@ def graph(models_per_chunk: int, chunks: int) -> Graph:
         for job in jobs:
             mine = places[number[job]]
             rules[mine].append(job.rule.name)
-            waits = {places[number[other]] for other in dag.dependencies[job] if not other.is_local}
+            waits = {places[number[other]] for other in dag.dependencies[job] if other.group is not None}
             before[mine] |= waits - {mine}
             kept = [str(path) for path in job.output if not is_flagged(path, "temp")]
             names |= {*kept, *map(str, job.log), *([str(job.benchmark)] if job.benchmark else [])}

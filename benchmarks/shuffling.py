@@ -1,6 +1,6 @@
 """How well readers of shards shuffle: labels, subtypes and motion models of their batches, against a random order.
 
-    python benchmarks/shuffling.py --shards results/paper/shards/*-train-0000?.tar --out shuffling.csv
+    python benchmarks/shuffling.py --shards results/RUN/shards/*-train-*.tar --out results/benchmarks/shuffling.csv
 
 Reads the same shards with each reader, one worker, and cuts what it gives into batches of 64. The entropy of a batch is
 that of its shares of labels or subtypes, in bits; `motion models` is the number of distinct ones in a batch. `random
