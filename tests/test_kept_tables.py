@@ -175,6 +175,13 @@ def gain(kept):
     return dict(zip(names, (f"{value:z.2f}" for value in found), strict=True))
 
 
+def precision(kept):
+    module = program("benchmarks/signal_precision.py")
+    found = module.rows(module.Dataset(module.overlaid([])), float(kept["snr_db"]))
+    (row,) = [row for row in found if row[0] == kept["kept_as"]]
+    return dict(zip(module.COLUMNS, row, strict=True))
+
+
 REMADE = {
     "results/reference/scene_cells.csv": cells, "results/reference/scale.csv": scale,
     "results/reference/observed_truth.csv": truth,
@@ -182,7 +189,7 @@ REMADE = {
     "results/benchmarks/planted_faults.csv": fault, "results/benchmarks/rounding.csv": rounding,
     "results/benchmarks/scene_levels.csv": scene_level, "results/benchmarks/target_levels.csv": target_level,
     "results/benchmarks/training_memory.csv": memory, "studies/detection/results/detection.csv": looks,
-    "results/benchmarks/sampling_gain.csv": gain,
+    "results/benchmarks/sampling_gain.csv": gain, "results/benchmarks/signal_precision.csv": precision,
     "studies/detection/results/neighbours.csv": neighbours,
     "studies/rotors/results/made.csv": made_rotors,
 }  # fmt: skip
