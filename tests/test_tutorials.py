@@ -133,6 +133,8 @@ def test_an_effect(checkout, capsys, monkeypatch):
     way_km = 2e-3 * np.linalg.norm(np.subtract([row[f"{axis}_m"] for axis in "xyz"], station.position_m))
     expected_db = way_km * rain.attenuation(76e9 + 307.2e6 / 2, 50.0)
     assert 10 * np.log10(heard[1] / heard[0]) == pytest.approx(expected_db, rel=0.02)
+    (lost,) = re.findall(r"^rain, out and back +(-\d+\.\d) dB$", printed, re.MULTILINE)
+    assert float(lost) == pytest.approx(-expected_db, abs=0.06)
 
 
 @pytest.mark.parametrize("page", SHARDS)

@@ -90,8 +90,8 @@ def recognised(folder, network, config, clouds, targets=TARGETS):
         "classes": classes_of(targets),
     }  # fmt: skip
     run(
-        "recognition", "train", "--views", *views, "--protocol", "seen", "--scheme", name, "--schemes", table,
-        "--stations", *stations, "--out", folder / "model", **settings,
+        "recognition", "train", "--views", *views, "--protocol", "seen", "--out", folder / "model",
+        scheme=schemes.named(table, name, list(stations)).record, **settings,
     )  # fmt: skip
     evaluation = {"batch": 8, "threads": 1, "precision": "fp32", "mirror": False}
     model = ("--model", folder / "model/model.pt")

@@ -38,11 +38,11 @@ SIZES = {
 }  # fmt: skip
 EXAMPLES = {
     "drone": "lowalt target drone --rotors 6 --diagonal 1.13 --propeller 0.53 --blades 2 --rate 50:120 --speed 18 "
-             "--out m600.yaml",
+    "--out m600.yaml",
     "bird": "lowalt target bird --length 0.46 --span 0.99 --rate 3:5 --speed 13 --out carrion-crow.yaml",
     "vehicle": "lowalt target vehicle --length 4.63 --width 1.85 --height 1.44 --wheel 0.67 --wheel-base 2.85 "
-               "--speed 30 --out sedan.yaml",
-}  # fmt: skip
+    "--speed 30 --out sedan.yaml",
+}
 CATEGORIES = {"drone": ("UAV", "radial"), "bird": ("Bird", "bird"), "vehicle": ("Vehicle", "car")}
 """Category and usual frame of each command's targets."""
 

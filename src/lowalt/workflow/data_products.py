@@ -6,7 +6,7 @@ Each method takes the wildcards of a job and can be used in a rule's `input:`. N
 from typing import Any
 
 from lowalt.files.atomic import slug
-from lowalt.scene.lateness import timed
+from lowalt.scene.lateness import late_effects
 from lowalt.spectra.catalogue import of_cells
 from lowalt.targets.records import source_files
 from lowalt.workflow.run import Run
@@ -94,7 +94,7 @@ class DataProducts:
         """Inputs of tiles other than signals: the motion table, if spectra use known symbol instants or range cells;
         for range cells also clouds and surfaces."""
         cells = bool(of_cells(self._config["spectra"]))
-        motion = {"motion": self.motion(wildcards)} if cells or timed(self._config) else {}
+        motion = {"motion": self.motion(wildcards)} if cells or late_effects(self._config) else {}
         return motion | (self._scene(wildcards) if cells else {})
 
     def _scene(self, wildcards: Any) -> dict[str, list[str]]:
