@@ -182,13 +182,6 @@ def gain(kept):
     return dict(zip(names, (f"{value:z.2f}" for value in found), strict=True))
 
 
-def precision(kept):
-    module = program("benchmarks/signal_precision.py")
-    found = module.rows(module.Dataset(module.overlaid([])), float(kept["snr_db"]))
-    (row,) = [row for row in found if row[0] == kept["kept_as"]]
-    return dict(zip(module.COLUMNS, row, strict=True))
-
-
 REMADE = {
     "results/reference/scene_cells.csv": cells, "results/reference/scale.csv": scale,
     "results/reference/observed_truth.csv": truth,
