@@ -196,7 +196,8 @@ def test_an_answer_has_no_number_that_json_lacks():
 
 def test_every_command_with_an_answer_takes_json(capsys):
     """All commands but `completion`, whose answer is a script."""
-    for words in re.findall(r"\.venv/bin/lowalt (\w+(?: (?:inspect|new|make|show|train|drone|bird|vehicle)\b)?)", PAGE):
+    actions = "inspect|new|make|show|train|drone|bird|vehicle|tracks|score|confirm|table"
+    for words in re.findall(rf"\.venv/bin/lowalt (\w+(?: (?:{actions})\b)?)", PAGE):
         with pytest.raises(SystemExit):
             main([*words.split(), "--help"])
         assert "--json" in capsys.readouterr().out
