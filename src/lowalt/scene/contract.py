@@ -8,6 +8,7 @@ It may also define
 - IDLE, a list of settings that change nothing: where all values of an entry are set, the effect is dropped;
 - `check(settings, scene)`, which raises InputError where settings contradict the rest of a `checks.CheckedScene`;
 - STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the same numbers;
+- PARTS, settings that leave out a part of the effect, by the part's name: `lowalt explain` measures each;
 - DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of a link's stations.
 
 N symbols, M subcarriers or range cells, L points of a target; arrays are float64 or complex128.

@@ -195,10 +195,12 @@ def changes(
     passes = 2 if len(chosen) * len(station_names) == 1 else 1
     signals, cells, times_ms = _received(config, station_names, chosen, 2)
     before, result = shown(signals), []
-    for name in [*named, *(name for name in PLACES if name not in config["effects"])]:
+    parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
+    others = [name for name in PLACES if name not in config["effects"]]
+    for name, part in [*((name, "") for name in named), *parts, *((name, "") for name in others)]:
         place, inside = places.get(name) or PLACES[name], name in named
         try:
-            changed, also = _changed(config, name)
+            changed, also = _without_part(config, name, part) if part else _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
         except InputError as error:
             result.append(Change(name, place, inside, refused=str(error)))
@@ -211,6 +213,12 @@ def changes(
         cost = float(np.median(cost_ms)), float(np.std(cost_ms))
         result.append(Change(name, place, inside, *shares, more, *cost, also))
     return result
+
+
+def _without_part(config: dict, name: str, part: str) -> tuple[dict, str]:
+    """The configuration without a part of an effect that it names, and the part."""
+    settings = (config["effects"][name] or {}) | module_of(name).PARTS[part]
+    return config | {"effects": config["effects"] | {name: settings}}, f"its {part} alone"
 
 
 def _differing(before: np.ndarray, after: np.ndarray) -> float:
