@@ -1,5 +1,7 @@
-"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py, and files that effects read. Only the user may
-choose them."""
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py, and files that effects read.
+
+Only the user may choose them.
+"""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -27,14 +29,14 @@ def buildings_of(effects: Mapping[str, dict | None]) -> str | None:
 
 
 def refuse_effects(effects: Mapping[str, dict | None], where: str | Path) -> None:
-    """Refuse effects of the user's own, and files that effects read, in a file or folder `where` that may be a stranger's.
+    """Refuse effects of the user's own, and files that effects read, in what may be a stranger's file or folder.
 
     Raises: InputError naming the effect.
     """
     if buildings := buildings_of(effects):
         raise InputError(
-            f"{where}: its effect 'town' reads the file {buildings!r}, which a file may not choose; expected an overlay "
-            "of your own that names it"
+            f"{where}: its effect 'town' reads the file {buildings!r}, which a file may not choose; expected an "
+            "overlay of your own that names it"
         )
     for name in own_effects(effects):
         raise InputError(

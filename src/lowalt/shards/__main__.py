@@ -22,8 +22,8 @@ from lowalt.tiles.cubes import Cubes
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
-    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions and of a town in a scene that has them, and
-    those of canceller for recipe shards, and echo {tolerance, effects} for cube shards.
+    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions and of a town in a scene that
+    has them, those of canceller for recipe shards, and echo {tolerance, effects} for cube shards.
     """
     line = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     line.add_argument("--motion", required=True, help="the chunk's motion table")

@@ -108,8 +108,9 @@ def record(
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
     whether noise was added; where none was, `snr_db` is infinite. Numbers that are unknown are null, as for a
     recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
-    targets in the beam, the record has it too; the label is the row's own target's; and the same with `paths`, those of
-    each station to the target in a town. A row of a track adds its track and look. classes: in the order of their labels; cubes: facts on each station's cube.
+    targets in the beam, the record has it too; the label is the row's own target's. The same holds for `paths`, those
+    of each station to the target in a town. A row of a track adds its track and look. classes: in the order of their
+    labels; cubes: facts on each station's cube.
     Raises: InputError where the row's category is no class.
     """
     names = NAMES + TRACK * (TRACK[0] in row)

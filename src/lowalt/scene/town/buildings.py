@@ -1,4 +1,4 @@
-"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene; in metres, z up, z = 0 ground."""
+"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene; in metres, z up."""
 
 from collections.abc import Iterable
 from functools import lru_cache
@@ -23,8 +23,8 @@ TALLEST_M, SMALLEST_M, LARGEST_M = (2.0, 900.0), 3.0, 20_000.0
 
 
 class Surfaces(NamedTuple):
-    """Triangles as a reader finds them: corners (F, 3, 3), material (F,) number in `names`, "" where the file names none;
-    left_out: what the reader left out, in words, with how many."""
+    """Triangles as a reader finds them: corners (F, 3, 3) m; material (F,), numbers of `names`, "" where the file names
+    none; left_out: what the reader left out, in words, with how many."""
 
     corners: np.ndarray
     material: np.ndarray

@@ -1,5 +1,6 @@
 """The plane facets of a town's triangles, and the tree of boxes in which rays look for triangles that block them."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from lowalt.scene import rays
 GRID_M = 1e-3
 """Corners in the same cell of this grid are one corner: files in single precision repeat corners with other digits."""
 FLAT_M, PARALLEL = 0.02, 1e-3
-"""A facet's corners are at most this far off its plane; normals of its neighbouring triangles differ by at most this."""
+"""Corners of a facet are at most this far off its plane; normals of neighbouring triangles differ by at most this."""
 
 
 class Facets(NamedTuple):
@@ -125,8 +126,8 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
     order = np.argsort(label, kind="stable")
     corners, numbers, material, label = corners[order], numbers[order], material[order], label[order]
     first = np.searchsorted(label, np.arange(label.max() + 2))
-    count, area = len(first) - 1, np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    largest = np.array([a + np.linalg.norm(area[a:b], axis=1).argmax() for a, b in zip(first, first[1:], strict=False)])
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    largest = np.array([a + area[a:b].argmax() for a, b in pairwise(first)])
     normal = _normals(corners[largest])
     across = np.cross([0.0, 0.0, 1.0], normal)
     flat = np.linalg.norm(across, axis=1) < 1e-6
@@ -144,7 +145,7 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
         np.vstack([normal, [0.0, 0.0, 1.0]]), np.append(offset, 0.0), np.vstack([centre, np.zeros(3)]),
         np.vstack([across, [1.0, 0.0, 0.0]]), np.vstack([up, [0.0, 1.0, 0.0]]),
         np.vstack([0.5 * (high - low) + FLAT_M, [np.inf, np.inf]]), np.append(first, first[-1]), triangles,
-        np.append(_convex(along, 0.5 * np.linalg.norm(area, axis=1), first), False),
+        np.append(_convex(along, area, first), False),
     )  # fmt: skip
     tree, facet = rays.tree(corners, False), {row.tobytes(): k for row, k in zip(triangles, label, strict=True)}
     of_tree = np.array([facet[row.tobytes()] for row in np.ascontiguousarray(tree.triangles)])
@@ -157,7 +158,7 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
 
 
 def _ridges(corners: np.ndarray, numbers: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The edges (E, 2, 3) m between facets or at their rims, their buildings (E,), and each triangle's building (F,)."""
+    """The edges (E, 2, 3) m at the rims of facets, their buildings (E,), and the building (F,) of each triangle."""
     links = np.concatenate([numbers[:, :2], numbers[:, 1:]])
     size = int(numbers.max()) + 1
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(size, size))

@@ -4,6 +4,7 @@ Source: RFC 7946; OpenStreetMap wiki, Simple 3D Buildings (height, min_height, b
 """
 
 import re
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,14 @@ from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.scene.town.buildings import Surfaces, joined
 from lowalt.scene.town.materials import named
+
+try:
+    import shapely
+    from pyproj import Transformer
+    from shapely.geometry import Polygon, shape
+    from shapely.geometry.polygon import orient
+except ImportError as error:
+    raise InputError(f"GeoJSON needs pyproj and shapely ({error}), expected the extra `town`") from None
 
 STOREY_M = 3.0
 """Height of a storey, for buildings whose file has `building:levels` alone. Source: Simple 3D Buildings."""
@@ -40,11 +49,8 @@ def _is_building(properties: dict) -> bool:
     return any(kind != "no" for kind in kinds) if kinds else _height(properties) is not None
 
 
-def _prism(polygon, height_m: float, low_m: float) -> np.ndarray:
+def _prism(polygon: Polygon, height_m: float, low_m: float) -> np.ndarray:
     """The walls and the roof (F, 3, 3) of a footprint in metres, walls turned outward."""
-    import shapely
-    from shapely.geometry.polygon import orient
-
     polygon, walls = orient(polygon.simplify(0.0)), []
     for ring in (polygon.exterior, *polygon.interiors):
         places = np.asarray(ring.coords)[:, :2]
@@ -60,11 +66,8 @@ def _prism(polygon, height_m: float, low_m: float) -> np.ndarray:
     return np.concatenate([*walls, *roofs])
 
 
-def _polygons(path: Path, place) -> tuple[list, dict[str, int]]:
+def _polygons(path: Path, place: Callable[[np.ndarray], np.ndarray]) -> tuple[list, dict[str, int]]:
     """The footprints of a file in metres, each with its properties, and what was left out."""
-    from shapely.geometry import shape
-    from shapely.ops import transform
-
     if path.stat().st_size > LARGEST_BYTES:
         raise InputError(f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a town")
     features = json_object(path.read_text(encoding="utf-8"), str(path), "GeoJSON").get("features")
@@ -76,7 +79,7 @@ def _polygons(path: Path, place) -> tuple[list, dict[str, int]]:
         label = "" if _is_building(properties) else "features that are no buildings"
         if not label and geometry.get("type") not in ("Polygon", "MultiPolygon"):
             label = "buildings without an area"
-        outline = None if label else transform(place, shape(geometry))
+        outline = None if label else shapely.transform(shapely.force_2d(shape(geometry)), place)
         if outline is not None and not outline.is_valid:
             label = "footprints that cross themselves"
         if label:
@@ -88,46 +91,50 @@ def _polygons(path: Path, place) -> tuple[list, dict[str, int]]:
 
 def middle_of(path: Path) -> tuple[float, float]:
     """Return the middle (longitude, latitude) of a file's buildings. Raises: InputError where it has none."""
-    found, _ = _polygons(path, lambda x, y, z=None: (x, y))
+    found, _ = _polygons(path, lambda degrees: degrees)
     if not found:
         raise InputError(f"{path}: has no building, expected polygons with the key building or height")
     low_x, low_y, high_x, high_y = np.array([part.bounds for part, _ in found]).T
     return float((low_x.min() + high_x.max()) / 2), float((low_y.min() + high_y.max()) / 2)
 
 
-def read_footprints(
-    path: Path, origin: tuple[float, float] | None, height_m: float | None, material: str
-) -> Surfaces:
+def _local(origin: Sequence[float]) -> Transformer:
+    """From longitude and latitude to metres east and north of an origin (degrees)."""
+    text = f"+proj=aeqd +lon_0={origin[0]!r} +lat_0={origin[1]!r} +datum=WGS84 +units=m"
+    return Transformer.from_crs("EPSG:4326", text, always_xy=True)
+
+
+def moved(origin: Sequence[float], offset_m: Sequence[float]) -> list[float]:
+    """Return the place (longitude, latitude; degrees) that lies offset_m (2,), east and north, of an origin."""
+    return [round(float(value), 7) for value in _local(origin).transform(*offset_m, direction="INVERSE")]
+
+
+def read_footprints(path: Path, origin: tuple[float, float] | None, height_m: float | None, material: str) -> Surfaces:
     """Return the walls and roofs of the buildings of a GeoJSON file.
 
-    origin: longitude and latitude (degrees) of x = y = 0, x to the east; height_m: of buildings whose file does not say;
-    material: of those too.
-    Raises: InputError naming the file: no origin, no GeoJSON, a place that is no longitude and latitude, or heights that
-    are missing.
+    origin: longitude and latitude (degrees) of x = y = 0, x to the east; height_m, material: of buildings for which the
+    file has none.
+    Raises: InputError naming the file: no origin, no GeoJSON, places that are no longitudes and latitudes, or heights
+    that are missing.
     """
-    try:
-        from pyproj import Transformer
-    except ImportError as error:
-        raise InputError(f"{path}: GeoJSON needs pyproj and shapely ({error}), expected the extra `town`") from None
     if origin is None:
         raise InputError(f"{path}: effects.town.origin is not set, expected [longitude, latitude] of x = y = 0; "
                          "`lowalt scene new` proposes one")  # fmt: skip
     if not (abs(origin[0]) <= 180 and abs(origin[1]) <= 89):
         raise InputError(f"effects.town.origin: {list(origin)}, expected longitude and latitude in degrees")
-    local = f"+proj=aeqd +lon_0={origin[0]!r} +lat_0={origin[1]!r} +datum=WGS84 +units=m"
-    towards = Transformer.from_crs("EPSG:4326", local, always_xy=True)
+    towards = _local(origin)
 
-    def place(x, y, z=None):
-        """Metres of degrees."""
-        if not (np.abs(x) <= 180).all() or not (np.abs(y) <= 90).all():
+    def place(degrees: np.ndarray) -> np.ndarray:
+        """Metres (K, 2) of degrees (K, 2)."""
+        if not (abs(degrees) <= (180, 90)).all():
             raise InputError(f"{path}: a place is no longitude and latitude in degrees, expected EPSG:4326 (RFC 7946)")
-        return towards.transform(x, y)
+        return np.column_stack(towards.transform(*degrees.T))
 
     found, left_out = _polygons(path, place)
     heights = [_height(properties) or height_m for _, properties in found]
     if missing := sum(height is None for height in heights):
-        raise InputError(f"{path}: {missing} of {len(found)} buildings have neither height nor building:levels, expected "
-                         "effects.town.height_m, the height of those")  # fmt: skip
+        raise InputError(f"{path}: {missing} of {len(found)} buildings have neither height nor building:levels, "
+                         "expected effects.town.height_m, the height of those")  # fmt: skip
     parts = []
     for (outline, properties), height in zip(found, heights, strict=True):
         low = _metres(properties.get("min_height")) or 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.scene.fresnel import VACUUM_F_M
-from lowalt.scene.town import image_loops, knife_edge
+from lowalt.scene.town import image_loops, knife_edge, shadow_loops
 from lowalt.scene.town.facets import Town
 from lowalt.scene.town.materials import properties
 
@@ -77,7 +77,7 @@ def _pairs(station_m: tuple[float, ...], same: "_Same") -> np.ndarray:
     """The pairs (P, 2) of facets by which a ray from a station may go on; they hold for all targets."""
     facets, occluders = same.town.facets, same.town.occluders
     place = np.array(station_m)
-    unseen = image_loops.hidden(facets, occluders, np.arange(len(facets.offset)), np.repeat(place[None], 8, axis=0))
+    unseen = shadow_loops.hidden(facets, occluders, np.arange(len(facets.offset)), np.repeat(place[None], 8, axis=0))
     return image_loops.ordered_pairs(facets, ~unseen, place, np.hypot(*facets.half.T))
 
 
@@ -97,7 +97,7 @@ def _unhidden(town: Town, routes: np.ndarray, low: np.ndarray, high: np.ndarray)
     """The routes whose last facet is not hidden from the whole box between two corners (3,) m."""
     corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(8, 3)
     last, which = np.unique(routes[:, -1], return_inverse=True)
-    return routes[~image_loops.hidden(town.facets, town.occluders, last, corners)[which]]
+    return routes[~shadow_loops.hidden(town.facets, town.occluders, last, corners)[which]]
 
 
 def candidates(town: Town, station_m: np.ndarray, places: np.ndarray, order: int) -> list[np.ndarray]:
@@ -117,9 +117,7 @@ def candidates(town: Town, station_m: np.ndarray, places: np.ndarray, order: int
 def seen(town: Town, station_m: np.ndarray, rays: Rays, facets: np.ndarray) -> np.ndarray:
     """Return which points a ray from a station by facets (0 to 2,) reaches past all buildings, (N, L) bool."""
     present = np.zeros((len(rays.places), 1), bool)
-    image_loops.trace(
-        town.facets, town.occluders, facets, station_m, rays.places, rays.boxes, BLOCK, present
-    )
+    shadow_loops.trace(town.facets, town.occluders, facets, station_m, rays.places, rays.boxes, BLOCK, present)
     return present[:, 0][rays.of_point]
 
 
@@ -134,7 +132,7 @@ def reflected(
     result = []
     for routes in candidates(town, station_m, rays.places, order):
         ask = town.facets, town.occluders, routes, station_m, rays.places, rays.boxes, BLOCK
-        for route in routes[image_loops.reaching(*ask)]:
+        for route in routes[shadow_loops.reaching(*ask)]:
             present = seen(town, station_m, rays, route)
             images, coefficient = np.empty((len(places), 3, places.shape[1])), np.empty(present.shape, np.complex128)
             image_loops.coefficients(town.facets, epsilon, route, station_m, places, present, images, coefficient)
@@ -148,7 +146,7 @@ def reflected(
 def direct(
     town: Town, station_m: np.ndarray, places: np.ndarray, rays: Rays, wavelength_m: float, diffraction: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the direct ray is free, (N, L) bool, and the direct field over that in free space, (N, L) complex."""
+    """Return where the direct ray is free, (N, L) bool, and its field over that in free space, (N, L) complex."""
     lit = seen(town, station_m, rays, np.empty(0, np.int64))
     if not diffraction:
         return lit, lit.astype(np.complex128)

@@ -1,8 +1,8 @@
 """Diffraction of the direct ray over roofs and around vertical edges: knife edges and screens of finite width.
 
 A building beside or across the ray is a screen with a top and two upright edges. By Babinet's principle the field
-behind it is 1 - (1 - F(left) - F(right)) (1 - F(top)) of that in free space, where F is Fresnel's integral of the edge's
-parameter nu, which is positive in the shadow: with no wide screen this is the wave over the top and around both sides.
+behind it is 1 - (1 - F(left) - F(right)) (1 - F(top)) of that in free space, where F is Fresnel's integral of an edge's
+parameter nu, which is positive in the shadow: the wave passes over the top and around both sides.
 Of several buildings the one that weakens most counts in full, and on each side of it the next one as seen from its
 edge (Deygout's construction). The field changes smoothly across the border of the shadow.
 """
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import fresnel
 
-from lowalt.scene.town import image_loops
+from lowalt.scene.town import shadow_loops
 from lowalt.scene.town.facets import Town
 
 CLEAR = -0.78
@@ -41,8 +41,8 @@ class Screen(NamedTuple):
 
 
 def _along(start: np.ndarray, ends: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the ways from a start (3,) to ends (..., 3) at which places (..., 2 or 3) stand beside them in the plan,
-    and how far to the left (m)."""
+    """Shares of the ways from a start (3,) to ends (..., 3) at which places (..., 2 or 3) stand beside them in the
+    plan, and how far to the left (m)."""
     way, off = (ends - start)[..., :2], places[..., :2] - start[:2]
     length = np.sqrt((way * way).sum(axis=-1))
     left = (way[..., 0] * off[..., 1] - way[..., 1] * off[..., 0]) / length
@@ -135,7 +135,6 @@ def _block(
     found.sort(key=lambda each: each[0])
     _, shape, _, result, least = found[0]
     top = _detour(shape, station_m, middle, wavelength_m)
-    share, _ = _along(station_m, middle, top)
     before, after = [np.ones(())], [np.ones(result.shape)]
     for _, _, edges, _, _ in found[1:] if abs(result).mean() < 1.0 and least.max() > 0.0 else ():
         for start, end, seen, factors in ((station_m, top, top, before), (top, middle, places, after)):
@@ -163,7 +162,7 @@ def direct(
         ends = np.ascontiguousarray(some.reshape(-1, 3))
         length = float(np.linalg.norm(ends - station_m, axis=1).max())
         room = -CLEAR * np.sqrt(wavelength_m * length / 8.0)
-        count = image_loops.near(town.occluders, np.repeat(station_m[None], len(ends), axis=0), ends, room, held)
+        count = shadow_loops.near(town.occluders, np.repeat(station_m[None], len(ends), axis=0), ends, room, held)
         if count:
             buildings = np.unique(building_of[town.occluders.facet[held[:count]]])
             part = lit[first : first + block]

@@ -36,7 +36,7 @@ MATERIALS = {
 
 
 def named(text: str) -> str | None:
-    """Return the material that a name in a file means, such as `mat-itu_concrete` or `Brick.001`, None for no known one."""
+    """Return the material that a name such as `mat-itu_concrete` or `Brick.001` means, None for none that is known."""
     plain = text.lower().replace("-", "_").replace(" ", "_")
     return max((name for name in MATERIALS if name in plain), key=len, default=None)
 

@@ -89,7 +89,7 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
     Raises: InputError naming the file: no scene, too large, a mesh outside its folder, or what a mesh's reader refuses.
     """
     if path.stat().st_size > LARGEST_BYTES:
-        raise InputError(f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a scene whose meshes are files of their own")
+        raise InputError(f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a scene whose meshes are files")
     root = parsed(path)
     shapes = root.findall("shape")
     if root.tag != "scene" or len(shapes) > MOST_SHAPES:

@@ -14,7 +14,7 @@ from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.response import ImagePath
-from lowalt.scene.town import image_loops, image_paths
+from lowalt.scene.town import image_paths, shadow_loops
 from lowalt.scene.town.buildings import read
 from lowalt.scene.view import View
 
@@ -64,7 +64,7 @@ def refuse_place(settings: dict, network: Network) -> None:
         )
     for name, mast in masts:
         top = np.array([mast[0], mast[1], high[2] + 1.0])
-        if mast[2] < top[2] and image_loops.blocked(found.town.occluders, mast[None], top[None])[0]:
+        if mast[2] < top[2] and shadow_loops.blocked(found.town.occluders, mast[None], top[None])[0]:
             raise InputError(
                 f"{path}: station {name} at {mast.tolist()} m stands under a roof, expected it above the buildings: "
                 "move it, or set effects.town.origin"
@@ -103,7 +103,8 @@ def listed(settings: dict, network: Network, row: dict) -> dict[str, dict]:
         if station.transmitter is not None:
             continue
         frequency, station_m = radar(network, station).centre_hz, np.array(station.position_m, float)
-        lit, field = image_paths.direct(town, station_m, place, rays, SPEED_OF_LIGHT / frequency, settings["diffraction"])
+        wavelength_m = SPEED_OF_LIGHT / frequency
+        lit, field = image_paths.direct(town, station_m, place, rays, wavelength_m, settings["diffraction"])
         epsilon = image_paths.epsilons(town, frequency, "effects.town")
         found = image_paths.reflected(town, epsilon, station_m, place, rays, settings["order"])
         kinds = ["wall" if abs(up) < 0.5 else "roof" for up in normal[:-1, 2]] + ["ground"]
