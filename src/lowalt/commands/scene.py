@@ -29,8 +29,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         )
         line.add_argument("overlay", type=Path, nargs="*", help="overlays on the default, for stations and region")
         line.add_argument("--origin", type=float, nargs=2, metavar=("X", "Y"),
-                          help="place in the file of x = y = 0: metres, in GeoJSON longitude and latitude (degrees); by "
-                          "default the middle of the town is that of the stations")  # fmt: skip
+                          help="place in the file of x = y = 0: metres, in GeoJSON longitude and latitude (degrees); "
+                          "by default the middle of the town is that of the stations")  # fmt: skip
         line.add_argument("--unit", help="unit of a mesh: m (default), cm, mm, in, ft")
         line.add_argument("--up", choices=("z", "y"), help="axis of a mesh that is up (default: z)")
         line.add_argument("--height", type=float, help="height of GeoJSON buildings that state none (m)")

@@ -218,7 +218,7 @@ def changes(
 def _without_part(config: dict, name: str, part: str) -> tuple[dict, str]:
     """The configuration without a part of an effect that it names, and the part."""
     settings = (config["effects"][name] or {}) | module_of(name).PARTS[part]
-    return config | {"effects": config["effects"] | {name: settings}}, f"its {part} alone"
+    return config | {"effects": config["effects"] | {name: settings}}, f"{part} left out"
 
 
 def _differing(before: np.ndarray, after: np.ndarray) -> float:
