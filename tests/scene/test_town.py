@@ -6,15 +6,18 @@ import math
 import numpy as np
 import pytest
 
+from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
+from lowalt.scene.chain import received_signal
+from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.channel import ground_reflection, town, walls
 from lowalt.scene.town import image_paths, knife_edge
 from lowalt.scene.town.buildings import read
 from lowalt.scene.town.facets import town as made
 from lowalt.scene.town.materials import MATERIALS, named, properties
-from scenes import A, network, view_of
+from scenes import A, network, scene, target, view_of
 from towns import BOXES, ORIGIN, block, geojson, mitsuba, ply
 
 NETWORK = network()
@@ -40,9 +43,9 @@ def crosses(start, end, triangle):
 
 
 def test_direct_rays_are_blocked_as_by_every_triangle():
-    rng, scene = np.random.default_rng(1), built(BOXES)
+    rng, city = np.random.default_rng(1), built(BOXES)
     places = rng.uniform([-80, -80, 0.5], [80, 80, 40], (50, 8, 3))
-    lit = image_paths.seen(scene, MAST, image_paths.rays_to(places, 0.0), np.empty(0, np.int64))
+    lit = image_paths.seen(city, MAST, image_paths.rays_to(places, 0.0), np.empty(0, np.int64))
     triangles = np.concatenate([block(*box) for box in BOXES])
     expected = [not any(crosses(MAST, end, triangle) for triangle in triangles) for end in places.reshape(-1, 3)]
     np.testing.assert_array_equal(lit.reshape(-1), expected)
@@ -91,12 +94,12 @@ def reference_paths(scene, mast, place, order):
 
 
 def test_reflected_paths_are_those_of_every_pair_of_facets():
-    rng, scene = np.random.default_rng(2), built(BOXES[:3])
-    epsilon, counts = image_paths.epsilons(scene, HZ, "test"), []
+    rng, city = np.random.default_rng(2), built(BOXES[:3])
+    epsilon, counts = image_paths.epsilons(city, HZ, "test"), []
     for place in rng.uniform([-50, -50, 1.0], [60, 50, 30], (40, 3)):
         places = place[None, None]
-        routes = image_paths.reflected(scene, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
-        assert {route.facets for route in routes} == reference_paths(scene, MAST, place, 2), place
+        routes = image_paths.reflected(city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
+        assert {route.facets for route in routes} == reference_paths(city, MAST, place, 2), place
         counts.append(len(routes))
         for route in routes:
             # Both images keep the path's length.
@@ -107,14 +110,14 @@ def test_reflected_paths_are_those_of_every_pair_of_facets():
 
 
 def test_paths_of_many_points_are_those_of_each():
-    rng, scene = np.random.default_rng(3), built(BOXES)
-    epsilon = image_paths.epsilons(scene, HZ, "test")
+    rng, city = np.random.default_rng(3), built(BOXES)
+    epsilon = image_paths.epsilons(city, HZ, "test")
     places = np.array([5.0, -40.0, 12.0]) + rng.uniform(-1, 1, (1, 20, 3)) + np.linspace(0, 25, 90)[:, None, None]
-    together = image_paths.reflected(scene, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
+    together = image_paths.reflected(city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
     found = {route.facets: route.coefficient for route in together}
     for n, point in itertools.product(range(0, 90, 9), range(0, 20, 5)):
         one = places[n : n + 1, point : point + 1]
-        alone = image_paths.reflected(scene, epsilon, MAST, one, image_paths.rays_to(one, 0.0), 2)
+        alone = image_paths.reflected(city, epsilon, MAST, one, image_paths.rays_to(one, 0.0), 2)
         assert {route.facets for route in alone} == {key for key, value in found.items() if value[n, point] != 0}
         for route in alone:
             np.testing.assert_allclose(found[route.facets][n, point], route.coefficient[0, 0], rtol=1e-12)
@@ -207,8 +210,10 @@ def test_a_record_names_the_paths(tmp_path):
     row = {"x_m": 40.0, "y_m": 0.0, "z_m": 1.5}
     settings = {"buildings": path, "origin": ORIGIN}
     facts = town.listed(settings, NETWORK, row)
-    assert set(facts) == {station.name for station in NETWORK.stations}
-    for fact in facts.values():
+    assert facts["under_roof"] is False
+    assert town.listed(settings, NETWORK, row | {"x_m": 20.0})["under_roof"] is True
+    assert set(facts["stations"]) == {station.name for station in NETWORK.stations}
+    for fact in facts["stations"].values():
         assert fact["direct"] == (fact["field_db"] > -6.1)
         assert all(set(surfaces) <= {"wall", "roof", "ground"} for surfaces in fact["reflected"])
 
@@ -248,9 +253,9 @@ def test_a_mesh_outside_the_folder_of_a_scene_is_not_opened(tmp_path):
     ply(tmp_path / "secret.ply", BOXES)
     (tmp_path / "inside").mkdir()
     for name in ("../secret.ply", str(tmp_path / "secret.ply"), "\0.ply"):
-        scene = mitsuba(tmp_path / "inside/scene.xml", BOXES, name=name.replace("\0", "&#1;"))
+        path = mitsuba(tmp_path / "inside/scene.xml", BOXES, name=name.replace("\0", "&#1;"))
         with pytest.raises(InputError, match=r"expected a file in the folder of the scene|not a readable XML"):
-            read(town.DEFAULTS | {"buildings": str(scene)})
+            read(town.DEFAULTS | {"buildings": str(path)})
 
 
 def test_materials_are_those_of_p2040():
@@ -261,3 +266,36 @@ def test_materials_are_those_of_p2040():
     with pytest.raises(InputError, match="floorboard is known from 50 to 100 GHz"):
         properties("floorboard", 4.9e9, "here")
     assert all(law.low < law.high for law in MATERIALS.values())
+
+
+def test_what_counts_the_same_waves_twice_is_refused(tmp_path):
+    settings = town.DEFAULTS | {"buildings": str(ply(tmp_path / "town.ply", BOXES))}
+    for name in ("ground_reflection", "walls", "line_of_sight"):
+        with pytest.raises(InputError, match=f"{name}.*together with town"):
+            town.check(settings, CheckedScene(NETWORK, {name: {}, "town": settings}, (math.inf,)))
+    town.check(settings, CheckedScene(NETWORK, {"clutter": {}, "town": settings}, (math.inf,)))
+    with pytest.raises(InputError, match="buildings: not set"):
+        town.check(town.DEFAULTS, CheckedScene(NETWORK, {}, (math.inf,)))
+
+
+def test_a_strangers_folder_may_not_name_a_file_of_buildings():
+    with pytest.raises(InputError, match=r"index.json: its effect 'town' reads the file '/etc/passwd'"):
+        refuse_effects({"town": {"buildings": "/etc/passwd"}}, "index.json")
+
+
+def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):
+    """Far buildings change nothing, a wall hides, and the ground of a town is that of `ground_reflection`."""
+    cloud, row = target(np.random.default_rng(5))
+    alone = ply(tmp_path / "far.ply", [(900.0, 900.0, 9.0, 9.0, 9.0)])
+    behind = ply(tmp_path / "wall.ply", [(30.0, 12.0, 2.0, 300.0, 60.0)])
+    quiet = {"order": 0, "ground": "very_dry_ground"}
+    free = received_signal(scene({}), A, cloud, row).signal
+    clear = received_signal(scene({"town": {"buildings": str(alone), **quiet}}), A, cloud, row).signal
+    np.testing.assert_allclose(clear, free, rtol=1e-9, atol=1e-9 * abs(free).max())
+    dark = received_signal(scene({"town": {"buildings": str(behind), **quiet}}), A, cloud, row)
+    assert abs(dark.signal).max() < 0.01 * abs(free).max()
+    # Set SNRs refer to free space.
+    assert math.isclose(dark.power, received_signal(scene({}), A, cloud, row).power, rel_tol=1e-6)
+    ground = received_signal(scene({"ground_reflection": {}}), A, cloud, row).signal
+    both = received_signal(scene({"town": {"buildings": str(alone), "order": 1}}), A, cloud, row).signal
+    np.testing.assert_allclose(both, ground, rtol=1e-6, atol=1e-6 * abs(ground).max())

@@ -90,11 +90,11 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     return result
 
 
-def listed(settings: dict, network: Network, row: dict) -> dict[str, dict]:
-    """Return by station which paths lead to the origin of a target, a row of the motion table, at the first symbol.
+def listed(settings: dict, network: Network, row: dict) -> dict:
+    """Return which paths lead to the origin of a target, a row of the motion table, at the first symbol.
 
-    Each has `direct`, whether the sight is free; `field_db`, the direct field over that in free space; and `reflected`,
-    the list of the surfaces of each reflected path, such as ["wall", "ground"].
+    `under_roof`: whether a roof is above it; `stations`: by name `direct`, whether the sight is free; `field_db`, the
+    direct field over that in free space; and `reflected`, the surfaces of each reflected path, as ["wall", "ground"].
     """
     settings = DEFAULTS | settings
     town, place = read(settings).town, np.array([[[row["x_m"], row["y_m"], row["z_m"]]]], float)
@@ -112,4 +112,5 @@ def listed(settings: dict, network: Network, row: dict) -> dict[str, dict]:
             "direct": bool(lit[0, 0]), "field_db": float(np.round(20 * np.log10(max(abs(field[0, 0]), 1e-20)), 2)),
             "reflected": [[kinds[k] for k in route.facets] for route in found],
         }  # fmt: skip
-    return result
+    roof = shadow_loops.blocked(town.occluders, place[0], place[0] + [0.0, 0.0, 1e4])[0]
+    return {"under_roof": bool(roof), "stations": result}
