@@ -167,11 +167,11 @@ def classified(views: Path, scheme: Scheme, path: Path) -> None:
         temporary.write_text(json.dumps(told))
 
 
-def judged(config: dict, local: dict, scheme: str, seed: int | str, make: bool = True) -> Path | None:
+def judged(config: dict, local: dict, scheme: str, seed: int | str | None, make: bool = True) -> Path | None:
     """Return the prediction file of a row's training from one seed; whatever is there is not made again.
 
-    scheme: name of one whose stations are the first of the network's; make: whether to make what is not there, or to
-    return None.
+    scheme: name of one whose stations are the first of the network's; seed: None makes the row's views alone; make:
+    whether to make what is not there, or to return None.
     """
     names = list(config["network"]["stations"])
     what = named(TABLE, scheme, names)
@@ -185,6 +185,8 @@ def judged(config: dict, local: dict, scheme: str, seed: int | str, make: bool =
             return None
         if not views.is_file():
             write_views(config, local, stations, views)
+        if seed is None:
+            return None
         if seed == SVM:
             classified(views, what, path)
         else:

@@ -20,6 +20,22 @@ from lowalt.config.layers import merge
 from lowalt.files.yaml_files import load_yaml
 
 
+def side_by_side(table: dict, seeds: int, workers: int) -> None:
+    """Make the samples of all rows or, of so many of the table's seeds, their trainings, in processes side by side."""
+    jobs = [
+        (merge(merge(trainings.config_of(), table["base"]), block.get("overlay", {})), block.get("local", {}),
+         table["scheme"], seed)
+        for seed in table["base"]["recognition"]["seeds"][:seeds] or [None]
+        for block in table["rows"].values()
+    ]  # fmt: skip
+    trainings.side_by_side(made, jobs, workers)
+
+
+def made(job: tuple) -> None:
+    """Make what a row's training from one seed needs and, where there is a seed, the training."""
+    judged(*job)
+
+
 def main(arguments: list[str]) -> None:
     """Run every row that is not there yet, and write the tables after each."""
     line = argparse.ArgumentParser("study.py", description=__doc__.splitlines()[0])
@@ -28,13 +44,21 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--rows", nargs="+", help="first row and others to run (default: all)")
     line.add_argument("--finished", action="store_true", help="tables of what is finished, without a training")
     line.add_argument("--svm", action="store_true", help="a support vector machine instead of the network")
+    line.add_argument("--scheme", help="another scheme than the table's; its name goes into those of the tables")
+    line.add_argument("--workers", type=int, help="make samples, then trainings, in as many processes side by side")
     given = line.parse_args(arguments)
     table = load_yaml(given.table)
+    if given.scheme:
+        table["name"] += f"-{given.scheme.partition(':')[0]}"
+        table["scheme"] = given.scheme
     table["rows"] = {name: block for name, block in table["rows"].items() if name in (given.rows or table["rows"])}
     paths: dict[str, list[Path]] = {}
     if given.svm:
         table["name"] += "-svm"
         table["base"]["recognition"]["seeds"] = [SVM]
+    if given.workers:
+        for seeds in (0, len(table["base"]["recognition"]["seeds"])):
+            side_by_side(table, seeds, given.workers)
     # Seed by seed, so that an unfinished run has judged every row equally often.
     for seed in table["base"]["recognition"]["seeds"]:
         for name, block in table["rows"].items():
