@@ -20,7 +20,7 @@ from lowalt.motion.drawing import region_polygon
 from lowalt.scene.effects.channel.town import DEFAULTS
 from lowalt.scene.town import image_paths, shadow_loops
 from lowalt.scene.town.buildings import read
-from lowalt.scene.town.facets import Town
+from lowalt.scene.town.facets import Occluders, Town
 
 CARRIER_HZ = 4.9e9
 SLAB_M = 1000.0
@@ -45,6 +45,19 @@ def drawn(
         if not shadow_loops.blocked(town.occluders, place[None], place[None] + [0.0, 0.0, 1000.0])[0]:
             found.append(place)
     return np.array(found)
+
+
+def roof_m(occluders: Occluders, place: np.ndarray) -> float:
+    """Return the height (m) of the highest surface over a place (2,) m of the plan, 0 where there is none."""
+    low, high = np.array([*place, -1.0]), np.array([*place, 2000.0])
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if shadow_loops.blocked(occluders, middle[None], high[None])[0] else (low, middle)
+    return (
+        float(high[2])
+        if shadow_loops.blocked(occluders, low[None] - [0.0, 0.0, 1.0], np.array([[*place, 2000.0]]))[0]
+        else 0.0
+    )
 
 
 def of_lowalt(town: Town, epsilon: np.ndarray, mast: np.ndarray, place: np.ndarray) -> list[tuple]:
@@ -143,7 +156,7 @@ def main(arguments: list[str]) -> None:
             found: dict[int, list[list]] = defaultdict(lambda: [[], [], [], [], []])
             for station in network.stations:
                 ground = middle + scale * (np.array(station.position_m[:2]) - corners.mean(axis=0))
-                above = shadow_loops.roof_m(town.occluders, ground)
+                above = roof_m(town.occluders, ground)
                 mast = np.array([*ground, max(station.position_m[2], above + 3.0)])
                 theirs = of_sionna(rt, scene, mast, places, options.samples)
                 for place, other in zip(places, theirs, strict=True):

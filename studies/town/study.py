@@ -1,4 +1,4 @@
-"""An invented town of blocks, and a picture of a drone in it: its paths, and its micro-Doppler with and without them."""
+"""An invented town of blocks, and a picture of a drone in it: its paths and its micro-Doppler."""
 
 import argparse
 import json

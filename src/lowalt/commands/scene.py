@@ -64,7 +64,7 @@ def _examined(options: argparse.Namespace, picture: Path) -> tuple[dict, dict, l
     from lowalt.config.network import Network, masts_m
     from lowalt.motion.drawing import region_polygon
     from lowalt.scene.effects.channel import town
-    from lowalt.scene.town import plan
+    from lowalt.scene.town import town_plan
     from lowalt.scene.town.buildings import read
 
     config = overlaid(options.overlay)
@@ -73,12 +73,12 @@ def _examined(options: argparse.Namespace, picture: Path) -> tuple[dict, dict, l
     settings = _settings(options, masts[:, :2].mean(axis=0))
     complete = town.DEFAULTS | settings
     found = read(complete)
-    lines = plan.described(options.file, found)
+    lines = town_plan.described(options.file, found)
     try:
         town.refuse_place(complete, network)
     except InputError as error:
         lines.append(f"a run would refuse it: {error}")
-    plan.draw(picture, found, network, region)
+    town_plan.draw(picture, found, network, region)
     facts = {"settings": settings, **found.facts, "picture": picture}
     return settings, facts, [*lines, f"{picture}: its plan"]
 
@@ -92,13 +92,13 @@ def _inspect(options: argparse.Namespace) -> Answer:
 def _new(options: argparse.Namespace) -> Answer:
     """Draft an overlay. Raises: InputError naming the file and what is wrong with it, or an overlay that exists."""
     from lowalt.files.atomic import replacing, slug
-    from lowalt.scene.town import plan
+    from lowalt.scene.town import town_plan
 
     if options.out.suffix not in (".yaml", ".yml") or options.out.exists():
         raise InputError(f"--out: {options.out}, expected a new file that ends in .yaml")
     settings, facts, lines = _examined(options, options.out.with_suffix(".png"))
     comments = [*lines[:-1], f"Look: {facts['picture']}. Move the town by `origin`, or the stations in `network`."]
     with replacing(options.out) as temporary:
-        temporary.write_text(plan.overlay(settings, slug(options.out.stem), comments))
+        temporary.write_text(town_plan.overlay(settings, slug(options.out.stem), comments))
     text = [*lines, f"{options.out}: drafted; `lowalt explain {options.out}` says what its paths change"]
     return Answer({**facts, "overlay": options.out}, "\n".join(text))

@@ -29,7 +29,7 @@ class Route(NamedTuple):
     station_m: np.ndarray
 
 
-class Rays(NamedTuple):
+class TracedRays(NamedTuple):
     """The rays that decide which points are reached: places (R, 1, 3) m, where they end; of_point (N, L): the ray that
     decides for each point and symbol; boxes (C, 2, 3) m: low and high corners around the places of BLOCK rays each."""
 
@@ -38,7 +38,7 @@ class Rays(NamedTuple):
     boxes: np.ndarray
 
 
-def rays_to(places: np.ndarray, cell_m: float) -> Rays:
+def rays_to(places: np.ndarray, cell_m: float) -> TracedRays:
     """Return one ray for the points of places (N, L, 3) m that are in one cell of a grid of cell_m (m), STEP symbols
     sharing them; with cell_m 0 one for each point and symbol."""
     count, points = places.shape[:2]
@@ -57,7 +57,7 @@ def rays_to(places: np.ndarray, cell_m: float) -> Rays:
         ends, which = some.reshape(-1, 1, 3)[first], np.repeat(which.reshape(keys.shape), STEP, axis=0)[:count]
     starts = np.arange(0, len(ends), BLOCK)
     low, high = np.minimum.reduceat(ends[:, 0], starts), np.maximum.reduceat(ends[:, 0], starts)
-    return Rays(np.ascontiguousarray(ends), which, np.stack([low, high], axis=1))
+    return TracedRays(np.ascontiguousarray(ends), which, np.stack([low, high], axis=1))
 
 
 def epsilons(town: Town, frequency_hz: float, where: str) -> np.ndarray:
@@ -73,7 +73,7 @@ def epsilons(town: Town, frequency_hz: float, where: str) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _pairs(station_m: tuple[float, ...], same: "_Same") -> np.ndarray:
+def _pairs(station_m: tuple[float, ...], same: "_SameTown") -> np.ndarray:
     """The pairs (P, 2) of facets by which a ray from a station may go on; they hold for all targets."""
     facets, occluders = same.town.facets, same.town.occluders
     place = np.array(station_m)
@@ -81,7 +81,7 @@ def _pairs(station_m: tuple[float, ...], same: "_Same") -> np.ndarray:
     return image_loops.ordered_pairs(facets, ~unseen, place, np.hypot(*facets.half.T))
 
 
-class _Same(NamedTuple):
+class _SameTown(NamedTuple):
     """A town, told apart by which object it is."""
 
     town: Town
@@ -90,7 +90,7 @@ class _Same(NamedTuple):
         return id(self.town.facets.normal)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.town.facets.normal is other.town.facets.normal
+        return isinstance(other, _SameTown) and self.town.facets.normal is other.town.facets.normal
 
 
 def _unhidden(town: Town, routes: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -109,12 +109,12 @@ def candidates(town: Town, station_m: np.ndarray, places: np.ndarray, order: int
     if order >= 1:
         found.append(_unhidden(town, image_loops.single(town.facets, station_m, middle, radius)[:, None], low, high))
     if order >= 2:
-        pairs = _pairs(tuple(station_m.tolist()), _Same(town))
+        pairs = _pairs(tuple(station_m.tolist()), _SameTown(town))
         found.append(_unhidden(town, image_loops.double(town.facets, pairs, station_m, middle, radius), low, high))
     return found
 
 
-def seen(town: Town, station_m: np.ndarray, rays: Rays, facets: np.ndarray) -> np.ndarray:
+def seen(town: Town, station_m: np.ndarray, rays: TracedRays, facets: np.ndarray) -> np.ndarray:
     """Return which points a ray from a station by facets (0 to 2,) reaches past all buildings, (N, L) bool."""
     present = np.zeros((len(rays.places), 1), bool)
     shadow_loops.trace(town.facets, town.occluders, facets, station_m, rays.places, rays.boxes, BLOCK, present)
@@ -122,7 +122,7 @@ def seen(town: Town, station_m: np.ndarray, rays: Rays, facets: np.ndarray) -> n
 
 
 def reflected(
-    town: Town, epsilon: np.ndarray, station_m: np.ndarray, places: np.ndarray, rays: Rays, order: int
+    town: Town, epsilon: np.ndarray, station_m: np.ndarray, places: np.ndarray, rays: TracedRays, order: int
 ) -> list[Route]:
     """Return the paths by 1 to `order` reflections that reach any of the points, places (N, L, 3) m C-contiguous.
 
@@ -144,7 +144,7 @@ def reflected(
 
 
 def direct(
-    town: Town, station_m: np.ndarray, places: np.ndarray, rays: Rays, wavelength_m: float, diffraction: bool
+    town: Town, station_m: np.ndarray, places: np.ndarray, rays: TracedRays, wavelength_m: float, diffraction: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return where the direct ray is free, (N, L) bool, and its field over that in free space, (N, L) complex."""
     lit = seen(town, station_m, rays, np.empty(0, np.int64))

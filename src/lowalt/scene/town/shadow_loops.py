@@ -398,12 +398,3 @@ def reaching(facets, occluders, routes, station, places, boxes, block):
         scene = facets, occluders, routes[p], station
         result[p] = _trace_blocks(scene, places, boxes, block, work, present, True)
     return result
-
-
-def roof_m(occluders, place: np.ndarray) -> float:
-    """Return the height (m) of the highest surface over a place (2,) m of the plan, 0 where there is none."""
-    low, high = np.array([*place, -1.0]), np.array([*place, 2000.0])
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if blocked(occluders, middle[None], high[None])[0] else (low, middle)
-    return float(high[2]) if blocked(occluders, low[None] - [0.0, 0.0, 1.0], np.array([[*place, 2000.0]]))[0] else 0.0
