@@ -3,8 +3,8 @@
     python benchmarks/waiting_times.py --out results/benchmarks/waiting_times.csv
 
 Each command runs REPEATS times as a user runs it, and the row keeps the run of the fewest core-seconds; one more run,
-with `python -X importtime`, says what the imports of each package take. `run tiny` and `make` have rows by stage in
-the run's own stages.csv; here they are whole.
+with `python -X importtime`, says what the imports of each package take. `from_clone.py` does the same for `make` and
+for `config/tiny.yaml`, stage by stage.
 """
 
 import argparse

@@ -14,10 +14,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
+import lowalt
 from dataset import build, publish
 from lowalt.__main__ import main
 from lowalt.config.layers import load
+from lowalt.files.yaml_files import load_yaml
+from lowalt.shards.build import write_run
 
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "docs/tutorials"
@@ -61,8 +65,11 @@ def in_this_process(line, monkeypatch):
     return printed.getvalue()
 
 
-def followed(page, folder, monkeypatch):
-    """Do what a page says: write the files it names, run its commands and its Python; returns (printed, names)."""
+def followed(page, folder, monkeypatch, more=None):
+    """Do what a page says: write the files it names, run its commands and its Python; returns (printed, names).
+
+    more: options by the line that gets them besides its own.
+    """
     printed, names = "", {"__name__": page}
     for language, title, block in FENCE.findall((FOLDER / f"{page}.md").read_text()):
         if title:
@@ -71,7 +78,7 @@ def followed(page, folder, monkeypatch):
             for line in block.splitlines():
                 if line.startswith(".venv/bin/lowalt run "):
                     continue  # a whole run: tests/test_notebooks.py has the slow ones
-                printed += in_this_process(line, monkeypatch)
+                printed += in_this_process(f"{line} {(more or {}).get(line, '')}", monkeypatch)
         elif language == "python":
             exec(compile(block, f"{page}.md", "exec"), names)
     return printed, names
@@ -133,6 +140,8 @@ def test_an_effect(checkout, capsys, monkeypatch):
     way_km = 2e-3 * np.linalg.norm(np.subtract([row[f"{axis}_m"] for axis in "xyz"], station.position_m))
     expected_db = way_km * rain.attenuation(76e9 + 307.2e6 / 2, 50.0)
     assert 10 * np.log10(heard[1] / heard[0]) == pytest.approx(expected_db, rel=0.02)
+    lost, *_ = re.findall(r"^ +rain, out and back +(-\d+\.\d) dB$", printed, re.MULTILINE)
+    assert float(lost) == pytest.approx(-expected_db, abs=0.06)
 
 
 @pytest.mark.parametrize("page", SHARDS)
@@ -170,17 +179,30 @@ def test_the_first_hour_has_no_block_beyond_ten_lines():
     assert len(blocks) > 10 and max(len(block.splitlines()) for block in blocks) <= 10
 
 
-# A town at two bands, a target from its data sheet, two seconds of a walker and its answer.
+# A town at two bands, a target from its data sheet, two seconds of a walker, a network of its radar and of one station.
 @pytest.mark.slow
 def test_the_first_hour(checkout, capsys, monkeypatch):
     (checkout / "results/tiny").mkdir(parents=True)
     (checkout / "results/zoo").symlink_to(ROOT / "results/zoo")
-    # The run itself: tests/test_notebooks.py.
-    table = checkout / "results/tiny/confusion_by_snr.csv"
-    table.write_text("protocol,scheme,snr_db,category,predicted,samples\nseen,A,3,Bird,UAV,7\nseen,A,inf,Bird,UAV,9\n")
-    printed, names = followed("../first_hour", checkout, monkeypatch)
+    # The run itself: tests/test_notebooks.py. Here its data set, and one row of its table.
+    config = load(["config/default.yaml", "config/tiny.yaml"], SCHEMA)
+    (checkout / "results/tiny/config.yaml").write_text(yaml.safe_dump(config))
+    write_run(lowalt.Dataset(config), checkout / "results/tiny", "image")
+    (checkout / "results/tiny/confusion_by_snr.csv").write_text(
+        "protocol,scheme,snr_db,category,predicted,samples\nunseen,ABC:VRP+TRP+VT,3,Bird,Bird,8\n"
+    )
+    block = load_yaml("config/measured/recognition.yaml") | {"size": 24, "echoes": {"train": 1, "validation": 1}}
+    block["training"] |= {"steps": 1, "batch": 4, "validate_every": 1}
+    (checkout / "quick.yaml").write_text(yaml.safe_dump(block))
+    quick = {".venv/bin/lowalt recording train walk.yaml --out my_radar": "--recognition quick.yaml"}
+    printed, names = followed("../first_hour", checkout, monkeypatch, quick)
     said = capsys.readouterr().out
-    assert "(400, 256) sqrt(W) ('body', 'right inner wing'" in said and "Bird taken for UAV           7" in said
+    assert "(400, 256) sqrt(W) ('body', 'right inner wing'" in said and "('Bird',)\n[[100.]]" in said
+    assert names["alone"].scheme.record["name"] == "A:VRP+TRP+VT" and list(names["scores"]["by_snr_percent"]) == [
+        "3",
+        "inf",
+    ]
+    assert "windows right" in printed and printed.count("windows hold a target") == 2
     for name, echo in {"town": names["echo"], "fourth": names["fourth"], "hexacopter": names["hexacopter"]}.items():
         assert (checkout / f"{name}.png").is_file()
         # In the cells around the target, the strongest line of the map is at the folded speed of the target.
@@ -192,7 +214,7 @@ def test_the_first_hour(checkout, capsys, monkeypatch):
     # 12 dB/km, there and back.
     assert names["lost_db"] == pytest.approx(0.012 * 2 * names["dry"].truth["range_m"].mean(), rel=1e-3)
     assert names["fourth"].station == "D" and len(names["hexacopter"].parts) == 7
-    assert "m600.yaml: 'm600'" in printed and "of 5 windows hold a target" in printed
+    assert "m600.yaml: 'm600'" in printed and "reading 1; another" in printed
 
 
 def test_a_recording(checkout, monkeypatch):

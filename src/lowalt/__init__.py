@@ -10,7 +10,9 @@ __version__ = "0.2.0"
 
 _HOMES = {
     "Dataset": "shards.dataset", "Endless": "shards.dataset", "RawEcho": "shards.receive",
-    "evaluate": "recognition.train_evaluate", "receive": "shards.receive", "train": "recognition.train_evaluate",
+    "confusion": "recognition.train_evaluate", "draft_target": "drafting.scaled",
+    "evaluate": "recognition.train_evaluate", "inspect_recording": "recordings.file_inspection",
+    "receive": "shards.receive", "train": "recognition.train_evaluate",
 }  # fmt: skip
 __all__ = sorted(_HOMES)
 

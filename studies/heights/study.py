@@ -1,6 +1,6 @@
 """Measured heights and invented sizes: the best recipe known for subtypes that were not trained on.
 
-    python studies/heights/study.py [--data default] [--seeds 0 1 2] [--no-heights] [--no-invented]
+    python studies/heights/study.py [--data default] [--seeds 0 1 2] [--no-heights] [--no-invented] [--for-cost]
 
 Trains on the samples of a finished run and on those of the run `invented`, with the height that each station measures;
 writes accuracy.csv and its companions into results/heights-DATA[-...].
@@ -50,6 +50,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], help="training seeds (default: 0 1 2)")
     line.add_argument("--no-heights", action="store_true", help="images alone")
     line.add_argument("--no-invented", action="store_true", help="the run's own samples alone")
+    line.add_argument("--for-cost", action="store_true", help="three stations, unseen protocol, no tables")
     line.add_argument("--workers", type=int, help="trainings side by side (default: the cores)")
     given = line.parse_args(arguments)
     config, data = trainings.config_of(Path(__file__).with_name("config.yaml")), Path("results") / given.data
@@ -61,11 +62,15 @@ def main(arguments: list[str]) -> None:
         schemes = [replace(one, name=f"{one.name} with height") for one in schemes]
         for folder in (data, *([INVENTED] if kept[1] else [])):
             of_run(folder)
-    jobs = [trainings.Job(*one) for one in product(schemes, PROTOCOLS, given.seeds)]
+    # `make accuracy-cost` compares three stations in the unseen protocol.
+    asked = (schemes[1:], ["unseen"]) if given.for_cost else (schemes, PROTOCOLS)
+    jobs = [trainings.Job(*one) for one in product(*asked, given.seeds)]
     of = partial(source, data, *kept, config["recognition"]["size"])
     call = partial(trainings.trained, config=config, data=data, out=out, source=of, build=built if kept[0] else plain)
-    trainings.write_tables(trainings.side_by_side(call, jobs, given.workers), out, config["seed"])
-    print(f"{out / 'accuracy.csv'}: written")
+    paths = trainings.side_by_side(call, jobs, given.workers)
+    if not given.for_cost:
+        trainings.write_tables(paths, out, config["seed"])
+        print(f"{out / 'accuracy.csv'}: written")
 
 
 if __name__ == "__main__":

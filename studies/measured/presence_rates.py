@@ -3,6 +3,8 @@
 Every row is of simulated recordings of `WINDOWS` windows through a twin, judged by `presence.present` as recordings
 are, from their own noise alone.
     radar, scene     white: white noise alone; receiver: the noise, leak and hum of receivers drawn as for training;
+                     empty: the same recordings where the first `EMPTY` windows are known to hold no target
+                     (radars whose targets may hover);
                      a category: its scenes, each at a receiver from the middle of the ranges, with the echo snr_db over
                      the white noise of the receiver's band
     windows          with a target (a category) or without one (white, receiver)
@@ -26,6 +28,7 @@ PRESENCE = ("radar", "scene", "snr_db", "recordings", "windows", "taken_percent"
 HOVER = ("UAV", "Bird")
 WINDOWS = 24
 SNRS_DB = (-20.0, -10.0, 0.0, 10.0, 20.0)
+EMPTY = 5
 REPEATS = 2000
 
 
@@ -62,7 +65,9 @@ def noise_rows(name: str, library: Library, count: int) -> list[list]:
     samples_of_window = math.ceil(twin.symbols * twin.symbol_interval_s * twin.rate_hz)
     margin = math.ceil(2 * MARGIN * twin.symbol_interval_s * twin.rate_hz)
     for kind in ("white", "receiver"):
-        taken = []
+        taken: dict[str, list[np.ndarray]] = {kind: []} | (
+            {"empty": []} if kind == "receiver" and not twin.slowest_mps else {}
+        )
         for number in range(count):
             rng = stream(library.seed, "presence", name, kind, number)
             drawn = {key: value(item, rng) for key, item in scenes[number % len(scenes)]["receiver"].items()}
@@ -71,8 +76,12 @@ def noise_rows(name: str, library: Library, count: int) -> list[list]:
                 drawn |= {"highpass_hz": 0.0, "clip_rms": 0.0}
             # The echo of a moving point sets the level of the noise, and is left out.
             point = np.exp(0.3j * np.arange(samples_of_window + margin))
-            taken.append(present(recorded(twin, drawn, point, 0, rng), twin))
-        rows.append(_row(name, kind, math.nan, taken, stream(library.seed, "presence", name, kind, "interval")))
+            windows = recorded(twin, drawn, point, 0, rng)
+            taken[kind].append(present(windows, twin))
+            if "empty" in taken:
+                taken["empty"].append(present(windows[EMPTY:], twin, windows[:EMPTY]))
+        rows += [_row(name, scene, math.nan, found, stream(library.seed, "presence", name, scene, "interval"))
+                 for scene, found in taken.items()]  # fmt: skip
     return rows
 
 

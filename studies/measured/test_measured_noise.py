@@ -41,9 +41,12 @@ def test_slow_noise_is_found_at_its_level_over_white_noise_and_rises_as_one_over
 
 @pytest.mark.parametrize("name", ["uav_3ghz", "bird_drone_10ghz", "cw_24ghz"])
 def test_white_noise_is_taken_for_a_target_in_no_window_of_the_table(library, name):
-    white, receiver = noise_rows(name, library, 3)
+    white, receiver, *empty = noise_rows(name, library, 3)
     assert white[:3] == [name, "white", pytest.approx(np.nan, nan_ok=True)] and white[3:] == [3, 72, 0.0, 0.0, 0.0]
     assert receiver[1] == "receiver" and 0 <= receiver[6] <= receiver[5] <= receiver[7] <= 100
+    # Where targets may hover, hum that is known from empty windows is no target.
+    assert [row[1:6] for row in empty] == [["empty", pytest.approx(np.nan, nan_ok=True), 3, 57, 0.0]] * len(empty)
+    assert len(empty) == (name != "cw_24ghz")
 
 
 def test_strong_targets_are_found_and_weak_ones_are_not(library, monkeypatch):

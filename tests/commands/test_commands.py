@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -63,38 +64,6 @@ def test_sample_writes_the_bytes_of_the_data_set_and_a_picture(tmp_path, capsys)
     np.testing.assert_array_equal(np.load(tmp_path / f"{stem}.npy"), made.signal)
     assert json.loads((tmp_path / f"{stem}.json").read_text()) == made.record
     assert (tmp_path / f"{stem}-axes.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-
-
-def given(**changes):
-    from types import SimpleNamespace
-
-    return SimpleNamespace(
-        **{
-            "overlay": [],
-            "configfile": [],
-            "target": [],
-            "cores": None,
-            "dry_run": False,
-            "printshellcmds": False,
-            "profile": None,
-        }
-        | changes
-    )
-
-
-def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatch, capsys):
-    line = workflow.command(given(overlay=[Path("config/tiny.yaml")], target=["data"], cores="2", dry_run=True))
-    assert line[3:] == ["--snakefile", str(workflow.SNAKEFILE), "--cores", "2", "--configfile", "config/tiny.yaml",
-                        "--dry-run", "--", "data"]  # fmt: skip
-    assert workflow.SNAKEFILE.is_file()
-    assert main(["run", str(tmp_path / "none.yaml")]) == 2
-    assert "configuration: no file at" in capsys.readouterr().err
-    # 137 is how shells name the end by SIGKILL.
-    for code, seen in ((7, 7), (-9, 137)):
-        monkeypatch.setattr(workflow.subprocess, "run", lambda line, code=code: given(returncode=code))
-        assert main(["run"]) == seen
-    monkeypatch.setattr(workflow, "SNAKEFILE", tmp_path / "Snakefile")
-    assert main(["run"]) == 2 and "has no workflow" in capsys.readouterr().err
 
 
 def test_every_command_has_help_with_an_example_that_parses(capsys, monkeypatch):
@@ -224,7 +193,7 @@ def test_report_asks_the_workflow_for_the_page_of_the_same_run(tmp_path, monkeyp
     def snakemake(line):
         overlay = line[line.index("--configfile") + 1 :]
         asked.append((load([*overlay[: overlay.index("--")]], SCHEMA), overlay[overlay.index("--") + 1 :]))
-        return given(returncode=0)
+        return SimpleNamespace(returncode=0)
 
     config = load(["config/default.yaml", "config/tiny.yaml"], SCHEMA)
     del config["network"]["stations"]["C"]

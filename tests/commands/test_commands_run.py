@@ -16,18 +16,8 @@ from lowalt.files.shipped import SHIPPED
 
 
 def given(**changes):
-    return SimpleNamespace(
-        **{
-            "overlay": [],
-            "configfile": [],
-            "target": [],
-            "cores": None,
-            "dry_run": False,
-            "printshellcmds": False,
-            "profile": None,
-        }
-        | changes
-    )
+    usual = {"overlay": [], "configfile": [], "target": [], "cores": None, "dry_run": False, "printshellcmds": False}
+    return SimpleNamespace(**{**usual, "profile": None, **changes})
 
 
 def test_outside_a_checkout_a_run_gets_the_package_s_configuration_and_profile(tmp_path, monkeypatch):
@@ -86,3 +76,18 @@ def test_the_page_of_a_run_is_refused_where_its_folder_names_code(tmp_path, monk
     monkeypatch.setattr(workflow, "ended", lambda options: started.append(options) or {"status": 0})
     assert lowalt_command(["report", "results/copied"]) == 2
     assert "evil.py:f" in capsys.readouterr().err and not started
+
+
+def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatch, capsys):
+    line = workflow.command(given(overlay=[Path("config/tiny.yaml")], target=["data"], cores="2", dry_run=True))
+    assert line[3:] == ["--snakefile", str(workflow.SNAKEFILE), "--cores", "2", "--configfile", "config/tiny.yaml",
+                        "--dry-run", "--", "data"]  # fmt: skip
+    assert workflow.SNAKEFILE.is_file()
+    assert lowalt_command(["run", str(tmp_path / "none.yaml")]) == 2
+    assert "configuration: no file at" in capsys.readouterr().err
+    # 137 is how shells name the end by SIGKILL.
+    for code, seen in ((7, 7), (-9, 137)):
+        monkeypatch.setattr(workflow.subprocess, "run", lambda line, code=code: given(returncode=code))
+        assert lowalt_command(["run"]) == seen
+    monkeypatch.setattr(workflow, "SNAKEFILE", tmp_path / "Snakefile")
+    assert lowalt_command(["run"]) == 2 and "has no workflow" in capsys.readouterr().err

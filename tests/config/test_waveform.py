@@ -71,7 +71,7 @@ def test_cubes_have_a_range_cell_for_each_sample():
         ({"waveform": {}}, r"network.waveform: missing key\(s\) \['kind'\]"),
         ({"subcarriers": None}, r"network: missing key\(s\) \['subcarriers'\]"),
     ],
-)  # fmt: skip
+)
 def test_what_contradicts_a_waveform_is_refused_in_one_sentence(network, words):
     with pytest.raises(InputError, match=words) as refused:
         built(network)

@@ -8,6 +8,7 @@ import yaml
 
 import lowalt
 from lowalt.__main__ import main
+from lowalt.files.errors import InputError
 from lowalt.targets.cloud import read
 from lowalt.targets.records import estimates
 
@@ -72,6 +73,21 @@ def test_what_the_sheet_does_not_say_grows_with_the_size(drafts, tmp_path):
         assert large["figures"][name][0] == pytest.approx(value * (2 if unit == "m" else 1), rel=0.01)
     assert large["row"]["vz_abs_max"] == 3 and "vz_abs_max" in large["row_from"]
     assert "vz_abs_max" not in small["row_from"]
+
+
+def test_python_drafts_the_same_record_and_refuses_what_a_sheet_lacks(drafts, tmp_path):
+    stated = {"rotors": 6, "diagonal": 1.13, "propeller": 0.53, "blades": 2, "rate": (50.0, 120.0), "speed": 18.0}
+    text, lender = lowalt.draft_target("drone", subtype="my-drone", **stated)
+    assert text == drafts["drone"].read_text() and lender in text
+    assert lowalt.draft_target("drone", tmp_path / "again.yaml", subtype="my-drone", **stated)[0] == text
+    assert (tmp_path / "again.yaml").read_text() == text
+    lacking = {word: value for word, value in stated.items() if word != "blades"}
+    for kind, wrong, words in (
+        ("drone", lacking, "it states"), ("drone", {**stated, "wheel": 1.0}, "it states"),
+        ("drone", {**stated, "rate": (1, 2, 3)}, "rate is .*, expected 2 numbers"), ("boat", stated, "no kind"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            lowalt.draft_target(kind, **wrong)
 
 
 def test_its_echo_is_made_by_its_name(drafts):

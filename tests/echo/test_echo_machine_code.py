@@ -183,3 +183,35 @@ def test_the_key_of_kept_code_has_the_kernel_s_own_options():
     assert (
         len({digest(run.function, options) for options in (None, {"fastmath": {"contract"}}, {"fastmath": set()})}) == 3
     )
+
+
+LINKED = """
+from lowalt.machine.jit import LEAN
+
+
+@LEAN
+def called(x):
+    {}
+    return x
+
+
+@LEAN
+def caller(x):
+    return called(x)
+"""
+"""A function that is too long to be copied into its caller."""
+
+
+def test_a_kept_kernel_calls_the_function_that_it_was_compiled_with(tmp_path):
+    # As numba links, the function that was loaded first also serves a second caller, whose answer then is 2.0. In the
+    # same way the bits of a scene depended on whether its kernels had been compiled in the process.
+    uses = []
+    for offset in ("1.0", "2.0"):
+        module = tmp_path / offset / "linked.py"
+        module.parent.mkdir()
+        module.write_text(LINKED.format(60 * f"x = x * 0.5 + {offset}; "))
+        uses.append(f"sys.path.insert(0, {str(module.parent)!r}); sys.modules.pop('linked', None); import linked")
+    # The first two programs compile, the third finds machine code in the cache.
+    programs = [["import sys", use, "print(linked.caller(0.0))"] for use in uses]
+    programs += [["import sys", uses[0], "print(linked.called(0.0))", uses[1], "print(linked.caller(0.0))"]]
+    assert printed(["\n".join(lines) for lines in programs]) == ["2.0\n", "4.0\n", "2.0\n4.0\n"]

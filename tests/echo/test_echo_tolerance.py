@@ -95,7 +95,7 @@ def test_fixed_functions_keep_their_bound(kind, degree):
     exact = {
         "cosine": lambda v: mpmath.cos(2 * mpmath.pi * mpmath.sqrt(v)),
         "sine": lambda v: mpmath.sin(2 * mpmath.pi * mpmath.sqrt(v)) / mpmath.sqrt(v),
-    }[kind]  # fmt: skip
+    }[kind]
     with mpmath.workdps(40):
         truth = np.array([float(exact(mpmath.mpf(v))) for v in x])
     found = np.polynomial.polynomial.polyval(x, coefficients)

@@ -143,7 +143,11 @@ def test_a_target_turns_to_climb_the_other_way_while_it_can_still_go_on_for_a_lo
 def test_rotors_with_rates_of_their_own_go_on_from_look_to_look(dataset):
     cloud = dataset.clouds["DJI Mini 2"]
     own = replace(cloud, record=cloud.record | {"rate_factors": {cloud.names[cloud.parts_of("rotor")[1]]: 1.37}})
-    goes_on(own, model_rows(1, own, TABLE["DJI Mini 2"], *places_of(dataset.config), 0))
+    rows = model_rows(1, own, TABLE["DJI Mini 2"], *places_of(dataset.config), 0)
+    goes_on(own, rows)
+    # With the rate of the other rotors, this one jumps.
+    with pytest.raises(AssertionError):
+        goes_on(cloud, rows)
 
 
 def test_along_a_log_a_larger_car_s_wheels_turn_at_a_lower_rate_and_a_full_circle_is_one_turn(dataset, tmp_path):

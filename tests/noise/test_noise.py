@@ -61,8 +61,7 @@ def test_200_db_is_below_double_resolution_but_finite():
 
 
 @pytest.mark.parametrize(
-    ("signal", "snr_db"),
-    [([], 3.0), ([1, np.nan], 3.0), ([1, np.inf], 3.0), ([1.0], math.nan), ([1.0], -math.inf)],
+    ("signal", "snr_db"), [([], 3.0), ([1, np.nan], 3.0), ([1, np.inf], 3.0), ([1.0], math.nan), ([1.0], -math.inf)]
 )
 def test_bad_input_is_refused(signal, snr_db):
     with pytest.raises(InputError, match="noise:"):

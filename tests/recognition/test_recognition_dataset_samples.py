@@ -12,7 +12,7 @@ import yaml
 from configured import Inputs, parts
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, samples, schemes
+from lowalt.recognition import checkpoint, samples
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.dataset_samples import DatasetSamples, opened, stations_of
 from lowalt.recognition.views import ShardSamples
@@ -23,6 +23,7 @@ from lowalt.shards.dataset import Dataset
 from lowalt.spectra import NAMES
 from lowalt.workflow import options
 from small_configuration import configuration
+from trainings import SCHEME
 
 SIZE, COLUMNS = 24, [0, 2, len(NAMES), len(NAMES) + 2]
 """Views by the catalogue, whose spectra are four: images 0, 2, 3 and 5 of a data set with the first three."""
@@ -78,12 +79,9 @@ def test_a_training_on_made_samples_ends_in_the_same_weights(run, tmp_path):
     config = yaml.safe_load((run / "config.yaml").read_text())
     block = config["recognition"]
     block["training"] |= {"steps": 3, "validate_every": 3, "batch": 4}
-    table = tmp_path / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
     settings = {key: block[key] for key in ("network", "training", "augmentation")}
     settings |= {"seed": 1, "size": SIZE, "colour_map": "viridis", "classes": list(CATEGORIES)}
-    line = ["train", "--settings", json.dumps(settings), "--protocol", "seen", "--stations", "A", "B", "C",
-            "--scheme", "AB:VRP+VT", "--schemes", str(table)]  # fmt: skip
+    line = ["train", "--settings", json.dumps({**settings, "scheme": SCHEME.record}), "--protocol", "seen"]
     weights = []
     for name, source in (("dataset", run / "config.yaml"), ("index", run / "shards" / "index.json")):
         main([*line, f"--{name}", str(source), "--out", str(tmp_path / name)])

@@ -51,6 +51,10 @@ def test_a_file_holds_every_column_and_is_read_back_as_it_was(tmp_path):
     for name, value in vars(told).items():
         np.testing.assert_array_equal(getattr(found, name), value)
     assert len(found) == 2 and found.model.dtype == found.label.dtype == np.int64
+    # Folds of a study's own have no parts.
+    for protocol, part in (("unseen", ",part"), ("without fold 0", "")):
+        predictions.write(tmp_path / "q.csv", told.take([1]), protocol=protocol)
+        assert (tmp_path / "q.csv").read_text().splitlines()[0] == lines[0] + part
 
 
 @pytest.mark.parametrize(

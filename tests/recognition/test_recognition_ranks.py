@@ -13,7 +13,7 @@ import torch
 from torch import nn
 
 from lowalt.config.layers import load_yaml
-from lowalt.recognition import batch_norm, checkpoint, predictions, runs, schemes
+from lowalt.recognition import batch_norm, checkpoint, predictions, runs
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.workflow.launch import Launch
@@ -62,15 +62,12 @@ def on_two_ranks(*lines):
 
 def training_line(folder, views, name, batch):
     """A command line that trains six steps without random images, into `folder`/`name`."""
-    table = folder / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
-    settings = with_training(steps=6, validate_every=3, batch=batch)
+    settings = {**with_training(steps=6, validate_every=3, batch=batch), "scheme": SCHEME.record}
     settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
     # The shipped backbone, whose batch norm needs the statistics of the whole batch.
     shipped = load_yaml("config/default.yaml")["recognition"]["network"]["backbone"]
     settings["network"] = {**SETTINGS["network"], "dropout": 0.0, "backbone": shipped}
     return ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
-            "--scheme", "AB:VRP+VT", "--stations", "A", "B", "C", "--schemes", str(table),
             "--out", str(folder / name)]  # fmt: skip
 
 

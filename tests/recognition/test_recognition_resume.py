@@ -13,7 +13,7 @@ import torch
 
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import checkpoint, recipe, runs, samples, schemes, training
+from lowalt.recognition import checkpoint, recipe, runs, samples, training
 from lowalt.recognition.__main__ import main
 from trainings import SCHEME, TRAINING, Killed, equal, kill_at, sources, train, with_training
 
@@ -73,11 +73,9 @@ def test_checkpoints_come_by_the_clock_and_the_time_spent_waiting_for_data_is_to
 
 def killed_at(moments, views, folder, settings):
     """Kill one training at each of the moments, s after its first new checkpoint; what is left of it, as a command."""
-    table = folder / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
-    line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
-            "--stations", "A", "B", "C",
-            "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(folder / "killed")]  # fmt: skip
+    settings = json.dumps({**settings, "scheme": SCHEME.record})
+    line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--out"]
+    line.append(str(folder / "killed"))
     kept = folder / "killed" / "checkpoint.pt"
     for moment in moments:
         before = kept.stat().st_mtime_ns if kept.exists() else None

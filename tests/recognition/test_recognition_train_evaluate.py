@@ -1,6 +1,7 @@
 """Training and evaluation in one call each: the model file and the accuracies that the commands give."""
 
 import json
+import math
 
 import pytest
 import yaml
@@ -56,5 +57,22 @@ def test_a_folder_that_is_no_run_and_a_setting_that_is_none_are_refused(run, tmp
         lowalt.train(run, "A:VRP+TRP+VT", out=tmp_path / "model", stepps=3)
 
 
-def test_the_package_lists_the_names_that_programs_use():
-    assert {"Dataset", "Endless", "train", "evaluate"} <= set(dir(lowalt))
+def test_confusion_is_read_at_one_snr_or_summed_over_all(tmp_path):
+    counts = {"seen,A,3": [3, 1, 0, 4], "seen,A,inf": [4, 0, 1, 3], "seen,B,3": [9, 9, 9, 9]}
+    pairs = ["Bird,Bird", "Bird,UAV", "UAV,Bird", "UAV,UAV"]
+    lines = [f"{about},{pair},{count}" for about, row in counts.items() for pair, count in zip(pairs, row, strict=True)]
+    head = "protocol,scheme,snr_db,category,predicted,samples"
+    (tmp_path / "confusion_by_snr.csv").write_text("\n".join([head, *lines, ""]))
+    at_3 = lowalt.confusion(tmp_path, "A", "seen", snr_db=3)
+    assert at_3.classes == ("Bird", "UAV") and at_3.samples.tolist() == [[3, 1], [0, 4]]
+    assert at_3.percent.tolist() == [[75, 25], [0, 100]]
+    assert lowalt.confusion(tmp_path, "A", "seen", snr_db=math.inf).samples.tolist() == [[4, 0], [1, 3]]
+    assert lowalt.confusion(tmp_path, "A", "seen").samples.tolist() == [[7, 1], [1, 7]]
+    for wrong, words in (({"snr_db": 5}, "snr_db 5 is not there"), ({"scheme": "C"}, "scheme 'C' is not there")):
+        with pytest.raises(InputError, match=words):
+            lowalt.confusion(tmp_path, **{"scheme": "A", "protocol": "seen", **wrong})
+
+
+def test_every_name_that_the_package_lists_leads_to_an_object_with_a_docstring():
+    assert set(lowalt.__all__) <= set(dir(lowalt))
+    assert all(len(getattr(lowalt, name).__doc__) > 60 for name in lowalt.__all__)

@@ -87,6 +87,16 @@ def test_hum_is_no_target_in_the_windows_of_a_recording_through_which_one_passes
     assert present(hum, twin).all() and present(passes[: ENOUGH - 1], twin).all()
 
 
+def test_what_is_heard_while_nothing_is_there_is_no_target_later():
+    twin, rng, time = radars()["bird_drone_10ghz"], np.random.default_rng(5), np.arange(400)
+    noise = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
+    hum = noise + np.exp(2j * np.pi * 0.05 * time)
+    hovers = hum + 1.2 * np.exp(2j * np.pi * 0.3 * time)
+    for empty in (hum[:1], hum[:5]):
+        assert not present(hum[5:], twin, empty).any()
+        assert present(hovers[5:], twin, empty).mean() > 0.95
+
+
 @pytest.mark.parametrize("name, inside, outside", [
     ("cw_24ghz", [0.5, 17.0], [18.5, 40.0]), ("bird_drone_10ghz", [0.5, 7.0], [8.0, 30.0]),
     ("uav_3ghz", [2.0, 55.0], [58.0, 100.0]),

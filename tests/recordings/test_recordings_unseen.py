@@ -52,6 +52,30 @@ def test_a_wav_and_five_lines_become_spectra_and_tiles(tmp_path, rate, stereo):
     assert set(spectra) == {"vrp", "trp", "vt"} and all(np.isfinite(spectra[name]).all() for name in spectra)
 
 
+def test_a_room_that_hums_is_empty_where_the_record_says_when_it_was(tmp_path, capsys):
+    time = np.arange(20_000) / 2000
+    craft = 0.3 * np.cos(2 * np.pi * 180 * time) * (time > 4)
+    values = 0.5 * np.cos(2 * np.pi * 50 * time) + craft + np.random.default_rng(1).normal(0, 0.1, len(time))
+    wavfile.write(tmp_path / "room.wav", 2000, (10_000 * values).astype(np.int16))
+    about = {"file": "room.wav", "carrier_hz": 10.5e9, "channel": "real"}
+    path, starts = tmp_path / "room.yaml", {}
+    for name, more in {"unknown": {}, "known": {"empty_s": [0, 2.5]}}.items():
+        path.write_text(yaml.safe_dump(about | more))
+        assert lowalt(["predict", "bird_drone_10ghz", str(path), "--json"]) == 0
+        starts[name] = [window["start_s"] for window in json.loads(capsys.readouterr().out) if window["target"]]
+        assert lowalt(["predict", "bird_drone_10ghz", str(path)]) == 0
+        said = capsys.readouterr().out
+        assert ("note: targets of this network may hover" in said) == (name == "unknown")
+        assert "note: this network learned a radar at 10 GHz, and the recording is at 10.5 GHz" in said
+    assert len(starts["unknown"]) == 25 and min(starts["known"]) == pytest.approx(4.0) and len(starts["known"]) == 15
+    path.write_text(yaml.safe_dump(about | {"empty_s": [1, 1.3]}))
+    assert lowalt(["predict", "bird_drone_10ghz", str(path)]) == 2
+    assert (
+        "empty_s is [1, 1.3], expected a stretch that holds at least one of the 25 windows of 0.4 s"
+        in capsys.readouterr().err
+    )
+
+
 def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path, capsys):
     path = drive(tmp_path, 44100, True)
     assert lowalt(["predict", "cw_24ghz", str(path), "--json"]) == 0

@@ -1,5 +1,6 @@
 """The page as a reader meets it: whole parts, links that lead somewhere, tables that sort, filter and can be kept."""
 
+import json
 import re
 from types import SimpleNamespace
 
@@ -10,9 +11,14 @@ from lowalt.report.page import PARTS, assembled, rendered
 from lowalt.report.sections import recognition_cost, simulation_cost
 from pages import browsed, sound
 
-TABLE = """<table><caption>Sizes</caption><thead><tr><th scope="col">name</th><th scope="col">size</th></tr></thead>
-<tbody><tr><td>b</td><td>10.5</td></tr><tr><td>c</td><td></td></tr>
-<tr><td>a, "x"</td><td>-9 (1 to 2)</td></tr></tbody></table>"""
+ROWS = (("b", "10.5"), ("c", ""), ('a, "x"', "-9 (1 to 2)"), *((f"d{number}", f"{20 + number}") for number in range(7)))
+
+
+def table(rows):
+    """A table of names and sizes."""
+    body = "".join(f"<tr><td>{name}</td><td>{size}</td></tr>" for name, size in rows)
+    head = '<tr><th scope="col">name</th><th scope="col">size</th></tr>'
+    return f"<table><caption>Sizes</caption><thead>{head}</thead><tbody>{body}</tbody></table>"
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +55,8 @@ def test_the_contents_name_every_part_of_the_page():
 
 def test_tables_sort_by_value_filter_and_download_and_the_theme_turns(tmp_path):
     script = """
-    const column = (at) => [...document.querySelectorAll("tbody tr")].map((row) => row.cells[at].textContent).join("|");
+    const column = (at) => [...document.querySelectorAll("tbody tr")].map((row) => row.cells[at].textContent)
+      .filter((text) => !text.startsWith("d")).join("|");
     const said = [], heads = document.querySelectorAll("th button");
     heads[1].click(); said.push(column(0)); heads[1].click(); said.push(column(0));
     heads[0].click(); said.push(column(0));
@@ -67,12 +74,43 @@ def test_tables_sort_by_value_filter_and_download_and_the_theme_turns(tmp_path):
     document.querySelector(".tools button").click();
     document.body.dataset.said = said.join(";");
     """
-    found = browsed(tmp_path, assembled("t", [{"id": "one", "title": "One", "html": TABLE}]), script)
+    found = browsed(tmp_path, assembled("t", [{"id": "one", "title": "One", "html": table(ROWS)}]), script)
     assert (
         re.search('data-said="(.*?)"', found)[1]
-        == "a, &quot;x&quot;|b|c;b|a, &quot;x&quot;|c;a, &quot;x&quot;|b|c;1 of 3 rows;light"
+        == "a, &quot;x&quot;|b|c;b|a, &quot;x&quot;|c;a, &quot;x&quot;|b|c;1 of 10 rows;light"
     )
     csv = re.search('data-csv="(.*?)"', found, re.S)[1].replace("&quot;", '"')
     assert csv == 'name,size\n"a, ""x""",-9 (1 to 2)\n'
     assert 'data-file="sizes.csv"' in found
     assert 'aria-sort="ascending"' in found and 'aria-current="true"' in found
+
+
+def test_a_table_below_ten_rows_sorts_and_scrolls_but_has_neither_filter_nor_download(tmp_path):
+    script = """
+    document.querySelectorAll("th button")[1].click();
+    const first = document.querySelector("tbody td").textContent;
+    const many = (name) => document.querySelectorAll(name).length;
+    document.body.dataset.said = [first, many(".scroll > table"), many(".tools")].join(";");
+    """
+    found = browsed(tmp_path, assembled("t", [{"id": "one", "title": "One", "html": table(ROWS[:9])}]), script)
+    assert re.search('data-said="(.*?)"', found)[1] == "a, &quot;x&quot;;1;0"
+
+
+def test_the_first_tiles_fill_a_telephone_and_the_sample_scrolls_within_its_figure(tmp_path):
+    tile = '<figure><div class="tile"><div class="down"><span>A</span></div><img alt="a" src="data:,"></div></figure>'
+    sample = '<div class="viewer"><figure><svg id="viewer-tile" viewBox="0 0 4 3"></svg></figure></div>'
+    inner = assembled("t", [{"id": "one", "title": "One", "html": f'<div class="row tiles">{4 * tile}</div>{sample}'}])
+    script = """
+    const frame = document.createElement("iframe");
+    frame.style.width = "390px"; frame.style.height = "3000px";
+    frame.srcdoc = INNER;
+    frame.onload = () => {
+      const page = frame.contentDocument, figure = page.querySelector(".viewer figure");
+      const wide = page.querySelector(".tile img").getBoundingClientRect().width;
+      const seen = [page.documentElement.scrollWidth <= 390, figure.scrollWidth > figure.clientWidth, wide >= 160];
+      document.body.dataset.said = seen.join(";");
+    };
+    document.body.append(frame);
+    """.replace("INNER", json.dumps(inner).replace("</", "<\\/"))
+    found = browsed(tmp_path, assembled("outer", [{"id": "two", "title": "Two", "html": "<p>x</p>"}]), script)
+    assert re.search('data-said="(.*?)"', found)[1] == "true;true;true"

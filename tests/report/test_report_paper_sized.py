@@ -36,8 +36,8 @@ def tables():
     return {
         "accuracy": [{**name, **several, "snr_db": snr, "accuracy_percent": rng.uniform(50, 100)}
                      for name in names for snr in snrs],
-        "confusion": [{**name, "category": true, "predicted": other, "samples": int(rng.integers(1, 999))}
-                      for name in names for true in CLASSES for other in CLASSES],
+        "confusion_by_snr": [{**name, "snr_db": snr, "category": true, "predicted": other, "samples": rng.integers(999)}
+                             for name in names for snr in snrs[:-1] for true in CLASSES for other in CLASSES],
         "subtypes": [{**name, **some, **row, "accuracy_percent": rng.uniform(20, 100)}
                      for name in names for row in targets],
         "comparisons": [one] * len(names), "orderings": [one] * len(names),

@@ -13,17 +13,27 @@ from lowalt.report.plots import plotted, write_plots
 from pages import sound
 
 REFERENCE = "results/reference/default"
+CLASSES = ("UAV", "Bird", "Vehicle", "Pedestrian")
 
 
 def table(name):
     return read_csv(f"{REFERENCE}-{name}.csv")
 
 
+def answers():
+    """Rows of confusion_by_snr.csv: of 10 samples of each class, one more is right per level; the others are birds."""
+    levels = enumerate(("inf", "13", "3"))
+    return [{"protocol": "seen", "scheme": "A", "snr_db": snr, "category": true, "predicted": guess, "samples": samples}
+            for place, snr in levels for true in CLASSES
+            for guess, samples in ((true, 10 - place), ("Bird" if true != "Bird" else "UAV", place))]  # fmt: skip
+
+
 def one_of_each():
     ours = by_scheme(table("accuracy"))
     return [
         accuracy_plots.over_snr(ours, by_scheme(read_csv("config/published_accuracy.csv"))),
-        accuracy_plots.confusion(confusion(table("confusion")), ("UAV", "Bird", "Vehicle", "Pedestrian")),
+        accuracy_plots.confusion(confusion(table("confusion")), CLASSES),
+        accuracy_plots.confusion_by_snr(answers(), CLASSES),
         cost_plots.recognition(table("accuracy_cost")), cost_plots.echo(table("cost")),
     ]  # fmt: skip
 
@@ -68,13 +78,24 @@ def test_a_row_of_a_confusion_matrix_is_whole_and_a_class_without_samples_has_da
     assert letters(crowded).count("100.0") == 8 and letters(crowded).count("-") == 9
 
 
+def test_bars_of_answers_are_whole_and_stand_in_the_order_of_the_snrs(plots):
+    plot = plots["confusion_by_snr"]
+    shares = {(row["true"], row["snr_db"], row["recognised_as"]): row["percent"] for row in plot.rows}
+    assert len(shares) == 4 * 3 * 4 and shares["UAV", "3", "Bird"] == 20 and shares["UAV", "inf", "UAV"] == 100
+    assert sum(shares.values()) == pytest.approx(4 * 3 * 100)
+    assert letters(plot)[:3] == ["3", "13", "∞"]
+    some = accuracy_plots.confusion_by_snr([row for row in answers() if row["category"] != "Bird"], CLASSES).rows
+    assert {row["percent"] for row in some if row["true"] == "Bird"} == {0.0}
+
+
 def test_costs_are_those_of_the_tables(plots):
     trained = [row for row in table("accuracy_cost") if row["kind"] == "trained"]
     drawn = plots["accuracy_cost"].rows
     assert {(row["scheme"], row["accuracy_percent"]) for row in drawn} == {
         (row["scheme"], float(row["unseen_percent"])) for row in trained}  # fmt: skip
     assert all(row["low"] <= row["accuracy_percent"] <= row["high"] for row in drawn)
-    assert {row["scheme"] for row in trained if row["front"] == "yes"} <= set(letters(plots["accuracy_cost"]))
+    front = {row["preset"] or row["scheme"] for row in trained if row["front"] == "yes"}
+    assert front <= set(letters(plots["accuracy_cost"]))
     assert [row["points"] for row in plots["echo_cost"].rows] == [int(row["points"]) for row in table("cost")]
 
 

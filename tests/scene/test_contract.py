@@ -17,6 +17,8 @@ def test_every_effect_offers_functions_of_its_place_with_the_arguments_of_the_co
     for function, found in offered.items():
         assert OFFERS[function].place in ("", PLACES[name])
         assert tuple(inspect.signature(found).parameters) == ("settings", *OFFERS[function].takes), function
+    assert set(getattr(module, "UNMODELLED", ())) <= {"links", "fmcw", "cw"}
+    assert getattr(module, "SET_SNR", None) in (None, *module.DEFAULTS)
 
 
 def test_the_contract_explains_every_argument_and_its_places_are_those_of_the_chain():

@@ -93,7 +93,7 @@ def test_the_clutter_filter_spares_targets_beyond_its_notch_which_grows_with_win
 def test_noise_behind_a_canceller_is_that_of_its_cell():
     noise = normals(4, 200)
     for changes in KINDS:
-        found = set_noise.behind_canceller(noise, changes)
+        found = set_noise.behind(noise, {"canceller": changes})
         np.testing.assert_array_equal(found, filtered(changes, noise[:, None])[:, 0])
     assert set_noise.in_all_cells({"cell_noise": None}) and not set_noise.in_all_cells({"cell_noise": {"snr_db": 3.0}})
 
@@ -173,9 +173,7 @@ def test_the_ordered_threshold_passes_noise_as_an_integral_over_the_order_statis
 
 @pytest.mark.parametrize("cfar, window", THRESHOLDS)
 def test_a_threshold_is_that_of_the_cells_about_it_one_by_one(cfar, window):
-    settings = detector.DEFAULTS | {
-        "guard": 2, "training": 7, "false_alarm": 0.1, "cfar": cfar, "range_window": window,
-    }  # fmt: skip
+    settings = detector.DEFAULTS | {"guard": 2, "training": 7, "false_alarm": 0.1, "cfar": cfar, "range_window": window}
     steps = range(3, 10) if window == "none" else (3, 6, 9)
     power = abs(normals(8, 6, 64)) ** 2
     found = detector.exceeds(settings, power)

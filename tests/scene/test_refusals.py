@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from lowalt.files.errors import InputError
-from lowalt.scene.checks import UNKNOWN_OF, check
+from lowalt.scene.checks import check
 from lowalt.scene.effects import PLACES, called, dotted
 
 STATIONS = {name: {"position_m": [x, 0.0, 10.0], "normal_deg": 0.0} for name, x in (("A", 0.0), ("B", 120.0))}
@@ -25,6 +25,8 @@ FMCW = {key: ALONE[key] for key in ("transmit_array", "receive_array", "power_w"
 }  # fmt: skip
 BELOW = ALONE | {"stations": {"A": STATIONS["A"] | {"position_m": [0.0, 0.0, -1.0]}}}
 QUIET, NOISY = [float("inf")], [3.0]
+OF_OFDM = ("data_symbols", "power_amplifier", "comb_pilots", "cyclic_prefix", "interference", "link_offset",
+           "timing_offset", "clock_offset", "carrier_offset")  # fmt: skip
 GAPS = {"slow_time": {"downlink": 0.75}}
 
 
@@ -73,9 +75,9 @@ GAPS = {"slow_time": {"downlink": 0.75}}
         (LINKED, {}, QUIET, r"network.stations: \['AB'\] are links .*expected effects.direct_path"),
         (LINKED, {"direct_path": {}, "transmit_leakage": {}}, QUIET, "not modelled between two stations"),
         (ALONE | {"stations": STATIONS, "guard_subcarriers": -9}, {}, QUIET, "guard_subcarriers: -9, .*interference"),
-        *((FMCW, {name: {}}, QUIET, rf"effects: \['{name}'\] .*kind 'fmcw'") for name in UNKNOWN_OF["fmcw"]),
+        *((FMCW, {name: {}}, QUIET, rf"effects: \['{name}'\] .*kind 'fmcw'") for name in OF_OFDM),
         *((FMCW | {"waveform": {"kind": "cw"}}, {name: {}}, QUIET, rf"\['{name}'\] .*kind 'cw'")
-          for name in UNKNOWN_OF["cw"]),
+          for name in (*OF_OFDM, "symbol_motion", "clutter")),
     ],
 )  # fmt: skip
 def test_settings_that_contradict_each_other_are_refused_by_name(network, effects, snr_db, said):

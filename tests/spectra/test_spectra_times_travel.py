@@ -11,7 +11,7 @@ from lowalt.files.errors import InputError
 from lowalt.motion import write_table
 from lowalt.scene.checks import check
 from lowalt.scene.effects import called
-from lowalt.scene.lateness import lateness, timed
+from lowalt.scene.lateness import late_effects, lateness
 from lowalt.scene.observe import Scene, observe
 from lowalt.shards import ShardSet
 from lowalt.shards.build import rows_of, write_run
@@ -47,7 +47,7 @@ def test_lateness_is_what_the_effect_drew(dataset):
         drawn = (view.times_s - network.times_s) / network.symbol_interval_s
         assert late == pytest.approx(drawn, abs=1e-12) and 0.3 < late.max() <= 0.4
     assert lateness({}, FRAMES, network, 1, row) is None and lateness({"times": "known"}, {}, network, 1, row) is None
-    assert timed(dataset.config) and not timed(dataset.config | {"effects": {}})
+    assert late_effects(dataset.config) == FRAMES and not late_effects(dataset.config | {"effects": {}})
 
 
 def test_every_kind_of_shards_gives_the_tiles_of_the_made_sample(dataset, tmp_path):

@@ -90,8 +90,8 @@ def recognised(folder, network, config, clouds, targets=TARGETS):
         "classes": classes_of(targets),
     }  # fmt: skip
     run(
-        "recognition", "train", "--views", *views, "--protocol", "seen", "--scheme", name, "--schemes", table,
-        "--stations", *stations, "--out", folder / "model", **settings,
+        "recognition", "train", "--views", *views, "--protocol", "seen", "--out", folder / "model",
+        scheme=schemes.named(table, name, list(stations)).record, **settings,
     )  # fmt: skip
     evaluation = {"batch": 8, "threads": 1, "precision": "fp32", "mirror": False}
     model = ("--model", folder / "model/model.pt")
@@ -110,7 +110,7 @@ def reported(folder, config, clouds, published=None):
     """The page of the run, as text."""
     job = {"rule_name": "echo", "wildcards": {}, "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0}
     (folder / "echo.jsonl").write_text(json.dumps(job))
-    names = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances")
+    names = ("accuracy", "confusion_by_snr", "subtypes", "comparisons", "orderings", "seeds", "distances")
     manifest = {name: str(folder / f"{name}.csv") for name in names}
     manifest |= {"index": str(folder / "index.json")}
     manifest |= {"clouds": list(map(str, clouds)), "benchmarks": [str(folder / "echo.jsonl")]}

@@ -68,7 +68,7 @@ def _recordings() -> list[Reader]:
     return [
         Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), **special.get(kind, {}))
         for kind, data in files.items()
-    ] + [Reader(*each) for each in more]  # fmt: skip
+    ] + [Reader(*each) for each in more]
 
 
 def _semicolons(path: Path) -> object:

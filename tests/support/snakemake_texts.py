@@ -99,6 +99,4 @@ def declared(rule: str) -> set[str]:
     """The source files a rule declares as its code, relative to the package, from the arguments in its rule file."""
     arguments = re.search(r"code=code\((.*?)\)", body(rule), re.DOTALL)[1]
     modules = re.findall(r'"([\w.]+)"', arguments)
-    if "SOURCE_MODULES" in arguments:
-        modules += [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
     return {str(path.relative_to(PACKAGE)) for path in sources(*modules, spectra=("vrp", "trp", "vt"))}

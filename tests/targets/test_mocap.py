@@ -99,7 +99,7 @@ def frozen(text: str) -> str:
         (lambda text: "", {}, "no frame"),
         (lambda text: walk(200, speed=0.0), {}, "moves 0.000 m/s"),
     ],
-)  # fmt: skip
+)
 def test_faults_are_named_by_file_and_frame(change, record, words, files):
     (files / "m.amc").write_text(change((files / "m.amc").read_text()))
     with pytest.raises(InputError, match=rf"m\.amc.*{words}"):

@@ -59,8 +59,7 @@ def test_real_walks_and_runs_pass_at_their_rate_and_not_at_twice_it(clip, tmp_pa
     text = (FOLDER / f"cmu/{clip}.amc").read_text().splitlines()
     (tmp_path / "s.asf").write_text((FOLDER / f"cmu/{folder}/{folder}.asf").read_text())
     frames = [index for index, line in enumerate(text) if line.isdecimal()] + [len(text)]
-    half = [f"{n + 1}\n" + "\n".join(text[a + 1 : b])
-            for n, (a, b) in enumerate(list(pairwise(frames))[::2])]  # fmt: skip
+    half = [f"{n + 1}\n" + "\n".join(text[a + 1 : b]) for n, (a, b) in enumerate(list(pairwise(frames))[::2])]
     (tmp_path / "m.amc").write_text("\n".join(text))
     cloud_of(tmp_path, rate_hz=None)
     (tmp_path / "m.amc").write_text("\n".join([":DEGREES", *half]))

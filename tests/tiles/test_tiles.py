@@ -15,17 +15,7 @@ from lowalt.config.command import settings as read_settings
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.spectra import Fourier, Spectra, Transfer, trp, vrp, vt
-from lowalt.tiles import (
-    Images,
-    Renderer,
-    Scale,
-    decode,
-    join,
-    resize,
-    split,
-    tile_files,
-    triangle,
-)
+from lowalt.tiles import Images, Renderer, Scale, decode, join, resize, split, tile_files, triangle
 from lowalt.tiles.__main__ import main
 from lowalt.tiles.render import normalised
 from lowalt.tiles.scale import lookup

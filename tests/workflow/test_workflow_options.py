@@ -43,7 +43,7 @@ def test_a_stage_loads_an_effect_s_module_only_in_its_scene():
     late = {"spectra": {"times": "known"}, "effects": {"slow_time": {"jitter_s": 1e-4}}}
     assert options.tile_modules(late) == [
         "lowalt.scene.lateness", "lowalt.motion", "lowalt.scene.effects.transmitter.slow_time"]  # fmt: skip
-    for other in (late | {"spectra": {}}, late | {"effects": {}}, late | {"effects": {"slow_time": {"jitter_s": 0.0}}}):
+    for other in (late | {"spectra": {}}, late | {"effects": {}}, late | {"effects": {"slow_time": {"downlink": 1}}}):
         assert options.tile_modules(other) == []
     cells = late | {"spectra": {"times": "known", "hrrp": {"window": 1}}}
     assert options.tile_modules(cells)[:3] == options.tile_modules(late)
@@ -65,15 +65,12 @@ def scene(effects, **more):
 def test_settings_name_an_effect_for_the_stages_that_read_it_alone():
     _, plain = scene({})
     products, cancelled = scene({"canceller": {"kind": "mean"}})
-    assert "canceller" not in json.loads(plain.noise(CHUNK)) and products.tile_content(CHUNK) == {}
-    assert json.loads(cancelled.noise(CHUNK))["canceller"]["kind"] == "mean"
+    assert "filters" not in json.loads(plain.noise(CHUNK)) and products.tile_content(CHUNK) == {}
+    assert json.loads(cancelled.noise(CHUNK))["filters"] == {"canceller": {"kind": "mean"}}
     assert "canceller" not in json.loads(cancelled.shard(CHUNK))
-    for effect in ({"canceller": None}, {"companions": None}):
-        (name,) = effect
-        _, named = scene(effect)
-        stage = {"canceller": "noise", "companions": "shard"}[name]
-        assert json.loads(getattr(named, stage)(CHUNK))[name] == {}
-        assert name not in json.loads(getattr(plain, stage)(CHUNK))
+    assert json.loads(scene({"canceller": None})[1].noise(CHUNK))["filters"] == {"canceller": {}}
+    assert json.loads(scene({"companions": None})[1].shard(CHUNK))["companions"] == {}
+    assert "companions" not in json.loads(plain.shard(CHUNK))
     _, recipe = scene({"canceller": {"kind": "mean"}}, shards={"kind": "recipe"})
     assert json.loads(recipe.shard(CHUNK))["canceller"]["kind"] == "mean"
     _, no_canceller = scene({}, shards={"kind": "recipe"})

@@ -149,9 +149,9 @@ def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signal
 
 def test_training_reads_images_of_the_scheme_s_own_size():
     run, products, _ = parts(
-        {"recognition": {"table": "config/cost/accuracy.csv", "schemes": ["default", "48 pixels"], "timed": []}}
+        {"recognition": {"table": "config/cost/accuracy.csv", "schemes": ["ABC:VRP+TRP+VT", "48 pixels"]}}
     )
-    for scheme, size in (("default", 24), ("48-pixels", 48)):
+    for scheme, size in (("abc-vrp-trp-vt", 24), ("48-pixels", 48)):
         views = products.samples(SimpleNamespace(scheme=scheme))["views"]
         assert views == [f"results/default/views/{size}/{shard}.npz" for shard in run.plan.shards]
     _, uncached, _ = parts({"recognition": {"cache": False}})

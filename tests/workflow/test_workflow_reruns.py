@@ -107,7 +107,13 @@ CHANGES = {
         edit=("config/targets.csv", "NIO ET5T 2023,,4,,,,,,4.8,", "NIO ET5T 2023,,4,,,,,,4.9,"),
     ),
     "a mesh": Change({("cloud", "dji-mini-2")}, (MESH,), edit=(f"inputs/{MESH}", "", "edited\n")),
-    "the table of schemes": Change(TRAIN | TABLES, ("config/schemes.csv",), edit=("config/schemes.csv", "", "\n")),
+    "another row of the table of schemes": Change(
+        TABLES, ("config/schemes.csv",), edit=("config/schemes.csv", "A:VRP,A,VRP,attention", "A:VRP,A,VRP,mean")
+    ),
+    "the row of a scheme that is trained": Change(
+        {work for work in TRAIN if work[2] == "a-vrp-trp-vt"} | TABLES,
+        edit=("config/schemes.csv", "A:VRP+TRP+VT,A,VRP+TRP+VT,attention", "A:VRP+TRP+VT,A,VRP+TRP+VT,mean"),
+    ),
     "published accuracy": Change(
         TABLES | REPORT, ("published_accuracy.csv",), edit=("config/published_accuracy.csv", "", "\n")
     ),
@@ -131,7 +137,7 @@ CHANGES = {
 
 QUICK = (
     "seed", "more motion models", "an SNR added", "a station more", "protocol", "a target's record", "a mesh",
-    "text of the report", "code of tiles", "nothing",
+    "the row of a scheme that is trained", "text of the report", "code of tiles", "nothing",
 )  # fmt: skip
 """Changes that are planned in every run of the tests. What the others rest on stands in the rule files, see the tests
 of the settings and of the code of each rule."""

@@ -40,7 +40,9 @@ CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", 
     ],
 )
 def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay, changed):
-    job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="24", train_seed="3", get=lambda key, default: 3)
+    job = SimpleNamespace(
+        **vars(CHUNK), subtype="crow", size="24", scheme="a-vrp-trp-vt", train_seed="3", get=lambda key, default: 3
+    )
     names = (
         "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "views",
         "training", "evaluation", "seed",

@@ -4,7 +4,7 @@ import pytest
 
 from lowalt.workflow import sources
 
-LINES = '''
+LINES = """
 import lowalt.files.errors
 if True:
     from lowalt.files import slug_is_none, atomic
@@ -37,7 +37,7 @@ async def later():
     import lowalt.numerics.portable
 from . import nothing
 import lowalt_other.common, numpy
-'''  # fmt: skip
+"""
 FOUND = {
     "files": ["errors", "atomic", "shipped"], "numerics": ["streams", "portable"],
     "machine": ["hardware", "timing", "memory", "progress"],

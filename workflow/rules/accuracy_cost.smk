@@ -7,7 +7,6 @@
 rule speed:
     input:
         code=code("lowalt.measure.network_speed"),
-        schemes=config["recognition"]["table"],
     output:
         "results/{run}/speed/{scheme}.json",
     log:
@@ -20,10 +19,8 @@ rule speed:
     threads: workflow.cores or 1
     params:
         settings=settings.training,
-        stations=RUN.stations,
     shell:
-        "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme:q}"
-        " --schemes {input.schemes:q} --stations {params.stations:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.measure.network_speed --settings {params.settings:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_table:

@@ -13,7 +13,7 @@ from lowalt.files.shipped import located, shipped
 from lowalt.workflow.products import PRESETS, TABLES, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.stage_settings import Settings
-from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
+from lowalt.workflow.sources import ROOT, code as code_of
 
 mends.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")

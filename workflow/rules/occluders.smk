@@ -5,7 +5,7 @@
 
 rule occluders:
     input:
-        code=code("lowalt.targets.occluders", *SOURCE_MODULES),
+        code=code("lowalt.targets.occluders"),
         files=products.record_files,
     output:
         "results/{run}/occluders/{subtype}.npz",

@@ -72,7 +72,6 @@ rule train:
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
-        schemes=config["recognition"]["table"],
     output:
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
         history="results/{run}/models/{protocol}/{scheme}/{train_seed}/history.csv",
@@ -92,11 +91,9 @@ rule train:
         launcher=RUN.launch.words,
         source=options.samples,
         events=["--tensorboard"] if config["recognition"]["tensorboard"] else [],
-        stations=RUN.stations,
     shell:
         "python -m {params.launcher:q} lowalt.recognition train --settings {params.settings:q} {params.source:q}"
-        " --frozen {input.frozen:q}"
-        " --schemes {input.schemes:q} --stations {params.stations:q} --protocol {wildcards.protocol:q} --scheme {wildcards.scheme:q}"
+        " --frozen {input.frozen:q} --protocol {wildcards.protocol:q}"
         ' {params.events:q} --out "$(dirname {output.model:q})" 2> {log:q}'
 
 

@@ -5,7 +5,7 @@
 
 rule cloud:
     input:
-        code=code("lowalt.targets", *SOURCE_MODULES),
+        code=code("lowalt.targets"),
         files=products.record_files,
     output:
         "results/{run}/clouds/{subtype}.npz",

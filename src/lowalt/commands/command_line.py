@@ -37,6 +37,22 @@ def add_command(
     return line
 
 
+def positive(limit: float, expected: str) -> Callable[[str], float]:
+    """Return the type of an option: a number between 0 and a limit; expected: what a refusal asks for."""
+
+    def number(text: str) -> float:
+        """The number. Raises: ArgumentTypeError for any other text."""
+        try:
+            value = float(text)
+        except ValueError:
+            value = 0.0
+        if not 0 < value < limit:
+            raise argparse.ArgumentTypeError(f"{text!r}, expected {expected}")
+        return value
+
+    return number
+
+
 def _plain(value: object) -> object:
     """Convert a value to JSON types: NaN becomes null, an infinity "inf" or "-inf"."""
     if dataclasses.is_dataclass(value):

@@ -88,4 +88,4 @@ def _recording(model: "Trained", settings: dict, record: "Record", options: argp
     last = f"{heard.present.sum()} of {len(names)} windows hold a target: {', '.join(counts)}"
     if not heard.present.any():
         last = f"nothing there: none of {len(names)} windows holds a target that this network could know"
-    return Answer(windows, "\n".join([*lines, last]))
+    return Answer(windows, "\n".join([*lines, last, *(f"note: {note}" for note in heard.notes)]))

@@ -6,7 +6,7 @@ import os
 import shlex
 from pathlib import Path
 
-from lowalt.commands.command_line import Answer, add_command
+from lowalt.commands.command_line import Answer, add_command, positive
 from lowalt.commands.command_table import COMMANDS
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
@@ -22,12 +22,13 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `recording` and its commands to a parser's commands."""
     _, meaning, example = COMMANDS[name]
     recording = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
+    hertz = positive(1e15, "hertz, such as 24e9")
     actions = recording.add_subparsers(dest="action", required=True)
     meaning = "layouts that fit the file's bytes, the best first, a picture, and a draft of its record"
     inspect = add_command(actions, "inspect", _inspect, meaning, example)
     inspect.add_argument("file", type=Path, help="the samples: WAV, MAT, CSV, NPY, SigMF, or numbers without a header")
-    inspect.add_argument("--carrier", type=_hertz, metavar="HZ", help="carrier, where the file does not say it")
-    inspect.add_argument("--rate", type=_hertz, metavar="HZ", help="samples a second, where the file does not say it; "
+    inspect.add_argument("--carrier", type=hertz, metavar="HZ", help="carrier, where the file does not say it")
+    inspect.add_argument("--rate", type=hertz, metavar="HZ", help="samples a second, where the file does not say it; "
                          "of chirps, chirps a second")  # fmt: skip
     inspect.add_argument("--take", type=int, default=1, metavar="N", help="draft the N-th reading (default: the first)")
     inspect.add_argument("--out", type=Path, help="record to write (default: the file's name and .yaml, here)")
@@ -36,17 +37,6 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     train.add_argument("record", type=Path, help="record of a recording, with the block twin")
     train.add_argument("--out", type=Path, required=True, help="network to write, my_radar for my_radar.safetensors")
     train.add_argument("--recognition", default="config/measured/recognition.yaml", help="network and training")
-
-
-def _hertz(text: str) -> float:
-    """A frequency of a command line. Raises: ArgumentTypeError for anything but a positive number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < 1e15:
-        raise argparse.ArgumentTypeError(f"{text!r}, expected hertz, such as 24e9")
-    return value
 
 
 def _described(seen: Seen) -> str:

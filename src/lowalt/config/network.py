@@ -219,6 +219,11 @@ class Network:
         return self.subcarrier_spacing_hz if self.sweep_s is None else 1 / self.sweep_s
 
     @property
+    def bin_name(self) -> str:
+        """What a value of Eq. 24 belongs to, in words: a subcarrier, or a sample of an FMCW sweep or of a carrier."""
+        return "one subcarrier" if self.waveform == "ofdm" else "one sample"
+
+    @property
     def noise_bandwidth_hz(self) -> float:
         """Noise bandwidth (Hz) of a value of Eq. 24: that of a subcarrier, or the sample rate of an FMCW sweep."""
         return self.symbol_rate_hz * (1 if self.sweep_s is None else self.subcarriers)

@@ -15,7 +15,7 @@ USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
 """Usual range (m) of the largest extent of a whole target, by category."""
 
 OTHER_SIZES_M = {"Vehicle": ((1.4, 2.7), (1.0, 4.0))}
-"""Usual ranges (m) of the two other extents, the larger first, where they have such ranges."""
+"""Usual ranges (m) of the second largest and of the smallest extent, for categories that have them."""
 
 UNUSUAL = 20
 """A target with its own table row may differ from USUAL_M by at most this factor."""
@@ -24,7 +24,7 @@ ALIKE = 0.1
 """Two pieces are alike if their extents differ by at most this share, as the four propellers of a craft do."""
 
 WIDE_ROTOR = 0.5
-"""A rotor wider than this share of the craft is no propeller of a plane but lifts a helicopter."""
+"""A rotor wider than this share of the craft is the main rotor of a helicopter, not the propeller of a plane."""
 
 FLAT = 0.35
 """Largest thickness of a propeller divided by its length."""
@@ -34,22 +34,24 @@ SMALLEST_ROTOR = 0.15
 
 OFF_CENTRE = 0.3
 """Largest distance between the centroid of a rotor's surface and the centre of its bounding box, as a share of its
-radius. Three blades have 0.25."""
+radius. A rotor of three blades has 0.25."""
 
 SYMMETRIC = 0.02
 """A body is symmetric if the mean distance from its mirror image is at most this share of its size."""
 
 ASYMMETRIC = 0.01
-"""A body has only one mirror plane if this distance is at least this share along the other level axis."""
+"""A body has no second mirror plane if its mean distance from its mirror image along the other horizontal axis is at
+least this share of its size."""
 
 IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
-"""One half of a target ends in a plane. IN_PLANE is the largest distance of its end points from that plane, AT_ZERO
-that of the plane from the origin of the file, both as shares of the size. CUT and OPEN_CUT are the least area that the
-end spans, as a share of the bounding box: CUT for a plane at the origin, OPEN_CUT for an open end anywhere."""
+"""A mesh may hold one half of a target, which ends in a plane. IN_PLANE is the largest distance of its end points from
+that plane, AT_ZERO that of the plane from the origin of the file, both as shares of the size. CUT and OPEN_CUT are the
+least area that the end spans, as a share of the bounding box: CUT for a plane at the origin, OPEN_CUT for an open end
+anywhere."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
-"""An arm is slender (its spread across is at most SLENDER times that along), points at the middle of the craft (cosine
-at least RADIAL) and reaches near it (its inner end is at most INWARD times as far out as its own middle)."""
+"""How an arm is told from a blade: its spread across is at most SLENDER times that along, it points at the middle of
+the craft with a cosine of at least RADIAL, and its inner end is at most INWARD times as far out as its own middle."""
 
 IN_LINE = 0.9
 """Least cosine of the angle between a blade and the line to the other blade of the same rotor."""
@@ -58,7 +60,7 @@ LONG = 0.75
 """Largest ratio of width to length of a blade's bounding box. A blade at 30 degrees to the axes has 0.6, a disc 1."""
 
 TOUCH = 0.1
-"""Two blades may be apart by at most twice this share of the longer one, since the hub lies between them."""
+"""Two blades of a rotor are at most twice this share of the longer blade apart, since the hub lies between them."""
 
 ROUND = 0.12
 """The two extents of a wheel across its axis differ by at most this share."""
@@ -78,10 +80,13 @@ FIXED = re.compile(r"(?<![a-z])(motor|mount|arm(?![a-z])|leg|skid|land|frame|gua
 
 @dataclass(frozen=True)
 class Component:
-    """A connected component: `low` and `high` (3,) m along the file's axes, its triangles, whether it is closed, the
-    names of the piece it belongs to, the kind of part that it may be (rotor, wheel, or an empty text), the `middle`
-    (3,) of its surface and its `area` (m2); `along` (3,) the direction in which it is longest, `slender` its spread
-    across by that along."""
+    """A connected component of a mesh.
+
+    low, high: (3,) m, corners of its bounding box along the file's axes; triangles: their number; closed: whether its
+    surface is closed; piece: the names of the piece that it belongs to; guess: the kind of part that it may be (rotor,
+    wheel, or an empty text); middle: (3,) m, centroid of its surface; area: m2; along: (3,) direction in which it is
+    longest; slender: its spread across that direction over its spread along it.
+    """
 
     number: int
     low: np.ndarray
@@ -107,7 +112,7 @@ class Component:
 
 
 class Group(tuple[Component, ...]):
-    """Components that may be one moving part, such as the blades of a rotor; sizes as those of a component."""
+    """Components that may be one moving part, such as the blades of a rotor; properties as those of a component."""
 
     low = property(lambda self: np.min([part.low for part in self], axis=0))
     high = property(lambda self: np.max([part.high for part in self], axis=0))
@@ -121,9 +126,9 @@ class Group(tuple[Component, ...]):
 def guessed_unit(extents: np.ndarray, category: str, wanted_m: float | None = None) -> str:
     """Return the unit of UNITS_M in which the extents (3,) of a file fit a target best.
 
-    wanted_m: the target's largest extent where it is known. Otherwise the unit is chosen in which the extents exceed
-    the category's usual ranges least (sum of the logarithms of the factors), and of several such units the one whose
-    largest extent is nearest to the geometric mean of USUAL_M.
+    wanted_m: the target's largest extent, if it is known. Otherwise the best unit is the one in which the extents leave
+    the usual ranges of the category least, by the sum of the logarithms of the factors. Of several such units, it is
+    the one whose largest extent is nearest to the geometric mean of USUAL_M.
     """
     sizes, usual = np.sort(extents)[::-1], (USUAL_M[category], *OTHER_SIZES_M.get(category, ()))
     middle = wanted_m or float(np.sqrt(np.prod(USUAL_M[category])))
@@ -138,7 +143,7 @@ def guessed_unit(extents: np.ndarray, category: str, wanted_m: float | None = No
 
 
 def off_mirror(points: np.ndarray) -> np.ndarray:
-    """Mean distance (3,) of a body of points (N, 3) from its mirror image along each axis, in parts of its size."""
+    """Return the mean distance (3,) of points (N, 3) from their mirror image along each axis, over their size."""
     tree, off = cKDTree(points), []
     for axis in range(3):
         mirrored = points.copy()
@@ -150,17 +155,17 @@ def off_mirror(points: np.ndarray) -> np.ndarray:
 def mirror_axis(points: np.ndarray) -> int | None:
     """Return the only axis along which a body of points (N, 3) is its own mirror image: left and right of a bird.
 
-    Return None where there is no such axis or more than one."""
+    Return None if there is no such axis or more than one."""
     off = off_mirror(points)
     best, second = np.sort(off)[:2]
     return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
 
 
 def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
-    """Return which of the axes a half of a target is cut along, None where it seems whole.
+    """Return the axis along which a target is cut in half, if the mesh holds one half only; None if it seems whole.
 
-    points: (N, 3) m on its surface. One half of a target ends flat in one plane, which is open or passes through the
-    origin of the file, and is not its own mirror image along that axis.
+    points: (N, 3) m on its surface. A half is not its own mirror image along that axis. It ends in a plane, where its
+    surface is open or which passes through the origin of the file.
     """
     edges, _, uses = edges_of(mesh.faces)
     ends, extent = mesh.vertices[edges], np.ptp(mesh.vertices, axis=0)
@@ -179,8 +184,8 @@ def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
 def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
     """Return the axes of the file that may point up and to the front, without signs, from the extents (3,) alone.
 
-    A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
-    across. `up` and `right` are the numbers of axes that are known otherwise.
+    The smallest extent points up. The largest points to the front of a vehicle, and across a bird with spread wings.
+    up, right: numbers of axes that are already known.
     """
     order = [axis for axis in np.argsort(extent, kind="stable") if axis not in (up, right)]
     order = order if up is None else [up, *order]
@@ -194,16 +199,16 @@ def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right
 
 
 def alike(first: Component | Group, second: Component | Group) -> bool:
-    """Return whether two have the same three sizes in any order, to within ALIKE, or as many triangles and as large a
-    surface: propellers at other angles have other boxes."""
+    """Return whether two components are copies: of the same three sizes in any order, to within ALIKE, or of the same
+    number of triangles and area, as propellers at different angles are, whose boxes differ."""
     a, b, areas = np.sort(first.extent), np.sort(second.extent), (first.area, second.area)
     copies = first.triangles == second.triangles and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
     return copies or bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
 
 
 def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bool:
-    """Return whether two components turn about one hub: one lies about the middle of the other, as a spinner does, and
-    they are no pair of coaxial rotors. `touching`: whether long blades that touch, not discs, are of one rotor too."""
+    """Return whether two components turn about one hub: one is centred on the other, as a spinner on a propeller, and
+    they are not a pair of coaxial rotors. touching: whether long blades that touch, unlike discs, share a hub too."""
     away, radius = np.abs(first.centre - second.centre), max(first.extent.max(), second.extent.max()) / 2
     same = alike(first, second)
     if same and away[up] > 2 * max(first.extent[up], second.extent[up]):
@@ -211,7 +216,7 @@ def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bo
     slack = TOUCH * 2 * radius
     near = bool((np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack).all())
     long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (first, second))
-    # Two slender blades in one line, nearer than their length, whatever their angle to the axes of the file.
+    # Two slender blades in one line, closer than their length, at any angle to the axes of the file.
     between, length = second.centre - first.centre, float(np.linalg.norm(first.extent))
     in_line = abs(float(between @ first.along)) > IN_LINE * float(np.linalg.norm(between))
     if same and in_line and max(first.slender, second.slender) < SLENDER and np.linalg.norm(between) < length:
@@ -221,7 +226,7 @@ def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bo
 
 
 def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list[Group]:
-    """Return components about one hub as one group each, such as the two blades of a propeller (`_one_hub`)."""
+    """Return the components grouped by hub (`_one_hub`), such as the two blades of a propeller."""
     groups: list[Group] = []
     for part in parts:
         near = [group for group in groups if any(_one_hub(part, other, up, touching) for other in group)]
@@ -231,13 +236,14 @@ def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list
 
 def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
     """Return whether a group is flat along one of the axes, wide enough, and lies about one hub."""
-    # By their names a helicopter's main rotor may be as wide as all of it, and its tail rotor small.
+    # All axes are asked for groups whose names call them rotors: a helicopter's main rotor may be as wide as the craft,
+    # its tail rotor small.
     least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
     for axis in axes:
         across = np.delete(group.extent, axis).max()
         off = np.linalg.norm(np.delete(group.middle - group.centre, axis))
         flat, wide = group.extent[axis] < FLAT * across, least * whole.max() <= across < most * whole.max()
-        if flat and wide and not off > OFF_CENTRE * across / 2:  # a middle that is not known is no fault
+        if flat and wide and not off > OFF_CENTRE * across / 2:  # true for an unknown middle, NaN
             return True
     return False
 
@@ -245,8 +251,9 @@ def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
 def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
     """Return the axis of the file about which a rotor or wheel turns: the one along which it is thinnest.
 
-    Two blades may be thinner along their chord, which a helicopter tells: a rotor wider than half the craft, whose
-    corners are `low` and `high` (3,) m, turns about the axis `up`; a tail rotor's axis is level and across the tail.
+    Two blades may be thinner along their chord than along their axis. A rotor wider than half the craft, whose corners
+    are `low` and `high` (3,) m, is therefore taken to turn about the axis `up`, and a tail rotor about the horizontal
+    axis across the tail.
     """
     order, extent = np.argsort(group.extent, kind="stable"), high - low
     if up in order[:2] and group.extent.max() > WIDE_ROTOR * extent.max():
@@ -261,11 +268,11 @@ def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> in
 def rotors(
     parts: Sequence[Component], ups: Sequence[int], whole: np.ndarray, count: int | None
 ) -> tuple[int, list[Group]]:
-    """Return the axis upwards and the groups of components that may be rotors: `count` of them, or none.
+    """Return the axis that points up, and the groups of components that may be rotors: `count` of them, or none.
 
-    Pieces that their names call rotors come first, whatever their axes, then sets of alike flat groups that lie about
-    a hub each, of which the set farthest out is taken: motors stand at the ends of arms. `ups` are the axes that may
-    point up, the likeliest first; at least three alike groups are needed where no name tells.
+    Pieces whose names call them rotors are tried first, whatever their axes. Without such names, rotors are a set of at
+    least three alike flat groups around a hub each. Of several sets the one farthest out is taken, since motors stand
+    at the ends of arms. ups: axes that may point up, the likeliest first.
     """
     named = [part for part in parts if TURNING["rotor"].search(part.piece)]
     for groups in _grouped(named, ups[0], count):
@@ -286,9 +293,9 @@ def rotors(
 
 
 def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[list[Group]]:
-    """Return the ways to group components about hubs: those near one another, and where the number is known also
-    `count` groups of as many alike blades each, those whose middles are nearest."""
-    # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
+    """Return possible groupings of components by hub: by nearness and, where the number of rotors is known, also in
+    `count` groups with the same number of alike blades each, clustered by their centres."""
+    # If the number is known, propellers that touch stay apart; otherwise blades that touch are one rotor.
     ways = [clusters(parts, up, touching=not count)]
     for index, part in enumerate(parts if count else ()):
         same = [other for other in parts if alike(part, other)]
@@ -304,7 +311,7 @@ def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[lis
 
 
 def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: int | None) -> list[Group]:
-    """The set of alike groups at one height that is farthest out, of `count` groups or of several, without arms."""
+    """The set of alike groups, but arms, that is farthest out: `count` of them, or at least two at one height."""
     best: tuple[float, list[Group]] = (0.0, [])
     for groups in choices:
         for group in groups:
@@ -332,7 +339,7 @@ def _are_arms(groups: list[Group], up: int) -> bool:
 
 
 def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
-    """Return the groups of components that may be wheels: those that their names call so, else the largest set of at
+    """Return the groups of components that may be wheels: those whose names say so, otherwise the largest set of at
     least two alike round ones."""
     named = [part for part in parts if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I)]
     groups = [group for group in clusters(named, int(whole.argmin()), False) if _round(group.extent, whole)]

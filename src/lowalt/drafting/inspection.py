@@ -149,10 +149,12 @@ def inspect_mesh(
     up, up_from, groups = _upright(parts, points, (low, high), category, row.get("n_rotors_or_wings"), axes, path)
     if path.suffix.lower() == ".glb" and up == "y":
         usual = "z"
-    upward = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
-    shape = Shape(category, upward, points, _places(parts, named),
-                  _turning(groups, "xyz".index(up[-1]), low, high))  # fmt: skip
-    front = front_of(shape, axes[1], usual, guessed_axes(high - low, category, "xyz".index(up[-1]))[1])
+    height, unit_vectors = "xyz".index(up[-1]), np.eye(3)
+    upward = unit_vectors[height] * (-1 if up[0] == "-" else 1)
+    hubs = [Turning(group[0].piece, group.centre, unit_vectors[turning_axis(group, height, low, high)])
+            for group in groups]  # fmt: skip
+    shape = Shape(category, upward, points, _places(parts, named), hubs)
+    front = front_of(shape, axes[1], usual, guessed_axes(high - low, category, height)[1])
     sides_seen = category != "Bird" or None not in axes or front.words != NOTHING_TELLS
     ends = [axis for axis, name in enumerate("xyz") if name not in (up[-1], axes[1] and axes[1][-1])]
     cut = cut_axis(mesh, points, ends)
@@ -174,11 +176,6 @@ def _places(parts: list[Component], named: list[Piece]) -> dict[str, np.ndarray]
         return {}
     return {name: np.mean([part.centre for part in parts if part.piece == name], axis=0)
             for name in names if any(part.piece == name for part in parts)}  # fmt: skip
-
-
-def _turning(groups: list[Group], up: int, low: np.ndarray, high: np.ndarray) -> list[Turning]:
-    """The rotors or wheels of groups, each with its axis; low, high: (3,) m, the corners of the target."""
-    return [Turning(group[0].piece, group.centre, np.eye(3)[turning_axis(group, up, low, high)]) for group in groups]
 
 
 def _upright(

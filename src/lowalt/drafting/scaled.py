@@ -2,11 +2,13 @@
 same frame that is nearest in size."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import yaml
 
+from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.builtin import UNITS
@@ -22,6 +24,26 @@ KEPT = ("coaxial", "flap", "wheel_size", "moving_share")
 """Keys of a record that a draft takes from the target that lends its figures."""
 BY_SIDE = {"track": "wid_m", "tyre_width": "wid_m", "rolling_diameter": "hgt_m", "ground_clearance": "hgt_m"}
 """Figures of a vehicle that grow with its width or height; all others grow with its length."""
+
+
+class Kind(NamedTuple):
+    """A kind of data sheet: its category and usual frame, and of each word of the sheet the cells of the table of
+    targets, or the figure of the frame, that it states."""
+
+    category: str
+    frame: str
+    cells: Mapping[str, tuple[str, ...]]
+    figures: Mapping[str, str]
+
+
+FLIES = {"rate": ("freq_lo_hz", "freq_hi_hz"), "speed": ("vx_abs_max", "vy_abs_max"), "climb": ("vz_abs_max",)}
+KINDS = {
+    "drone": Kind("UAV", "radial", {"rotors": ("n_rotors_or_wings",), "diagonal": ("size_m",), **FLIES},
+                  {"propeller": "propeller_diameter", "blades": "blade_count"}),
+    "bird": Kind("Bird", "bird", {"length": ("size_m",), **FLIES}, {"length": "length", "span": "span"}),
+    "vehicle": Kind("Vehicle", "car", {"length": ("len_m",), "width": ("wid_m",), "height": ("hgt_m",),
+                    "speed": ("speed_hi",)}, {"wheel": "rolling_diameter", "wheel_base": "wheel_base"}),
+}  # fmt: skip
 
 
 class Sheet(NamedTuple):
@@ -95,3 +117,40 @@ def drafted_sheet(sheet: Sheet, subtype: str) -> tuple[str, str]:
         f"# {lender}, scaled to this size; cells of the row that row_from does not name are {lender}'s.\n"
     )
     return head + lines, lender
+
+
+def draft_target(
+    kind: str, out: str | Path | None = None, *, subtype: str = "", frame: str = "", about: str = "data sheet",
+    **stated: float | tuple[float, float] | None,
+) -> tuple[str, str]:  # fmt: skip
+    """Return the record of a target drafted from its data sheet, as the text of a YAML file, and the name of the
+    published target whose figures were scaled for what the sheet does not state.
+
+    kind: "drone", "bird" or "vehicle"; out: new file to write the text to, for `targets.own` of a configuration;
+    subtype: its name (default: that of the file); frame: built-in model (default: that of `KINDS`); stated: in m, Hz
+    and m/s: of a drone `rotors`, `diagonal` (largest distance between two motor axes), `propeller` (diameter),
+    `blades` of a rotor; of a bird `length` (bill tip to tail tip), `span`; of both `rate` (lowest, highest turns or
+    beats per second), `speed` and perhaps `climb`, the highest ones; of a vehicle `length`, `width`, `height`, `wheel`
+    (rolling diameter), `wheel_base` and `speed`.
+    Raises: InputError for a word that is missing or unknown, as `drafted_sheet`, and where the file is there already.
+    """
+    if kind not in KINDS:
+        raise InputError(f"{kind!r} is no kind of data sheet, expected one of {list(KINDS)}")
+    category, usual, cells, figures = KINDS[kind]
+    if {*cells, *figures} - {"climb"} != set(stated) - {"climb"} or not set(stated) <= {*cells, *figures}:
+        raise InputError(f"data sheet of a {kind}: it states {[*stated]}, expected {sorted({*cells, *figures})}")
+    row: dict = {}
+    for word, names in cells.items():
+        values = np.ravel(stated.get(word)).tolist()
+        if len(values) not in (1, len(names)):
+            raise InputError(f"data sheet of a {kind}: {word} is {stated[word]}, expected {len(names)} numbers")
+        row |= dict(zip(names, values * (len(names) if len(values) == 1 else 1), strict=True))
+    path = None if out is None else Path(out)
+    sheet = Sheet(category, frame or usual, row, {figures[word]: stated[word] for word in figures}, about)
+    text, lender = drafted_sheet(sheet, subtype or (path.stem if path else f"My {kind}"))
+    if path:
+        if path.exists():
+            raise InputError(f"{path}: is there already, expected a new file")
+        with replacing(path) as temporary:
+            temporary.write_text(text)
+    return text, lender

@@ -13,11 +13,7 @@ from lowalt.targets.cloud import Cloud, cloud_of
 
 
 def clean_signals(
-    network: Network,
-    names: list[str],
-    clouds: Mapping[str, Cloud],
-    rows: list[dict],
-    tolerance: float | None,
+    network: Network, names: list[str], clouds: Mapping[str, Cloud], rows: list[dict], tolerance: float | None
 ) -> np.ndarray:
     """Return clean signals (stations, models, N) complex64 of the motion table `rows` at the stations `names`.
 

@@ -81,9 +81,7 @@ def radar(network: Network, station: Station) -> Radar:
 
     Source: spec: alpha, a0, kappa and the effective carrier f_k + (M-1) df / 2.
     """
-    low, spacing, carrier = map(
-        Fraction, (station.frequency_hz, network.subcarrier_spacing_hz, network.carrier_hz)
-    )  # fmt: skip
+    low, spacing, carrier = map(Fraction, (station.frequency_hz, network.subcarrier_spacing_hz, network.carrier_hz))
     (transmit_h, transmit_v), (receive_h, receive_v) = network.transmit, network.receive
     kappa, centre = low / carrier, low + (network.subcarriers - 1) * spacing / 2
     bandwidth, elements = network.subcarriers * spacing, transmit_h * transmit_v * receive_h * receive_v

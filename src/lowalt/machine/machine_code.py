@@ -10,8 +10,10 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from llvmlite.binding import Linkage
 from numba import njit
 from numba.core.caching import FunctionCache
+from numba.core.codegen import CPUCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
@@ -45,6 +47,26 @@ class _PartsByOptions(dict):
 
 
 cpu_target.target_context.cached_internal_func = _PartsByOptions()
+_numba_finalizes = CPUCodeLibrary._finalize_final_module
+
+
+def _finalize(library: CPUCodeLibrary) -> None:
+    """Finish a kernel's machine code as numba does, but let the kernel call its own copies of other functions."""
+    # By numba's linking, all kernels of a process share the copy of a function that was loaded first. Copies round
+    # differently, since each is optimised with its kernel, and a process that compiles loads other copies than one that
+    # finds its kernels in the cache. Even functions of two sources are shared if they have the same name.
+    functions = [function for function in library._final_module.functions if not function.is_declaration]
+    if functions:
+        # Keep a copy of the module as it is, for kernels that call this one; numba makes it of finished libraries only.
+        library._finalized = True
+        library._get_module_for_linking()
+    for function in functions:
+        if function.linkage == Linkage.linkonce_odr:
+            function.linkage = Linkage.internal
+    _numba_finalizes(library)
+
+
+CPUCodeLibrary._finalize_final_module = _finalize
 
 
 class _DigestCache(FunctionCache):
@@ -54,8 +76,9 @@ class _DigestCache(FunctionCache):
     """How the function is compiled."""
 
     def _index_key(self, sig, codegen):
-        """Numba's key, the digest of code and options, and the fields of named tuples among the arguments."""
-        return *super()._index_key(sig, codegen), digest(self._py_func, self.options), tuple(map(_fields, sig))
+        """Numba's key, the digest of code and options, the linking, and the fields of named tuples among arguments."""
+        code = digest(self._py_func, self.options), "own functions"
+        return *super()._index_key(sig, codegen), *code, tuple(map(_fields, sig))
 
     def load_overload(self, sig, target_context):
         """Return finished machine code for a signature, or None where none is kept."""

@@ -67,7 +67,7 @@ def closed(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dty
 
 def finufft_cells(
     network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Range cells (N, M): one non-uniform FFT (type 1, FINUFFT) a symbol from points to subcarriers, with one plan."""
     from finufft import Plan
 

@@ -1,9 +1,8 @@
 """Time per sample of a scheme's network on this machine, for inference and for a training step.
 
-    python -m lowalt.measure.network_speed --settings JSON --scheme NAME --stations A B C
-        --out speed.json
+    python -m lowalt.measure.network_speed --settings JSON --out speed.json
 
-Settings: seed, size, colour_map, network, training, augmentation.
+Settings: scheme, seed, size, colour_map, network, training, augmentation, classes.
 The weights are untrained, because time does not depend on them. The images are in memory, so reading is not timed.
 The minimum of several passes is used, because other work on the machine can only add time. On one thread the time is
 processor time.
@@ -24,7 +23,7 @@ from lowalt.recognition import recipe, recogniser
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.objective import objective
 from lowalt.recognition.recogniser import built
-from lowalt.recognition.schemes import TABLE, Scheme, named
+from lowalt.recognition.schemes import Scheme, with_scheme
 
 BATCHES = (1, 64)
 
@@ -49,7 +48,7 @@ def _inputs(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
     return torch.randint(0, 256, shape, dtype=torch.uint8, generator=generator)
 
 
-def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
+def measure(scheme: Scheme, settings: dict, limit_s: float = 2.0) -> dict:
     """Return the times of a scheme's network on one machine, in ms per sample, and its size.
 
     settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training; limit_s: seconds
@@ -106,13 +105,9 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
 def main(arguments: list[str]) -> None:
     """Time one scheme's network and write the record."""
     line = parser("lowalt.measure.network_speed", __doc__.splitlines()[0])
-    line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
-    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
-    line.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
     line.add_argument("--out", required=True, help="record to write (.json)")
     options = line.parse_args(arguments)
-    scheme = named(options.schemes, options.scheme, options.stations)
-    record = measure(scheme, scheme.settled(options.settings))
+    record = measure(*with_scheme(options.settings))
     with replacing(options.out) as temporary:
         temporary.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
 

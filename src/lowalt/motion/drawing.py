@@ -135,12 +135,7 @@ def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float,
 
 
 def draw(
-    rng: np.random.Generator,
-    cloud: Cloud,
-    published: dict,
-    masts_m: np.ndarray,
-    corners: np.ndarray,
-    settings: dict,
+    rng: np.random.Generator, cloud: Cloud, published: dict, masts_m: np.ndarray, corners: np.ndarray, settings: dict
 ) -> dict:
     """Return one motion model's row (without group and model) for the target `cloud`.
 

@@ -57,10 +57,7 @@ def turned(place_m: np.ndarray, velocity_mps: np.ndarray, rate: float, times_s: 
     """
     sine, cosine = (value[:, None] for value in portable.sine_cosine(rate * times_s))
     left = np.array([-velocity_mps[1], velocity_mps[0]])
-    return (
-        place_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left,
-        cosine * velocity_mps + sine * left,
-    )
+    return (place_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left, cosine * velocity_mps + sine * left)
 
 
 def _way_back(cell: Cell, place_m: np.ndarray, velocity_mps: np.ndarray) -> float:
@@ -161,10 +158,7 @@ def _cubic(path: LookStarts, look_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Acceleration at the start of each look, and its rate of change, (L, 3) both: the cubic between its ends."""
     way = np.diff(path.place_m, axis=0)
     first, last = path.velocity_mps[:-1], path.velocity_mps[1:]
-    return (
-        (6 * way / look_s - 4 * first - 2 * last) / look_s,
-        (6 * (first + last) - 12 * way / look_s) / look_s**2,
-    )
+    return ((6 * way / look_s - 4 * first - 2 * last) / look_s, (6 * (first + last) - 12 * way / look_s) / look_s**2)
 
 
 def _go_on(cloud: Cloud, row: dict, look_s: float) -> None:

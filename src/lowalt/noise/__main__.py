@@ -51,16 +51,16 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), one file per station")
     options.add_argument("--out", required=True, help="noisy signals to write (.npy)")
     given = options.parse_args(arguments)
-    canceller, behind = given.settings.pop("canceller", None), None
-    if canceller is not None:
-        from lowalt.scene.set_noise import behind_canceller
+    filters, filtered = given.settings.pop("filters", None), None
+    if filters:
+        from lowalt.scene.set_noise import behind
 
-        behind = functools.partial(behind_canceller, canceller=canceller)
+        filtered = functools.partial(behind, filters=filters)
     seed, stations, snrs = pick(given.settings, "seed", "stations", "snr_db")
     rows = read_table(given.motion)
     echoes = load_echoes(given.echoes, stations, len(rows), len(snrs))
     powers = load_powers(given.powers, stations, len(rows)) if given.powers else None
-    result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers, behind)
+    result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers, filtered)
     with replacing(given.out, result.nbytes) as temporary:
         np.save(temporary, result)
     print(f"{given.out}: {result.shape[0] * result.shape[1]} samples", file=sys.stderr)

@@ -11,7 +11,7 @@ from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.protocols import evaluated_folds
-from lowalt.recognition.schemes import PROTOCOLS, TABLE, named, names
+from lowalt.recognition.schemes import PROTOCOLS, TABLE, names, with_scheme
 
 
 def _views(arguments: list[str]) -> None:
@@ -72,23 +72,19 @@ def _source(options: Namespace):
 
 
 def _train(arguments: list[str]) -> None:
-    """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation,
+    """Train one scheme in one protocol. Settings: scheme, seed, size, colour_map, network, training, augmentation,
     classes."""
     from lowalt.recognition.runs import train
 
     line = parser("lowalt.recognition train", _train.__doc__)
     _add_source(line)
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
-    line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
-    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
-    line.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
     options = line.parse_args(arguments)
-    scheme, source = named(options.schemes, options.scheme, options.stations), _source(options)
-    pick(options.settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
-    settings = scheme.settled(options.settings)
-    samples = source.for_training(scheme, options.protocol, settings["size"])
+    scheme, settings = with_scheme(options.settings)
+    pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
+    samples = _source(options).for_training(scheme, options.protocol, settings["size"])
     train(samples, scheme, options.protocol, settings, Path(options.out), options.tensorboard)
 
 

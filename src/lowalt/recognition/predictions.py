@@ -120,9 +120,9 @@ def _number(value: float) -> str:
 def write(
     path: str | Path, table: Predictions, classes: tuple[str, ...] = CATEGORIES, protocol: str | None = None
 ) -> None:
-    """Write a prediction file, with the column `part` where a protocol is named; equal predictions give equal bytes."""
-    parts = {pair: part for part, pairs in (FOLDS[protocol].items() if protocol else ()) for pair in pairs}
-    part_column = ("part",) if protocol else ()
+    """Write a prediction file, with the column `part` for one of the protocols; equal predictions give equal bytes."""
+    parts = {pair: part for part, pairs in FOLDS.get(protocol or "", {}).items() for pair in pairs}
+    part_column = ("part",) if parts else ()
     rows = (
         [
             table.key[row], table.subtype[row], table.group[row], table.fold[row], int(table.model[row]),

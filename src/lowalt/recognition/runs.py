@@ -23,14 +23,14 @@ from lowalt.files.atomic import replacing, sha256
 from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
-from lowalt.recognition import checkpoint, inference, metrics, predictions, recipe, recogniser
+from lowalt.recognition import checkpoint, inference, predictions, recipe, recogniser
 from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.light_timm import timm
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
-from lowalt.recognition.training import Trainer, TrainingRun
+from lowalt.recognition.training import Trainer, TrainingRun, tensorboard
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
 
 Build = Callable[[Scheme, dict, int, str, int], nn.Module]
@@ -67,7 +67,7 @@ def train(
     if resumed and machine.rank == 0:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
     if events and machine.rank == 0:
-        trainer.metrics = metrics.tensorboard(folder / "events", trainer.at.steps)
+        trainer.metrics = tensorboard(folder / "events", trainer.at.steps)
     began, busy, steps = time.monotonic(), time.process_time(), trainer.at.steps
     at = trainer.fit()
     seconds, busy = time.monotonic() - began, time.process_time() - busy

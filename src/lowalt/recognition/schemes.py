@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from lowalt.config.schema import check_brought
 from lowalt.files.atomic import slug
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
@@ -80,6 +81,17 @@ class Scheme:
 def of_record(record: dict) -> Scheme:
     """Return the scheme of a checked record in a trained model."""
     return Scheme(**{key: tuple(value) if isinstance(value, list) else value for key, value in record.items()})
+
+
+def with_scheme(settings: dict) -> tuple[Scheme, dict]:
+    """Return the scheme that the settings of a training hold as a record, and the others as the scheme settles them.
+
+    Raises: InputError where there is no record of a scheme, or a wrong one.
+    """
+    others = {**settings}
+    check_brought("scheme", record := others.pop("scheme", None), "settings.scheme")
+    scheme = of_record(record)
+    return scheme, scheme.settled(others)
 
 
 def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, where: str) -> list[int]:

@@ -2,10 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 from lowalt.config.layers import SCHEMA, check, of_run
 from lowalt.config.named_code import allowed
 from lowalt.config.network import station_names
+from lowalt.files.csv_tables import number, read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.recognition import inference, runs, zoo
@@ -60,6 +64,42 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = 
     pairs = folds(trained.protocol, "test")
     samples = Source.of_run(index, trained.size).samples(trained.scheme.columns, pairs, trained.size)
     return {"protocol": trained.protocol, **scores(samples.facts, runs.answers(trained, samples, settings, machine))}
+
+
+class Confusion(NamedTuple):
+    """Names of the classes (C,), and the number of test samples (C, C) int of each true class (row) that each class
+    (column) was the answer for."""
+
+    classes: tuple[str, ...]
+    samples: np.ndarray
+
+    @property
+    def percent(self) -> np.ndarray:
+        """The same in percent of each true class (C, C); a class without samples has zeros."""
+        return 100 * self.samples / np.maximum(self.samples.sum(axis=1, keepdims=True), 1)
+
+
+def confusion(
+    run: str | Path, scheme: str = "ABC:VRP+TRP+VT", protocol: str = "unseen", snr_db: float | None = None
+) -> Confusion:
+    """Return what a finished run's networks took for what, at one SNR (dB; `math.inf`: no noise) or over all.
+
+    run: its folder; scheme, protocol: as in its table confusion_by_snr.csv, which sums over the training seeds.
+    Raises: InputError for a folder without that table, or a scheme, a protocol or an SNR that it lacks.
+    """
+    path = Path(run) / "confusion_by_snr.csv"
+    rows = read_csv(path, "protocol", "scheme", "snr_db", "category", "predicted", "samples")
+    for column, wanted in (("protocol", protocol), ("scheme", scheme), ("snr_db", snr_db)):
+        text = f"{wanted:g}" if column == "snr_db" and wanted is not None else wanted
+        known = list(dict.fromkeys(row[column] for row in rows))
+        if text is not None and text not in known:
+            raise InputError(f"{path}: {column} {wanted!r} is not there, expected one of {known}")
+        rows = [row for row in rows if text in (None, row[column])]
+    classes = tuple(dict.fromkeys(row["category"] for row in rows))
+    samples = np.zeros((len(classes), len(classes)), int)
+    for row in rows:
+        samples[classes.index(row["category"]), classes.index(row["predicted"])] += int(number(row, "samples", path))
+    return Confusion(classes, samples)
 
 
 def _opened(run: str | Path) -> tuple[dict, Path]:

@@ -7,6 +7,7 @@ library the loop is still one page. The settings are those of `lowalt.recognitio
 import math
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -24,13 +25,38 @@ from lowalt.recognition.batches import Augmented, Prefetch, Unchanged, batches, 
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.light_timm import timm
 from lowalt.recognition.matrix_products import as_products
-from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.objective import descent
 from lowalt.recognition.recipe import averaging, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.statistics import cross_entropy
 
 HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", "validation_accuracy")
+
+Metrics = Callable[[int, dict[str, float]], None]
+
+
+def tensorboard(folder: str | Path, first: int) -> Metrics:
+    """Return a function (step, {name: value}) that appends to TensorBoard's event files in `folder`.
+
+    first: the step that the run starts from; entries of an earlier, killed run after it are removed.
+    Raises: InputError where the package is not installed.
+    """
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError as error:
+        raise InputError(
+            f"recognition.tensorboard: the package tensorboard is not installed ({error}); "
+            "expected `pip install 'lowalt[tensorboard]'`, or recognition.tensorboard: false"
+        ) from error
+    writer = SummaryWriter(str(folder), purge_step=first)
+
+    def append(step: int, values: dict[str, float]) -> None:
+        """Append the values of one step and write them to disk."""
+        for name, value in values.items():
+            writer.add_scalar(name, value, step)
+        writer.flush()
+
+    return append
 
 
 class TrainingRun(NamedTuple):

@@ -15,10 +15,14 @@ from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.recordings.windows import looks
 from lowalt.tiles.image_settings import Images
 
+ANOTHER = 0.02
+"""Relative distance between carriers from which on a recording is of another radar than the network's."""
+
 
 class Answers(NamedTuple):
     """Of n windows: their starts (n,) s, whether each holds a target (n,) bool, class probabilities (n, classes),
-    whether each is clipped (n,) bool, and the speed (n,) m/s of a line beyond `fastest_mps`, NaN for none.
+    whether each is clipped (n,) bool, and the speed (n,) m/s of a line beyond `fastest_mps`, NaN for none; `notes` say
+    for which reasons an answer may be wrong.
 
     A window that is clipped or has such a line counts as one without a target: the network cannot know it.
     """
@@ -29,6 +33,7 @@ class Answers(NamedTuple):
     clipped: np.ndarray
     beyond_mps: np.ndarray
     fastest_mps: float
+    notes: list[str]
 
     def words(self, number: int, classes: list[str]) -> str:
         """Return what is said of one window: its class and probability, or why it has none."""
@@ -70,8 +75,32 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     shares = probabilities(trained.model, samples, numbers, Machine.here("fp32"), 64)
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
-    there = ~found.clipped
-    there[there] = present(intervals[there], twin)
+    starts, there = numbers * twin.symbols * twin.symbol_interval_s, ~found.clipped
+    empty = intervals[_empty(record, starts, twin, where, there)] if record.empty_s and not twin.slowest_mps else None
+    there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
-    starts = numbers * twin.symbols * twin.symbol_interval_s
-    return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps)
+    return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps, _notes(record, radar, there.any()))
+
+
+def _empty(record: Record, starts_s: np.ndarray, twin: Twin, where: str, sound: np.ndarray) -> np.ndarray:
+    """Which of the sound windows (n,) bool, by their starts (n,) s, lie where the record says that nothing was."""
+    first, last = record.empty_s
+    window_s = twin.symbols * twin.symbol_interval_s
+    inside = sound & (starts_s >= first) & (starts_s + window_s <= last)
+    if not inside.any():
+        raise InputError(f"{where}: empty_s is {record.empty_s}, expected a stretch that holds at least one of "
+                         f"the {len(starts_s)} windows of {window_s:.3g} s, not clipped")  # fmt: skip
+    return inside
+
+
+def _notes(record: Record, radar: Twin, found: bool) -> list[str]:
+    """For which reasons answers on a recording may be wrong; found: whether any window holds a target."""
+    notes = []
+    if abs(record.carrier_hz / radar.carrier_hz - 1) > ANOTHER:
+        at, here = radar.carrier_hz / 1e9, record.carrier_hz / 1e9
+        notes.append(f"this network learned a radar at {at:.4g} GHz, and the recording is at {here:.4g} GHz: expect "
+                     "wrong classes; `lowalt recording train` makes a network for its radar")  # fmt: skip
+    if found and not radar.slowest_mps and record.empty_s is None:
+        notes.append("targets of this network may hover, so hum and slow noise count as targets: the record's key "
+                     "`empty_s: [FROM, TO]` names seconds without any target")  # fmt: skip
+    return notes

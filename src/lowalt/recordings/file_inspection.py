@@ -206,7 +206,9 @@ def _seen(path: Path, one: Candidate, rate_hz: float, values: np.ndarray | None 
     return Seen(*one, values, rate_hz, _line(values, rate_hz))
 
 
-def inspect_recording(path: Path, carrier_hz: float | None = None, rate_hz: float | None = None) -> FileInspection:
+def inspect_recording(
+    path: str | Path, carrier_hz: float | None = None, rate_hz: float | None = None
+) -> FileInspection:
     """Return what a recording's file shows: its readings, the best first, and the faults of the best.
 
     carrier_hz, rate_hz: where they are known (of chirps, the number of chirps a second); what the file itself says

@@ -97,7 +97,8 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
     Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other windows, and the line
     is at or above slowest_mps. Where they may hover it is the floor between lines. A recording of `ENOUGH` windows
     through which a target passes is judged by its quiet time as well, so that hum is no target beside it.
-    noise: intervals (m, symbols) of the receiver's noise alone, where they are known, as in a simulation.
+    noise: intervals (m, symbols) of the receiver's noise alone, hum included, where they are known: a line must stand
+    above their mean at its own speed, too.
     """
     power, heard = heard_powers(intervals, twin)
     quiet = heard_powers(noise, twin)[0] if noise is not None else power
@@ -109,8 +110,10 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
 
     if twin.slowest_mps:
         return over(noise_floor(quiet, step_mps)) >= level
+    if noise is not None:
+        return over(np.maximum(floor_between(quiet), maximum_filter(quiet.mean(axis=0), 3, mode="wrap"))) >= level
     found = over(floor_between(quiet)) >= level
-    if noise is None and len(power) >= ENOUGH:
+    if len(power) >= ENOUGH:
         passing = over(noise_floor(quiet, step_mps))
         if passing.max() >= PASSES * level and np.median(passing) < level:
             found &= passing >= level

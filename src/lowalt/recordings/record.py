@@ -33,6 +33,7 @@ class Record:
     receiver: int = 0
     chirps: dict | None = None
     twin: dict | None = None
+    empty_s: list[float] | None = None
 
     @property
     def name(self) -> str:

@@ -14,7 +14,7 @@ from lowalt.files.atomic import existing, text_of
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 
-FILES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "index")
+FILES = ("accuracy", "confusion_by_snr", "subtypes", "comparisons", "orderings", "seeds", "distances", "index")
 """Names that every manifest has, with one file each."""
 LISTS = ("clouds", "benchmarks")
 """Names that every manifest has, with a list of files each."""

@@ -1,6 +1,7 @@
 "use strict";
-// Every table of the page: sort by a column, show rows that hold some words, download as CSV. The theme, and the place in the contents.
+// Every table of the page: sort by a column; of LONG rows or more, show rows that hold some words and download them as CSV. The theme, and the place in the contents.
 (() => {
+  const LONG = 10;
   const words = (node) => node.textContent.replace(/\s+/g, " ").trim();
   const make = (name, attributes, text) => {
     const node = Object.assign(document.createElement(name), attributes);
@@ -72,7 +73,8 @@
     const box = make("div", { className: "scroll", tabIndex: 0 });
     box.setAttribute("role", "region");
     box.setAttribute("aria-label", title);
-    table.before(tools, box);
+    table.before(box);
+    if (table.tBodies[0].rows.length >= LONG) box.before(tools);
     box.append(table);
     sortable(table, head);
     show();

@@ -36,8 +36,13 @@ def macro_f1(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
 
 
 def confusion(rows: Iterable[dict[str, str]]) -> dict[tuple[str, str], dict[tuple[str, str], int]]:
-    """Return counts as (protocol, scheme) -> (true category, predicted category) -> samples."""
+    """Return counts over all SNRs as (protocol, scheme) -> (true category, predicted category) -> samples."""
     result: dict = defaultdict(lambda: defaultdict(int))
     for row in rows:
         result[row["protocol"], row["scheme"]][row["category"], row["predicted"]] += int(row["samples"])
     return {key: dict(counts) for key, counts in result.items()}
+
+
+def best_schemes(accuracies: dict[str, dict[str, dict[str, float]]]) -> dict[str, str]:
+    """Return the scheme of the highest average accuracy of each protocol, out of `by_scheme`."""
+    return {protocol: max(schemes, key=lambda name: schemes[name]["avg"]) for protocol, schemes in accuracies.items()}

@@ -72,7 +72,7 @@ class SceneSample:
         return result
 
     def paths(self, view: View) -> list[ImagePath]:
-        """Return all paths but the direct one; on a link, each path of the receiver holds that of the sender."""
+        """Return all paths but the direct one; on a link, those of the receiver, each with the sender's of its kind."""
         adding = self.all("paths").values()
         ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
         if len(ends) == 1:
@@ -123,11 +123,11 @@ class SceneSample:
         return response(view, paths, self.routes(view, paths), **self._waves)
 
     def _samples(self, view: View) -> np.ndarray:
-        """Time samples (N, M) of a view's target that moves within symbols, or whose echo is later than the prefix."""
+        """Time samples (N, M) of a target that moves within symbols, or whose echo is later than the cyclic prefix."""
         delays_s, weights = np.zeros(1), np.ones((1, self.scene.network.subcarriers))
         if instants := self.only("instants"):
             delays_s, weights = instants(view)
-        # Each instant of a symbol is computed as a symbol of its own; a symbol's instants follow each other.
+        # Each instant of a symbol is computed as a separate symbol; the instants of one symbol are consecutive.
         moved = view.at((view.times_s[:, None] + delays_s).reshape(-1))
         factor, paths = self.routes(view, self.paths(view)), self.paths(moved)
         late, network = np.zeros(view.places.shape[:2], np.int64), self.scene.network
@@ -155,7 +155,7 @@ class SceneSample:
         return waveform.transmit(still.response, self.on_air("waveform"))
 
     def arrived(self) -> np.ndarray:
-        """Return the frequency response (N, M) that the receiver computes: behind its effects, divided by its data.
+        """Return the frequency response (N, M) that the receiver measures: after its effects, divided by the sent data.
 
         Without an effect on time samples, the responses of all echoes are added and no samples are made.
         """
@@ -233,8 +233,8 @@ class SceneSample:
         return self._present(cells)
 
     def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """Return the range cell (K,), with its fraction, at each received symbol, and the folded speed (N,) m/s at each
-        symbol, at which the echo of the middle of a view's target appears on the direct path."""
+        """Return where the echo of the middle of a view's target appears on the direct path: the range cell (K,), with
+        its fraction, at each received symbol, and the folded speed (N,) m/s at each symbol."""
         displacements = [displaced(view, self.draws(name)) for name, displaced in self.all("displaced").items()]
         cell, speed_mps = truth.observed(view, displacements, self.cells.shape[1])
         return self._present(cell), speed_mps
@@ -300,7 +300,7 @@ def scene_signals(
     """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.
 
     clouds: by subtype, companions included; occluders: each subtype's surfaces, needed for self-occlusion; snrs (dB):
-    where noise in all range cells is an effect of the scene, one signal per SNR, (models, snrs, N).
+    given if the scene itself adds noise at set SNRs; the result has one signal per SNR, (models, snrs, N).
     Raises: InputError naming the sample whose subtype has no cloud, or that cannot be computed.
     """
     station, occluders = scene.network.station(name), occluders or {}

@@ -7,6 +7,9 @@ It may also define
 
 - IDLE, a list of settings that change nothing: where all values of an entry are set, the effect is dropped;
 - `check(settings, scene)`, which raises InputError where settings contradict the rest of a `checks.CheckedScene`;
+- UNMODELLED, what the effect is not modelled with: "links" between two stations, the waveforms "fmcw" and "cw";
+- STILL, whether it adds echoes that stand still, which a canceller removes;
+- SET_SNR, the setting that holds an SNR of noise.snr_db: where it is null, the echo stage makes a signal for each SNR;
 - STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the same numbers;
 - PARTS, settings that leave out a part of the effect, by the part's name: `lowalt explain` measures each;
 - DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of a link's stations.
@@ -20,7 +23,7 @@ PLACE_ORDER = ("motion", "transmitter", "channel", "receiver", "detection")
 """The places where effects act, in the order of the chain."""
 
 ARGUMENTS = {
-    "sent": "(N, M) complex128, data or what earlier amplifiers made of them, of mean power one",
+    "sent": "(N, M) complex128, data of mean power one, behind the effects that act earlier",
     "cells": "(N, M) complex128, range cells",
     "chosen": "(N,) int64, range cells chosen so far",
     "cloud": "`Cloud` of the target",
@@ -28,7 +31,7 @@ ARGUMENTS = {
     "network": "`Network`",
     "on_air": "function of a symbol's name, see `SceneSample.on_air`, that returns its subcarriers (N, M) on the air",
     "look": "`Look`, what the receiver knows",
-    "offset_cells": "how far still echoes stand beyond their range cells' centres, in cells",
+    "offset_cells": "distance of still echoes beyond the centres of their range cells, in cells",
     "paths": "list of P `ImagePath`, the direct path not among them",
     "response": "(N, M) complex128, frequency response in sqrt(W) a subcarrier",
     "rng": "Generator of the effect's own stream (STREAM, DRAWN), from its start",
@@ -42,7 +45,7 @@ ARGUMENTS = {
     "timing": "`Sampling`",
     "view": "`View` of the target at the station",
     "wavelength_m": "wavelength of the carrier (m)",
-    "weight": "`SceneSample.weight`, product of the amplitude factors of all effects, of some, or of all but some",
+    "weight": "`SceneSample.weight`, the product of the amplitude factors of all or some effects",
 }
 """What functions take, with shapes and units."""
 
@@ -74,7 +77,7 @@ OFFERS = {
     "visible": Offer("channel", MANY, ("view", "rng"), "(N, L) or (N, 1), real factor on two-way amplitudes"),
     "visible_one_way": Offer(
         "channel", MANY, ("view", "rng"),
-        "as `visible` for a station; on a link asked for at either end, whose factors count with their roots",
+        "as `visible` for a station; on a link asked for at both ends, and the factor is the root of their product",
     ),
     "paths": Offer("channel", MANY, ("view",), "list of `ImagePath`: waves go out by any path and come back by any"),
     "routes": Offer(
@@ -94,6 +97,11 @@ OFFERS = {
     "scatter": Offer("channel", MANY, ("view", "rng"), "`Still`: the echoes of something other than a target"),
     "heard": Offer("channel", MANY, ("sample",), "(N, M) time samples of signals that the receiver does not know"),
     "displaced": Offer("", MANY, ("view", "rng"), "`Displacement` of the target's echo by the effect"),
+    "noise_w": Offer("receiver", ONE, ("network",), "mean power (W) of the receiver's noise in a subcarrier"),
+    "levels": Offer(
+        "", MANY, ("view",),
+        'list of lines of the link budget, (name, value, unit): a power in "W", or a ratio of powers, unit "1"',
+    ),
     "receive": Offer("receiver", MANY, ("samples", "look", "rng"), "(N, M) time samples after the effect"),
     "filtered": Offer("detection", MANY, ("cells",), "(N, M) range cells behind a linear filter"),
     "choose": Offer("detection", MANY, ("chosen", "cells", "look", "rng"), "(N,) chosen range cells"),

@@ -1,8 +1,8 @@
 """What a scene does to the signals of a few samples: whether the target's cell is found, and what each effect changes.
 
 An effect is priced by leaving it out of the scene, or by adding it with its defaults where the scene does not name it.
-`commands.explain` prints it all; what changes mean for images and for a trained network is asked of a function, since
-those rooms come later.
+`commands.explain` prints it all. It passes in a function that says what a change does to images and to the answers of a
+trained network, since a scene may not import those packages.
 """
 
 import math
@@ -37,11 +37,11 @@ CANCELLERS = (
 )  # fmt: skip
 """Cancellers that a verdict compares."""
 CLOSE_CELLS = 1
-"""Range cells by which a chosen cell may be beside the target's and still hold it."""
+"""A chosen range cell is right if it lies at most this many cells from the target's."""
 VISIBLE = 8
-"""Difference of pixels, of 255, from which they count as changed."""
+"""A pixel, 0 to 255, counts as changed if it changes by more than this."""
 FOUND = 0.9
-"""Share of symbols from which a target counts as found."""
+"""A target counts as found if the range cell is right in at least this share of the symbols."""
 
 
 class ExplainedSample(NamedTuple):
@@ -56,9 +56,9 @@ class Finding(NamedTuple):
     """One sample at one station.
 
     radial_mps: mean rate of the target's range over the look (m/s); right: share of symbols whose chosen cell is within
-    one of the target's; over_db: the target in its cell over the mean power of the loudest cell of all else, behind the
-    filters (dB, inf without anything else); otherwise: share right with other detection: each of CANCELLERS where the
-    scene has one, with and without a detector.
+    one of the target's; over_db: power of the target in its cell over the mean power of the loudest cell of everything
+    else, behind the filters (dB, inf without anything else); otherwise: the share `right` with other detection: with
+    each of CANCELLERS if the scene has one, with and without a detector.
     """
 
     category: str
@@ -77,9 +77,9 @@ class Change(NamedTuple):
     """What leaving an effect out, or adding it, changes.
 
     signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
-    more: shares of what becomes of the signals (pixels, answers) that differ; ms: processor time that the effect takes
-    per sample and station, a median; spread_ms: standard deviation of that time over samples and stations; also: what
-    else had to change for the scene to fit; refused: why it was not tried.
+    more: share of the pixels, or of a network's answers, that differ; ms: processor time of the effect per sample and
+    station, a median; spread_ms: standard deviation of that time over samples and stations; also: a further change
+    without which the scene would be refused; refused: why the effect was not tried.
     """
 
     effect: str
@@ -184,14 +184,15 @@ def changes(
     config: dict, chosen: list[ExplainedSample], station_names: Sequence[str],
     shown: Callable[[np.ndarray], dict[str, np.ndarray]],
 ) -> list[Change]:  # fmt: skip
-    """Return what each effect of the catalogue changes at some stations, those that the scene names first.
+    """Return what each effect changes at some stations; the effects that the scene names come first.
 
-    shown: returns what becomes of the signals (K, stations, N) of all samples by name: pixels of images, answers of a
-    network.
+    shown: turns the signals (K, stations, N) of all samples into what is compared, by name: pixels of images, answers
+    of a network.
     """
     places = {effect.name: effect.place for effect in scene_of(config).effects}
     named = list(places)
-    # A kernel's first call compiles it: the scene itself is heard twice, and a lone sample, which no median helps.
+    # The first call of a kernel compiles it, so the scene itself is computed twice. So is a single sample with each
+    # effect, whose time is no median of several.
     passes = 2 if len(chosen) * len(station_names) == 1 else 1
     signals, cells, times_ms = _received(config, station_names, chosen, 2)
     before, result = shown(signals), []
@@ -228,7 +229,7 @@ def _differing(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def _changed(config: dict, name: str) -> tuple[dict, str]:
-    """The configuration without an effect that it names, or with one more, and what else had to change with it.
+    """The configuration without an effect that it names, or with one that it does not, and the further change needed.
 
     Raises: InputError where no single further change makes the scene fit.
     """
@@ -288,7 +289,7 @@ def verdict(findings: Sequence[Finding]) -> list[str]:
 
 
 def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
-    """Return one line an effect: what the signal, the cells and the images lose or gain with it, and its time."""
+    """Return one line per effect: by how much it changes signals, range cells and images, and its time."""
     more = list(dict.fromkeys(key for change in changes for key in change.more))
     columns = "".join(f"{key:>9}" for key in more)
     lines = [f"{'effect':<20} {'':<7} {'signal':>8} {'cells':>7} {columns}{'ms':>9}"]
@@ -311,7 +312,7 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
 
 
 def cost_text(ms: float, spread_ms: float) -> str:
-    """Return a cost in ms; where it is below its spread or negative, the larger of both magnitudes, after a `<`."""
+    """Return a cost in ms; if it is negative or below its spread, the larger of both magnitudes behind a `<`."""
     return f"{ms:.1f}" if ms > spread_ms else f"<{max(spread_ms, -ms):.1f}"
 
 

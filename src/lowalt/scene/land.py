@@ -1,11 +1,12 @@
 """The land z = 0 that a station, or a link, sees in each of its range cells: patches, and their power under the beams.
 
-Land of one range sum is an ellipse, the section of an ellipsoid whose foci are both arrays; a station's is a circle.
-It is summed around its eccentric anomaly nu, on which patches stand closest where the ellipse passes close to a mast.
+The land at one range sum is an ellipse, the section of an ellipsoid whose foci are the two arrays; of a single station
+it is a circle. The sum runs over the eccentric anomaly nu, which places patches most densely where the ellipse passes
+close to a mast.
 
-Land fills every cell from edge to edge, and what stands off a cell's centre has range side lobes in all others. A patch
-a quarter of a cell off the centre has the mean side lobes of land spread over a whole cell: sin^2 of pi times the
-offset is then 1/2, its mean. So the land's rings are centred a quarter of a cell beyond the cells' centres.
+Land fills every range cell from edge to edge, and an echo off the centre of its cell has side lobes in all other cells.
+Their power is proportional to sin^2(pi x offset), whose mean over a cell is 1/2, as at an offset of a quarter of a
+cell. The rings of land are therefore centred a quarter of a cell beyond the centres of the cells.
 """
 
 from functools import lru_cache
@@ -30,7 +31,7 @@ class Land(NamedTuple):
     """Patches of land (K,) in the order of their range cells; none depends on the beams.
 
     cell: (C,) numbers of the cells with land, and first: (C,) each one's first patch; cells: number of all cells;
-    weight: area times the root of both grazing angles' sines over both squared ranges, and both elements' gains;
+    weight: area times the root of both grazing angles' sines, over both squared ranges, times both element gains;
     seen: (2, 2, K) direction cosines, across and up, from the sender and the receiver, of a station (1, 2, K); slow:
     cosine of half the bistatic angle.
     """
@@ -100,7 +101,7 @@ def land(network: Network, station: Station, reach_m: float, element: Element | 
     places = np.array([end.position_m for end in ends])
     between = places[1, :2] - places[0, :2]
     half, heights = 0.5 * float(np.hypot(*between)), (float(places[0, 2]), float(places[1, 2]))
-    # Of a station, or ends above each other, the ellipses are circles, which begin along the receiver's array.
+    # For a station, or ends above each other, the ellipses are circles, which begin along the receiver's array.
     axis = between / (2.0 * half) if half > 0 else station.horizontal[:2]
     low, high = _edges(station, reach_m, radio.cells)
     cells, lit = len(low), np.flatnonzero(high > low)
@@ -147,7 +148,7 @@ def cell_power(
     settings: dict, network: Network, station: Station, aims_m: np.ndarray, element: Element | None = None,
     nodes: int = NODES,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return the mean power (cells,) (W) of the land in every cell, and by how much it slows Doppler, mean cos(beta/2).
+    """Return the mean power (cells,) W of the land in every cell, and the factor on its Doppler, mean cos(beta / 2).
 
     settings: gamma and reach_m; cells beyond the M unambiguous ones are included; aims_m: (2, 3) m, where the sender's
     and the receiver's beams point; element: as in `land`. The integral of G_T G_R sigma0 / (R1^2 R2^2) over the land of

@@ -12,10 +12,9 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.motion.cross_section import mean_cross_section
-from lowalt.scene import antenna, land
-from lowalt.scene.effects import NamedEffect
+from lowalt.scene import antenna
+from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.view import View
-from lowalt.scene.waveform import prefix_length_s
 
 
 class Level(NamedTuple):
@@ -53,7 +52,7 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
     gains = [1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m))
              for end in ends.values()]  # fmt: skip
     budget = [
-        Level(f"transmit power, {_one(view)}", dbm(network.power), "dBm"),
+        Level(f"transmit power, {network.bin_name}", dbm(network.power), "dBm"),
         Level("transmit array", decibels(math.prod(network.transmit)), "dB"),
         Level("receive array", decibels(math.prod(network.receive)), "dB"),
         *(Level(f"element {name}", decibels(gain), "dBi") for name, gain in zip(ends, gains, strict=True)),
@@ -69,45 +68,21 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
         *budget,
         Level("expected echo", expected_dbm, "dBm"),
         Level("echo of this sample, mean |Y_bin|^2", dbm(echo_w), "dBm"),
-        *_beside(view, {effect.name: effect for effect in effects}, 0.5 * (out_m + back_m), expected_dbm),
+        *_beside(view, effects, expected_dbm),
     ]
 
 
-def _one(view: View) -> str:
-    """What the echo's amplitudes are those of."""
-    return "one subcarrier" if view.network.waveform == "ofdm" else "one sample"
-
-
-def _beside(view: View, effects: dict[str, NamedEffect], range_m: float, expected_dbm: float) -> list[Level]:
+def _beside(view: View, effects: Sequence[NamedEffect], expected_dbm: float) -> list[Level]:
     """Levels of what a scene adds to the target's echo, and the noise."""
     network, result = view.network, []
-    if "cyclic_prefix" in effects:
-        effect = effects["cyclic_prefix"]
-        prefix_s = prefix_length_s(effect.settings["prefix_s"], network)
-        kept = 1 - float(effect.module.lost(2 * range_m / SPEED_OF_LIGHT, prefix_s, network))
-        result.append(Level("loss beyond the cyclic prefix", 2 * decibels(kept), "dB"))
-    if "clutter" in effects:
-        power, _ = effects["clutter"].module.mean_power(effects["clutter"].settings, view)
-        cell = round(range_m / network.cell_m) % network.subcarriers
-        there = land.with_side_lobes(power, network.subcarriers)[cell]
-        result.append(Level("land, all range cells", dbm(float(power.sum())), "dBm"))
-        result.append(Level("land, the target's range cell", dbm(float(there)), "dBm"))
-    if "background_channel" in effects:
-        effect = effects["background_channel"]
-        usual_w = effect.module.usual_power(effect.settings, view)
-        result.append(Level(f"background, {_one(view)}, median of draws", dbm(usual_w), "dBm"))
-    if view.station.transmitter is not None and "direct_path" in effects:
-        direct = effects["direct_path"].module.scatter(effects["direct_path"].settings, view, None)
-        result.append(Level(f"direct path, {_one(view)}", dbm(float(np.mean(abs(direct.response) ** 2))), "dBm"))
-    if "transmit_leakage" in effects:
-        leaked_dbm = dbm(network.power) - effects["transmit_leakage"].settings["isolation_db"]
-        result.append(Level(f"transmit leakage, {_one(view)}", leaked_dbm, "dBm"))
-    if "receiver_noise" in effects:
-        effect = effects["receiver_noise"]
-        noise_dbm = dbm(effect.module.variance(effect.settings, network.noise_bandwidth_hz))
+    for lines in every(effects, "levels").values():
+        for name, value, unit in lines(view):
+            result.append(Level(name, dbm(value), "dBm") if unit == "W" else Level(name, decibels(value), "dB"))
+    if noise_w := only(effects, "noise_w"):
+        noise_dbm = dbm(noise_w(network))
         cell_dbm = noise_dbm - decibels(network.subcarriers)
         result += [
-            Level(f"noise, {_one(view)}", noise_dbm, "dBm"),
+            Level(f"noise, {network.bin_name}", noise_dbm, "dBm"),
             Level("noise, one range cell", cell_dbm, "dBm"),
             Level("expected echo over noise, in a range cell", expected_dbm - cell_dbm, "dB"),
         ]

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.numerics.streams import stream
-from lowalt.scene.checks import refuse_unknown_of
+from lowalt.scene.checks import refuse_unmodelled
 from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.view import Perturbations, View, located
 from lowalt.targets.cloud import Cloud
@@ -22,12 +22,12 @@ class Scene:
     effects: tuple[NamedEffect, ...]
 
     def __post_init__(self) -> None:
-        refuse_unknown_of(self.network, [effect.name for effect in self.effects])
+        refuse_unmodelled(self.network, {effect.name: effect.module for effect in self.effects})
 
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
         # Each SNR has a stream of its own, so its noise does not depend on the other SNRs.
-        levels = [effect.settings["snr_db"] for effect in self.effects if effect.name == name == "cell_noise"]
+        levels = [effect.snr_db for effect in self.effects if effect.name == name]
         # The stream of a user's own effect has the name of its file, wherever that lies.
         return stream(
             self.seed, "effect", name.rpartition("/")[2], row["subtype"], row["model"], *ends, *filter(None, levels)
@@ -48,10 +48,7 @@ class Scene:
 
     def at_snr(self, snr_db: float) -> "Scene":
         """Return the scene with noise in all range cells at this SNR (dB), instead of at each of noise.snr_db."""
-        changed = [
-            effect._replace(settings=effect.settings | {"snr_db": snr_db}) if effect.name == "cell_noise" else effect
-            for effect in self.effects
-        ]
+        changed = [effect.at_snr(snr_db) for effect in self.effects]
         return replace(self, effects=tuple(effect for effect in changed if not effect.idle))
 
 

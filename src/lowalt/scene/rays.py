@@ -1,8 +1,8 @@
 """Which points of a target a station cannot see: straight rays to the station against the target's moving triangles.
 
-In a part's own frame its triangles stand still, in a tree of boxes that is made once. Rays of one point in symbols
-that follow each other differ little, so they walk the tree together (`rays_loops`). As a turning part sees it, the
-station runs around the part's axis: its symbols are sorted by azimuth first.
+In a part's own frame its triangles stand still, in a tree of boxes that is made once. The rays of a point in successive
+symbols differ little, so they traverse the tree together (`rays_loops`). Seen from a rotating part, the station circles
+the part's axis, so symbols are sorted by its azimuth first.
 """
 
 from collections.abc import Collection
@@ -16,7 +16,7 @@ from lowalt.echo import Rigid
 from lowalt.scene import rays_loops
 
 LEAF = 4
-"""Most triangles of a leaf."""
+"""Largest number of triangles in a leaf."""
 
 
 class Tree(NamedTuple):
@@ -28,7 +28,7 @@ class Tree(NamedTuple):
 
 
 class _Same(NamedTuple):
-    """A target's surfaces, told apart by which object they are."""
+    """A target's surfaces as a key of the cache: only the same object is equal."""
 
     surfaces: dict
 
@@ -44,7 +44,7 @@ def tree(corners: np.ndarray, closed: bool) -> Tree:
     leaves = 1
     while leaves * LEAF < len(corners):
         leaves *= 2
-    # Leaves that are not full hold the last triangle several times.
+    # Incomplete leaves repeat the last triangle.
     whole = leaves * -(-len(corners) // leaves)
     order, middles = np.minimum(np.arange(whole), len(corners) - 1)[None], corners.mean(axis=1)
     while len(order) < leaves:
@@ -75,7 +75,7 @@ def _trees(same: _Same) -> dict[int, Tree]:
 
 
 def _around(axis: np.ndarray, rotation: np.ndarray, toward: np.ndarray) -> np.ndarray:
-    """The symbols (N,) by the azimuth at which the station, `toward` (N, 3), runs around a part's axis (3,)."""
+    """Symbols (N,), sorted by the azimuth of the station, in direction `toward` (N, 3), around a part's axis (3,)."""
     seen = np.einsum("nji,nj->ni", rotation, toward)
     right = np.cross(axis, np.eye(3)[abs(axis).argmin()])
     right /= np.linalg.norm(right)
@@ -88,10 +88,10 @@ def hidden_by(
 ) -> None:  # fmt: skip
     """Set hidden (N, L) where a triangle of the parts `casts` stands between a point and the station at place_m (3,).
 
-    motion: poses, and points off their own surface (L, 3), in their parts' frames (m); axes (P, 3): what parts turn
-    about, in their frames, NaN for others; toward (L,): the share of the way to the station by which a point is moved
-    instead, where it has no normal. Points that are hidden already are not asked. Of a closed surface with outward
-    normals, the side turned to the station alone hides.
+    motion: poses, and points (L, 3) moved off their own surface, in their parts' frames (m); axes (P, 3): rotation axes
+    in the parts' frames, NaN for parts that do not rotate; toward (L,): the share of the way to the station by which a
+    point without a normal is moved instead. Points that are already hidden are skipped. The normals of a closed surface
+    point outward, and only its faces turned to the station hide anything.
     """
     rotation, translation, points, part = map(np.ascontiguousarray, motion)
     moved, strip = (rotation, translation, points, part.astype(np.int64)), rays_loops.STRIP
@@ -100,7 +100,7 @@ def hidden_by(
         _around(axes[p], rotation[:, p], place_m - translation[:, p]) if turns[p] else np.arange(len(rotation))
         for p in range(len(axes))
     ]
-    # The last strip is filled up with its last symbol.
+    # The last strip is padded with its last symbol.
     strips = [np.pad(order, (0, -len(order) % strip), "edge").reshape(-1, strip) for order in orders]
     count, result = len(strips[0]), np.ascontiguousarray(hidden.T)
     work = tuple(map(np.empty, ((count, 15, strip), (9, strip), 12, strip)))
@@ -112,9 +112,9 @@ def hidden_by(
 
 
 def hidden_by_bones(surfaces: dict, place_m: np.ndarray, nodes: np.ndarray, hidden: np.ndarray) -> None:
-    """Set hidden (N, L) where a capsule round a bone stands between a recording's node, nodes (N, L, 3) m, and a place.
+    """Set hidden (N, L) where a capsule around a bone stands between a node of nodes (N, L, 3) m and the station.
 
-    place_m: the station's, (3,). Capsules do not hide the nodes that lie in them or end their bones.
+    place_m: the station's place (3,). A capsule hides neither nodes inside it nor the ends of its bone.
     """
     result = np.ascontiguousarray(hidden.T)
     apart = np.ascontiguousarray(nodes.transpose(1, 2, 0))

@@ -1,7 +1,7 @@
-"""The compiled loops of `rays`: the rays of one point in many symbols walk a part's tree of boxes together.
+"""The compiled loops of `rays`: the rays of one point in many symbols traverse a part's tree of boxes together.
 
-A bundle is the rays of one point in STRIP symbols. Boxes that none of its rays can meet are passed over; leaves and
-triangles are compared with all its rays at once, in vector instructions.
+A bundle is the rays of one point in STRIP symbols. Boxes that none of its rays can meet are skipped; leaves and
+triangles are tested against all its rays at once, in vector instructions.
 """
 
 import math
@@ -11,9 +11,9 @@ import numpy as np
 from lowalt.machine.jit import INNER_ORDERED, ORDERED
 
 STRIP = 16
-"""Symbols whose rays walk together."""
+"""Symbols in a bundle of rays."""
 ROOM_M = 1e-9
-"""Room around boxes for rounding."""
+"""Margin of boxes for rounding (m)."""
 FLAT = 1e-12
 """Squared sine of the angle between a ray and a bone, below which they count as parallel."""
 
@@ -36,7 +36,7 @@ def _relative(rotation, translation, place, symbols, pair, pose):
 
 @INNER_ORDERED
 def _span(values):
-    """The middle of values, and how far they go off it."""
+    """Return the middle of values and their largest distance from it, with the margin."""
     low, high = np.inf, -np.inf
     for k in range(STRIP):
         low, high = min(low, values[k]), max(high, values[k])
@@ -45,7 +45,7 @@ def _span(values):
 
 @INNER_ORDERED
 def _sent(pose, point, toward, ray, bundle):
-    """Fill ray (9, STRIP): starts, ways to the station, one over each way; and bundle (12,), the boxes around them."""
+    """Fill ray (9, STRIP) with starts, ways to the station and their inverses; and bundle (12,), boxes around them."""
     for i in range(3):
         r0, r1, r2, t, s = pose[3 * i], pose[3 * i + 1], pose[3 * i + 2], pose[9 + i], pose[12 + i]
         start, way, over = ray[i], ray[3 + i], ray[6 + i]
@@ -60,9 +60,9 @@ def _sent(pose, point, toward, ray, bundle):
 
 @INNER_ORDERED
 def can_meet(bundle, box):
-    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along it parts them.
+    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along it separates them.
 
-    Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by what the ways differ.
+    Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by the spread of the rays.
     """
     u, v, w, f, g, h = bundle[3], bundle[4], bundle[5], bundle[9], bundle[10], bundle[11]
     i, j, k = 0.5 * (box[3] - box[0]), 0.5 * (box[4] - box[1]), 0.5 * (box[5] - box[2])
@@ -96,7 +96,7 @@ def _meets(ray, free, box):
 def _shadow(triangle, closed, ray, free):
     """Set free (STRIP,) to 0 where rays meet a triangle (9,): a corner and both edges; Moeller & Trumbore 1997.
 
-    Of a closed surface with outward normals, the side turned to the station alone hides.
+    Of a closed surface with outward normals, only faces turned to the station hide anything.
     """
     a0, a1, a2, d0, d1, d2 = triangle[0], triangle[1], triangle[2], triangle[3], triangle[4], triangle[5]
     e0, e1, e2, largest = triangle[6], triangle[7], triangle[8], 0.0 if closed else np.inf
@@ -117,7 +117,7 @@ def _shadow(triangle, closed, ray, free):
 
 @INNER_ORDERED
 def _left(triangles, first, count, closed, ray, free):
-    """Hold rays against `count` triangles (`_shadow`); return whether any ray is still free."""
+    """Test rays against `count` triangles (`_shadow`); return whether any ray is still free."""
     for f in range(first, first + count):
         _shadow(triangles[f], closed, ray, free)
     most = 0.0
@@ -156,8 +156,8 @@ def _walk(boxes, triangles, closed, ray, bundle, free, last):
 def cast(tree, motion, place, order, pair, toward, work, hidden):
     """Set hidden (L, N) where triangles of part p stand between points of part q and the station at `place` (3,).
 
-    tree: `rays.Tree` of p; motion: as in `rays.hidden_by`, points already off their surface; order (strips, STRIP):
-    symbols that walk together, some may come twice; pair: (p, q); toward (L,): as in `rays.hidden_by`; work: poses
+    tree: `rays.Tree` of p; motion: as in `rays.hidden_by`; order (strips, STRIP):
+    symbols of each bundle, where one may come twice; pair: (p, q); toward (L,): as in `rays.hidden_by`; work: poses
     (strips, 15, STRIP), ray (9, STRIP), bundle (12,) and free (STRIP,).
     """
     (boxes, triangles, closed), (rotation, translation, points, part) = tree, motion
@@ -208,8 +208,8 @@ def _capsule(node, first, second, place, square, hidden):
 def capsules(place, nodes, bones, radius_m, hidden):
     """Set hidden (L, N) where a capsule round a bone stands between a node, nodes (L, 3, N) m, and the station.
 
-    bones (B, 2): nodes at the ends of each; radius_m (B,). A node stands for the skin round it: a capsule does not hide
-    the nodes that lie in it or end its bone.
+    bones (B, 2): nodes at the ends of each; radius_m (B,). A node stands for the skin around it: a capsule hides
+    neither nodes inside it nor the ends of its bone.
     """
     for l in range(len(nodes)):  # noqa: E741
         for b in range(len(bones)):

@@ -1,9 +1,11 @@
-"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths, with squint and spherical waves if asked.
+"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths; squint and spherical waves on request.
 
-Over the few range cells of a target the response is a smooth function of frequency. Each symbol is summed into
-Chebyshev moments of the points' excess ranges, at one frequency of the band or, where array sums depend on it, at a
-few; two matrix products turn moments into all M subcarriers: exp(-j B x u) = sum over p of
-eps_p (-j)^p J_p(B x) T_p(u), |u| <= 1. No array of symbols x points x subcarriers exists.
+A target fills few range cells, so its response is a smooth function of frequency. In each symbol, the excess ranges of
+the points are summed into Chebyshev moments, at one frequency of the band or, where array sums depend on frequency, at
+a few. Two matrix products turn the moments into all M subcarriers, so that no array of symbols x points x subcarriers
+is needed:
+
+    exp(-j B x u) = sum over p of eps_p (-j)^p J_p(B x) T_p(u),   |u| <= 1.
 """
 
 from collections.abc import Sequence
@@ -47,10 +49,10 @@ def response(
 ) -> np.ndarray:  # fmt: skip
     """Return the subcarriers Y (N, M) complex128 of a view's target, the known symbol removed.
 
-    paths: all but the direct one; waves go out by any path and come back by any; factor: real, on every point's two-way
-    amplitude, (N, L), or (R, R, N, L) by the way out and the way back, the direct path first; squint: the arrays'
-    phases follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves.
-    A link goes out by its transmitter's array and paths, and comes back by its receiver's.
+    paths: all but the direct one; waves go out on any path and return on any; factor: real factor on each point's
+    two-way amplitude, (N, L), or (R, R, N, L) by outward and return path, the direct path first; squint: array phases
+    follow the frequency of each subcarrier, beam weights do not; wavefront: elements see spherical waves. On a link,
+    waves leave from the transmitter's array and return to the receiver's.
     Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger expansion; Willis,
     Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
@@ -65,11 +67,11 @@ def response(
     points = back.places[0]
     reach = float(np.sqrt(np.square(points - points.mean(axis=2, keepdims=True)).sum(axis=1).max()))
     if squint:
-        # Ranges then count to the arrays' middles, whose directions to the points differ.
+        # Ranges are then measured from the arrays' middles, whose directions to the points differ.
         aperture = max(end.spacing * _half_diagonal(end.counts) for end in ends)
         nearest = min(float(end.centre.min()) for end in ends) - reach
         reach += 2.0 * aperture * min(reach / nearest if nearest > 0 else 1.0, 1.0)
-    # A power of sqrt(2), so that a few tables serve all samples.
+    # Rounded up to a power of sqrt(2), so that a few tables serve all samples.
     reach = 2.0 ** (np.ceil(2 * np.log2(max(reach, 1e-3))) / 2)
     band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
     to_nodes, to_band = band_tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers, ERROR)
@@ -88,7 +90,7 @@ def response(
         moments = weight * (result[a, b, :, :, 0] + 1j * result[a, b, :, :, 1]).reshape(len(view.times_s), -1)
         range_m = out.centre[a] + back.centre[b]
         nodes = moments @ to_nodes
-        # The matrix to all subcarriers is real, so two products of reals take half a complex one's time.
+        # The matrix to all subcarriers is real: two real products take half the time of a complex one.
         bands = nodes.real @ to_band, nodes.imag @ to_band
         response_loops.add_turned(bands, -out.turns * range_m, -range_m * band_m / network.subcarriers, total)
     return total
@@ -113,35 +115,34 @@ def cosines(station: Station, places: np.ndarray) -> np.ndarray:
 
 
 def _end(
-    view: View, station: Station, counts: tuple[int, int], paths: Sequence[ImagePath],
-    physics: tuple[bool, bool],
-) -> response_loops.End:  # fmt: skip
+    view: View, station: Station, counts: tuple[int, int], paths: Sequence[ImagePath], physics: tuple[bool, bool]
+) -> response_loops.End:
     """One end's array and paths as the loops take them; physics: squint and wavefront."""
     network, (squint, wavefront) = view.network, physics
     # On a link, all frequencies are those of the signal, which is the transmitter's.
     radio, beams = radar(network, view.station), view.beams_of(station)
-    # An instant that is a multiple of the update must not fall before it by rounding.
+    # Rounding must not put the instant of a beam update before that update.
     current = np.searchsorted(beams.starts_s, view.times_s + 1e-9, side="right") - 1
     images = np.stack([np.ascontiguousarray(path.places.swapaxes(1, 2), np.float64) for path in paths])
-    coefficient = np.stack([
-        np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths
-    ])  # fmt: skip
+    coefficient = np.stack(
+        [np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths]
+    )
     mast_m = np.array(station.position_m, np.float64)
     end = response_loops.End(
         mast_m, station.horizontal[:2].copy(), np.array(counts), SPEED_OF_LIGHT / (2.0 * network.carrier_hz),
         radio.kappa, frequencies(network, view.station, squint), squint, radio.centre_hz / SPEED_OF_LIGHT,
         cosines(station, beams.aims_m)[current], images, coefficient,
-        # An image keeps all distances, so the images' mean is as far from them as the points' mean is from these.
+        # Reflection keeps distances, so images lie around their mean as the points do around theirs.
         np.linalg.norm(images.mean(axis=3) - mast_m, axis=2), np.empty((0, 0, 0, 0), np.complex128),
     )  # fmt: skip
     return end._replace(gains=spherical.gains(end, ERROR)) if wavefront else end
 
 
 def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
-    """Return the frequencies (Q,) over the carrier at which array sums are taken: Chebyshev points of the band.
+    """Return the frequencies (Q,), over the carrier, at which array sums are computed: Chebyshev points of the band.
 
-    Elements' paths relative to the array's middle decide how many are needed. Without squint, arrays work at the lowest
-    subcarrier's frequency alone.
+    Their number follows from the elements' paths relative to the array's middle. Without squint, array sums are those
+    at the lowest subcarrier.
     """
     lowest = radar(network, station).kappa
     half = 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz / network.carrier_hz

@@ -4,12 +4,29 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.echo.fast.polynomials import smooth
 from lowalt.machine.jit import INNER_VECTOR, VECTOR, kernel
-from lowalt.scene.phasor import phasor
 
 CHUNK = 128
-"""Points whose polynomials are held together, so that they stay in the nearest cache."""
+"""Points per chunk, so few that their polynomials fit into the first-level cache."""
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+
+# cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2 on [-1/2, 1/2], to rounding; written out one by one, all steps
+# stay in registers.
+_C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10, _C11 = smooth("cosine", 11)[0].tolist()
+_S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11 = smooth("sine", 11)[0].tolist()
+
+
+@kernel(inner=True, forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract"})
+def phasor(turns):
+    """Cosine and sine of 2 pi turns; the angle's rounding is that of `turns`."""
+    t = turns - np.rint(turns)
+    z = t * t
+    c = (((((_C11 * z + _C10) * z + _C9) * z + _C8) * z + _C7) * z + _C6) * z + _C5
+    c = ((((c * z + _C4) * z + _C3) * z + _C2) * z + _C1) * z + _C0
+    s = (((((_S11 * z + _S10) * z + _S9) * z + _S8) * z + _S7) * z + _S6) * z + _S5
+    s = ((((s * z + _S4) * z + _S3) * z + _S2) * z + _S1) * z + _S0
+    return c, s * t
 
 
 class End(NamedTuple):
@@ -46,7 +63,8 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
     """
     for i in range(np.uint64(len(gain))):
         turns = 0.25 * (kappa * cosine[i] - beam * aim)
-        # Off the nearest grating lobe both sines keep all their digits; in an even row every second lobe is negative.
+        # Both sines keep all their digits if the angle counts from the nearest grating lobe. In an even row every
+        # second lobe is negative.
         lobe = np.rint(2.0 * turns)
         sign = 1.0 - 2.0 * ((count - 1) % 2) * abs(lobe - 2.0 * np.rint(0.5 * lobe))
         off = turns - 0.5 * lobe
@@ -123,7 +141,7 @@ def _add_moments(factors, strength, excess, reach, table, parts, result):
             for i in range(np.uint64(count)):
                 a, b, c, d = out_re[first + i], out_im[first + i], back_re[first + i], back_im[first + i]
                 real[i], imag[i] = strength[first + i] * (a * c - b * d), strength[first + i] * (a * d + b * c)
-            # Two orders share a pass over the points; a last one without a partner passes with itself.
+            # Two orders share a pass over the points; an odd last order is paired with itself.
             for p in range(0, orders, 2):
                 even, odd = table[p], table[min(p + 1, orders - 1)]
                 a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -143,9 +161,9 @@ def _add_moments(factors, strength, excess, reach, table, parts, result):
 def moments(out, back, same, strength, reach, result):
     """Fill result (A, B, N, Q, 2, P) with the moments of every way out by path a and back by path b.
 
-    out, back: `End`; same: whether both are one array, so that a, b holds b, a too and only b >= a is filled; strength:
-    (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges. Returns the number of the
-    first symbol with a point in a station plus one, 0 for none.
+    out, back: `End`; same: whether both are the same array; then a, b also stands for b, a, and only b >= a is filled;
+    strength: (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges. Returns 1 plus the
+    number of the first symbol with a point in a station, 0 for none.
     """
     ways_out, ways_back, symbols, nodes, _, orders = result.shape
     points = strength.shape[3]

@@ -1,9 +1,10 @@
-"""Noise at set SNRs in a scene: added in all range cells before compression, or by the noise stage behind a canceller.
+"""Noise at set SNRs in a scene: added in all range cells before compression, or later, behind the scene's filters."""
 
-The workflow asks this module before any effect is imported, so nothing is imported here at the top.
-"""
+from collections.abc import Mapping
 
 import numpy as np
+
+from lowalt.scene.effects import called, every, offering
 
 
 def white(rng: np.random.Generator, variance: float, shape: tuple[int, ...]) -> np.ndarray:
@@ -11,20 +12,23 @@ def white(rng: np.random.Generator, variance: float, shape: tuple[int, ...]) -> 
     return np.sqrt(variance / 2) * rng.standard_normal((*shape, 2)).view(np.complex128)[..., 0]
 
 
-def in_all_cells(effects: dict) -> bool:
+def in_all_cells(effects: Mapping[str, dict | None]) -> bool:
     """Return whether a configuration's `effects` add the noise of noise.snr_db themselves, before range compression."""
-    return "cell_noise" in effects and (effects["cell_noise"] or {}).get("snr_db") is None
+    return any(effect.snr_db is None for effect in called(offering(effects, "receiver", "SET_SNR")))
 
 
-def behind_canceller(noise: np.ndarray, canceller: dict) -> np.ndarray:
-    """Return noise (N,) of one range cell as a canceller (its parameters) leaves it: its spectrum is not flat.
+def filters(effects: Mapping[str, dict | None]) -> dict[str, dict]:
+    """Return the part of a configuration's `effects` that filters range cells, and so the noise that is added later."""
+    return offering(effects, "detection", "filtered")
 
-    Cancellers are linear and act on each range cell by itself, so this is the noise that the cell would hold if it had
+
+def behind(noise: np.ndarray, filters: Mapping[str, dict | None]) -> np.ndarray:
+    """Return noise (N,) of one range cell as these filters leave it: behind a canceller, its spectrum is not flat.
+
+    Filters are linear and act on each range cell by itself, so this is the noise that the cell would hold if it had
     been there before. A pulse canceller shapes it as |2 sin(pi f T_r)|^(2 k) over the noise gain C(2 k, k).
     Source: M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2.
     """
-    from lowalt.scene.effects import called
-
-    for effect in called({"canceller": canceller}):
-        noise = effect.module.filtered(effect.settings, noise[:, None])[:, 0]
+    for filtered in every(called(filters), "filtered").values():
+        noise = filtered(noise[:, None])[:, 0]
     return noise

@@ -1,7 +1,7 @@
-"""Array sums of spherical waves at many points, from exact sums at few nodes of the directions and ranges they fill.
+"""Array sums of spherical waves at many points, interpolated from exact sums at a few directions and ranges.
 
-A target fills a small box of direction cosines and inverse ranges while a few symbols last. Over it an array's sum
-is a smooth function: a polynomial of a few dozen terms takes less time than the elements, each with its own distance.
+During a few symbols, a target fills a small box of direction cosines and inverse ranges. Over this box an array sum is
+smooth: a polynomial of a few dozen terms takes less time than a sum over all elements, each at its own distance.
 """
 
 from itertools import pairwise
@@ -11,15 +11,14 @@ from scipy import fft
 
 from lowalt.machine.jit import INNER_VECTOR
 from lowalt.numerics.chebyshev_series import chebyshev_points, orders_of
-from lowalt.scene.phasor import phasor
-from lowalt.scene.response_loops import CHUNK, LOOPS, End
+from lowalt.scene.response_loops import CHUNK, LOOPS, End, phasor
 
 SYMBOLS = 600
-"""Symbols that share a box."""
+"""Largest number of symbols that share a box."""
 
 
 def gains(end: End, error: float) -> np.ndarray:
-    """Return the array sums (R, N, Q, L) of spherical waves, less what `response_loops` adds: r, and middle phases.
+    """Return the array sums (R, N, Q, L) of spherical waves, without the factor 1/r and the middle's phase.
 
     error: largest error relative to the number of elements. Source: Balanis, Antenna Theory, 4th ed. 2016, 4.4.1.
     """
@@ -47,7 +46,7 @@ def gains(end: End, error: float) -> np.ndarray:
             for axis in (1, 2, 3):
                 np.moveaxis(terms, axis, 0)[0] *= 0.5
             terms = terms.reshape(len(terms), -1)
-            # Terms that are small together at every frequency are left out.
+            # Leave out terms whose sum is negligible at every frequency.
             size = abs(terms).max(axis=0)
             order = np.argsort(size)
             kept = order[np.cumsum(size[order]) > error * np.prod(end.counts)]
@@ -58,10 +57,10 @@ def gains(end: End, error: float) -> np.ndarray:
 
 
 def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tuple[int, int, int] | None:
-    """Numbers of polynomials (across, up, inverse range) that hold the sums over a box; None where it nears the array.
+    """Polynomials per axis (across, up, inverse range) that the sums in a box need; None if it is close to the array.
 
-    The phase of an element at distance D from the array's corner changes by k D over a direction cosine and, with the
-    inverse range, by k D^2 / 2; a third more allows for the mixed terms of waves that bend.
+    The phase of an element at distance D from the array's corner changes by k D per unit of a direction cosine, and by
+    k D^2 / 2 per unit of inverse range. A third more allows for the mixed terms.
     """
     wide, tall = end.spacing * (end.counts - 1)
     diagonal = float(np.hypot(wide, tall))
@@ -108,7 +107,7 @@ def _sums(end, symbol, at, result):
                         # (distance - r) / r, without cancellation far away.
                         square = inverse[i] * (inverse[i] * (x * x + y * y) - 2.0 * (x * across[i] + y * up[i]))
                         longer = square / (1.0 + np.sqrt(1.0 + square))
-                        # In spacings, less the way of the array's middle, which `response_loops` adds.
+                        # In spacings, without the path of the array's middle, which `response_loops` adds.
                         away = longer / (inverse[i] * end.spacing) + h * across[i] + v * up[i]
                         c, s = phasor(-0.5 * (end.kappas[q] * away + beam))
                         real[i] += c / (1.0 + longer)
@@ -119,7 +118,7 @@ def _sums(end, symbol, at, result):
 
 @INNER_VECTOR
 def _scaled(values, middle, half, table):
-    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half; values: the first of the L."""
+    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half; at most L values."""
     for i in range(np.uint64(len(values))):
         table[0, i] = 1.0
     if len(table) > 1:
@@ -137,7 +136,7 @@ def _polynomials(at, box, counts, powers, terms, result):
 
     terms: (2 Q, T), the factors' real parts at every frequency, then their imaginary parts.
     """
-    # Chunks of about one size, since the last one is computed whole.
+    # Chunks of nearly equal size, because the last one is also computed at full size.
     chunks = (at.shape[2] + CHUNK - 1) // CHUNK
     size, (middle, half) = (at.shape[2] + chunks - 1) // chunks, box
     across, up, near = np.zeros((counts[0], size)), np.zeros((counts[1], size)), np.zeros((counts[2], size))

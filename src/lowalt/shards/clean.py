@@ -16,7 +16,7 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals
-from lowalt.scene.set_noise import behind_canceller, in_all_cells
+from lowalt.scene.set_noise import behind, in_all_cells
 from lowalt.shards.sample_record import encoded, sample_key
 
 POWER = "power_w"
@@ -81,10 +81,10 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
 def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) -> np.ndarray:
     """Return the signals of one sample from a motion model's clean echoes, both (stations, symbols) complex64."""
     powers = np.array(entry[POWER])[:, None] if POWER in entry else None
-    behind = None
+    filtered = None
     if CANCELLER in entry:
-        behind = functools.partial(behind_canceller, canceller=json.loads(entry[CANCELLER]))
-    return noisy_signals(clean[:, None], [entry], stations, [snr_db], entry["seed"], powers, behind)[0, 0]
+        filtered = functools.partial(behind, filters={"canceller": json.loads(entry[CANCELLER])})
+    return noisy_signals(clean[:, None], [entry], stations, [snr_db], entry["seed"], powers, filtered)[0, 0]
 
 
 def complex_signals(stored: np.ndarray) -> np.ndarray:

@@ -29,9 +29,7 @@ def _signals(kind: str, path: str | None, network: Network, shape: tuple[int, in
     return signals
 
 
-def noisy_content(
-    kind: str, path: str | None, tiles: str | None, network: Network, shape: tuple[int, int]
-) -> Content:  # fmt: skip
+def noisy_content(kind: str, path: str | None, tiles: str | None, network: Network, shape: tuple[int, int]) -> Content:
     """Return the content of image or signal shards from the chunk's files.
 
     path: of the noisy signals; shape: numbers of motion models and SNRs of the chunk.
@@ -72,7 +70,7 @@ def clean_content(
 
 def cube_content(
     path: str | None, cubes: Cubes, rows: Sequence[dict], snrs: Sequence[float], cell_type: str
-) -> Content:  # fmt: skip
+) -> Content:
     """Return the content of cube shards from the chunk's noisy signals and what makes their cubes.
 
     path: of the noisy signals; cell_type: as which cells are stored, "complex64" or "int16".

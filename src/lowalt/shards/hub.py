@@ -76,8 +76,7 @@ def features(shards: ShardSet) -> list[dict]:
         # One nested list per axis of the array.
         axes = {"list": {"list": {"list": "int16" if cell_type_of(entry) == "int16" else "float32"}}}
         data = {"list": axes} if shards.kind == "cube" else axes
-    return [typed("__key__", ""), typed("__url__", ""), typed("json", entry),
-            {"name": EXTENSIONS[shards.kind], **data}]  # fmt: skip
+    return [typed("__key__", ""), typed("__url__", ""), typed("json", entry), {"name": EXTENSIONS[shards.kind], **data}]
 
 
 def front(shards: ShardSet, name: str, license_name: str) -> dict:

@@ -13,7 +13,7 @@ from lowalt.echo.chunk import clean_signals
 from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.lateness import lateness
-from lowalt.scene.set_noise import behind_canceller, in_all_cells
+from lowalt.scene.set_noise import behind, filters, in_all_cells
 from lowalt.shards.sample_record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.spectra import Spectra
@@ -69,9 +69,7 @@ class Maker:
         scene = {"seed": self.seed, "network": self.render["network"], **self.echo}
         return Cubes.from_settings(scene, self.clouds, self.occluders)
 
-    def cubes(
-        self, row: dict, snr_db: float, signal: np.ndarray, stations: Sequence[int] | None = None
-    ) -> list[Cube]:  # fmt: skip
+    def cubes(self, row: dict, snr_db: float, signal: np.ndarray, stations: Sequence[int] | None = None) -> list[Cube]:
         """Return the cube of each station of a sample of the motion model `row` at an SNR (dB); signal: its noisy
         signals (stations, symbols); stations: numbers of those to make, all by default.
 
@@ -90,7 +88,7 @@ class Maker:
 
     def received(
         self, row: dict, snr_db: float | None = None, stations: Sequence[int] | None = None
-    ) -> tuple[np.ndarray, np.ndarray | None]:  # fmt: skip
+    ) -> tuple[np.ndarray, np.ndarray | None]:
         """Return a motion model's clean echoes (stations, symbols) complex64 and the reference powers (stations, 1) W
         of SNRs, None if these are the powers of the echoes. With an SNR (dB), the echoes include the noise of all
         range cells. stations: numbers of those to compute, all by default.
@@ -138,13 +136,13 @@ class Maker:
 
     def _noisy(self, row: dict, snr_db: float, stations: Sequence[int]) -> np.ndarray:
         """The noisy signals of one sample at some stations."""
-        effects, behind = self.echo["effects"], None
+        effects = self.echo["effects"]
         if in_all_cells(effects):
             return self.received(row, snr_db, stations)[0]
-        if "canceller" in effects:
-            behind = functools.partial(behind_canceller, canceller=effects["canceller"] or {})
+        passed = filters(effects)
+        filtered = functools.partial(behind, filters=passed) if passed else None
         clean, powers = self.received(row, None, stations)
-        return noisy_signals(clean[:, None], [row], self._names(stations), [snr_db], self.seed, powers, behind)[0, 0]
+        return noisy_signals(clean[:, None], [row], self._names(stations), [snr_db], self.seed, powers, filtered)[0, 0]
 
     def late(self, row: dict) -> np.ndarray | None:
         """Return the delays of a motion model's symbols, (stations, symbols); None if images do not use them."""
@@ -158,9 +156,7 @@ class Maker:
         """Return the PNG file of the tile of one sample of the motion model `row` at an SNR (dB)."""
         return encode(self.tile(signal, row, snr_db), self.images.palette)
 
-    def data(
-        self, kind: str, signal: np.ndarray, row: dict, snr_db: float, cell_type: str
-    ) -> tuple[bytes, dict]:  # fmt: skip
+    def data(self, kind: str, signal: np.ndarray, row: dict, snr_db: float, cell_type: str) -> tuple[bytes, dict]:
         """Return the data of one sample as a shard of a kind holds it, and what its record says of its cubes.
 
         kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations, symbols);

@@ -57,9 +57,8 @@ def _entry(key: str, number: int, model: int, snr_db: float, span: Span) -> tupl
 
 
 def write_shard(
-    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Content,
-    piece: tuple[int, int] = (0, 1),
-) -> dict:  # fmt: skip
+    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Content, piece: tuple[int, int] = (0, 1)
+) -> dict:
     """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it; return the table's header.
 
     content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind "image") or .npy, or of

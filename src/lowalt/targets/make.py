@@ -1,6 +1,5 @@
 """Make the calibration point cloud of a target from any source that its record may name."""
 
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
@@ -12,8 +11,22 @@ SOURCES = ("builtin", "mesh", "mocap", "gait")
 
 
 def source_module(source: str) -> ModuleType:
-    """Return the module of a source. It is imported only here: a built-in cloud does not wait for pymeshlab."""
-    return import_module(f"lowalt.targets.{source}")
+    """Return the module of one of SOURCES, imported at the call: a built-in cloud waits for no reader of files."""
+    if source == "mesh":
+        from lowalt.targets import mesh
+
+        return mesh
+    if source == "mocap":
+        from lowalt.targets import mocap
+
+        return mocap
+    if source == "gait":
+        from lowalt.targets import gait
+
+        return gait
+    from lowalt.targets import builtin
+
+    return builtin
 
 
 def refuse_source(record: dict, inputs: Path | None) -> None:

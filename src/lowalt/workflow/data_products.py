@@ -7,7 +7,7 @@ from typing import Any
 
 from lowalt.config.named_code import buildings_of
 from lowalt.files.atomic import slug
-from lowalt.scene.lateness import timed
+from lowalt.scene.lateness import late_effects
 from lowalt.spectra.catalogue import of_cells
 from lowalt.targets.records import source_files
 from lowalt.workflow.run import Run
@@ -104,7 +104,7 @@ class DataProducts:
         """Inputs of tiles other than signals: the motion table, if spectra use known symbol instants or range cells;
         for range cells also clouds and surfaces."""
         cells = bool(of_cells(self._config["spectra"]))
-        motion = {"motion": self.motion(wildcards)} if cells or timed(self._config) else {}
+        motion = {"motion": self.motion(wildcards)} if cells or late_effects(self._config) else {}
         return motion | (self._scene(wildcards) if cells else {})
 
     def _scene(self, wildcards: Any) -> dict[str, list[str]]:

@@ -53,14 +53,14 @@ class Launch:
         """Snakemake resources of a training job: `gpu` on one machine, `gres` (GPUs per node) over several nodes."""
         if self.nodes == 1:
             return {"gpu": self.processes if self.gpu else 0}
-        # `mpi`: the executor requests `tasks` tasks and leaves it to the command to call srun. `tasks_per_gpu: 0` keeps
-        # the executor from also requesting `tasks` tasks per GPU.
+        # With `mpi`, the executor requests `tasks` tasks and the command itself calls srun. Without `tasks_per_gpu: 0`,
+        # the executor would also request `tasks` tasks per GPU.
         tasks = {"nodes": self.nodes, "tasks": self.nodes, "mpi": "srun", "tasks_per_gpu": 0}
         return tasks | self.evaluation
 
     @property
     def evaluation(self) -> dict:
-        """Snakemake resources of a prediction job, in the form of `training`, since both may share one Slurm job."""
+        """Snakemake resources of a prediction job, in the form of `training`: both may run in the same Slurm job."""
         if self.nodes == 1:
             return {"gpu": int(self.gpu)}
         return {"gpu": 0} | ({"gres": f"gpu:{self.per_node}"} if self.gpu else {})

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.scene.effects import dotted
-from lowalt.scene.lateness import timed
+from lowalt.scene.lateness import late_effects
+from lowalt.scene.set_noise import filters
 from lowalt.spectra.catalogue import of_cells
 
 
@@ -45,8 +46,9 @@ def reduced(wildcards: Any, output: Any) -> list[str]:
 
 
 def noise_modules(config: dict) -> list[str]:
-    """The modules that the noise stage loads in a scene with a canceller."""
-    return ["lowalt.scene.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
+    """The modules that the noise stage loads in a scene whose filters the noise passes."""
+    passed = filters(config["effects"])
+    return ["lowalt.scene.set_noise", *map(dotted, passed)] if passed else []
 
 
 def shard_modules(config: dict) -> list[str]:
@@ -57,5 +59,6 @@ def shard_modules(config: dict) -> list[str]:
 
 def tile_modules(config: dict) -> list[str]:
     """The modules that the tiles stage loads where spectra know the instants of late symbols or show range cells."""
-    late = ["lowalt.scene.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
+    named = late_effects(config)
+    late = ["lowalt.scene.lateness", "lowalt.motion", *map(dotted, named)] if named else []
     return [*late, "lowalt.tiles.cubes", *map(dotted, config["effects"])] if of_cells(config["spectra"]) else late

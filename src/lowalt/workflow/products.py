@@ -26,7 +26,7 @@ TABLES = (
     "alarms.csv", "calibration.csv",
 )  # fmt: skip
 """Tables of recognition; their rows name a protocol and a scheme."""
-PAGE_TABLES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds")
+PAGE_TABLES = ("accuracy", "confusion_by_snr", "subtypes", "comparisons", "orderings", "seeds")
 """Tables that the report shows."""
 
 

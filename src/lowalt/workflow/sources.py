@@ -10,9 +10,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 ROOT = PACKAGE.parent
-SOURCE_MODULES = [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
-"""Modules that targets are read from; a command imports the one that a record names."""
 CATALOGUE = "lowalt.spectra.catalogue"
+"""The module that imports spectra by name, so that a new file in their folder changes no other."""
 
 
 @functools.cache

@@ -11,8 +11,8 @@ from lowalt.config.network import as_far_as, masts_m
 from lowalt.config.plan import Chunk, motion_block
 from lowalt.files.shipped import as_named
 from lowalt.motion.drawing import masts_in_reach
-from lowalt.scene.lateness import timed
-from lowalt.scene.set_noise import in_all_cells
+from lowalt.scene.lateness import late_effects
+from lowalt.scene.set_noise import filters, in_all_cells
 from lowalt.spectra.catalogue import of_cells
 from lowalt.workflow.run import Run
 
@@ -68,7 +68,7 @@ class Settings:
             masts_m=masts_in_reach(masts_m(self._config["network"]), **block["region"]),
             motion={key: block[key] for key in MOTION if key in block},
             published={name: self._run.records[name]["published"] for name in members},
-        )  # fmt: skip
+        )
 
     def echo(self, wildcards: Any) -> str:
         """The network as far as it decides the job's station, and the echo's tolerance."""
@@ -83,17 +83,17 @@ class Settings:
         return _text(**self._blocks("seed", "network", "effects"), tolerance=tolerance, **inside)
 
     def noise(self, wildcards: Any) -> str:
-        """The set of SNRs, the names of the stations, and the canceller that the noise passes."""
-        snrs, effects = self._snrs(wildcards), self._config["effects"]
-        passed = {"canceller": effects["canceller"] or {}} if "canceller" in effects else {}
-        return _text(**self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
+        """The set of SNRs, the names of the stations, and the scene's filters, which the noise passes."""
+        snrs, passed = self._snrs(wildcards), filters(self._config["effects"])
+        return _text(
+            **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **({"filters": passed} if passed else {})
+        )
 
     def images(self, wildcards: Any) -> str:
         """Network, spectra and images; what late symbols are drawn from, where spectra know their instants; what
         range cells are made from, where spectra show them."""
         blocks = self._blocks("network", "spectra", "images")
-        if timed(self._config):
-            late = {"slow_time": self._config["effects"]["slow_time"]}
+        if late := late_effects(self._config):
             blocks["drawn"] = {"seed": self._config["seed"], "effects": late}
         if not of_cells(self._config["spectra"]):
             return _text(**blocks)
@@ -130,11 +130,11 @@ class Settings:
         return _text(size=size, **more)
 
     def training(self, wildcards: Any) -> str:
-        """Settings of a training, with its training seed or, if the job has none, the run's seed."""
-        block = self._config["recognition"]
+        """Settings of a training with its scheme, and its training seed or, if the job has none, the run's seed."""
+        block, scheme = self._config["recognition"], self._run.schemes_by_slug[wildcards.scheme].record
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
-        seed = int(wildcards.get("train_seed", self._config["seed"]))
-        return _text(seed=seed, colour_map=self._config["images"]["colour_map"], classes=self._run.classes, **kept)
+        kept |= {"scheme": scheme, "colour_map": self._config["images"]["colour_map"], "classes": self._run.classes}
+        return _text(seed=int(wildcards.get("train_seed", self._config["seed"])), **kept)
 
     def evaluation(self, wildcards: Any) -> str:
         """Settings with which a network predicts."""

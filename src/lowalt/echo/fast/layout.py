@@ -99,9 +99,7 @@ def layout(scene: EchoInput, peak: float) -> Layout:
     total = float(amplitude.sum())
     share = amplitude / total if total > 0 else amplitude
     room = count if rigid else 0
-    groups = Groups(
-        np.zeros(room, np.int64), np.zeros(room + 1, np.int64), np.empty((room, 3)), *np.empty((3, room))
-    )  # fmt: skip
+    groups = Groups(np.zeros(room, np.int64), np.zeros(room + 1, np.int64), np.empty((room, 3)), *np.empty((3, room)))
     # Loops process MULTIPLE points at a time, so the arrays extend beyond the last point.
     x, y, z = np.zeros((3, room + MULTIPLE))
     number = 0

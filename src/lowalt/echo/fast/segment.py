@@ -39,12 +39,8 @@ def fit_gains(segment, aims, gains, error, unit, fold, work):
     segment: row of the table of segments; aims: the beams' direction cosines; gains: `ArrayGains`; else as `fit_gain`.
     """
     centre_h, centre_v = segment[PSI_CENTRE] - aims[0], segment[OMEGA_CENTRE] - aims[1]
-    degree_h, bound_h = fit_gain(
-        gains.horizontal, centre_h, segment[PSI_HALF], error, unit, fold, work, np.int64(0)
-    )  # fmt: skip
-    degree_v, bound_v = fit_gain(
-        gains.vertical, centre_v, segment[OMEGA_HALF], error, unit, fold, work, np.int64(1)
-    )  # fmt: skip
+    degree_h, bound_h = fit_gain(gains.horizontal, centre_h, segment[PSI_HALF], error, unit, fold, work, np.int64(0))
+    degree_v, bound_v = fit_gain(gains.vertical, centre_v, segment[OMEGA_HALF], error, unit, fold, work, np.int64(1))
     return degree_h, degree_v, bound_h + bound_v + bound_h * bound_v
 
 

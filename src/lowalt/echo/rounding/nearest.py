@@ -86,7 +86,7 @@ def same_double(x, error, bits):
 
 def correct(
     sample: EchoSample, refs: np.ndarray, found: Found, pointwise_bound: tuple[float, float]
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int]:
     """Make every value of `found` round to the complex64 nearest to the true value, in the truly strongest cell.
 
     Returns the number of recomputed symbols and how many of them remain undecided. Cells whose strengths differ by less

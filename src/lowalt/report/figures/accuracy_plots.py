@@ -1,7 +1,9 @@
 """Plots of accuracy over SNR, and confusion matrices."""
 
 import math
+from itertools import cycle
 
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -31,19 +33,13 @@ def over_snr(ours: dict, published: dict) -> Plot:
     levels = sorted({row["snr_db"] for row in rows}, key=lambda snr: float("inf" if snr in infinite else snr))
     schemes = list(dict.fromkeys(row["scheme"] for row in rows))
     colours = {scheme: COLOURS[number % len(COLOURS)] for number, scheme in enumerate(schemes)}
-    lines: dict[tuple, list[dict]] = {}
-    for row in rows:
-        lines.setdefault((row["protocol"], row["scheme"], row["source"]), []).append(row)
     names = [f"{protocol} subtypes" for protocol in ours]
     figure = Figure(figsize=(6.5 * len(names), 4 + 0.2 * math.ceil(len(schemes) / 4)), layout="constrained")
     for panel, name in zip(plain(figure.subplots(1, len(names), sharey=True, squeeze=False)), names, strict=True):
-        for (protocol, scheme, source), line in lines.items():
-            if protocol == name:
-                places, values = (
-                    [levels.index(row["snr_db"]) for row in line],
-                    [row["accuracy_percent"] for row in line],
-                )
-                panel.plot(places, values, SOURCES[source], marker="o", markersize=4, color=colours[scheme])
+        for scheme, source in dict.fromkeys((row["scheme"], row["source"]) for row in rows):
+            line = [(levels.index(row["snr_db"]), row["accuracy_percent"]) for row in rows
+                    if (row["protocol"], row["scheme"], row["source"]) == (name, scheme, source)]  # fmt: skip
+            panel.plot(*np.array(line).reshape(-1, 2).T, SOURCES[source], marker="o", ms=4, color=colours[scheme])
         panel.set(title=name, xlabel="SNR (dB)", xticks=range(len(levels)), xticklabels=levels)
     figure.axes[0].set_ylabel("accuracy (%)")
     handles = [Line2D([], [], color=colour, label=scheme) for scheme, colour in colours.items()]
@@ -87,3 +83,36 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
     for panel in panels[len(counts) :]:
         panel.set_axis_off()
     return drawn("confusion", "confusion matrices in percent of the true class", figure, rows)
+
+
+def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) -> Plot:
+    """Return what each class is taken for at each SNR: a row of panels per protocol, a panel per true class, and in it
+    a bar per SNR of the shares (percent) of all answers; rows: those of confusion_by_snr.csv, one scheme per protocol.
+    """
+    counts = {(row["protocol"], row["snr_db"], row["category"], row["predicted"]): int(row["samples"]) for row in rows}
+    schemes = {row["protocol"]: row["scheme"] for row in rows}
+    levels = sorted({row["snr_db"] for row in rows}, key=float)
+    places = [(protocol, true) for protocol in schemes for true in categories]
+    columns = min(len(categories), 4)
+    height = math.ceil(len(places) / columns)
+    figure = Figure(figsize=(3.2 * columns, 2.4 * height + 0.5), layout="constrained")
+    panels = plain(figure.subplots(height, columns, sharex=True, sharey=True, squeeze=False))
+    shown: list[dict] = []
+    for panel, (protocol, true) in zip(panels, places, strict=False):
+        samples = np.array([[counts.get((protocol, snr, true, answer), 0) for snr in levels] for answer in categories])
+        shares = 100 * samples / np.maximum(samples.sum(axis=0), 1)
+        for answer, colour, part, below in zip(categories, cycle(COLOURS), shares, shares.cumsum(axis=0) - shares):
+            panel.bar(range(len(levels)), part, bottom=below, color=colour, label=answer)
+        shown += [{"protocol": protocol, "scheme": schemes[protocol], "snr_db": snr, "true": true,
+                   "recognised_as": answer, "samples": samples[line, column], "percent": shares[line, column].round(2)}
+                  for line, answer in enumerate(categories) for column, snr in enumerate(levels)]  # fmt: skip
+        panel.set(title=f"{true}, {protocol} subtypes", ylim=(0, 100))
+        panel.set_xticks(range(len(levels)), [SNR_LABELS.get(snr, snr) for snr in levels])
+        panel.grid(visible=False)
+    for panel in panels[len(places) :]:
+        panel.set_axis_off()
+    figure.supxlabel("SNR (dB)")
+    figure.supylabel("recognised as (%)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=8, frameon=False)
+    words = "what each class is taken for at each SNR, in percent of its samples"
+    return drawn("confusion_by_snr", words, figure, shown)

@@ -14,8 +14,8 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.style import COLOURS, plain
 from lowalt.report.plots import Plot, drawn
 
-RECOGNITION = ("scheme", "kind", "unseen_percent", "low", "high", "core_s_data", "core_s_training", "front")
-PRESET = ("preset", "command", "macro_f1_low", "macro_f1_high")
+RECOGNITION = ("scheme", "preset", "kind", "unseen_percent", "low", "high", "core_s_data", "core_s_training", "front")
+PRESET = ("command", "macro_f1_low", "macro_f1_high")
 ECHO = ("method", "tolerance", "points", "seconds", "relative_error")
 STORED = 2.0**-24
 """Relative rounding error of a stored value (complex64): half a unit in the last place."""
@@ -28,9 +28,9 @@ def _rows(rows: list[dict[str, str]]) -> list[dict]:
     for row in sorted((row for row in rows if row["kind"] == "trained"), key=seconds):
         low, high = float(row["low"]), float(row["high"])
         data.append({
-            "scheme": row["scheme"], "core_s": seconds(row), "accuracy_percent": float(row["unseen_percent"]),
-            "low": first + low, "high": min(first + high, 100.0), "front": row["front"],
-            "same": low <= 0 <= high, "first": row is base,
+            "scheme": row["scheme"], "name": row["preset"] or row["scheme"], "core_s": seconds(row),
+            "accuracy_percent": float(row["unseen_percent"]), "low": first + low, "high": min(first + high, 100.0),
+            "front": row["front"], "same": low <= 0 <= high, "first": row is base,
         })  # fmt: skip
     return data
 
@@ -47,7 +47,7 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
     same = [row["accuracy_percent"] for row in data if row["same"]]
     panel.axhspan(min(same), max(same), color="0.5", alpha=0.2, linewidth=0)
     base = next(row for row in data if row["first"])
-    for apart, colour, label in ((False, "#6e7781", f"cannot be told apart from {base['scheme']}"),
+    for apart, colour, label in ((False, "#6e7781", f"cannot be told apart from {base['name']}"),
                                  (True, COLOURS[1], "differs")):  # fmt: skip
         some = [row for row in data if row["same"] != apart]
         times, values = ([row[name] for row in some] for name in ("core_s", "accuracy_percent"))
@@ -62,7 +62,7 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
     for row in front:
         level = max(row["accuracy_percent"], level) + (100 - least) / 18
         place = row["core_s"], level
-        panel.annotate(row["scheme"], (row["core_s"], row["accuracy_percent"]), place, ha="right",
+        panel.annotate(row["name"], (row["core_s"], row["accuracy_percent"]), place, ha="right",
                        arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5})  # fmt: skip
     panel.set(xscale="log", ylim=(math.floor(least), max(100.0, level) + 1), ylabel="accuracy, unseen subtypes (%)",
               xlabel="processor-seconds of data and training")  # fmt: skip

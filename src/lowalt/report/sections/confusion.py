@@ -1,13 +1,21 @@
-"""Section: confusion matrices."""
+"""Section: confusion matrices over all SNRs, and what each class is taken for at each SNR."""
 
 from lowalt.report.figures import accuracy_plots
-from lowalt.report.pivots import confusion
+from lowalt.report.pivots import best_schemes, by_scheme, confusion
 from lowalt.report.reported_run import ReportedRun
+from lowalt.report.sections import accuracy
 
-COLUMNS = ("protocol", "scheme", "category", "predicted", "samples")
+COLUMNS = ("protocol", "scheme", "snr_db", "category", "predicted", "samples")
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the plot; None where nothing was predicted."""
-    counts = confusion(run.inputs.table("confusion", *COLUMNS))
-    return {"plot": accuracy_plots.confusion(counts, run.shards.classes)} if counts else None
+    """Return both plots, that by SNR of the best scheme of each protocol; None where nothing was predicted."""
+    rows, classes = run.inputs.table("confusion_by_snr", *COLUMNS), run.shards.classes
+    if not rows:
+        return None
+    best = best_schemes(by_scheme(run.inputs.table("accuracy", *accuracy.COLUMNS)))
+    chosen = [row for row in rows if row["scheme"] == best[row["protocol"]]]
+    return {
+        "plot": accuracy_plots.confusion(confusion(rows), classes),
+        "by_snr": accuracy_plots.confusion_by_snr(chosen, classes),
+    }

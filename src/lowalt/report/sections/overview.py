@@ -4,7 +4,7 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
 from lowalt.report.figures.style import embedded
 from lowalt.report.figures.tiles import example_tiles
-from lowalt.report.pivots import by_scheme, macro_f1
+from lowalt.report.pivots import best_schemes, by_scheme, macro_f1
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections.accuracy import COLUMNS
 from lowalt.spectra.catalogue import named
@@ -27,9 +27,8 @@ def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]], clas
     """Return one entry per protocol: scheme of highest average, its accuracy, interval of macro F1, and a verdict."""
     ours, paper, intervals = by_scheme(rows), by_scheme(published), macro_f1(rows)
     entries = []
-    for protocol, schemes in ours.items():
-        scheme = max(schemes, key=lambda name: schemes[name]["avg"])
-        here, there = schemes[scheme]["avg"], paper.get(protocol, {}).get(scheme, {}).get("avg")
+    for protocol, scheme in best_schemes(ours).items():
+        here, there = ours[protocol][scheme]["avg"], paper.get(protocol, {}).get(scheme, {}).get("avg")
         seeds = max(int(row["seeds"]) for row in rows)
         entries.append({
             "protocol": protocol, "scheme": scheme, "percent": here, "paper": there,

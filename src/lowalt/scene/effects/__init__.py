@@ -4,7 +4,7 @@ What such a file offers: `lowalt.scene.contract`. An effect is imported when a s
 """
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -59,6 +59,16 @@ class NamedEffect(NamedTuple):
         entries = getattr(self.module, "IDLE", ())
         return any(all(self.settings[key] == value for key, value in entry.items()) for entry in entries)
 
+    @property
+    def snr_db(self) -> float | None:
+        """The SNR at which the effect adds noise; None for each of noise.snr_db, and for effects without one."""
+        return self.settings.get(getattr(self.module, "SET_SNR", None))
+
+    def at_snr(self, snr_db: float) -> "NamedEffect":
+        """Return the effect with its noise, if it adds any, at this SNR (dB)."""
+        key = getattr(self.module, "SET_SNR", None)
+        return self._replace(settings=self.settings | {key: snr_db}) if key else self
+
 
 def dotted(name: str) -> str:
     """Return the module of an effect, such as lowalt.scene.effects.receiver.adc, or the path of the user's own.
@@ -78,7 +88,7 @@ def module_of(name: str) -> ModuleType:
     return loaded(name) if own_effects([name]) else importlib.import_module(dotted(name))
 
 
-def called(block: dict[str, dict | None]) -> list[NamedEffect]:
+def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
     """Return the effects of a scene's `effects` block in the chain's order, without those that are idle.
 
     Raises: InputError for an unknown effect or parameter, or two effects that offer a function of which a scene has
@@ -111,6 +121,15 @@ def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[.
         for effect in effects
         if hasattr(effect.module, function)
     }
+
+
+def offering(block: Mapping[str, dict | None], place: str, name: str) -> dict[str, dict]:
+    """Return the part of an `effects` block that acts at a place and has a function, or another name, of the contract.
+
+    Only shipped effects of that place are imported; idle ones are left out.
+    """
+    asked = called({key: value for key, value in block.items() if PLACES.get(key) == place})
+    return {effect.name: block[effect.name] or {} for effect in asked if hasattr(effect.module, name)}
 
 
 def only(effects: Iterable[NamedEffect], function: str) -> Callable[..., Any] | None:

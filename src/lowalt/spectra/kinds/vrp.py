@@ -10,7 +10,7 @@ from lowalt.spectra.fourier import (  # noqa: F401
     rows,
     speeds,
     tables,
-)  # fmt: skip
+)
 from lowalt.spectra.settings import Fourier as Settings
 
 TITLE = "velocity preferred (VRP)"

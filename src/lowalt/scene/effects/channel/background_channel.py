@@ -23,6 +23,8 @@ SOURCE = (
     "clusters); arrival angles are those of departure, as agreed in 3GPP RAN1"
 )
 DEFAULTS = {"environment": "UMa", "weak_clusters": False}
+UNMODELLED = ("links",)
+STILL = True
 
 PLACES = {
     "UMi": ((6.1996, 0.1558, 15.2697), (12.0487, 2.3261, 0.0157)),
@@ -102,10 +104,11 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
     return Still(np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy())
 
 
-def usual_power(settings: dict, view: View) -> float:
+def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
     """Return the mean power (W) of a subcarrier of the surroundings' echoes, the median of `USUAL` draws."""
     drawn = [scatter(settings, view.at(view.times_s[:1]), np.random.default_rng(number)) for number in range(USUAL)]
-    return float(np.median([np.mean(abs(still.response) ** 2) for still in drawn]))
+    usual_w = float(np.median([np.mean(abs(still.response) ** 2) for still in drawn]))
+    return [(f"background, {view.network.bin_name}, median of draws", usual_w, "W")]
 
 
 def _antennas(view: View, direction: np.ndarray) -> np.ndarray:

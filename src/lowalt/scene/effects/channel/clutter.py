@@ -27,10 +27,10 @@ SOURCE = (
     "(sin psi_1 sin psi_2)^(1/2), Willis, Bistatic Radar, 2nd ed. 1995, ch. 9, measured in the plane of both grazing "
     "rays; at other angles out of plane, and the spectrum narrowed by cos(beta / 2): estimates"
 )
-DEFAULTS = {
-    "gamma": 0.03, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5, "correlation_m": 20.0,
-}  # fmt: skip
+DEFAULTS = {"gamma": 0.03, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5, "correlation_m": 20.0}
 IDLE = [{"gamma": 0}]
+UNMODELLED = ("cw",)
+STILL = True
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
@@ -74,6 +74,14 @@ def mean_power(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean power (cells,) W of the land in each slant-range cell, and the factor on its Doppler."""
     aims_m = np.stack([view.aim_of(view.station.transmitter or view.station), view.aim_m])
     return land.cell_power(settings, view.network, view.station, aims_m, view.element)
+
+
+def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
+    """Return the mean power (W) of the land in all range cells, and in that of the target, side lobes included."""
+    power, network = mean_power(settings, view)[0], view.network
+    cell = round(float(view.ways_m(view.origin_m)) / (2 * network.cell_m)) % network.subcarriers
+    there = land.with_side_lobes(power, network.subcarriers)[cell]
+    return [("land, all range cells", float(power.sum()), "W"), ("land, the target's range cell", float(there), "W")]
 
 
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:

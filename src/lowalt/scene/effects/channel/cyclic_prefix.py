@@ -24,6 +24,7 @@ SOURCE = (
     "Residual ISI cancellation for OFDM with applications to HDTV broadcasting, IEEE J. Sel. Areas Commun. 16(8), 1998"
 )
 DEFAULTS = {"prefix_s": None}
+UNMODELLED = ("fmcw", "cw")
 
 
 def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.ndarray | float:
@@ -36,6 +37,13 @@ def prefix_s(settings: dict, network: Network) -> float:
     return prefix_length_s(settings["prefix_s"], network)
 
 
+def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
+    """Return what the echo of the target's middle keeps of its power."""
+    delay_s = float(view.ways_m(view.origin_m)) / SPEED_OF_LIGHT
+    kept = 1 - float(lost(delay_s, prefix_s(settings, view.network), view.network))
+    return [("loss beyond the cyclic prefix", kept**2, "1")]
+
+
 def late_samples(settings: dict, view: View) -> np.ndarray:
     """Return how many samples (N, L) of each point's echo, at the start of the window, carry the previous symbol."""
     network = view.network
@@ -46,7 +54,7 @@ def late_samples(settings: dict, view: View) -> np.ndarray:
 
 def convolved(
     settings: dict, network: Network, response: np.ndarray, on_air: Callable[[str], np.ndarray], offset_cells: float
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return the time samples (N, M) of still echoes: the linear convolution of the sent stream with the range cells.
 
     response: (N, M) of all echoes; on_air: subcarriers (N, M) on the air in the "waveform" and the "previous waveform";

@@ -18,12 +18,21 @@ SOURCE = (
 )
 DEFAULTS = {"loss_db": 0.0}
 IDLE = [{"loss_db": None}]
+STILL = True
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a network without links."""
     if all(station.transmitter is None for station in scene.network.stations):
         raise InputError("effects.direct_path: no station of the network is a link, expected {transmit, receive}")
+
+
+def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
+    """Return the power (W) of the direct path; nothing for a station that receives its own signal."""
+    if view.station.transmitter is None:
+        return []
+    response = scatter(settings, view, np.random.default_rng()).response
+    return [(f"direct path, {view.network.bin_name}", float(np.mean(abs(response) ** 2)), "W")]
 
 
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:

@@ -28,6 +28,7 @@ SOURCE = (
     "Communication Networks, KIT 2014, ch. 4 and 5 (other nodes as noise)"
 )
 DEFAULTS = {"leakage_db": 45.0, "loss_db": 0.0, "sigma_ppm": 0.017, "sigma_s": 2e-8}
+UNMODELLED = ("links", "fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

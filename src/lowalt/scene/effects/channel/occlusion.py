@@ -1,8 +1,9 @@
 """Self-occlusion: points that the target's own surfaces hide from a station do not echo.
 
-Straight rays, point by point and symbol by symbol, against the surfaces of all parts as they turn; shadows are sharp.
-Waves bend around blades: a hidden point keeps the power share on the axis of the shadow of a strip of a blade's width.
-Waves on other paths (a ground reflection) are taken to be hidden where the direct one is.
+For every point and symbol, a straight ray to the station is tested against the surfaces of all moving parts; shadows
+are sharp. Waves bend around rotor blades: a point behind one keeps the share of power that reaches the axis of the
+shadow of a strip as wide as the blade. Other paths, such as a ground reflection, count as hidden where the direct path
+is.
 """
 
 from collections.abc import Collection
@@ -49,7 +50,7 @@ def passed(width_m: float, distance_m: float, wavelength_m: float) -> float:
 
 
 def through_blades(view: View) -> float:
-    """Return the factor on a two-way amplitude behind a blade: its power share, the mean over the craft's rotors.
+    """Return the factor on a two-way amplitude behind a blade: the share of power, averaged over the rotors.
 
     The rotor's radius is taken as the distance behind the blade, and the phase is left out.
     """
@@ -94,9 +95,8 @@ def _surfaces(view: View) -> dict:
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 0 where not.
 
-    Behind `bent` blades it is the share that goes around them instead, behind `transparent` ones 1. On a link each way
-    has the root of the factor that a station at its end has: a point hidden from either end by opaque surfaces does
-    not echo.
+    Behind `bent` blades it is the share that goes around them, behind `transparent` ones 1. On a link it is the root of
+    the product of the factors at both ends, so a point that opaque surfaces hide from either end does not echo.
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
     ends = view.ends()

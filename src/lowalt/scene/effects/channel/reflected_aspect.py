@@ -1,8 +1,9 @@
-"""Aspect and occlusion along reflected routes: by the ground or a facade a target shows another side.
+"""Aspect and occlusion along reflected paths: the ground and a facade see another side of a target than the station.
 
-A point sees the station in the mirror, so the way there and back by one reflected path has the aspect and the shadows
-of a station at the mirror image's place. Out by one path and back by another, each way counts with the root of its own
-two-way factor. Without this effect all paths have the direct one's aspect and shadows.
+A point sees a reflected path come from the station's mirror image. Out and back on that path, the target has the aspect
+and the shadows that a station at the mirror image would see. Where the outward and the return path differ, the factor
+is the root of the product of both two-way factors. Without this effect, all paths have the aspect and the shadows of
+the direct path.
 """
 
 from collections.abc import Callable

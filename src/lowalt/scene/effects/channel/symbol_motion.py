@@ -18,6 +18,7 @@ SOURCE = (
     "number of instants: Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2"
 )
 DEFAULTS: dict[str, float] = {}
+UNMODELLED = ("cw",)
 
 
 def instants(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:

@@ -1,9 +1,9 @@
 """Building multipath: facades reflect the wave to a target and back, each as a further path.
 
 A facade is an upright rectangle on the ground. The station sees every point's image behind it, weaker by the Fresnel
-coefficient of the wall, where the ray meets the rectangle. Out and back by any two paths add; rays that meet two
-facades, edges and shadows of the buildings are left out (`line_of_sight` blocks by probability). Points may be on
-either side; a facade reflects only between points on the station's side.
+coefficient of the wall, where the ray meets the rectangle. All pairs of an outward and a return path add. Rays that
+meet two facades, diffraction at edges and the shadows of buildings are left out (`line_of_sight` blocks paths at
+random). A facade reflects only where station and point are on the same side of it.
 """
 
 import numpy as np
@@ -45,7 +45,7 @@ def mirrored(
     foot_x, foot_y, azimuth, width, height = facade
     cosine, sine = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
     x, y, z = np.moveaxis(places, -1, 0)
-    # Ways off the facade's plane, and along it from its foot's middle.
+    # Distances from the facade's plane, and along it from the middle of its foot.
     before = (station_m[0] - foot_x) * cosine + (station_m[1] - foot_y) * sine
     beside = (station_m[1] - foot_y) * cosine - (station_m[0] - foot_x) * sine
     off = (x - foot_x) * cosine + (y - foot_y) * sine
@@ -61,7 +61,7 @@ def mirrored(
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:
-    """Return one path a facade: images (N, L, 3) m and coefficients (N, L), zero where no ray is reflected.
+    """Return one path per facade: images (N, L, 3) m and coefficients (N, L), zero where no ray is reflected.
 
     A facade that reflects nothing in the whole look has the coefficient 0.0, and the points themselves as images.
     """

@@ -32,7 +32,12 @@ IDLE = [{"kind": "none"}, {"kind": "pulse", "order": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a filter of evenly spaced symbols where some are not received, or of another radar."""
+    """Raise InputError where nothing stands still, and for `clutter` where symbols are missing or of another radar."""
+    if not any(getattr(module, "STILL", False) for module in scene.modules.values()):
+        raise InputError(
+            "effects.canceller: there is no clutter to cancel, expected an effect in the same scene whose echoes stand "
+            "still: clutter, background_channel, direct_path or transmit_leakage"
+        )
     if settings["kind"] != "clutter":
         return
     timing = scene.effects.get("slow_time", {"downlink": 1, "missing": 0})

@@ -77,12 +77,7 @@ def process(scale: float, longitudinal: bool, response: float, lag: float) -> tu
         [0, 0, 1, 0, 0],
         [0, 0, -SPEED_GAIN * c * c, -PLACE_GAIN * c * c * c, -c],
     ])  # fmt: skip
-    outputs = gain * np.array([
-        [1, mix, 0, 0, 0],
-        [0, 0, b, 0, 0],
-        [0, 0, 0, b, 0],
-        [0, 0, 0, 0, b],
-    ])  # fmt: skip
+    outputs = gain * np.array([[1, mix, 0, 0, 0], [0, 0, b, 0, 0], [0, 0, 0, b, 0], [0, 0, 0, 0, b]])
     return drift, np.array([1.0, 0, 0, 0, 0]), outputs
 
 

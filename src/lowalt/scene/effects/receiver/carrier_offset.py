@@ -14,6 +14,7 @@ SOURCE = (
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017}
 STREAM = "oscillator"
 IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
+UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

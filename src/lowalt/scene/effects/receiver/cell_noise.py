@@ -20,6 +20,7 @@ SOURCE = (
 )
 DEFAULTS = {"snr_db": None}
 IDLE = [{"snr_db": math.inf}]
+SET_SNR = "snr_db"
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

@@ -21,6 +21,7 @@ SOURCE = (
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
 STREAM = "oscillator"
 IDLE = [{"fixed_ppm": 0, "sigma_ppm": 0}]
+UNMODELLED = ("fmcw", "cw")
 
 ROUNDING = 1e-14
 """Largest share of a sample that the series of the stretch leaves out."""

@@ -22,6 +22,7 @@ SOURCE = (
 DEFAULTS = {"sigma_ppm": 0.017, "sigma_s": 2e-8}
 DRAWN = "look"
 IDLE = [{"sigma_ppm": 0, "sigma_s": 0}]
+UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

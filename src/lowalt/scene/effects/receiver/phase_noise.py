@@ -1,8 +1,8 @@
 """Phase noise of the oscillator: one random phase that changes from symbol to symbol and within each symbol.
 
-The slow part, a sum of lines, turns whole symbols (common phase error, seen in Doppler). The fast part, from SPLIT
-symbol rates on, leaks between subcarriers. All its bands as wide as the symbol rate are alike, so symbols are
-independent, and the samples of one are Gaussian with that part's covariance.
+The slow part, a sum of spectral lines, rotates whole symbols: the common phase error, seen in Doppler. The fast part,
+above SPLIT times the symbol rate, leaks between subcarriers. Its spectrum varies little over a symbol rate, so symbols
+are independent, and the samples of a symbol are Gaussian with the covariance of the fast part.
 """
 
 import math
@@ -37,12 +37,12 @@ DEFAULTS = {
     "reference": [[1.0, -46.0], [10.0, -76.0], [100.0, -96.0]],
 }  # fmt: skip
 IDLE = [{"points": []}]
-"""points, reference: offset (Hz) and L(f) (dBc/Hz) of the oscillator and of what its loop follows up to loop_hz."""
+"""points: offset (Hz) and L(f) (dBc/Hz) of the oscillator; reference: those of what its loop follows up to loop_hz."""
 
 SPLIT = 16
-"""Symbol rates at which slow ends and fast begins."""
+"""Offset between the slow and the fast part, in symbol rates."""
 OCTAVE, EVENLY = 64, 12
-"""Frequencies of the fast part in an octave, and in a subcarrier's spacing from EVENLY such spacings on."""
+"""Frequencies of the fast part per octave, and per subcarrier spacing above EVENLY spacings."""
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
@@ -129,7 +129,7 @@ def phase(settings: dict, look: Look, rng: np.random.Generator) -> np.ndarray:
         slow_power = slow_power * range_factor(line_hz, line_hz[0], look.delay_s)
         fast_power = fast_power * range_factor(frequency, width, look.delay_s)
     lines = np.sqrt(slow_power) * rng.standard_normal((len(line_hz), 2)).view(np.complex128)[:, 0]
-    # At the symbols' starts, lines 2 N apart have equal phases: one transform of 2 N lines an instant.
+    # At the starts of symbols, lines 2 N apart have equal phases: each instant takes one transform of 2 N lines.
     folded = (lines[:, None] * turns).reshape(-1, 2 * symbols, turns.shape[1]).sum(axis=0)
     slow = fft.ifft(np.roll(folded, 1, axis=0), axis=0, norm="forward").real[:symbols] @ blend
     lags = fast_power @ cosines

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
+from lowalt.scene.checks import CheckedScene
 from lowalt.scene.set_noise import white
 from lowalt.scene.waveform import Look
 
@@ -16,9 +19,19 @@ BOLTZMANN = 1.380649e-23
 """J/K, exact by definition of the kelvin."""
 
 
-def variance(settings: dict, bandwidth_hz: float) -> float:
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for noise at set SNRs as well."""
+    if scene.noisy:
+        raise InputError(
+            f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget "
+            "or set SNRs, not both"
+        )
+
+
+def noise_w(settings: dict, network: Network) -> float:
     """Return the noise power k T B F (W) of one subcarrier; a range cell, the mean of M of them, has 1/M of it."""
-    return BOLTZMANN * settings["temperature_k"] * bandwidth_hz * 10 ** (settings["noise_figure_db"] / 10)
+    bandwidth_hz, factor = network.noise_bandwidth_hz, 10 ** (settings["noise_figure_db"] / 10)
+    return BOLTZMANN * settings["temperature_k"] * bandwidth_hz * factor
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
@@ -28,5 +41,5 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
     have 1/M of the noise of a subcarrier. In an FMCW sweep a sample takes the place of a subcarrier, and the sample
     rate that of df. The receive weights have unit norm, so the noise is that of one antenna. Source: Friis 1944.
     """
-    power = variance(settings, look.network.noise_bandwidth_hz) / look.network.subcarriers
+    power = noise_w(settings, look.network) / look.network.subcarriers
     return samples + white(rng, power, samples.shape)

@@ -17,6 +17,7 @@ SOURCE = (
 )
 DEFAULTS = {"fixed_s": 0.0, "sigma_s": 2e-8, "prefix_slack_s": 2.9e-7}
 IDLE = [{"fixed_s": 0, "sigma_s": 0}]
+UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

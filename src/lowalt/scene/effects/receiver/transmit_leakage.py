@@ -9,6 +9,7 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
+from lowalt.scene.view import View
 from lowalt.scene.waveform import Look, transmit
 
 SOURCE = (
@@ -17,6 +18,8 @@ SOURCE = (
 )
 DEFAULTS = {"isolation_db": 80.0, "delay_s": 0.0}
 IDLE = [{"isolation_db": None}]
+UNMODELLED = ("links",)
+STILL = True
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
@@ -29,6 +32,12 @@ def check(settings: dict, scene: CheckedScene) -> None:
             f"effects.transmit_leakage: {apart} give the receiver an oscillator of its own, expected the transmitter's "
             "for leakage, in which offsets and phase noise cancel"
         )
+
+
+def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
+    """Return the power (W) of the leakage."""
+    leaked_w = view.network.power * 10 ** (-settings["isolation_db"] / 10)
+    return [(f"transmit leakage, {view.network.bin_name}", leaked_w, "W")]
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:

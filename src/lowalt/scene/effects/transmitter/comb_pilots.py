@@ -15,6 +15,7 @@ SOURCE = (
 )
 DEFAULTS = {"spacing": 4, "offset": 0}
 IDLE = [{"spacing": 1}]
+UNMODELLED = ("fmcw", "cw")
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

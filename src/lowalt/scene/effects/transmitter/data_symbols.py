@@ -13,6 +13,7 @@ SOURCE = (
 )
 DEFAULTS = {"order": 16}
 IDLE = [{"order": 4}]
+UNMODELLED = ("fmcw", "cw")
 
 
 def constellation(order: int) -> np.ndarray:

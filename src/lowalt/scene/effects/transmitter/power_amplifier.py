@@ -17,6 +17,7 @@ SOURCE = (
 )
 DEFAULTS = {"backoff_db": 8.0}
 IDLE = [{"backoff_db": None}]
+UNMODELLED = ("fmcw", "cw")
 
 OVERSAMPLING = 4
 

@@ -36,9 +36,13 @@ def check(settings: dict, scene: CheckedScene) -> None:
             f"effects.slow_time: downlink {settings['downlink']} of a period of {settings['tdd_period_s']} s holds "
             f"fewer than {FEWEST} of {scene.network.symbols} symbols, expected more"
         )
-    noisy = [snr for snr in scene.snr_db if snr != float("inf")]
+    if scene.known_times and settings["regrid"] != "zero":
+        raise InputError(
+            f"effects.slow_time.regrid: {settings['regrid']!r} makes an even signal, and spectra.times is 'known', "
+            "expected 'zero'"
+        )
     gaps = settings["downlink"] < 1 or settings["missing"] > 0
-    if noisy and gaps:
+    if scene.noisy and gaps:
         raise InputError(
             f"effects.slow_time: gaps hold no signal, and noise.snr_db {list(scene.snr_db)} would fill them with "
             "noise; expected [.inf] with receiver_noise"
