@@ -272,10 +272,10 @@ def test_what_counts_the_same_waves_twice_is_refused(tmp_path):
     settings = town.DEFAULTS | {"buildings": str(ply(tmp_path / "town.ply", BOXES))}
     for name in ("ground_reflection", "walls", "line_of_sight"):
         with pytest.raises(InputError, match=f"{name}.*together with town"):
-            town.check(settings, CheckedScene(NETWORK, {name: {}, "town": settings}, (math.inf,)))
-    town.check(settings, CheckedScene(NETWORK, {"clutter": {}, "town": settings}, (math.inf,)))
+            town.check(settings, CheckedScene(NETWORK, {name: {}, "town": settings}, {}, (math.inf,), False))
+    town.check(settings, CheckedScene(NETWORK, {"clutter": {}, "town": settings}, {}, (math.inf,), False))
     with pytest.raises(InputError, match="buildings: not set"):
-        town.check(town.DEFAULTS, CheckedScene(NETWORK, {}, (math.inf,)))
+        town.check(town.DEFAULTS, CheckedScene(NETWORK, {}, {}, (math.inf,), False))
 
 
 def test_a_strangers_folder_may_not_name_a_file_of_buildings():
