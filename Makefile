@@ -55,7 +55,7 @@ $(SETUP): $(BASE)
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,weights) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,weights) $(call of_extra,town) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
 # Write the bytecode of the tests and their imports once, not in both test processes at the same time. The tests report

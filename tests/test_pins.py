@@ -11,7 +11,7 @@ import yaml
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
-OF_JOBS = ("workflow", "recognition", "methods", "cost", "tensorboard")
+OF_JOBS = ("workflow", "recognition", "methods", "cost", "tensorboard", "town")
 """Extras whose packages a job of the workflow may import."""
 
 

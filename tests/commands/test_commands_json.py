@@ -17,17 +17,20 @@ from lowalt.config.layers import load, plain
 from lowalt.files.atomic import replacing
 from lowalt.report.figures import mesh_picture, target_picture
 from lowalt.scene import explanation
+from lowalt.scene.checks import check
 from lowalt.scene.effects import PLACES
 from lowalt.workflow.board import Board, Job
 from lowalt.workflow.status import FOLDER, PLANNED_JOBS
 from meshes import quadrotor
+from towns import BOXES, ORIGIN, geojson
 
 ROOT = Path(__file__).parents[2]
 CONFIG, SCHEMA = ROOT / "config/default.yaml", ROOT / "workflow/schemas/config.schema.yaml"
 PAGE = (ROOT / "docs/reference/json.md").read_text()
 STATION = {"method", "decisions", "rms_change", "other_cells"}
-STATIC = ("settings", "stages", "method", "otherwise")
-"""Keys whose own keys are names of settings, stages, fields or filters that the reference does not list."""
+STATIC = ("settings", "stages", "method", "otherwise", "materials", "dropped")
+"""Keys whose own keys are names of settings, stages, fields, filters, materials or reasons that the reference does not
+list."""
 
 
 def refused(text):
@@ -55,6 +58,24 @@ def keys(value):
     if not isinstance(value, dict):
         return set()
     return set(value).union(*(keys(item) for name, item in value.items() if name not in STATIC))
+
+
+def test_a_town_is_looked_at_and_its_scene_drafted(answer, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    town = geojson(tmp_path / "blocks.geojson", BOXES)
+    facts, status = answer("scene", "inspect", town, "--origin", *ORIGIN, "--material", "brick")
+    assert status == 0 and facts["buildings"] == len(BOXES) and facts["walls"] == 4 * len(BOXES)
+    assert facts["materials"] == {"brick": 10 * len(BOXES)} and Path(facts["picture"]).stat().st_size > 5000
+    drafted, status = answer("scene", "new", town, "--out", "mine.yaml")
+    assert status == 0 and (tmp_path / "mine.png").is_file()
+    config = load([CONFIG, tmp_path / "mine.yaml"], SCHEMA)
+    # Its middle is that of the stations.
+    low, high = (np.array(drafted[key][:2]) for key in ("low_m", "high_m"))
+    masts = [station["position_m"][:2] for station in config["network"]["stations"].values()]
+    np.testing.assert_allclose((low + high) / 2, np.mean(masts, axis=0), atol=0.1)
+    check(config)
+    assert main(["scene", "new", str(town), "--out", "mine.yaml"]) == 2
+    assert main(["scene", "inspect", str(town), "--unit", "cubit"]) == 2
 
 
 def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_surfaces(answer, tmp_path):

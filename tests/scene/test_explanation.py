@@ -50,6 +50,16 @@ def test_a_cost_below_its_spread_is_said_to_be_below_it(ms, spread_ms, text):
     assert line.split() == ["adc", "named", "10.0%", "20.0%", text]
 
 
+def test_parts_of_an_effect_are_no_effects_of_a_suggested_scene():
+    whole = explanation.Change("town", "channel", True, 0.5)
+    part = whole._replace(part="second order", signal=0.1)
+    text = explanation.suggested({"effects": {"town": {"buildings": "a.ply"}}}, [whole, part], 1e-3)
+    assert text.count("town:") == 1 and "0.5" in text
+    table = explanation.effects_table([whole, part], sources=True)
+    assert sum("its second order left out" in line for line in table) == 1
+    assert sum(line.startswith("town: ") for line in table) == 1
+
+
 def test_a_finding_says_how_fast_the_range_grows():
     still = dict.fromkeys(("vx_mps", "vy_mps", "vz_mps"), 0.0)
     ahead = {"x_m": 300.0, "y_m": 0.0, "z_m": 25.0}

@@ -5,12 +5,14 @@ import importlib.util
 import json
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import yaml
 from scipy.io import savemat, wavfile
 
+import towns
 from craft import craft, row
 from fuzzed_folders import folders
 from fuzzed_seals import ARCHIVE, CHECKPOINT, INDEX, JSON, MATLAB, MODEL, PNG, YAML
@@ -113,6 +115,22 @@ def _meshes() -> list[Reader]:
     readers += [Reader(f"mesh {kind}", f"a{kind[-4:]}", data, lambda path: read_mesh(path, "m"))
                 for kind, data in more.items()]  # fmt: skip
     return readers
+
+
+def _towns() -> list[Reader]:
+    """Readers of buildings, each with a good file."""
+    from lowalt.scene.effects.channel.town import DEFAULTS
+    from lowalt.scene.town.buildings import read
+
+    def buildings(path: Path) -> object:
+        """Read a town; a Mitsuba scene has its mesh next to it."""
+        towns.ply(path.with_name("cube.ply"), [(0.0, 0.0, 1.0, 1.0, 1.0)])
+        origin = towns.ORIGIN if path.suffix == ".geojson" else None
+        return read(DEFAULTS | {"buildings": str(path), "origin": origin})
+
+    kinds = {".geojson": towns.geojson, ".xml": towns.mitsuba}
+    good = {kind: _bytes(partial(write, boxes=towns.BOXES), f"a{kind}") for kind, write in kinds.items()}
+    return [Reader(f"town {kind}", f"a{kind}", data, buildings) for kind, data in good.items()]
 
 
 def _robots() -> list[Reader]:
@@ -280,4 +298,5 @@ def _all(tiles) -> list[bytes]:
 
 def readers() -> list[Reader]:
     """Return every reader with a good file of its kind."""
-    return [*_texts(), *_arrays(), *_models(), *_captures(), *_recordings(), *_meshes(), *_robots(), *folders()]
+    texts = [*_texts(), *_arrays(), *_models(), *_captures(), *_recordings()]
+    return [*texts, *_meshes(), *_towns(), *_robots(), *folders()]

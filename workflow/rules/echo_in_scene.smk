@@ -1,7 +1,7 @@
 # Echo in a scene with effects: the signals at one base station, or at all in one job, and the powers of the targets'
 # own echoes.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz; results/{run}/occluders/*.npz
-#                  where the scene hides points behind surfaces
+#                  where the scene hides points behind surfaces; the file of buildings that effects.town names
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
 
 
@@ -11,6 +11,7 @@ rule echo_in_scene:
         motion="results/{run}/motion/{group}-{part}.csv",
         clouds=products.scene_clouds,
         occluders=products.chunk_occluders,
+        town=products.town,
     output:
         signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),
         power=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=LISTENING),

@@ -25,6 +25,8 @@ COMMANDS = {
                      "lowalt predict default-seen sample.npy"),
     "explain": Entry("explain", "say whether a scene's receiver finds its targets, and what each effect changes",
                      "lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml"),
+    "scene": Entry("scene", "your own town: look at a file of buildings, draft the scene",
+                   "lowalt scene new town.geojson --out town.yaml"),
     "target": Entry("target", "your own mesh or robot: look, draft a record, make its cloud",
                     "lowalt target inspect inputs/mydrone.stl"),
     "recording": Entry("recording", "a recording of your own radar: look, draft its record, train a recogniser",

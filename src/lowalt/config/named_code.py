@@ -1,6 +1,9 @@
-"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py. Only the user may choose it."""
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py, and files that effects read.
 
-from collections.abc import Iterable
+Only the user may choose them.
+"""
+
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from lowalt.files.errors import InputError
@@ -20,11 +23,21 @@ def own_effects(effects: Iterable[str]) -> list[str]:
     return sorted(name for name in effects if name.endswith(".py"))
 
 
-def refuse_effects(effects: Iterable[str], where: str | Path) -> None:
-    """Refuse effects of the user's own in a file or folder `where` that may be a stranger's.
+def buildings_of(effects: Mapping[str, dict | None]) -> str | None:
+    """Return the file of buildings that an `effects` block names, None for none."""
+    return (effects.get("town") or {}).get("buildings")
+
+
+def refuse_effects(effects: Mapping[str, dict | None], where: str | Path) -> None:
+    """Refuse effects of the user's own, and files that effects read, in what may be a stranger's file or folder.
 
     Raises: InputError naming the effect.
     """
+    if buildings := buildings_of(effects):
+        raise InputError(
+            f"{where}: its effect 'town' reads the file {buildings!r}, which a file may not choose; expected an "
+            "overlay of your own that names it"
+        )
     for name in own_effects(effects):
         raise InputError(
             f"{where}: its effect {name!r} is code, which a file may not choose; expected an overlay of your own that "

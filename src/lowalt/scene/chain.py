@@ -8,6 +8,7 @@ motion only, and time samples are made only where an effect acts on them.
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property, partial
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +77,9 @@ class SceneSample:
         ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
         if len(ends) == 1:
             return ends[0]
-        return [there._replace(sender=here) for here, there in zip(*ends, strict=True)]
+        # In a town the ends of a link see different numbers of paths: the shorter list is filled with none.
+        none = ImagePath(view.places, 0.0)
+        return [there._replace(sender=here) for here, there in zip_longest(*ends, fillvalue=none)]
 
     def routes(self, view: View, paths: list[ImagePath]) -> np.ndarray:
         """Return the amplitude factor of each point, (N, L), or (R, R, N, L) where it depends on the route."""

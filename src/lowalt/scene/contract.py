@@ -11,6 +11,7 @@ It may also define
 - STILL, whether it adds echoes that stand still, which a canceller removes;
 - SET_SNR, the setting that holds an SNR of noise.snr_db: where it is null, the echo stage makes a signal for each SNR;
 - STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the same numbers;
+- PARTS, settings that leave out a part of the effect, by the part's name: `lowalt explain` measures each;
 - DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of a link's stations.
 
 N symbols, M subcarriers or range cells, L points of a target; arrays are float64 or complex128.

@@ -79,7 +79,8 @@ class Change(NamedTuple):
     signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
     more: share of the pixels, or of a network's answers, that differ; ms: processor time of the effect per sample and
     station, a median; spread_ms: standard deviation of that time over samples and stations; also: a further change
-    without which the scene would be refused; refused: why the effect was not tried.
+    without which the scene would be refused; refused: why the effect was not tried; part: the part of the effect that
+    was left out, "" for the whole.
     """
 
     effect: str
@@ -92,6 +93,7 @@ class Change(NamedTuple):
     spread_ms: float = math.nan
     also: str = ""
     refused: str = ""
+    part: str = ""
 
 
 def samples(config: dict, inputs: Path | None, asked: list[tuple[str, int]]) -> list[ExplainedSample]:
@@ -196,10 +198,12 @@ def changes(
     passes = 2 if len(chosen) * len(station_names) == 1 else 1
     signals, cells, times_ms = _received(config, station_names, chosen, 2)
     before, result = shown(signals), []
-    for name in [*named, *(name for name in PLACES if name not in config["effects"])]:
+    parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
+    others = [name for name in PLACES if name not in config["effects"]]
+    for name, part in [*((name, "") for name in named), *parts, *((name, "") for name in others)]:
         place, inside = places.get(name) or PLACES[name], name in named
         try:
-            changed, also = _changed(config, name)
+            changed, also = (_without_part(config, name, part), "") if part else _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
         except InputError as error:
             result.append(Change(name, place, inside, refused=str(error)))
@@ -210,8 +214,14 @@ def changes(
         after = shown(new_signals)
         more = {kind: _differing(before[kind], after[kind]) for kind in before}
         cost = float(np.median(cost_ms)), float(np.std(cost_ms))
-        result.append(Change(name, place, inside, *shares, more, *cost, also))
+        result.append(Change(name, place, inside, *shares, more, *cost, also, part=part))
     return result
+
+
+def _without_part(config: dict, name: str, part: str) -> dict:
+    """The configuration without a part of an effect that it names."""
+    settings = (config["effects"][name] or {}) | module_of(name).PARTS[part]
+    return config | {"effects": config["effects"] | {name: settings}}
 
 
 def _differing(before: np.ndarray, after: np.ndarray) -> float:
@@ -293,13 +303,13 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
         shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
         signal = f"{change.signal:.1%}" if change.signal < 10 else f"{change.signal:.0f}-fold"
         cells = f"{signal:>8} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
-        lines.append(f"{head}{cells}  {change.also}".rstrip())
+        lines.append(f"{head}{cells}  {change.also}{f'its {change.part} left out' * bool(change.part)}".rstrip())
     lines.append(
         "named: without it; added: with it and its defaults. Shares of the signal's rms, of symbols, of pixels; "
         "<: a time that the measurement cannot tell from zero."
     )
     if sources:
-        lines += [f"{change.effect}: {module_of(change.effect).SOURCE}" for change in changes]
+        lines += [f"{change.effect}: {module_of(change.effect).SOURCE}" for change in changes if not change.part]
     return lines
 
 
@@ -315,7 +325,7 @@ def suggested(overlay: dict, changes: Sequence[Change], least: float) -> str:
     """
     others = {key: value for key, value in overlay.items() if key != "effects"}
     lines = [yaml.safe_dump(others, sort_keys=False).rstrip()] if others else []
-    kept = [change for change in changes if change.named and not change.signal <= least]
+    kept = [change for change in changes if change.named and not change.part and not change.signal <= least]
     lines.append(f"# Effects that change a signal by more than {least:g} of its root mean square, and by how much.")
     lines.append("effects:" if kept else "effects: {}")
     for change in kept:

@@ -59,7 +59,7 @@ def _sent(pose, point, toward, ray, bundle):
 
 
 @INNER_ORDERED
-def _can_meet(bundle, box):
+def can_meet(bundle, box):
     """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along it separates them.
 
     Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by the spread of the rays.
@@ -138,7 +138,7 @@ def _walk(boxes, triangles, closed, ray, bundle, free, last):
     if last > 0 and not _left(triangles, (last - leaves) * size, size, closed, ray, free):
         return last
     while True:
-        if _can_meet(bundle, boxes[node]):
+        if can_meet(bundle, boxes[node]):
             if node < leaves:
                 node *= 2
                 continue

@@ -22,8 +22,8 @@ from lowalt.tiles.cubes import Cubes
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
-    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions in a scene that has them, and
-    those of canceller for recipe shards, and echo {tolerance, effects} for cube shards.
+    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions and of a town in a scene that
+    has them, those of canceller for recipe shards, and echo {tolerance, effects} for cube shards.
     """
     line = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     line.add_argument("--motion", required=True, help="the chunk's motion table")
@@ -40,7 +40,7 @@ def write(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     settings = options.settings
     classes, canceller, echo = _classes(settings), settings.pop("canceller", None), settings.pop("echo", {})
-    company = {name: settings.pop(name) for name in ("companions",) if name in settings}
+    company = {name: settings.pop(name) for name in ("companions", "town") if name in settings}
     seed, network, snrs, split, shards = pick(settings, "seed", "network", "snr_db", "split", "shards")
     kind, _, cells = pick(
         {"largest_mb": None, "cells": cell_type({"shards": shards}), **shards}, "kind", "largest_mb", "cells"
@@ -51,9 +51,9 @@ def write(arguments: list[str]) -> None:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
     if cells not in CELL_BYTES:
         raise InputError(f"shards.cells is {cells!r}, expected one of {list(CELL_BYTES)}")
-    rows = [accompanied(row, company, seed) for row in read_table(options.motion)]
     scene, powers = {"seed": seed, "network": network, **echo}, None
     snrs, network = [float(snr) for snr in snrs], Network.from_settings(network)
+    rows = [accompanied(row, company, seed, network) for row in read_table(options.motion)]
     if kind == "recipe":
         content, powers = clean_content(options.echoes, options.powers, network, len(rows))
     elif kind == "cube":

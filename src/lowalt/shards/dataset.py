@@ -222,7 +222,7 @@ class Dataset:
             sources = self.clouds[place.subtype], self.published[place.subtype], self._masts, self._corners
             self._drawn = name, model_rows(self.plan.seed, *sources, self._motion, track, self._path)
         row = {**self._drawn[1][look], "group": place.group, "model": place.model}
-        return accompanied(row, self.config["effects"], self.plan.seed)
+        return accompanied(row, self.config["effects"], self.plan.seed, self.maker.network)
 
     def made_signal(self, place: Place) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""

@@ -86,7 +86,7 @@ class Remaker:
         row, snr_db = row_of(entry)
         seed, signal = entry["seed"], self.signal(entry)
         data, cubes = self._maker(seed).data(self.shards.kind, signal, row, snr_db, cell_type_of(entry))
-        row = accompanied(row, self.shards.index["echo"]["effects"], seed)
+        row = accompanied(row, self.shards.index["echo"]["effects"], seed, self.network)
         return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes, cubes), data
 
     def faults(self, number: int) -> list[str]:

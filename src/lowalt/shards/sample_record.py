@@ -107,13 +107,15 @@ def record(
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
     whether noise was added; where none was, `snr_db` is infinite. Numbers that are unknown are null, as for a
     recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
-    targets in the beam, the record has it too; the label is the row's own target's. A row of a track adds its track
-    and look. classes: in the order of their labels; cubes: facts on each station's cube.
+    targets in the beam, the record has it too; the label is the row's own target's. The same holds for `paths`, those
+    of each station to the target in a town. A row of a track adds its track and look. classes: in the order of their
+    labels; cubes: facts on each station's cube.
     Raises: InputError where the row's category is no class.
     """
     names = NAMES + TRACK * (TRACK[0] in row)
-    motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions")}
+    motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions", "paths")}
     added = {"companions": list(row["companions"])} if "companions" in row else {}
+    added |= {"paths": row["paths"]} if "paths" in row else {}
     blank = None if math.isnan(row["x_m"]) else 0.0
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
@@ -135,14 +137,19 @@ def record(
     return encoded(content)
 
 
-def accompanied(row: dict, effects: dict, seed: int) -> dict:
-    """Return the row and the subtypes that the scene's effects put next to its target, or the row alone."""
-    if "companions" not in effects:
-        return row
+def accompanied(row: dict, effects: dict, seed: int, network: Network) -> dict:
+    """Return the row with the subtypes that the scene's effects put next to its target, and with the paths to it in a
+    town; the row alone where the scene has neither."""
     # Most runs have no companions, so the module is loaded only for those that have.
-    from lowalt.scene.effects.channel.companions import listed
+    if "companions" in effects:
+        from lowalt.scene.effects.channel.companions import listed
 
-    return {**row, "companions": listed(effects["companions"] or {}, seed, row)}
+        row = {**row, "companions": listed(effects["companions"] or {}, seed, row)}
+    if "town" in effects:
+        from lowalt.scene.effects import module_of
+
+        row = {**row, "paths": module_of("town").listed(effects["town"], network, row)}
+    return row
 
 
 def row_of(entry: dict) -> tuple[dict, float]:

@@ -5,6 +5,7 @@ Each method takes the wildcards of a job and can be used in a rule's `input:`. N
 
 from typing import Any
 
+from lowalt.config.named_code import buildings_of
 from lowalt.files.atomic import slug
 from lowalt.scene.lateness import late_effects
 from lowalt.spectra.catalogue import of_cells
@@ -59,6 +60,15 @@ class DataProducts:
         """Surfaces of a chunk's subtypes, if the scene has the effect `occlusion`."""
         return self._of_chunk("occluders", wildcards) if "occlusion" in self._config["effects"] else []
 
+    def town(self, wildcards: Any) -> list[str]:
+        """The file of buildings and the meshes that it names, in a scene with the effect `town`."""
+        buildings = buildings_of(self._config["effects"])
+        if buildings is None:
+            return []
+        from lowalt.scene.town.buildings import files_of
+
+        return files_of(buildings)
+
     def span(self, wildcards: Any) -> list[str]:
         """The motion models of a chunk within its group, as command-line words."""
         first, count = self._run.plan.span(f"{wildcards.group}-{wildcards.part}")
@@ -98,17 +108,23 @@ class DataProducts:
         return motion | (self._scene(wildcards) if cells else {})
 
     def _scene(self, wildcards: Any) -> dict[str, list[str]]:
-        """Clouds and surfaces that cubes of a chunk are made from."""
-        return {"clouds": self.scene_clouds(wildcards), "occluders": self.chunk_occluders(wildcards)}
+        """Clouds, surfaces and buildings that cubes of a chunk are made from."""
+        found = {"clouds": self.scene_clouds(wildcards), "occluders": self.chunk_occluders(wildcards)}
+        return found | self._town(wildcards)
+
+    def _town(self, wildcards: Any) -> dict[str, list[str]]:
+        """The files of the buildings, by which a record names the paths; none in a scene without a town."""
+        files = self.town(wildcards)
+        return {"town": files} if files else {}
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files from which shards are packed, by kind: noisy signals and tiles (image), noisy signals (signal), clean
-        echoes (recipe), or noisy signals, clouds and surfaces (cube)."""
+        echoes (recipe), or noisy signals, clouds and surfaces (cube); in a town the buildings too."""
         base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
-        kind = self._config["shards"]["kind"]
+        kind, town = self._config["shards"]["kind"], self._town(wildcards)
         if kind == "recipe":
-            return {"echoes": self.chunk_echoes(wildcards), "powers": self.chunk_powers(wildcards)}
-        signals = {"signals": f"{base}/noisy/{chunk}.npy"}
+            return {"echoes": self.chunk_echoes(wildcards), "powers": self.chunk_powers(wildcards), **town}
+        signals = {"signals": f"{base}/noisy/{chunk}.npy", **town}
         if kind == "cube":
             return {**signals, **self._scene(wildcards)}
         return {**signals, "tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else signals

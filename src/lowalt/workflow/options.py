@@ -52,8 +52,9 @@ def noise_modules(config: dict) -> list[str]:
 
 
 def shard_modules(config: dict) -> list[str]:
-    """The modules of effects that the shards stage loads where it makes the cubes of a scene."""
-    return [*map(dotted, config["effects"])] if config["shards"]["kind"] == "cube" else []
+    """The modules of effects that the shards stage loads: all where it makes cubes, the town's for what records say."""
+    town = [dotted("town")] if "town" in config["effects"] else []
+    return [*map(dotted, config["effects"])] if config["shards"]["kind"] == "cube" else town
 
 
 def tile_modules(config: dict) -> list[str]:

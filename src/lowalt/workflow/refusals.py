@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
-from lowalt.config.named_code import own_effects
+from lowalt.config.named_code import buildings_of, own_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -31,6 +31,7 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
     keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("motion", "track"))
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
     paths |= {"effects": " ".join(own_effects(config["effects"]))}
+    paths |= {"effects.town.buildings": buildings_of(config["effects"])}
     paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
     for name, path in paths.items():
         if path and {"{", "}"} & {*path}:
@@ -151,6 +152,7 @@ def refuse_missing(config: dict) -> None:
     files = {
         "inputs": [config["inputs"]],
         "motion.track": [config["motion"].get("track")],
+        "effects.town.buildings": [buildings_of(config["effects"])],
         "recognition.table": [config["recognition"]["table"]],
         "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
         "recognition.network.weights": [] if network["weights"] in ("none", "hub") else [network["weights"]],

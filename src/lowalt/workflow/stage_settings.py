@@ -108,9 +108,9 @@ class Settings:
         return _text(**blocks, echo=echo, classes=self._run.classes)
 
     def shard(self, wildcards: Any) -> str:
-        """The fold of each sample, its name and its form, and the companions that its record names."""
+        """The fold of each sample, its name and its form, and the companions and paths that its record names."""
         snrs, effects = self._snrs(wildcards), self._config["effects"]
-        added = {"companions": effects["companions"] or {}} if "companions" in effects else {}
+        added = {name: effects[name] or {} for name in ("companions", "town") if name in effects}
         if self._config["shards"]["kind"] == "recipe" and "canceller" in effects:
             added["canceller"] = effects["canceller"] or {}
         if self._config["shards"]["kind"] == "cube":

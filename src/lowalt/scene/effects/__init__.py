@@ -20,8 +20,8 @@ LISTED = {
     "transmitter": "slow_time data_symbols power_amplifier comb_pilots",
     "channel": (
         "pointing_error element_pattern mean_cross_section fluctuation cross_sections occlusion line_of_sight "
-        "ground_reflection walls reflected_aspect squint wavefront symbol_motion cyclic_prefix companions direct_path "
-        "interference clutter background_channel"
+        "ground_reflection walls town reflected_aspect squint wavefront symbol_motion cyclic_prefix companions "
+        "direct_path interference clutter background_channel"
     ),
     "receiver": (
         "receiver_noise cell_noise link_offset timing_offset clock_offset carrier_offset phase_noise transmit_leakage "

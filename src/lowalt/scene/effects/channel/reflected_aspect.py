@@ -28,10 +28,10 @@ FOLLOWED = ("cross_sections", "fluctuation", "occlusion")
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError where the scene has no reflected route, or none of FOLLOWED."""
-    if not {"ground_reflection", "walls"} & set(scene.effects):
+    if not {"ground_reflection", "walls", "town"} & set(scene.effects):
         raise InputError(
-            "effects.reflected_aspect: there is no reflected route, expected ground_reflection or walls in the same "
-            "scene"
+            "effects.reflected_aspect: there is no reflected route, expected ground_reflection, walls or town in the "
+            "same scene"
         )
     if not set(FOLLOWED) & set(scene.effects):
         raise InputError(f"effects.reflected_aspect: no side to follow, expected one of {list(FOLLOWED)} in the scene")

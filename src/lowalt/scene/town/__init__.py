@@ -1,0 +1,1 @@
+"""A town: buildings from a file, and the paths of waves between a station and a target among them."""

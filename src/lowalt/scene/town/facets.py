@@ -1,0 +1,174 @@
+"""The plane facets of a town's triangles, and the tree of boxes in which rays look for triangles that block them."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
+
+from lowalt.scene import rays
+
+GRID_M = 1e-3
+"""Corners in the same cell of this grid are one corner: files in single precision repeat corners with other digits."""
+FLAT_M, PARALLEL = 0.02, 1e-3
+"""Corners of a facet are at most this far off its plane; normals of neighbouring triangles differ by at most this."""
+
+
+class Facets(NamedTuple):
+    """K plane facets, the ground z = 0 last, as the compiled loops take them.
+
+    normal (K, 3) and offset (K,) m: a facet's plane is normal . x = offset; centre (K, 3) m, across and up (K, 3), half
+    (K, 2) m: a rectangle in the plane that holds the facet, infinite for the ground; first (K + 1,): a facet's
+    triangles are rows first[k] to first[k + 1] of triangles (F, 9) m, a corner and two edges; the ground has none;
+    convex: (K,) bool, whether the triangles fill a convex polygon.
+    """
+
+    normal: np.ndarray
+    offset: np.ndarray
+    centre: np.ndarray
+    across: np.ndarray
+    up: np.ndarray
+    half: np.ndarray
+    first: np.ndarray
+    triangles: np.ndarray
+    convex: np.ndarray
+
+
+class Occluders(NamedTuple):
+    """The triangles (F, 9) in a tree of boxes (2 B, 6) as `rays.tree` makes it, and the facet (F,) of each."""
+
+    boxes: np.ndarray
+    triangles: np.ndarray
+    facet: np.ndarray
+
+
+class Town(NamedTuple):
+    """A town as paths need it.
+
+    material: (K,) number of each facet's material in `materials`; building: (F,) number of the building of each
+    triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet, and of_building (E,), their buildings.
+    """
+
+    facets: Facets
+    occluders: Occluders
+    material: np.ndarray
+    materials: tuple[str, ...]
+    building: np.ndarray
+    edges: np.ndarray
+    of_building: np.ndarray
+
+
+def corner_numbers(corners: np.ndarray) -> np.ndarray:
+    """Return the number (F, 3) of each corner of triangles (F, 3, 3) m, equal for corners in one cell of GRID_M."""
+    cells = np.rint(corners.reshape(-1, 3) / GRID_M).astype(np.int64)
+    return np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1, 3)
+
+
+def _normals(corners: np.ndarray) -> np.ndarray:
+    """Unit normals (F, 3) of triangles."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normal / np.linalg.norm(normal, axis=1)[:, None]
+
+
+def _edges(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The edges (3 F, 2) of triangles by their corners' numbers, the smaller first, and the triangle (3 F,) of each."""
+    edges = np.concatenate([numbers[:, [0, 1]], numbers[:, [1, 2]], numbers[:, [2, 0]]])
+    return np.sort(edges, axis=1), np.tile(np.arange(len(numbers)), 3)
+
+
+def labels(corners: np.ndarray, numbers: np.ndarray, material: np.ndarray) -> np.ndarray:
+    """Return the facet (F,) of each triangle: neighbours in one plane and of one material share a facet.
+
+    A facet that is not flat, such as a finely divided dome, falls apart into its triangles.
+    """
+    normal, (edges, owner) = _normals(corners), _edges(numbers)
+    order = np.lexsort(edges.T)
+    edges, owner = edges[order], owner[order]
+    met = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    first, second = owner[met], owner[met + 1]
+    alike = abs((normal[first] * normal[second]).sum(axis=1)) > 1.0 - PARALLEL**2 / 2
+    alike &= material[first] == material[second]
+    first, second, count = first[alike], second[alike], len(corners)
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
+    label = connected_components(graph, directed=False)[1]
+    # The plane of a facet is that of its largest triangle.
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    order = np.lexsort((-area, label))
+    leader = np.empty(label.max() + 1, np.int64)
+    leader[label[order][::-1]] = order[::-1]
+    own = leader[label]
+    off = abs(((corners - corners[own, :1]) * normal[own][:, None]).sum(axis=2)).max(axis=1)
+    bent = np.isin(label, label[off > FLAT_M])
+    return np.unique(np.where(bent, count + np.arange(count), label), return_inverse=True)[1]
+
+
+def _convex(along: np.ndarray, area: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Whether facets fill the convex hull of their corners, (K,) bool.
+
+    along: (F, 3, 2) m, corners in the facets' planes; area: (F,) m2.
+    """
+    result = np.ones(len(first) - 1, bool)
+    for k in np.flatnonzero(np.diff(first) > 1):
+        part = slice(first[k], first[k + 1])
+        result[k] = ConvexHull(along[part].reshape(-1, 2)).volume <= area[part].sum() * (1.0 + 1e-6)
+    return result
+
+
+def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], ground: str) -> Town:
+    """Return the town of triangles (F, 3, 3) m with materials (F,), on ground of another material.
+
+    Buildings are what shares corners.
+    """
+    numbers = corner_numbers(corners)
+    label = labels(corners, numbers, material)
+    order = np.argsort(label, kind="stable")
+    corners, numbers, material, label = corners[order], numbers[order], material[order], label[order]
+    first = np.searchsorted(label, np.arange(label.max() + 2))
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    largest = np.array([a + area[a:b].argmax() for a, b in pairwise(first)])
+    normal = _normals(corners[largest])
+    across = np.cross([0.0, 0.0, 1.0], normal)
+    flat = np.linalg.norm(across, axis=1) < 1e-6
+    across[flat] = [1.0, 0.0, 0.0]
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    up = np.cross(normal, across)
+    offset = (normal * corners[largest, 0]).sum(axis=1)
+    along = np.stack([(corners * axis[label][:, None]).sum(axis=2) for axis in (across, up)], axis=2)
+    low = np.minimum.reduceat(along.min(axis=1), first[:-1])
+    high = np.maximum.reduceat(along.max(axis=1), first[:-1])
+    middle = 0.5 * (low + high)
+    centre = offset[:, None] * normal + middle[:, :1] * across + middle[:, 1:] * up
+    triangles = np.concatenate([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
+    facets = Facets(
+        np.vstack([normal, [0.0, 0.0, 1.0]]), np.append(offset, 0.0), np.vstack([centre, np.zeros(3)]),
+        np.vstack([across, [1.0, 0.0, 0.0]]), np.vstack([up, [0.0, 1.0, 0.0]]),
+        np.vstack([0.5 * (high - low) + FLAT_M, [np.inf, np.inf]]), np.append(first, first[-1]), triangles,
+        np.append(_convex(along, area, first), False),
+    )  # fmt: skip
+    tree, facet = rays.tree(corners, False), {row.tobytes(): k for row, k in zip(triangles, label, strict=True)}
+    of_tree = np.array([facet[row.tobytes()] for row in np.ascontiguousarray(tree.triangles)])
+    names = tuple(dict.fromkeys((*materials, ground)))
+    edges, owner, building = _ridges(corners, numbers, label)
+    return Town(
+        facets, Occluders(tree.boxes, tree.triangles, of_tree), np.append(material[first[:-1]], names.index(ground)),
+        names, building, edges, owner,
+    )  # fmt: skip
+
+
+def _ridges(corners: np.ndarray, numbers: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The edges (E, 2, 3) m at the rims of facets, their buildings (E,), and the building (F,) of each triangle."""
+    links = np.concatenate([numbers[:, :2], numbers[:, 1:]])
+    size = int(numbers.max()) + 1
+    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(size, size))
+    building = connected_components(graph, directed=False)[1]
+    building = np.unique(building[numbers[:, 0]], return_inverse=True)[1]
+    edges, owner = _edges(numbers)
+    _, which = np.unique(np.column_stack([edges, label[owner]]), axis=0, return_inverse=True)
+    # An edge that one facet has twice lies inside it.
+    rim = np.flatnonzero(np.bincount(which)[which] == 1)
+    _, first = np.unique(edges[rim], axis=0, return_index=True)
+    place = np.empty((size, 3))
+    place[numbers.reshape(-1)] = corners.reshape(-1, 3)
+    return place[edges[rim[first]]], building[owner[rim[first]]], building

@@ -1,0 +1,301 @@
+"""A town: facets, blockage, reflections and diffraction against brute force, closed forms and the simpler effects."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from lowalt.config.named_code import refuse_effects
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.echo.radar import radar
+from lowalt.files.errors import InputError
+from lowalt.scene.chain import received_signal
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects.channel import ground_reflection, town, walls
+from lowalt.scene.town import image_paths, knife_edge
+from lowalt.scene.town.buildings import read
+from lowalt.scene.town.facets import town as made
+from lowalt.scene.town.materials import MATERIALS, named, properties
+from scenes import A, network, scene, target, view_of
+from towns import BOXES, ORIGIN, block, geojson, mitsuba, ply
+
+NETWORK = network()
+HZ = 4.9e9
+WAVELENGTH_M = SPEED_OF_LIGHT / HZ
+MAST = np.array([-60.0, 3.0, 30.0])
+
+
+def built(boxes, material="concrete"):
+    """A town of boxes (x, y, width, depth, height) on medium dry ground."""
+    corners = np.concatenate([block(*box) for box in boxes])
+    return made(corners, np.zeros(len(corners), int), (material,), "medium_dry_ground")
+
+
+def crosses(start, end, triangle):
+    """Whether a segment crosses a triangle (3, 3): the slow reference solves a 3 x 3 system."""
+    a, b, c = triangle
+    matrix = np.column_stack([end - start, a - b, a - c])
+    if abs(np.linalg.det(matrix)) < 1e-12:
+        return False
+    t, u, v = np.linalg.solve(matrix, a - start)
+    return 1e-9 < t < 1 - 1e-9 and u >= 0 and v >= 0 and u + v <= 1
+
+
+def test_direct_rays_are_blocked_as_by_every_triangle():
+    rng, city = np.random.default_rng(1), built(BOXES)
+    places = rng.uniform([-80, -80, 0.5], [80, 80, 40], (50, 8, 3))
+    lit = image_paths.seen(city, MAST, image_paths.rays_to(places, 0.0), np.empty(0, np.int64))
+    triangles = np.concatenate([block(*box) for box in BOXES])
+    expected = [not any(crosses(MAST, end, triangle) for triangle in triangles) for end in places.reshape(-1, 3)]
+    np.testing.assert_array_equal(lit.reshape(-1), expected)
+    assert 0.2 < lit.mean() < 0.9
+
+
+def reference_paths(scene, mast, place, order):
+    """Every path of 1 to `order` facets to one place: images of the mast, each leg against every triangle."""
+    facets = scene.facets
+    corners = [facets.triangles[a:b] for a, b in itertools.pairwise(facets.first)]
+    triangles = [(k, np.array([t[:3], t[:3] + t[3:6], t[:3] + t[6:]])) for k, rows in enumerate(corners) for t in rows]
+
+    def mirror(k, point):
+        return point - 2 * (facets.normal[k] @ point - facets.offset[k]) * facets.normal[k]
+
+    found = set()
+    for count in range(1, order + 1):
+        for route in itertools.product(range(len(facets.offset)), repeat=count):
+            if any(a == b for a, b in itertools.pairwise(route)):
+                continue
+            images = [mast]
+            for k in route:
+                images.append(mirror(k, images[-1]))
+            points, end, fits = [place], place, True
+            for k, image in zip(route[::-1], images[:0:-1], strict=True):
+                here, there = facets.normal[k] @ end - facets.offset[k], facets.normal[k] @ image - facets.offset[k]
+                if here * there >= 0:
+                    fits = False
+                    break
+                end = end + here / (here - there) * (image - end)
+                points.append(end)
+                rows = corners[k]
+                on = [np.linalg.lstsq(np.column_stack([t[3:6], t[6:]]), end - t[:3], rcond=None)[0] for t in rows]
+                fits &= not rows.size or any(u >= 0 and v >= 0 and u + v <= 1 for u, v in on)
+            if not fits:
+                continue
+            points, at = [*points, mast][::-1], (None, *route, None)
+            if not any(
+                crosses(start, stop, triangle)
+                for leg, (start, stop) in enumerate(itertools.pairwise(points))
+                for k, triangle in triangles
+                if k not in at[leg : leg + 2]
+            ):
+                found.add(route)
+    return found
+
+
+def test_reflected_paths_are_those_of_every_pair_of_facets():
+    rng, city = np.random.default_rng(2), built(BOXES[:3])
+    epsilon, counts = image_paths.epsilons(city, HZ, "test"), []
+    for place in rng.uniform([-50, -50, 1.0], [60, 50, 30], (40, 3)):
+        places = place[None, None]
+        routes = image_paths.reflected(city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
+        assert {route.facets for route in routes} == reference_paths(city, MAST, place, 2), place
+        counts.append(len(routes))
+        for route in routes:
+            # Both images keep the path's length.
+            length = np.linalg.norm(route.images[0, 0] - MAST)
+            assert math.isclose(length, np.linalg.norm(route.station_m - place), rel_tol=1e-12)
+            assert abs(route.coefficient[0, 0]) <= 1.0
+    assert max(counts) >= 4
+
+
+def test_paths_of_many_points_are_those_of_each():
+    rng, city = np.random.default_rng(3), built(BOXES)
+    epsilon = image_paths.epsilons(city, HZ, "test")
+    places = np.array([5.0, -40.0, 12.0]) + rng.uniform(-1, 1, (1, 20, 3)) + np.linspace(0, 25, 90)[:, None, None]
+    together = image_paths.reflected(city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
+    found = {route.facets: route.coefficient for route in together}
+    for n, point in itertools.product(range(0, 90, 9), range(0, 20, 5)):
+        one = places[n : n + 1, point : point + 1]
+        alone = image_paths.reflected(city, epsilon, MAST, one, image_paths.rays_to(one, 0.0), 2)
+        assert {route.facets for route in alone} == {key for key, value in found.items() if value[n, point] != 0}
+        for route in alone:
+            np.testing.assert_allclose(found[route.facets][n, point], route.coefficient[0, 0], rtol=1e-12)
+
+
+def test_one_wall_and_the_ground_are_the_simpler_effects(tmp_path):
+    """The ground's law is that of `ground_reflection`; the wall's is that of `walls` where rays are level."""
+    rng = np.random.default_rng(4)
+    places = np.array([60.0, 25.0, 10.0]) + rng.uniform(-1, 1, (24, 9, 3))
+    places[:, :4, 2] = A.position_m[2]
+    view = view_of(NETWORK, places, np.ones(9), [60.0, 25.0, 10.0])
+    path = ply(tmp_path / "wall.ply", [(20.0, -60.0, 400.0, 2.0, 800.0)])
+    settings = town.DEFAULTS | {"buildings": str(path), "order": 1, "diffraction": False}
+    found = town.paths(settings, view)
+    assert len(found) == 2
+    wall, ground = sorted(found, key=lambda each: each.station_m[2], reverse=True)
+    hz = radar(NETWORK, A).centre_hz
+    permittivity, conductivity = properties("concrete", hz, "test")
+    facade = {"facades": [[20.0, -59.0, 90.0, 400.0, 800.0]], "permittivity": permittivity,
+              "conductivity_s_m": conductivity}  # fmt: skip
+    by_wall = walls.paths(walls.DEFAULTS | facade, view)[0]
+    by_ground = ground_reflection.paths(ground_reflection.DEFAULTS, view)[0]
+    for each, expected in ((wall, by_wall), (ground, by_ground)):
+        np.testing.assert_allclose(each.places, expected.places, atol=1e-12 * 1e3)
+        np.testing.assert_allclose(each.station_m, expected.station_m, atol=1e-12 * 1e3)
+    np.testing.assert_allclose(ground.coefficient, by_ground.coefficient, atol=1e-12)
+    np.testing.assert_allclose(wall.coefficient[:, :4], by_wall.coefficient[:, :4], atol=1e-12)
+    # Inclined rays have a part in the plane of incidence, which `walls` leaves out.
+    off = abs(wall.coefficient[:, 4:] - by_wall.coefficient[:, 4:])
+    assert 1e-9 < off.max() < 1e-3
+
+
+def test_a_knife_edge_loses_what_p526_says():
+    nu = np.array([-0.78, 0.0, 1.0, 2.4])
+    loss_db = -20 * np.log10(abs(knife_edge.field(nu)))
+    # P.526-15, equation 31, an approximation to within 0.2 dB, and exactly 6.02 dB at grazing.
+    near = 6.9 + 20 * np.log10(np.sqrt((nu - 0.1) ** 2 + 1) + nu - 0.1)
+    np.testing.assert_allclose(loss_db, near, atol=0.25)
+    assert math.isclose(loss_db[1], 20 * math.log10(2), rel_tol=1e-12)
+    np.testing.assert_allclose(knife_edge.field(nu) + knife_edge.field(-nu), 1.0, atol=1e-12)
+
+
+def test_a_wide_block_is_one_knife_edge_and_a_pole_nearly_none():
+    wide, ends = built([(0.0, 0.0, 2.0, 4000.0, 40.0)]), np.array([[[60.0, 3.0, 20.0]]])
+    mast = np.array([-60.0, 3.0, 30.0])
+    lit, field = image_paths.direct(wide, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    assert not lit.any()
+    length, rise = np.linalg.norm(ends[0, 0] - mast), -10.0
+    expected = max(
+        (40.0 - 30.0 - rise * share) * math.sqrt(1 - (rise / length) ** 2)
+        * math.sqrt(2 / (WAVELENGTH_M * length * share * (1 - share)))
+        for share in (59.0 / 120.0, 61.0 / 120.0)
+    )  # fmt: skip
+    np.testing.assert_allclose(field, knife_edge.field(expected), atol=5e-4)
+    pole = built([(0.0, 3.0, 0.02, 0.02, 400.0)])
+    lit, field = image_paths.direct(pole, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    assert not lit.any()
+    assert 0.9 < abs(field[0, 0]) < 1.05
+
+
+def test_the_field_is_smooth_across_the_border_of_the_shadow():
+    wide = built([(0.0, 0.0, 2.0, 4000.0, 26.0)])
+    ends = np.stack([np.full(400, 60.0), np.full(400, 3.0), np.linspace(10, 30, 400)], axis=1)[:, None]
+    lit, field = image_paths.direct(wide, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    assert lit.any()
+    assert not lit.all()
+    assert abs(np.diff(abs(field[:, 0]))).max() < 0.05
+    assert abs(field[0, 0]) < 0.2
+    assert field[-1, 0] == 1.0
+
+
+def test_the_ply_the_geojson_and_the_mitsuba_version_of_a_town_have_equal_facades(tmp_path):
+    files = {"ply": (ply(tmp_path / "town.ply", BOXES), None),
+             "geojson": (geojson(tmp_path / "town.geojson", BOXES), ORIGIN),
+             "xml": (mitsuba(tmp_path / "scene.xml", BOXES), None)}  # fmt: skip
+    planes = {}
+    for kind, (path, origin) in files.items():
+        found = read(town.DEFAULTS | {"buildings": str(path), "origin": origin}).town.facets
+        sides = np.column_stack([found.normal, found.offset, found.centre, found.half])[:-1]
+        # A PLY file of this kind may be wound either way.
+        sides[sides[:, :4].sum(axis=1) < 0, :4] *= -1
+        planes[kind] = sides[np.lexsort(np.round(sides.T, 2))]
+    assert len(planes["ply"]) == 5 * len(BOXES)
+    np.testing.assert_allclose(planes["geojson"], planes["ply"], atol=2e-3)
+    np.testing.assert_allclose(planes["xml"], planes["ply"], atol=1e-5)
+
+
+def test_a_record_names_the_paths(tmp_path):
+    path = str(geojson(tmp_path / "town.geojson", BOXES))
+    row = {"x_m": 40.0, "y_m": 0.0, "z_m": 1.5}
+    settings = {"buildings": path, "origin": ORIGIN}
+    facts = town.listed(settings, NETWORK, row)
+    assert facts["under_roof"] is False
+    assert town.listed(settings, NETWORK, row | {"x_m": 20.0})["under_roof"] is True
+    assert set(facts["stations"]) == {station.name for station in NETWORK.stations}
+    for fact in facts["stations"].values():
+        assert fact["direct"] == (fact["field_db"] > -6.1)
+        assert all(set(surfaces) <= {"wall", "roof", "ground"} for surfaces in fact["reflected"])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"height_m": None, "heights": False}, "4 of 4 buildings have neither height nor building:levels"),
+        ({"origin": None}, "origin is not set"),
+        ({"origin": [11.7, 48.137]}, r"km from station .*expected at most 2 km"),
+        ({"material": "cheese"}, "effects.town.material: 'cheese'"),
+    ],
+)
+def test_a_town_that_does_not_fit_is_refused(tmp_path, change, message):
+    change = dict(change)
+    path = geojson(tmp_path / "town.geojson", BOXES, heights=change.pop("heights", True))
+    settings = town.DEFAULTS | {"buildings": str(path), "origin": ORIGIN} | change
+    with pytest.raises(InputError, match=message):
+        town.refuse_place(settings, NETWORK)
+
+
+def test_wrong_units_and_sunk_towns_are_refused(tmp_path):
+    path = str(ply(tmp_path / "town.ply", BOXES))
+    for change in ({"unit": "mm"}, {"up": "y"}):
+        with pytest.raises(InputError, match="expected a town in metres, z up"):
+            read(town.DEFAULTS | {"buildings": path} | change)
+
+
+def test_a_station_under_a_roof_is_refused(tmp_path):
+    x, y, z = NETWORK.stations[0].position_m
+    path = ply(tmp_path / "town.ply", [*BOXES, (x, y, 20.0, 20.0, z + 5.0)])
+    with pytest.raises(InputError, match=f"station {NETWORK.stations[0].name} .* stands under a roof"):
+        town.refuse_place(town.DEFAULTS | {"buildings": str(path)}, NETWORK)
+
+
+def test_a_mesh_outside_the_folder_of_a_scene_is_not_opened(tmp_path):
+    ply(tmp_path / "secret.ply", BOXES)
+    (tmp_path / "inside").mkdir()
+    for name in ("../secret.ply", str(tmp_path / "secret.ply"), "\0.ply"):
+        path = mitsuba(tmp_path / "inside/scene.xml", BOXES, name=name.replace("\0", "&#1;"))
+        with pytest.raises(InputError, match=r"expected a file in the folder of the scene|not a readable XML"):
+            read(town.DEFAULTS | {"buildings": str(path)})
+
+
+def test_materials_are_those_of_p2040():
+    assert named("mat-itu_medium_dry_ground.001") == "medium_dry_ground"
+    assert named("Roof tiles") is None
+    permittivity, conductivity = properties("concrete", 4.9e9, "test")
+    assert (permittivity, round(conductivity, 3)) == (5.24, 0.16)
+    with pytest.raises(InputError, match="floorboard is known from 50 to 100 GHz"):
+        properties("floorboard", 4.9e9, "here")
+    assert all(law.low < law.high for law in MATERIALS.values())
+
+
+def test_what_counts_the_same_waves_twice_is_refused(tmp_path):
+    settings = town.DEFAULTS | {"buildings": str(ply(tmp_path / "town.ply", BOXES))}
+    for name in ("ground_reflection", "walls", "line_of_sight"):
+        with pytest.raises(InputError, match=f"{name}.*together with town"):
+            town.check(settings, CheckedScene(NETWORK, {name: {}, "town": settings}, {}, (math.inf,), False))
+    town.check(settings, CheckedScene(NETWORK, {"clutter": {}, "town": settings}, {}, (math.inf,), False))
+    with pytest.raises(InputError, match="buildings: not set"):
+        town.check(town.DEFAULTS, CheckedScene(NETWORK, {}, {}, (math.inf,), False))
+
+
+def test_a_strangers_folder_may_not_name_a_file_of_buildings():
+    with pytest.raises(InputError, match=r"index.json: its effect 'town' reads the file '/etc/passwd'"):
+        refuse_effects({"town": {"buildings": "/etc/passwd"}}, "index.json")
+
+
+def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):
+    """Far buildings change nothing, a wall hides, and the ground of a town is that of `ground_reflection`."""
+    cloud, row = target(np.random.default_rng(5))
+    alone = ply(tmp_path / "far.ply", [(900.0, 900.0, 9.0, 9.0, 9.0)])
+    behind = ply(tmp_path / "wall.ply", [(30.0, 12.0, 2.0, 300.0, 60.0)])
+    quiet = {"order": 0, "ground": "very_dry_ground"}
+    free = received_signal(scene({}), A, cloud, row).signal
+    clear = received_signal(scene({"town": {"buildings": str(alone), **quiet}}), A, cloud, row).signal
+    np.testing.assert_allclose(clear, free, rtol=1e-9, atol=1e-9 * abs(free).max())
+    dark = received_signal(scene({"town": {"buildings": str(behind), **quiet}}), A, cloud, row)
+    assert abs(dark.signal).max() < 0.01 * abs(free).max()
+    # Set SNRs refer to free space.
+    assert math.isclose(dark.power, received_signal(scene({}), A, cloud, row).power, rel_tol=1e-6)
+    ground = received_signal(scene({"ground_reflection": {}}), A, cloud, row).signal
+    both = received_signal(scene({"town": {"buildings": str(alone), "order": 1}}), A, cloud, row).signal
+    np.testing.assert_allclose(both, ground, rtol=1e-6, atol=1e-6 * abs(ground).max())
