@@ -24,7 +24,8 @@ records = records_of(config["targets"], None)
 occluders = {name: make(records[name], None, config["seed"]) | {"subtype": name} for name in names}
 clouds, found = Dataset(config).clouds, {}
 for name in ["none", *PLACES]:
-    dataset = Dataset(config | {"effects": {} if name == "none" else {name: {}}}, clouds, occluders=occluders)
+    settings = {"buildings": "studies/town/blocks.geojson", "origin": [11.575, 48.137]} if name == "town" else {}
+    dataset = Dataset(config | {"effects": {} if name == "none" else {name: settings}}, clouds, occluders=occluders)
     rows = [dataset.row(dataset.place(number)) for number in (0, len(dataset) // 2)]
     found[name] = np.stack([dataset.maker.signal(row, np.inf) for row in rows])
 np.savez(sys.argv[1], **found)

@@ -139,8 +139,9 @@ def read(settings: dict) -> Buildings:
 
     Raises: InputError naming the file and what is wrong with it, or a material that is not known.
     """
-    path = existing(settings["buildings"], "file of buildings")
-    origin = settings["origin"]
+    if settings["buildings"] is None:
+        raise InputError("effects.town.buildings: not set, expected the file of the buildings, such as town.geojson")
+    path, origin = existing(settings["buildings"], "file of buildings"), settings["origin"]
     key = (settings["height_m"], settings["unit"], settings["up"], settings["material"], settings["ground"])
     return _read(path, path.stat().st_mtime_ns, None if origin is None else tuple(origin), key)
 

@@ -35,9 +35,7 @@ NEAR_M = 2000.0
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for no file, effects that count waves twice, a wrong place, or an unknown material."""
-    if settings["buildings"] is None:
-        raise InputError("effects.town.buildings: not set, expected the file of the buildings, such as town.geojson")
+    """Raise InputError for effects that count waves twice, no file, a wrong place, or an unknown material."""
     if twice := [name for name in TWICE if name in scene.effects]:
         raise InputError(f"effects: {twice} together with town, which holds the same waves; expected one or the other")
     above_ground("town", scene.network)
