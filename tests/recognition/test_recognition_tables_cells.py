@@ -289,7 +289,7 @@ def page(run):
     """The tables of the page's sections by caption, and the plots' values by section."""
     files = {
         name: str(run.folder / f"{name}.csv")
-        for name in ("accuracy", "confusion", "subtypes", "comparisons", "orderings")
+        for name in ("accuracy", "confusion_by_snr", "subtypes", "comparisons", "orderings")
     }
     (run.folder / "distances.csv").write_text(
         "category,subtype,nearest_trained,trained_distance,trained_size_ratio\n"
