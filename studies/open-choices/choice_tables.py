@@ -19,8 +19,7 @@ class Held:
 
     def __init__(self, facts: Facts | predictions.Predictions, correct: list[np.ndarray]) -> None:
         """facts: of the samples; correct: (samples,) bool, of each training seed."""
-        motion = np.char.add(np.char.add(facts.subtype, "/"), facts.model.astype(str))
-        first, self.count, self.shares = model_shares(motion, correct)
+        first, self.count, self.shares = model_shares(facts.motion, correct)
         self.subtype = facts.subtype[first]
 
     def difference(self, other: "Held | None", name: str, seed: int, *keys: str, whole: bool = True) -> Interval:

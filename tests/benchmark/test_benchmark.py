@@ -13,6 +13,7 @@ from lowalt.benchmark.definition import MAIN, PARTS, VERSION, config_of, truth
 from lowalt.commands.compare import leaves
 from lowalt.config.layers import SCHEMA
 from lowalt.files.shipped import as_named
+from lowalt.recognition import checkpoint, recogniser, runs, schemes
 from lowalt.workflow.run import Run
 
 ROOT = Path(__file__).parents[2]
@@ -87,6 +88,20 @@ def test_the_held_out_class_neither_trains_nor_validates():
 def test_forty_labels_are_the_subtypes():
     facts, classes = TRACKS["forty"].truth()
     assert [classes[label] for label in facts.label.tolist()] == facts.subtype.tolist()
+
+
+@pytest.mark.parametrize("track", ["seen", "forty"])
+def test_a_trained_network_may_have_the_classes_of_a_track(track, tmp_path):
+    classes = TRACKS[track].truth().classes
+    scheme = schemes.Scheme("A:VRP", (0,), (0,))
+    block = {"backbone": "test_resnet", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
+             "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
+    weights = recogniser.Recogniser(scheme, block, 24, np.zeros((1, 256, 3), np.uint8), len(classes)).state_dict()
+    about = {"scheme": vars(scheme), "protocol": "seen", "network": block, "size": 24, "seed": 0}
+    checkpoint.save(
+        tmp_path / "model.pt", "{}", {"weights": weights, "colour_map": "gray", "classes": list(classes), **about}
+    )
+    assert runs.load(tmp_path / "model.pt").classes == classes
 
 
 def test_each_part_has_a_seed_of_its_own_and_tests_alone():

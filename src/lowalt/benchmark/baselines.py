@@ -27,8 +27,7 @@ def path_of(track: Track, folder: str | Path = REFERENCE) -> Path:
 def samples_per_model(track: Track) -> np.ndarray:
     """Return the number of test samples of each motion model, (models,), in the order of the models' names."""
     facts = track.truth().facts.take(track.numbers("test"))
-    motion = np.char.add(np.char.add(facts.subtype, "/"), facts.model.astype(str))
-    return model_shares(motion, [np.zeros(len(facts))])[1]
+    return model_shares(facts.motion, [np.zeros(len(facts))])[1]
 
 
 def packed(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Checksums of the benchmark's bytes: of whole parts, and of a few samples that a test makes again.
 
 Kept are `checksums.txt`, with a line "SHA-256  PART/FILE" for each file of signals and the files they come from, and
-`samples.txt`, with one sample of each subtype, "SHA-256  PART/KEY". Records are hashed without the version of this
-package, which they name.
+`samples.txt`, with one sample of each subtype, "SHA-256  PART/KEY". Records are hashed without the version
+of the rules, which they name.
 """
 
 import hashlib
@@ -78,7 +78,7 @@ def write_samples(out: str | Path) -> None:
 def samples(part: str) -> Iterator[tuple[str, str]]:
     """Make one sample of each subtype of a part (or of some, FEW) and yield its key and its SHA-256.
 
-    The checksum covers the record without the package's version, the signals and the tile.
+    The checksum covers the record without the version of its rules, the signals and the tile.
     """
     data = Dataset(config_of(part))
     names, snrs = [name for members in data.plan.groups.values() for name in members], data.plan.snrs

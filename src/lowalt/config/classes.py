@@ -22,7 +22,7 @@ CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")
 AIRBORNE = ("UAV", "Bird")
 """Categories that fly; the other two stay on the ground."""
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9 _-]{0,39}")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9 ()_-]{0,39}")
 _PLURALS = {"UAV": "UAVs", "Bird": "birds", "Vehicle": "vehicles", "Pedestrian": "pedestrians"}
 
 
@@ -34,7 +34,9 @@ def classes_of(table: Mapping[str, dict]) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(row["category"] for row in table.values()))
     for name in names:
         if not _NAME.fullmatch(name):
-            raise InputError(f"table of targets: category {name!r}, expected a letter, then letters, digits, - or _")
+            raise InputError(
+                f"table of targets: category {name!r}, expected a letter, then letters, digits, spaces or ()-_"
+            )
     if len({word(name) for name in names}) < len(names):
         raise InputError(f"table of targets: categories {list(names)}, expected names that differ in their letters")
     return names

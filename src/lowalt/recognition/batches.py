@@ -26,7 +26,7 @@ def epoch_order(facts: Facts, seed: int, keys: tuple, epoch: int, snrs_per_model
     order = np.argsort(draw, kind="stable")
     if not snrs_per_model:
         return order
-    _, motion = np.unique(np.char.add(np.char.add(facts.subtype, "\n"), facts.model.astype(str)), return_inverse=True)
+    _, motion = np.unique(facts.motion, return_inverse=True)
     # Rank the samples within each motion model by their draw; keep the first `snrs_per_model`.
     grouped = order[np.argsort(motion[order], kind="stable")]
     starts = np.concatenate([[0], np.cumsum(np.bincount(motion))[:-1]])

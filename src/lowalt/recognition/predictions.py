@@ -77,10 +77,7 @@ class Predictions:
         """Whether the most probable class is the true one, (samples,) bool."""
         return self.guesses == self.label
 
-    @property
-    def motion(self) -> np.ndarray:
-        """Name of each sample's motion model, (samples,) text."""
-        return np.char.add(np.char.add(self.subtype, "/"), self.model.astype(str))
+    motion = Facts.motion
 
     def take(self, numbers: np.ndarray) -> "Predictions":
         """Return the rows `numbers` (indices or a mask)."""

@@ -43,6 +43,11 @@ class Facts:
     def __len__(self) -> int:
         return len(self.key)
 
+    @property
+    def motion(self) -> np.ndarray:
+        """Name of each sample's motion model, (samples,) text."""
+        return np.char.add(np.char.add(self.subtype, "/"), self.model.astype(str))
+
     def take(self, numbers: np.ndarray) -> "Facts":
         """Return the facts of the samples `numbers` (indices or a mask)."""
         return Facts(*(getattr(self, name)[numbers] for name in FACTS))
