@@ -45,7 +45,6 @@ class Machine:
         """Return this process's machine: a free GPU if there is any, else the CPU.
 
         Under torchrun, ranks take the visible GPUs in order and communicate by nccl (GPU) or gloo (CPU).
-
         precision: "auto", "bf16" or "fp32". Raises: InputError where a rank finds no GPU left.
         """
         gpu = torch.cuda.is_available()

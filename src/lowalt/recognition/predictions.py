@@ -63,6 +63,7 @@ class Predictions:
     range_m: np.ndarray
     aspect_deg: np.ndarray
     probabilities: np.ndarray
+    motion = Facts.motion
 
     def __len__(self) -> int:
         return len(self.key)
@@ -76,8 +77,6 @@ class Predictions:
     def correct(self) -> np.ndarray:
         """Whether the most probable class is the true one, (samples,) bool."""
         return self.guesses == self.label
-
-    motion = Facts.motion
 
     def take(self, numbers: np.ndarray) -> "Predictions":
         """Return the rows `numbers` (indices or a mask)."""
