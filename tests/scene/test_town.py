@@ -18,6 +18,7 @@ from lowalt.scene.town.buildings import read
 from lowalt.scene.town.facets import town as made
 from lowalt.scene.town.materials import MATERIALS, named, properties
 from scenes import A, network, scene, target, view_of
+from shown_meshes import ply as ply_bytes
 from towns import BOXES, ORIGIN, block, geojson, mitsuba, ply
 
 NETWORK = network()
@@ -203,6 +204,25 @@ def test_the_ply_the_geojson_and_the_mitsuba_version_of_a_town_have_equal_facade
     assert len(planes["ply"]) == 5 * len(BOXES)
     np.testing.assert_allclose(planes["geojson"], planes["ply"], atol=2e-3)
     np.testing.assert_allclose(planes["xml"], planes["ply"], atol=1e-5)
+
+
+def test_a_mesh_whose_y_axis_is_up_is_turned_and_not_mirrored(tmp_path):
+    upright = read(town.DEFAULTS | {"buildings": str(ply(tmp_path / "z.ply", BOXES))}).corners
+    faces = [(3 * k, 3 * k + 1, 3 * k + 2) for k in range(len(upright))]
+    # The x axis stays; what was y points against z.
+    turned = np.stack([upright[..., 0], upright[..., 2], -upright[..., 1]], axis=-1).reshape(-1, 3)
+    (tmp_path / "y.ply").write_bytes(ply_bytes(turned.tolist(), faces, "ascii"))
+    found = read(town.DEFAULTS | {"buildings": str(tmp_path / "y.ply"), "up": "y"})
+    np.testing.assert_allclose(found.corners, upright, atol=1e-5)
+
+
+def test_without_diffraction_a_blocked_ray_has_no_field():
+    city = built([(0.0, 0.0, 2.0, 4000.0, 40.0)])
+    for end, free in ((60.0, False), (-50.0, True)):
+        ends = np.array([[[end, 3.0, 20.0]]])
+        lit, field = image_paths.direct(city, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, False)
+        assert lit[0, 0] == free
+        assert field[0, 0] == float(free)
 
 
 def test_a_record_names_the_paths(tmp_path):

@@ -135,3 +135,8 @@ def test_an_index_leads_to_no_file_but_those_below_its_folder(folder, tmp_path, 
         with pytest.raises(InputError, match=r"the server answers 404|lies outside"):
             ShardSet(f"{server.address}/inner/index.json").signal(0)
         assert set(server.sent) <= {"index.json"} | {key for key, sent in server.sent.items() if not sent}
+
+
+def test_the_files_of_an_index_are_asked_for_with_its_query():
+    """The query holds the signature of an address that a store has signed."""
+    assert remote.beside("https://host/a/index.json?key=1", "b c.tar") == "https://host/a/b%20c.tar?key=1"
