@@ -69,7 +69,7 @@ def pngs(found: Evidence) -> list[bytes]:
     return [encode(found.shards.tile(number), found.shards.palette) for number in range(len(found.shards))]
 
 
-def png_beside_pixels(found: Evidence) -> np.ndarray:
+def png_apart_from_pixels(found: Evidence) -> np.ndarray:
     """Bytes of each PNG before and after its pixels."""
     return np.array([list(data[:33] + data[-12:]) for data in pngs(found)], float)
 
@@ -120,7 +120,7 @@ CHANNELS: dict[str, tuple[Callable[[Evidence], np.ndarray], str]] = {
     "SNR": (lambda f: np.minimum(f.shards.snrs_db, 99).reshape(-1, 1), "chance"),
     "root seed in the record": (leaves_below("seed"), "chance"),
     "SHA-256 of the sample": (lambda f: np.concatenate([table["sha256"] for _, table in f.shards.tables()]), "chance"),
-    "PNG beside its pixels": (png_beside_pixels, "chance"),
+    "PNG apart from its pixels": (png_apart_from_pixels, "chance"),
     "lowest bits of the signal": (low_bits, "chance"),
     "size of the PNG": (lambda f: np.array([[len(data)] for data in pngs(f)], float), "in the image"),
     "level of the signal": (levels_db, "forbidden"),

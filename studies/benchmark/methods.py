@@ -113,7 +113,8 @@ def on_signals(backbone: str, given: Given) -> Answer:
         """Return a network on signals with fresh weights."""
         return SignalRecogniser(replace(scheme, backbone=backbone), block, size, classes)
 
-    scheme = Scheme(f"signals {backbone}", given.train.track.stations, ())
+    # A model's file names at least one view per station; the network's is the signal.
+    scheme = Scheme(f"signals {backbone}", given.train.track.stations, (0,))
     return network(given, scheme, built, Signals)
 
 

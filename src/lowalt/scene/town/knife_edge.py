@@ -1,6 +1,6 @@
 """Diffraction of the direct ray over roofs and around vertical edges: knife edges and screens of finite width.
 
-A building beside or across the ray is a screen with a top and two upright edges. By Babinet's principle the field
+A building near or across a ray is a screen with a top and two upright edges. By Babinet's principle the field
 behind it is 1 - (1 - F(left) - F(right)) (1 - F(top)) of that in free space, where F is Fresnel's integral of an edge's
 parameter nu, which is positive in the shadow: the wave passes over the top and around both sides.
 Of several buildings the one that weakens most counts in full, and on each side of it the next one as seen from its
@@ -41,8 +41,8 @@ class Screen(NamedTuple):
 
 
 def _along(start: np.ndarray, ends: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the ways from a start (3,) to ends (..., 3) at which places (..., 2 or 3) stand beside them in the
-    plan, and how far to the left (m)."""
+    """Where places (..., 2 or 3) project onto the ways from a start (3,) to ends (..., 3) in the plan, as shares of the
+    ways, and how far to the left of them the places are (m)."""
     way, off = (ends - start)[..., :2], places[..., :2] - start[:2]
     length = np.sqrt((way * way).sum(axis=-1))
     left = (way[..., 0] * off[..., 1] - way[..., 1] * off[..., 0]) / length
