@@ -73,8 +73,8 @@ def receive(
     """Return the echo of a motion model of a subtype at a station, at one place of the chain, in sqrt(W).
 
     configuration: overlays on the embedded default, each a path or a dict, a whole configuration, or a `Dataset`, which
-    keeps the targets between calls; station: the first one by default. Only this target, and the companions that the scene gives
-    it, are made. at:
+    keeps the targets between calls; station: the first one by default. Only this target and its
+    companions in the scene are made. at:
     "subcarriers": Y[n, m] of Eq. 24, the known symbol removed, as a receiver without faults or noise finds it;
     "receiver": the same behind the receiver's effects and noise; "cells": range cells; "canceller": range cells behind
     the clutter canceller; "signal": the chosen range cell of each symbol.
