@@ -94,6 +94,18 @@ def test_headline_and_f1_are_those_of_the_definitions():
     assert list(found["by_snr_percent"]) == ["3", "8", "13", "18", "23", "inf"]
 
 
+def test_the_interval_of_a_headline_number_ends_at_0_and_100():
+    facts, classes = facts_of(UNSEEN)
+    # All subtypes but two are right in every sample, so an interval that is symmetric passes 100 percent.
+    wrong = np.isin(facts.subtype, ["EH 216 S", "Sparrow"])
+    for right, end in ((~wrong, "high"), (wrong, "low")):
+        shares = np.eye(len(classes))[np.where(right, facts.label, (facts.label + 1) % len(classes))]
+        parts = [scoring.tested(UNSEEN, facts, shares)]
+        found = scoring.headline(UNSEEN, scoring.values_of(UNSEEN, parts, classes))
+        assert getattr(found, end) == {"high": 100.0, "low": 0.0}[end]
+        assert found.low < found.value < found.high
+
+
 def test_auroc_is_the_area_under_the_curve_and_its_interval_covers_it():
     shares, (facts, classes) = answers(OPEN, 2, 1.0), facts_of(OPEN)
     held_out = facts.label == classes.index(UNKNOWN)

@@ -83,9 +83,11 @@ def difference(track: Track, first: Values, second: np.ndarray) -> Interval:
 def headline(track: Track, found: Values) -> Interval:
     """Return the headline number in percent with its 95 % interval.
 
-    It is the difference to a method that gets nothing right, so both intervals are computed alike.
+    It is the difference to a method that gets nothing right, so both intervals are computed alike; this one ends at 0
+    and 100, which the headline number cannot pass.
     """
-    return difference(track, found, np.zeros((1, found.values.shape[1])))
+    value, low, high = difference(track, found, np.zeros((1, found.values.shape[1])))
+    return Interval(value, max(low, 0.0), min(high, 100.0))
 
 
 def kept_share(part: Predictions, label: int, accepted: float = 0.95) -> float:
