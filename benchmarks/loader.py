@@ -3,14 +3,18 @@
     python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 
 Packs one chunk of the run as image shards, as signal shards and as the usual RGB PNG tiles (Pillow, level 6), then
-reads each through `torch.utils.data.DataLoader` with two workers, shuffled, at 224 and 64 pixels. RGB tiles are decoded
-and resized by Pillow. Then harms copies of the shards 1 000 times (a byte, or a cut) and stops an epoch 100 times.
+reads each through `torch.utils.data.DataLoader` with two workers, shuffled, at 224, 64 and 24 pixels. RGB tiles are
+decoded and resized by Pillow. Then reads single samples in random order from disk, and from a local web server in a
+process of its own by byte ranges. Then harms copies of the shards 1 000 times (a byte, or a cut) and stops an epoch
+100 times.
 """
 
 import argparse
 import io
 import json
 import shutil
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -39,6 +43,7 @@ from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.spectra import Spectra
 from lowalt.tiles import Images, Renderer, encode, paint
 
+SERVER = Path(__file__).parent.parent / "tests/support/range_server.py"
 COLUMNS = ("what", "kind", "pixels", "workers", "samples", "value", "unit", "hardware")
 
 
@@ -88,8 +93,8 @@ def pack(run: Path, folder: Path, models: int) -> dict[str, Path]:
         for source in sorted((run / "noisy").glob("*-00000.npy")):
             rows = read_table(run / "motion" / f"{source.stem}.csv")[:models]
             signals = np.load(source, mmap_mode="r")
-            png = lambda n, level, s=signals: encode(tiles.tile(s[n, level]), images.palette)  # noqa: E731
-            raw = lambda n, level, s=signals: npy(s[n, level])  # noqa: E731
+            png = lambda n, level, s=signals: (encode(tiles.tile(s[n, level]), images.palette), {})  # noqa: E731
+            raw = lambda n, level, s=signals: (npy(s[n, level]), {})  # noqa: E731
             for fold in FOLDS:
                 group, part = source.stem.split("-")
                 shards.append(folder / kind / f"{group}-{fold}-{part}.tar")
@@ -131,6 +136,30 @@ def processor_ms(data: Dataset, samples: int = 60) -> float:
             times.append(time.process_time() - start)
         passes.append(times)
     return 1e3 * float(np.min(passes, axis=0).mean())
+
+
+def access_ms(index: str | Path, rng: np.random.Generator, count: int = 300) -> float:
+    """Median time until the record and data of a random sample are read and checked (ms), once its table is there."""
+    shards, times = ShardSet(index), []
+    if not len(shards.keys):
+        raise InputError(f"{index}: no samples")
+    for number in rng.integers(len(shards), size=count):
+        shards.keys[number]
+        start = time.perf_counter()
+        shards.members(number)
+        times.append(time.perf_counter() - start)
+    return 1e3 * float(np.median(times))
+
+
+def served_ms(index: Path, rng: np.random.Generator) -> float:
+    """`access_ms` over HTTP, from a server on this machine."""
+    command = [sys.executable, str(SERVER), str(index.parent)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        address = server.stdout.readline().strip()
+        try:
+            return access_ms(f"{address}/{index.name}", rng)
+        finally:
+            server.terminate()
 
 
 def damage(index: Path, folder: Path, count: int, rng: np.random.Generator) -> tuple[int, int, int, int]:
@@ -220,12 +249,15 @@ def main() -> None:
             buffer = io.BytesIO()
             Image.fromarray(paint(sets["image"].tile(number), sets["image"].palette)).save(buffer, "PNG")
             colours.append(buffer.getvalue())
-        for size in (224, 64):
+        for size in (224, 64, 24):
             sources = {kind: Views(shards, size) for kind, shards in sets.items()} | {"RGB PNG": Colours(colours, size)}
             for kind, data in sources.items():
                 rows.append(("loading", kind, size, 2, len(data), rate(data, 2), "samples/s"))
                 rows.append(("one sample", kind, size, 0, len(data), processor_ms(data), "ms of processor"))
         rng = np.random.default_rng(0)
+        for kind, index in indexes.items():
+            rows.append(("random access, disk", kind, "", 0, 300, access_ms(index, rng), "ms"))
+            rows.append(("random access, HTTP", kind, "", 0, 300, served_ms(index, rng), "ms"))
         for kind, index in indexes.items():
             count, found, named, refused = damage(index, folder / f"harmed-{kind}", given.faults, rng)
             for what, number in (("found", found), ("named", named), ("refused by the loader", refused)):

@@ -40,6 +40,33 @@ KINDS = {"complex64": (8, np.copy), "float16": (4, halves), "int16": (4, integer
 """By name: bytes of a symbol, and what comes back of a station's signal."""
 
 
+def rows(dataset: Dataset, snr_db: float) -> list[list]:
+    """Return the rows of an SNR (dB)."""
+    maker = dataset.maker
+    powers: dict[str, list] = {name: [] for name in KINDS}
+    pixels: dict[str, list] = {name: [] for name in KINDS}
+    groups = dataset.plan.groups.items()
+    places = [Place(group, name, model, snr_db) for group, names in groups for name in names for model in range(MODELS)]
+    for place in places:
+        row, signals = dataset.row(place), dataset.made_signal(place)
+        tile = maker.tile(signals, row, snr_db).astype(int)
+        for name, (_, kept) in KINDS.items():
+            back = np.array([kept(signal) for signal in signals])
+            error = np.mean(np.abs(back.astype(complex) - signals) ** 2, axis=1)
+            powers[name].append(error / np.mean(np.abs(signals.astype(complex)) ** 2, axis=1))
+            changed = np.abs(maker.tile(back, row, snr_db).astype(int) - tile)
+            pixels[name].append((np.count_nonzero(changed) / changed.size, changed.max()))
+    found = []
+    for name, (size, _) in KINDS.items():
+        share, changes = float(np.mean(powers[name])), np.array(pixels[name])
+        below = -10 * np.log10(share) if share else np.inf
+        # The noisy signal's power is that of the signal and the noise together.
+        noise = f"{below - 10 * np.log10(1 + 10 ** (snr_db / 10)):.1f}" if np.isfinite(snr_db) else ""
+        percent, largest = f"{100 * changes[:, 0].mean():.4f}", int(changes[:, 1].max())
+        found.append([name, size * maker.network.symbols, snr_db, len(places), f"{below:.1f}", noise, percent, largest])
+    return found
+
+
 def main() -> None:
     """Measure and write the table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -47,37 +74,7 @@ def main() -> None:
     given = options.parse_args()
     dataset = Dataset(overlaid([]))
     finite = [snr for snr in dataset.plan.snrs if np.isfinite(snr)]
-    maker, snrs = dataset.maker, (min(finite), max(finite), np.inf)
-    places = [
-        (group, name, model)
-        for group, names in dataset.plan.groups.items()
-        for name in names
-        for model in range(MODELS)
-    ]
-    rows = []
-    for snr in snrs:
-        powers: dict[str, list] = {name: [] for name in KINDS}
-        pixels: dict[str, list] = {name: [] for name in KINDS}
-        for place in places:
-            one = Place(*place, snr)
-            row, signals = dataset.row(one), dataset.made_signal(one)
-            tile = maker.tile(signals, row, snr).astype(int)
-            for name, (_, kept) in KINDS.items():
-                back = np.array([kept(signal) for signal in signals])
-                error = np.mean(np.abs(back.astype(complex) - signals) ** 2, axis=1)
-                powers[name].append(error / np.mean(np.abs(signals.astype(complex)) ** 2, axis=1))
-                changed = np.abs(maker.tile(back, row, snr).astype(int) - tile)
-                pixels[name].append((np.count_nonzero(changed) / changed.size, changed.max()))
-        for name, (size, _) in KINDS.items():
-            share = float(np.mean(powers[name]))
-            below = -10 * np.log10(share) if share else np.inf
-            # The noisy signal's power is that of the signal and the noise together.
-            noise = below - 10 * np.log10(1 + 10 ** (snr / 10)) if np.isfinite(snr) else np.nan
-            found = np.array(pixels[name])
-            rows.append([name, size * maker.network.symbols, snr, len(places), f"{below:.1f}",
-                         "" if np.isnan(noise) else f"{noise:.1f}", f"{100 * found[:, 0].mean():.4f}",
-                         int(found[:, 1].max())])  # fmt: skip
-    write_csv(given.out, COLUMNS, rows)
+    write_csv(given.out, COLUMNS, [row for snr in (min(finite), max(finite), np.inf) for row in rows(dataset, snr)])
 
 
 if __name__ == "__main__":

@@ -3,11 +3,13 @@
     python docs/filled_tables.py DOCUMENT NAME=FOLDER/PREFIX ...
 
 replaces the text between `<!-- NAME -->` and `<!-- end of NAME -->`. NAME is `schemes`: accuracy of every scheme
-next to the paper's, and which orderings hold; or `presets`: those of `make accuracy-cost`, their time and accuracy.
+next to the paper's, and which orderings hold; `presets`: those of `make accuracy-cost`, their time and accuracy; or
+`benchmark`: the baselines of the benchmark.
 """
 
 from pathlib import Path
 
+from lowalt.benchmark import baseline_table
 from lowalt.config.command import run
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.csv_tables import read_csv
@@ -68,7 +70,21 @@ def presets(prefix: str) -> str:
     return text
 
 
-MAKERS = {"schemes": schemes, "presets": presets}
+TRACKS = (("seen", "unseen", "one-station", "few-shot-1", "few-shot-5", "few-shot-20"),
+          ("forty", "open-set", "low-snr", "town", "fr2"))  # fmt: skip
+"""Tracks of the benchmark's tables, side by side."""
+
+
+def benchmark(prefix: str) -> str:
+    """Return the tables of the benchmark's baselines from {prefix}table.csv."""
+    rows = baseline_table.read(prefix)
+    has = {row["track"] for row in rows}
+    shown = [[track for track in tracks if track in has] for tracks in TRACKS]
+    text = "\n\n".join(baseline_table.markdown(rows, tracks) for tracks in shown if tracks)
+    return f"{text}\n\nMeasured on {'; and '.join(dict.fromkeys(row['hardware'] for row in rows))}.\n"
+
+
+MAKERS = {"schemes": schemes, "presets": presets, "benchmark": benchmark}
 
 
 def fill(document: str, name: str, table: str) -> str:

@@ -1,8 +1,9 @@
-"""The container's definition holds all that a run reads, and installs what it needs: shown without a container engine.
+"""The definitions of containers hold all that a run reads, and install what it needs: shown without a container engine.
 
-Instructions and copied files are read from envs/Dockerfile; a dry run stands on those files alone.
+Instructions and copied files are read from envs/; a dry run, or make, stands on those files alone.
 """
 
+import json
 import os
 import re
 import shlex
@@ -17,18 +18,21 @@ from snakemake_runs import run
 
 ROOT = Path(__file__).parents[1]
 KNOWN = {"FROM", "RUN", "WORKDIR", "COPY", "ENTRYPOINT", "CMD", "ENV", "LABEL"}
+FILES = sorted(path.name for path in (ROOT / "envs").glob("*Dockerfile"))
+OFFLINE = "benchmark.Dockerfile"
+"""Built and run without a network, from wheels."""
 
 
-def instructions() -> list[tuple[str, str]]:
-    """Instruction and rest of every line of the Dockerfile that is neither empty nor a comment."""
-    text = (ROOT / "envs/Dockerfile").read_text().replace("\\\n", " ")
+def instructions(file: str = "Dockerfile") -> list[tuple[str, str]]:
+    """Instruction and rest of every line of a file of envs/ that is neither empty nor a comment."""
+    text = (ROOT / "envs" / file).read_text().replace("\\\n", " ")
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     return [tuple(line.split(maxsplit=1)) for line in lines]
 
 
-def copied(folder: Path) -> Path:
-    """The working directory of the container as its COPY lines make it."""
-    for name, rest in instructions():
+def copied(folder: Path, file: str = "Dockerfile") -> Path:
+    """The working directory of a container as its COPY lines make it."""
+    for name, rest in instructions(file):
         if name == "COPY":
             *sources, target = rest.split()
             for source in sources:
@@ -42,10 +46,11 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def test_instructions_are_known_and_begin_with_a_python_that_the_package_allows():
-    found = instructions()
+@pytest.mark.parametrize("file", FILES)
+def test_instructions_are_known_and_begin_with_a_python_that_the_package_allows(file):
+    found = instructions(file)
     assert {name for name, _ in found} <= KNOWN and found[0][0] == "FROM"
-    version = re.fullmatch(r"python:3\.(\d+)-slim-[a-z]+", found[0][1])
+    version = re.fullmatch(r"python:3\.(\d+)-(?:slim-)?[a-z]+", found[0][1])
     asked = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"]
     assert int(version[1]) >= int(asked.removeprefix(">=3."))
 
@@ -81,6 +86,31 @@ def test_packages_of_the_system_exist_in_the_release_that_the_image_stands_on():
     if "libgl-dev" not in offered:
         pytest.skip("no index of Debian's packages is here")
     assert [package for package in packages if package not in offered] == []
+
+
+def test_the_offline_container_asks_only_for_the_folder_of_wheels_and_makes_a_target_of_make(tmp_path):
+    """With every target that it names, make finds its files among those copied, and would install what pip fetched."""
+    found = instructions(OFFLINE)
+    settings = dict(pair.split("=") for name, rest in found if name == "ENV" for pair in rest.split())
+    mounts, targets = [], []
+    for name, rest in found:
+        if name == "RUN":
+            mount, command = re.fullmatch(r"--mount=type=bind,source=wheels,target=(\S+) make (\S+)", rest).groups()
+            mounts.append(mount)
+            targets.append(command)
+    assert settings == {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": mounts[0], "UV_NO_INDEX": "1", "UV_OFFLINE": "1",
+                        "UV_FIND_LINKS": mounts[0]}  # fmt: skip
+    (entry,), (default,) = (json.loads(rest) for kind in ("ENTRYPOINT", "CMD") for name, rest in found if name == kind)
+    assert entry == "make"
+    folder = copied(tmp_path / "lowalt", OFFLINE)
+    for target in (*targets, default):
+        run = subprocess.run(["make", "--dry-run", target], cwd=folder, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
+    text = (ROOT / "envs" / OFFLINE).read_text()
+    fetched = re.search(r"pip download --dest wheels -c envs/constraints.txt (.*) '\.\[(.*)\]'", text)
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert {"pip", "uv", "setuptools"} == set(fetched[1].split())
+    assert {"workflow", "cost", "recognition"} <= set(fetched[2].split(",")) <= set(extras)
 
 
 @pytest.mark.workflow

@@ -158,10 +158,11 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (15, 1290), "config": (9, 1190), "drafting": (11, 2190), "echo": (28, 2665), "files": (12, 760),
+    "commands": (16, 1450), "config": (9, 1190), "drafting": (11, 2190), "echo": (28, 2665), "files": (12, 760),
     "machine": (10, 545), "measure": (6, 595), "motion": (10, 1010), "noise": (4, 175), "numerics": (13, 1030),
-    "recognition": (46, 4705), "recordings": (24, 2930), "report": (33, 1862), "scene": (75, 6175),
-    "shards": (23, 2915), "spectra": (16, 930), "targets": (36, 5105), "tiles": (16, 1478), "workflow": (15, 1750),
+    "recognition": (46, 4705), "recordings": (24, 2930), "report": (33, 1862), "scene": (75, 6235),
+    "shards": (24, 3050), "spectra": (16, 930), "targets": (36, 5115), "tiles": (16, 1478), "workflow": (15, 1755),
+    "benchmark": (11, 900),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 

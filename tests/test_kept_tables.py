@@ -167,6 +167,13 @@ def made_rotors(kept):
     return dict(zip(module.COLUMNS, row, strict=True))
 
 
+def precision(kept):
+    module = program("benchmarks/signal_precision.py")
+    rows = module.rows(module.Dataset(module.overlaid([])), float(kept["snr_db"]))
+    (row,) = [row for row in rows if row[0] == kept["kept_as"]]
+    return dict(zip(module.COLUMNS, row, strict=True))
+
+
 def gain(kept):
     module = program("benchmarks/sampling_gain.py")
     tone_hz, names = float(kept["tone_hz"]), [name for name in kept if name.startswith("gain_") and kept[name]]
@@ -182,7 +189,7 @@ REMADE = {
     "results/benchmarks/planted_faults.csv": fault, "results/benchmarks/rounding.csv": rounding,
     "results/benchmarks/scene_levels.csv": scene_level, "results/benchmarks/target_levels.csv": target_level,
     "results/benchmarks/training_memory.csv": memory, "studies/detection/results/detection.csv": looks,
-    "results/benchmarks/sampling_gain.csv": gain,
+    "results/benchmarks/sampling_gain.csv": gain, "results/benchmarks/signal_precision.csv": precision,
     "studies/detection/results/neighbours.csv": neighbours,
     "studies/rotors/results/made.csv": made_rotors,
 }  # fmt: skip

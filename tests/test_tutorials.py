@@ -17,8 +17,13 @@ import pytest
 import yaml
 
 import lowalt
+import lowalt.benchmark
+import small_benchmark
 from dataset import build, publish
 from lowalt.__main__ import main
+from lowalt.benchmark import definition, frozen_bytes
+from lowalt.benchmark.submission import read as read_submission
+from lowalt.commands import workflow
 from lowalt.config.layers import load
 from lowalt.files.yaml_files import load_yaml
 from lowalt.shards.build import write_run
@@ -88,6 +93,7 @@ def test_every_tutorial_is_followed_here():
     pages = {path.stem for path in FOLDER.glob("*.md")}
     assert pages == {
         "first_data_set", "trajectory", "target", "effect", "backbone", "pytorch", "hugging_face", "recording",
+        "benchmark",
     }  # fmt: skip
 
 
@@ -97,6 +103,19 @@ def test_a_first_data_set(checkout, capsys, monkeypatch):
     assert capsys.readouterr().out.startswith("80 ")
     # The overlay of the last step is a whole configuration's overlay.
     names["load"](["config/default.yaml", "first.yaml"], SCHEMA)
+
+
+def test_a_submission_to_the_benchmark(checkout, monkeypatch):
+    """On a small copy of the benchmark; its data come from the test, so that no workflow starts and no byte is kept."""
+    small_benchmark.shrink(monkeypatch)
+    monkeypatch.setattr(workflow, "ended", lambda options: {"status": small_benchmark.write(Path("results")) is None})
+    monkeypatch.setattr(frozen_bytes, "faults", lambda part, folder: [])
+    printed, _ = followed("benchmark", checkout, monkeypatch)
+    assert "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
+    test = lowalt.benchmark.load("unseen", "test")
+    right = read_submission("mine.csv", test.track).argmax(1) == test.labels
+    assert f"accuracy {100 * right.mean():.1f} (" in printed
+    definition.truth.cache_clear()
 
 
 def test_a_trajectory(checkout, monkeypatch):
@@ -140,7 +159,7 @@ def test_an_effect(checkout, capsys, monkeypatch):
     way_km = 2e-3 * np.linalg.norm(np.subtract([row[f"{axis}_m"] for axis in "xyz"], station.position_m))
     expected_db = way_km * rain.attenuation(76e9 + 307.2e6 / 2, 50.0)
     assert 10 * np.log10(heard[1] / heard[0]) == pytest.approx(expected_db, rel=0.02)
-    (lost,) = re.findall(r"^rain, out and back +(-\d+\.\d) dB$", printed, re.MULTILINE)
+    lost, *_ = re.findall(r"^ +rain, out and back +(-\d+\.\d) dB$", printed, re.MULTILINE)
     assert float(lost) == pytest.approx(-expected_db, abs=0.06)
 
 

@@ -52,6 +52,32 @@ def test_the_wheel_holds_the_workflow_and_says_that_it_is_typed(installed):
     assert (installed / "snakemake_logger_plugin_lowalt/__init__.py").is_file()
 
 
+def said(command, folder):
+    """What a program prints that sees no other variable of the environment than PATH and HOME; it must succeed."""
+    environment = {"PATH": "/usr/bin:/bin", "HOME": str(folder)}
+    run = subprocess.run([*map(str, command)], cwd=folder, capture_output=True, text=True, env=environment)
+    assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["*.whl", "*.tar.gz"])
+def test_a_new_environment_has_the_command_and_makes_the_bytes_of_the_checkout(installed, tmp_path, kind):
+    """From the wheel, and from the source distribution, with the packages that they ask for and no others."""
+    (package,) = installed.parent.glob(kind)
+    python = tmp_path / "env/bin/python"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "env"], check=True)
+    # Without a refresh, uv takes a wheel that it built from an earlier source distribution of this version.
+    install = [Path(sys.executable).with_name("uv"), "pip", "install", "--quiet", "--refresh-package", "lowalt"]
+    subprocess.run([*install, "--python", python, "-c", ROOT / "envs/constraints.txt", package], check=True)
+    here, there = Path(sys.executable).with_name("lowalt"), python.with_name("lowalt")
+    assert said([there, "--help"], tmp_path) == said([here, "--help"], tmp_path)
+    for program, folder in ((here, "here"), (there, "there")):
+        said([program, "sample", "DJI Mini 2", "0", "--out", folder], tmp_path)
+    made = {path.name: path.read_bytes() for path in (tmp_path / "there").iterdir()}
+    assert made and made == {path.name: path.read_bytes() for path in (tmp_path / "here").iterdir()}
+
+
 @pytest.mark.workflow
 def test_the_installed_command_makes_the_reference_s_bytes_in_an_empty_folder(installed, tmp_path):
     environment = os.environ | {"PYTHONPATH": str(installed)}

@@ -5,7 +5,7 @@ One folder a stage, in pipeline order: targets, motion, echo, noise, spectra, ti
 
 import importlib
 
-__version__ = "0.2.0"
+__version__ = "1.0.0"
 
 
 _HOMES = {

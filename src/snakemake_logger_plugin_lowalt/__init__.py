@@ -1,10 +1,10 @@
-"""Snakemake's log as one line per stage: `snakemake --logger lowalt`, as the profiles of this project ask.
+"""Snakemake's log as one line per stage: `snakemake --logger lowalt`, which this project's profiles select.
 
-On a terminal the lines of the stages that run are drawn anew in place; in a log each stage has a line when it starts,
-every half minute and when it ends. Everything else is in files: Snakemake's own log, whose path it prints at the end,
-and the log of each job, whose last lines are shown when it fails. A dry run prints a table of stages, their
-jobs and why these would run; with --printshellcmds it prints what Snakemake prints of every job. A quiet run shows
-warnings and failures alone and keeps no status, since Snakemake then does not say which jobs have ended.
+On a terminal, the lines of running stages are redrawn in place. In a log, each stage has a line when it starts, every
+half minute, and when it ends. Everything else is in files: Snakemake's own log, whose path it prints at the end, and
+the log of each job, whose last lines are shown if it fails. A dry run prints a table of stages, with their jobs and why
+these would run; with --printshellcmds it prints what Snakemake prints for every job. A quiet run shows only warnings
+and failures and keeps no status, because Snakemake then does not report which jobs have ended.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ from lowalt.workflow import closing, status
 from lowalt.workflow.board import Board, Job
 
 EVERY_S = {True: 1.0, False: 30.0}
-"""Seconds between two states shown, on a terminal and in a log."""
+"""Seconds between two updates of the display: on a terminal (True), and in a log."""
 LAST_LINES = 15
 """Lines of a failed job's log that are shown."""
 QUIET = {
@@ -45,16 +45,16 @@ NOISE = (
     "Some jobs were triggered by provenance", "If you prefer that only modification time", "If you are sure that",
     "Rules with provenance triggered jobs", "Reasons:",
 )  # fmt: skip
-"""Beginnings of messages that say nothing about this run."""
+"""Messages that begin like this say nothing about the run and are not shown."""
 FOLLOWS = "input files updated by another job"
-"""Snakemake's reason of a job that runs because another one does."""
+"""Snakemake's reason for a job that runs only because another job does."""
 
 INTERRUPTED = "on user request"
 """Part of the message with which Snakemake answers Ctrl-C and SIGTERM."""
 
 
 def quiet_on_a_full_disk(file: logging.FileHandler, record: logging.LogRecord) -> None:
-    """Report that a line could not be written to a log file, unless its disk is full: then the run itself says so.
+    """Report that a line could not be written to a log file, unless its disk is full, which the run itself reports.
 
     Python would print two tracebacks for every such line.
     """
@@ -65,7 +65,7 @@ def quiet_on_a_full_disk(file: logging.FileHandler, record: logging.LogRecord) -
 def short_reason(reason: str) -> str:
     """Return why a job would run without the files that Snakemake names, such as "missing output files"."""
     kinds = dict.fromkeys(part.partition(":")[0].strip().lower() for part in reason.split("; "))
-    # A job that has a reason of its own would run whatever happens to its inputs.
+    # A job with another reason would run even if its inputs stayed the same.
     own = [kind for kind in kinds if kind and kind != FOLLOWS]
     return ", ".join(own or kinds)
 
@@ -166,7 +166,7 @@ class LogHandler(LogHandlerBase):
             self._say(self._plain.format(record))
 
     def _take(self, record: logging.LogRecord) -> None:
-        """Update the display by one record of Snakemake."""
+        """Update the display with one record of Snakemake."""
         event = getattr(record, "event", None)
         if self._quiet and record.levelno <= logging.INFO:
             return
@@ -190,7 +190,7 @@ class LogHandler(LogHandlerBase):
             self._say_full(str(record.msg))
 
     def _say_full(self, text: str) -> None:
-        """Say once that the disk is full, if an error's text or the free space shows it: job logs may have no room."""
+        """Say once that the disk is full, if an error's text or the free space shows it; job logs may be cut short."""
         free = free_bytes(Path.cwd())
         if not self._full and (free < NEARLY_FULL_BYTES or os.strerror(FULL[0]) in text):
             self._full = True
@@ -201,7 +201,7 @@ class LogHandler(LogHandlerBase):
 
     @staticmethod
     def _noise(record: logging.LogRecord) -> bool:
-        """Whether a record says nothing that the display does not say."""
+        """Whether a record tells nothing beyond what the display shows."""
         text = record.getMessage() if record.msg is not None else ""
         # The command of a failed job stands in Snakemake's own log; its error is shown by `_fail`.
         failed = hasattr(record, "exception") and "CalledProcessError" in text[:200]
@@ -254,13 +254,13 @@ class LogHandler(LogHandlerBase):
             self._draw()
 
     def _erase(self) -> None:
-        """Take the drawn board off the terminal."""
+        """Erase the drawn lines from the terminal."""
         if self._drawn:
             print(f"\x1b[{self._drawn}F\x1b[J", end="", file=self._stream)
             self._drawn = 0
 
     def _draw(self) -> None:
-        """Draw the stages that run, in place; in a log nothing."""
+        """Draw the running stages in place; do nothing in a log."""
         if not (self._terminal and self._board):
             return
         now, size = time.time(), shutil.get_terminal_size()
@@ -289,6 +289,6 @@ class LogHandler(LogHandlerBase):
 
     def _keep(self, state: str) -> None:
         """Write the state of the run to its status file."""
-        # On a full disk the jobs fail with messages of their own; the display must not.
+        # On a full disk, jobs fail with their own messages; the display must not fail.
         with contextlib.suppress(OSError, InputError):
             status.write(self._board, state)

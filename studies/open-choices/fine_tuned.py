@@ -87,12 +87,16 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser("fine_tuned.py", description=__doc__.splitlines()[0])
     line.add_argument("--out", type=Path, default=HERE / "results/fine-tuned.csv", help="table to write (.csv)")
     line.add_argument("--workers", type=int, default=os.cpu_count(), help="trainings side by side")
+    line.add_argument("--pixels", type=int, nargs="+", help="images of these sizes alone (default: 64, 128, 224)")
+    line.add_argument("--stations", nargs="+", help="of these stations alone (default: A, ABC)")
     line.add_argument("--finished", action="store_true", help="the table of what is finished, without a training")
     given = line.parse_args(arguments)
     if not given.finished:
+        asked = [one for one in RUNS if one.pixels in (given.pixels or [one.pixels])]
+        asked = [one for one in asked if one.stations in (given.stations or [one.stations])]
         write_weights(OUT / f"{BACKBONE}.pth")
-        trainings.side_by_side(views_of, RUNS, given.workers)
-        jobs = [(one, words, seed) for seed in SEEDS for one in reversed(RUNS) for words in WEIGHTS]
+        trainings.side_by_side(views_of, asked, given.workers)
+        jobs = [(one, words, seed) for seed in SEEDS for one in reversed(asked) for words in WEIGHTS]
         trainings.side_by_side(answered, jobs, given.workers)
     columns = "pixels", "models", "snrs", "stations", "weights", "seeds", "seen_percent", "percent", "low", "high"
     write_csv(given.out, (*columns, *list(NAMED)[1:], "worst", "hardware"), rows())

@@ -2,16 +2,20 @@
 
 import json
 import math
+import shutil
 
 import pytest
+import torch
 import yaml
 
 import lowalt
 from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import checkpoint, score
+from lowalt.recognition import checkpoint, runs, score
 from lowalt.recognition.__main__ import main
+from lowalt.recognition.inference import Machine
+from lowalt.recognition.sample_sources import Source
 from lowalt.shards.build import write_run
 
 CHANGES = {
@@ -48,6 +52,33 @@ def test_one_call_trains_and_another_evaluates_as_the_commands_do(run, tmp_path)
     assert found == score.score(table, index, "seen") == lowalt.evaluate(tmp_path / "model/model.pt", run)
     parts = [line.rpartition(",")[2] for line in (tmp_path / "p.csv").read_text().splitlines()]
     assert parts[0] == "part" and parts.count("test") == found["samples"] and set(parts[1:]) == {"test", "validation"}
+
+
+def test_training_reads_no_test_sample(run, tmp_path):
+    """No statistic of test samples, such as a mean for normalising, can enter: the weights come out without them."""
+    without = shutil.copytree(run, tmp_path / "run")
+    gone = list((without / "shards").glob("*-test-*"))
+    for path in gone:
+        path.unlink()
+    models = [lowalt.train(folder, "A:VRP+TRP+VT", "seen", out=tmp_path / f"model {number}", steps=3).model
+              for number, folder in enumerate((run, without))]  # fmt: skip
+    kept, found = (model.state_dict() for model in models)
+    assert gone and kept.keys() == found.keys()
+    assert all(torch.equal(kept[name], found[name]) for name in kept)
+
+
+def test_an_answer_depends_on_its_own_sample_alone(run, tmp_path):
+    trained = lowalt.train(run, "A:VRP+TRP+VT", "seen", out=tmp_path / "model", steps=3)
+    source = Source.of_run(run / "shards/index.json", trained.size)
+    settings, machine = {"batch": 3, "threads": 1, "precision": "float32", "mirror": False}, Machine.here("float32")
+    of_fold = {}
+    for pairs in ({("seen", "test")}, {("seen", "val"), ("seen", "test")}):
+        samples = source.samples(trained.scheme.columns, pairs, trained.size)
+        shares = runs.answers(trained, samples, settings, machine)
+        of_fold[len(pairs)] = dict(zip(samples.facts.key.tolist(), shares, strict=True))
+    assert of_fold[1].keys() < of_fold[2].keys()
+    for key, share in of_fold[1].items():
+        assert of_fold[2][key] == pytest.approx(share, abs=1e-5)
 
 
 def test_a_folder_that_is_no_run_and_a_setting_that_is_none_are_refused(run, tmp_path):

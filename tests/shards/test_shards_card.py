@@ -10,6 +10,7 @@ import shutil
 import pytest
 import yaml
 
+import lowalt
 from dataset import RENDER, SEED, SNRS, SPLIT, build, motion_rows
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
@@ -44,6 +45,21 @@ def test_card_has_counts_configuration_and_versions(published):
     assert (published / shard).is_file()
     for word in ("Known limits", "Oddities", "Licence", "verify"):
         assert word in text
+
+
+@pytest.mark.parametrize(("run", "name", "version"), [
+    ("trial", "lowalt-trial", "0.2.0"), ("lowalt-40-v1", "lowalt-40-v1", "1.0.0"),
+    ("lowalt-40-v12", "lowalt-40-v12", "12.0.0"), ("trial-v2", "lowalt-trial-v2", "0.2.0"),
+])  # fmt: skip
+def test_only_a_frozen_run_gives_its_data_set_a_version_and_a_card_with_rules(published, tmp_path, run, name, version):
+    folder = shutil.copytree(published, tmp_path / "shards")
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(CONFIG | {"run": run}))
+    main(["--index", str(folder / "index.json"), "--config", str(tmp_path / "config.yaml")])
+    described = json.loads((folder / "croissant.json").read_text())
+    assert (described["name"], described["version"]) == (name, version)
+    card_text = (folder / "README.md").read_text()
+    assert f"# {name}\n" in card_text and f"lowalt\n{lowalt.__version__} wrote this page" in card_text
+    assert ("docs/benchmark-rules.md" in card_text) == (version != "0.2.0")
 
 
 def test_samples_are_all_listed(published):

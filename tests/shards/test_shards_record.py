@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import pytest
 
 from dataset import SEED, motion_rows
+from forks import printed
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.shards.sample_record import geometry, record, row_of, sample_key, snr_label
+from lowalt.shards.sample_record import DATA_VERSION, geometry, record, row_of, sample_key, snr_label
 from lowalt.shards.tar import Writer
 from pictures import NETWORK
 
@@ -30,7 +31,22 @@ def test_record_tells_motion_geometry_and_versions():
     assert seen["range_m"] == 50 and seen["omega"] == 0
     assert seen["radial_mps"] == pytest.approx(5)
     assert seen["psi"] == pytest.approx(-math.sin(math.radians(30)) * 0.6 + math.cos(math.radians(30)) * 0.8)
-    assert set(entry["versions"]) == {"lowalt"}
+    assert entry["versions"] == {"lowalt": DATA_VERSION}
+
+
+def test_a_record_does_not_depend_on_the_version_of_the_package():
+    made = """
+import sys, lowalt
+{}
+sys.path[:0] = ["tests/support"]
+from dataset import NETWORK, motion_rows
+from lowalt.config.network import Network
+from lowalt.shards.sample_record import record
+
+print(record(motion_rows("seen")[0], 3.0, "val", 1, Network.from_settings(NETWORK)).decode())
+"""
+    here, later = printed([made.format("pass"), made.format("lowalt.__version__ = '9.9.9'")])
+    assert here == later and f'"versions":{{"lowalt":"{DATA_VERSION}"}}' in here
 
 
 def types(value):

@@ -1,13 +1,18 @@
 """Disk: a run's bytes follow from its arrays, what is there already is not counted, a full disk is named."""
 
+import contextlib
 import errno
 import os
+import re
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
+from test_workflow import checksums, snakemake, workplace
+from test_workflow_extension import BASE
 
 from lowalt.config.layers import load_yaml
 from lowalt.config.plan import Plan
@@ -72,14 +77,22 @@ def test_a_run_is_refused_where_its_new_bytes_do_not_fit_and_started_when_told(t
         space.before(workflow, PLAN, CONFIG)
 
 
+@contextlib.contextmanager
+def mounted(folder):
+    """Mount a disk of 2 MB at a folder, where this user may."""
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "lowalt", folder], capture_output=True).returncode:
+        pytest.skip("mounting a file system needs root")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
 @pytest.fixture
 def small_disk(tmp_path):
-    """A disk of 2 MB of its own, where this user may mount one."""
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "lowalt", tmp_path], capture_output=True)
-    if mounted.returncode:
-        pytest.skip("mounting a file system needs root")
-    yield tmp_path
-    subprocess.run(["umount", tmp_path], check=True)
+    """A disk of 2 MB of its own."""
+    with mounted(tmp_path):
+        yield tmp_path
 
 
 def written(path, size):
@@ -147,6 +160,29 @@ def test_other_errors_pass_unchanged(tmp_path):
     assert not isinstance(caught.value, SpaceError)
     with pytest.raises(RuntimeError, match="plain"), replacing(tmp_path / "x"):
         raise RuntimeError("plain")
+
+
+@pytest.mark.slow
+@pytest.mark.workflow
+def test_a_run_that_met_a_full_disk_twice_has_the_bytes_of_an_undisturbed_one(tmp_path, monkeypatch):
+    """The data set needs three megabytes; the same command continues once there is room."""
+    overlay = yaml.safe_dump(BASE | {"motion": BASE["motion"] | {"models": 20}})
+    whole, disturbed = workplace(tmp_path / "whole"), workplace(tmp_path / "disturbed")
+    for folder in (whole, disturbed):
+        (folder / "overlay.yaml").write_text(overlay)
+    snakemake(whole, "--", "data")
+    results = disturbed / "results"
+    results.mkdir()
+    monkeypatch.setenv(space.VARIABLE, "off")
+    with mounted(results):
+        for size in ("1m", "2m"):
+            subprocess.run(["mount", "-o", f"remount,size={size}", results], check=True)
+            said = snakemake(disturbed, "--", "data", status=1)
+            assert re.search(r"^ *error: results/test/\S+: the disk is full; the file needs .* free", said, re.M), said
+            assert "Traceback" not in said and not list(results.rglob("*.part*"))
+        subprocess.run(["mount", "-o", "remount,size=64m", results], check=True)
+        snakemake(disturbed, "--", "data")
+        assert checksums(disturbed) == checksums(whole)
 
 
 @pytest.mark.parametrize("place", ["results", "results/a", "results/a/echo"])

@@ -34,6 +34,8 @@ COMMANDS = {
     "verify": Entry("data", "check every byte of a data set", f"lowalt verify {_INDEX}"),
     "remake": Entry("data", "make stored samples again from their records and compare every byte",
                     f"lowalt remake {_INDEX} crow-000003-snr013"),
+    "benchmark": Entry("benchmark", "lowalt-40: data, tracks, scores of submissions, table of baselines",
+                       "lowalt benchmark score predictions.csv --track unseen"),
     "compare": Entry("compare", "two finished runs: what differs in configuration, accuracy, time and bytes",
                      "lowalt compare results/default results/tiny"),
     "report": Entry("report", "make the page of one run again, or a page that links all runs and compares any two",

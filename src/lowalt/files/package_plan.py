@@ -10,7 +10,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).parents[1]
 ROOMS = (
     "files", "machine", "numerics", "config", "targets", "drafting", "motion", "echo", "scene", "noise", "spectra",
-    "tiles", "shards", "recognition", "recordings", "measure", "report", "workflow", "commands",
+    "tiles", "shards", "recognition", "recordings", "benchmark", "measure", "report", "workflow", "commands",
 )  # fmt: skip
 
 

@@ -25,8 +25,11 @@ from lowalt.shards import checksums
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.hub import front
 from lowalt.shards.read import ShardSet
+from lowalt.shards.sample_record import DATA_VERSION
 from lowalt.shards.sample_table import EXTENSIONS
 
+FROZEN = re.compile(r"lowalt-\d+-v(\d+)")
+"""Name of a run that makes the data set of a benchmark, which only a new version may change."""
 SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
 LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
@@ -121,9 +124,23 @@ def description(shards: ShardSet) -> str:
     )
 
 
+def rules(shards: ShardSet) -> str:
+    """Return the version of the rules that decide the samples' bytes, as their records state it."""
+    return shards.record(0)["versions"]["lowalt"] if len(shards) else DATA_VERSION
+
+
+def identity(run_name: str, shards: ShardSet) -> tuple[str, str]:
+    """Return name and version of the data set of a run.
+
+    The data set of a benchmark has the benchmark's version; any other has the version of its rules.
+    """
+    frozen = FROZEN.fullmatch(run_name)
+    name = run_name if run_name.startswith("lowalt-") else f"lowalt-{run_name}"
+    return name, f"{frozen[1]}.0.0" if frozen else rules(shards)
+
+
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
-    versions = shards.record(0)["versions"] if len(shards) else {"lowalt": __version__}
     # Template blocks must not leave empty lines.
     templates = jinja2.Environment(
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined
@@ -133,7 +150,8 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
         description=description(shards), counts=_counts(shards), config=config.strip(), images=len(shards.columns()),
         spectra=", ".join(spectrum.upper() for spectrum in shards.spectra), extension=EXTENSIONS[shards.kind],
         example=shards.shards[0]["path"] if shards.shards else "SHARD.tar", license=license_name,
-        license_address=LICENSES[license_name], versions=_table(("package", "version"), sorted(versions.items())),
+        license_address=LICENSES[license_name], package=__version__, frozen=FROZEN.fullmatch(name),
+        versions=_table(("rules of", "version"), [("lowalt", rules(shards))]),
     )  # fmt: skip
 
 
@@ -147,7 +165,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     if license_name not in LICENSES:
         raise InputError(f"--license: {license_name!r}, expected one of {sorted(LICENSES)}")
     shards, config = ShardSet(index_path), text_of(config_path, "configuration")
-    name = f"lowalt-{yaml.safe_load(config)['run']}"
+    name, version = identity(yaml.safe_load(config)["run"], shards)
     folder = Path(index_path).parent
     with replacing(folder / "README.md") as temporary:
         temporary.write_text(readme(shards, config, name, license_name))
@@ -155,7 +173,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     write_samples(shards, samples)
     table = {"path": samples.name, "bytes": samples.stat().st_size, "sha256": sha256(samples)}
     known = {
-        "name": name, "description": description(shards), "version": __version__,
+        "name": name, "description": description(shards), "version": version,
         "license": LICENSES[license_name], "citeAs": PAPER,
         "datePublished": f"{datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC):%Y-%m-%d}", **facts,
     }  # fmt: skip

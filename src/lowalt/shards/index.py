@@ -17,6 +17,7 @@ from lowalt.files.json_objects import read_object
 from lowalt.shards.sample_table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"
+WHAT = "an index of shards"
 READABLE = ("lowalt-shards-1", FORMAT)
 """Readable formats. In the first, records contain nulls and an SNR of \"inf\", and signals are complex64."""
 
@@ -79,12 +80,19 @@ def _relative(shard: Path, index: Path) -> str:
 
 
 def load(path: str | Path) -> dict:
-    """Return an index.
+    """Return an index from disk.
 
     Raises: InputError naming the file where it is missing or no index, or the setting in it that is wrong.
     """
     existing(path, "index")
-    index = read_object(path, "an index of shards")
+    return checked(read_object(path, WHAT), path)
+
+
+def checked(index: dict, path: str | Path) -> dict:
+    """Return an index that was read from `path`, after its check; no shard lies outside its folder.
+
+    Raises: InputError naming `path` where it is damaged or no index, or the setting in it that is wrong.
+    """
     try:
         written, stated, computed = index["format"], index["sha256"], _checksum(index)
     except KeyError as error:

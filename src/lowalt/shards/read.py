@@ -8,6 +8,7 @@ import hashlib
 import io
 import json
 from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,13 @@ from lowalt.config.plan import GROUPS
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
+from lowalt.files.json_objects import json_object
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
-from lowalt.shards.index import load
+from lowalt.shards.index import WHAT, checked, load
+from lowalt.shards.remote import MOST_INDEX_BYTES, beside, fetched, is_address, span
 from lowalt.shards.sample_record import npy, row_of
-from lowalt.shards.sample_table import map_samples, table_path
+from lowalt.shards.sample_table import MOST_OVERHEAD_BYTES, SAMPLE, map_samples, table_path
 from lowalt.shards.stored_cubes import cubes_of
 from lowalt.spectra.catalogue import named, of_cells
 from lowalt.spectra.cube import Cube
@@ -42,6 +45,7 @@ def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
 class ShardSet:
     """The samples of some groups and folds of a data set, numbered in the order of the index.
 
+    Of a data set on a web server, only the index, the tables of the shards in use and the samples asked for are read.
     It can be pickled; each worker memory-maps the tables itself. Every access checks the sample's SHA-256, unless
     `check` is False.
     """
@@ -51,11 +55,14 @@ class ShardSet:
     ) -> None:
         """Select the shards of these groups and folds.
 
+        index_path: a file, or an address (http or https) on a server that sends byte ranges.
         Raises: InputError naming an unknown group or fold, or a file that is missing or damaged.
         """
-        self.index_path, self.groups, self.folds, self.check = Path(index_path), tuple(groups), tuple(folds), check
+        self.remote, self._base = is_address(index_path), str(index_path)
+        self.index_path = self._base if self.remote else Path(index_path)
+        self.groups, self.folds, self.check = tuple(groups), tuple(folds), check
         refuse_unknown(self.groups, self.folds)
-        self.index = load(index_path)
+        self.index = self._fetched_index() if self.remote else load(index_path)
         self.kind, self.classes = self.index["kind"], stated(self.index)
         self.shards = [s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds]
         self._ends = np.cumsum([0, *(shard["samples"] for shard in self.shards)])
@@ -69,20 +76,38 @@ class ShardSet:
         kept = {name: value for name, value in self.__dict__.items() if name != "renderer"}
         return {**kept, "_tables": {}}
 
-    def _path(self, shard: int) -> Path:
-        """Path of a shard by its place in the index."""
-        return self.index_path.parent / self.shards[shard]["path"]
+    def _fetched_index(self) -> dict:
+        """The index from its address."""
+        text = span(self._base, 0, MOST_INDEX_BYTES).decode(errors="replace")
+        return checked(json_object(text, self._base, WHAT), self._base)
+
+    def _read(self, shard: int, offset: int, size: int) -> bytes:
+        """At most `size` bytes of a shard from `offset` on."""
+        name = self.shards[shard]["path"]
+        if self.remote:
+            return span(beside(self._base, name), offset, size)
+        # Open the shard for each access: there may be more shards than allowed open files, and a memory map of a
+        # truncated file would crash the process.
+        with existing(Path(self.index_path).parent / name, "shard").open("rb") as file:
+            file.seek(offset)
+            return file.read(size)
 
     def _table(self, shard: int) -> np.ndarray:
-        """The rows of a shard's table, checked and mapped at first use."""
+        """The rows of a shard's table, fetched if it is remote, checked and mapped at first use."""
         if shard not in self._tables:
-            path, entry = table_path(self._path(shard)), self.shards[shard]
-            samples = map_samples(path)
-            if len(samples) != entry["samples"] or (self.check and sha256(path) != entry["table_sha256"]):
-                raise InputError(
-                    f"{path.name}: damaged or another table: {len(samples)} rows, expected {entry['samples']}, and the "
-                    "SHA-256 that the index states"
-                )
+            entry = self.shards[shard]
+            name = table_path(entry["path"])
+            most = entry["samples"] * SAMPLE.itemsize + MOST_OVERHEAD_BYTES
+            place: AbstractContextManager[Path] = nullcontext(Path(self.index_path).parent / name)
+            if self.remote:
+                place = fetched(beside(self._base, name.as_posix()), most)
+            with place as path:
+                samples = map_samples(path)
+                if len(samples) != entry["samples"] or (self.check and sha256(path) != entry["table_sha256"]):
+                    raise InputError(
+                        f"{path.name}: damaged or another table: {len(samples)} rows, expected {entry['samples']}, and "
+                        "the SHA-256 that the index states"
+                    )
             self._tables[shard] = samples
         return self._tables[shard]
 
@@ -109,18 +134,15 @@ class ShardSet:
         Raises: InputError naming shard and sample where it is damaged.
         """
         shard, place = self._locate(number)
-        row, path = self._table(shard)[place], existing(self._path(shard), "shard")
+        row = self._table(shard)[place]
         first, length = int(row[f"{member}_offset"]), int(row[f"{member}_size"])
         # Without a check, read only the member: a record is about 1 % of its sample's bytes.
         offset, size = (int(row["offset"]), int(row["size"])) if self.check else (first, length)
-        # Open the shard for each access: there may be more shards than allowed open files, and a memory map of a
-        # truncated file would crash the process.
-        with path.open("rb") as file:
-            file.seek(offset)
-            span = file.read(size)
-        if len(span) < size or (self.check and hashlib.sha256(span).digest() != row["sha256"].tobytes()):
-            raise InputError(f"{path.name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
-        return span[first - offset : first - offset + length]
+        sample = self._read(shard, offset, size)
+        if len(sample) < size or (self.check and hashlib.sha256(sample).digest() != row["sha256"].tobytes()):
+            name = Path(self.shards[shard]["path"]).name
+            raise InputError(f"{name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
+        return sample[first - offset : first - offset + length]
 
     def _column(self, name: str) -> np.ndarray:
         """One column of the tables of all shards, (n,)."""

@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from lowalt import __version__
 from lowalt.config.classes import CATEGORIES, label
 from lowalt.config.network import Network, Station
 from lowalt.files.atomic import slug
@@ -19,6 +18,11 @@ from lowalt.numerics.streams import digest
 from lowalt.tiles.tile_files import npy_header
 
 NAMES = ("subtype", "category", "group", "model")
+DATA_VERSION = "0.2.0"
+"""Version of the rules by which a configuration becomes bytes. A change of the default's bytes changes the rules.
+
+It is not the version of the package: a release that changes no rule makes the same shards as the release before it.
+"""
 
 
 def snr_label(snr_db: float) -> str:
@@ -61,11 +65,6 @@ def encoded(content: dict) -> bytes:
              for name, value in content.items() if name != "snr_db"}  # fmt: skip
     texts["snr_db"] = f"[{','.join(map(number, snr_db))}]" if isinstance(snr_db, list) else number(snr_db)
     return ("{" + ",".join(f'"{name}":{texts[name]}' for name in content) + "}").encode()
-
-
-def versions() -> dict[str, str]:
-    """Return the versions that decide a sample's bytes: that of this package alone."""
-    return {"lowalt": __version__}
 
 
 def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
@@ -131,7 +130,7 @@ def record(
             for station, seen in geometry(row, network).items()
         },
         **({"cube": cubes} if cubes else {}),
-        "versions": versions(),
+        "versions": {"lowalt": DATA_VERSION},
     }
     return encoded(content)
 

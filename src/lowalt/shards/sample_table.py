@@ -33,6 +33,8 @@ SAMPLE = np.dtype(
         ("sha256", "u1", (32,)),
     ]
 )
+MOST_OVERHEAD_BYTES = 1 << 16
+"""Most bytes of a table next to its rows: the header and what the archive adds."""
 KINDS = ("image", "signal", "recipe", "cube")
 """Tiles as PNG files, noisy signals, clean echoes from which noisy signals are made (`lowalt.shards.clean`), or
 all range cells with noise."""

@@ -1,13 +1,15 @@
-"""Classical methods on physical features: support-vector machines and boosted trees, chosen on validation alone.
+"""Classical methods on physical features: linear ones, support-vector machines and trees, chosen on validation alone.
 
 Each method tries the candidates of GRID on the training samples and keeps the one with the least cross entropy on the
 validation samples; the test folds are never read. Boosting rounds, at most ROUNDS in steps of EVERY, and the
 temperature of the softmax over scores are chosen on validation too.
 Sources: Cortes and Vapnik, Mach. Learn. 20, 1995; Rifkin and Klautau, J. Mach. Learn. Res. 5, 2004 (one against the
-rest); Friedman, Ann. Stat. 29, 2001; Chen and Guestrin, XGBoost, 2016; Guo et al., 2017 (temperature).
+rest); Friedman, Ann. Stat. 29, 2001; Chen and Guestrin, XGBoost, 2016; Breiman, Mach.
+Learn. 45, 2001 (forests); Guo et al., 2017 (temperature).
 """
 
 from collections.abc import Callable, Iterator
+from itertools import islice
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -18,21 +20,27 @@ from lowalt.recognition.statistics import cross_entropy
 GRID = {
     "svm": [{"c": c, "gamma": gamma} for c in (3.0, 30.0) for gamma in (0.3, 1.0)],
     "boosting": [{"leaves": 15, "rate": 0.1}, {"leaves": 31, "rate": 0.1}],
+    "forest": [{"leaf": 1}, {"leaf": 3}],
+    "logistic": [{"c": c} for c in (0.1, 1.0, 10.0)],
     "xgboost": [{"depth": 4, "rate": 0.1}, {"depth": 6, "rate": 0.1}],
 }
 """Candidates of each method; gamma is relative to one over the number of features."""
 ROUNDS, EVERY = 200, 25
+MANY = 10
+"""With so many classes or more, only the first candidate is tried, since each takes minutes."""
 Scores = Callable[[np.ndarray], np.ndarray]
 
 
 def _svm(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
-    """Yield the decision functions of one candidate's machines, one class against the rest."""
+    """Yield the decision functions of one candidate's machines: one class against the rest, or of MANY classes each
+    against each, which needs smaller machines."""
     from sklearn.multiclass import OneVsRestClassifier
     from sklearn.svm import SVC
 
     mean, scale = features.mean(0), np.maximum(features.std(0), 1e-9)
     machine = SVC(C=candidate["c"], gamma=candidate["gamma"] / features.shape[1])
-    model = OneVsRestClassifier(machine).fit((features - mean) / scale, labels)
+    many = len(np.unique(labels)) >= MANY
+    model = (machine if many else OneVsRestClassifier(machine)).fit((features - mean) / scale, labels)
     yield lambda asked: model.decision_function((asked - mean) / scale)
 
 
@@ -45,7 +53,7 @@ def _boosting(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: i
         random_state=seed,
     ).fit(features, labels)  # fmt: skip
     for count in range(EVERY, ROUNDS + 1, EVERY):
-        yield lambda asked, last=count: list(model.staged_decision_function(asked))[last - 1]
+        yield lambda asked, last=count: next(islice(model.staged_decision_function(asked), last - 1, None))
 
 
 def _xgboost(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
@@ -63,7 +71,24 @@ def _xgboost(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: in
         )
 
 
-MAKERS = {"svm": _svm, "boosting": _boosting, "xgboost": _xgboost}
+def _forest(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+    """Yield the scores of a random forest: logarithms of its smoothed votes."""
+    from sklearn.ensemble import RandomForestClassifier
+
+    model = RandomForestClassifier(300, min_samples_leaf=candidate["leaf"], random_state=seed).fit(features, labels)
+    yield lambda asked: np.log(model.predict_proba(asked) + 1 / 300)
+
+
+def _logistic(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+    """Yield the decision functions of a logistic regression on standardised features."""
+    from sklearn.linear_model import LogisticRegression
+
+    mean, scale = features.mean(0), np.maximum(features.std(0), 1e-9)
+    model = LogisticRegression(C=candidate["c"], max_iter=300).fit((features - mean) / scale, labels)
+    yield lambda asked: model.decision_function((asked - mean) / scale)
+
+
+MAKERS = {"svm": _svm, "boosting": _boosting, "forest": _forest, "logistic": _logistic, "xgboost": _xgboost}
 
 
 def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
@@ -73,7 +98,8 @@ def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
     """
     asked, labels = validation
     least, best = np.inf, None
-    for candidate in GRID[method]:
+    candidates = GRID[method]
+    for candidate in candidates[:1] if train[1].max() >= MANY else candidates:
         for scores in MAKERS[method](*train, candidate, seed):
             found = scores(asked)
             cost = lambda logarithm, found=found: cross_entropy(softmax(np.exp(logarithm) * found, 1), labels)  # noqa: E731

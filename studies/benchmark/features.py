@@ -33,6 +33,20 @@ def power_spectrum(signals: np.ndarray, interval_s: float) -> tuple[np.ndarray, 
     return np.fft.fftfreq(POINTS, interval_s), power / np.where(total > 0, total, 1)
 
 
+def spectral_moments(signals: np.ndarray, frequency_hz: float, interval_s: float) -> np.ndarray:
+    """Return mean size, deviation, skewness and kurtosis (B, 4) of the Doppler frequency, weighted by power.
+
+    frequency_hz: of the station, not used; interval_s: T_r. The mean is the size of the folded frequency; the other
+    three are about the mean. The skewness has no sign, since a target turned by 180 degrees has the opposite one.
+    """
+    frequency, power = power_spectrum(signals, interval_s)
+    mean = power @ frequency
+    away = frequency - mean[:, None]
+    deviation = np.sqrt(np.maximum((power * away**2).sum(-1), 1e-12))
+    third, fourth = ((power * away**order).sum(-1) / deviation**order for order in (3, 4))
+    return np.stack([np.abs(mean), deviation, np.abs(third), fourth], axis=-1)
+
+
 def body_line_hz(signals: np.ndarray, interval_s: float) -> np.ndarray:
     """Return the Doppler frequency (B,) Hz of the strongest line, by a parabola through its three largest values."""
     _, power = power_spectrum(signals, interval_s)

@@ -1,0 +1,82 @@
+"""The frozen definition of the benchmark: its version, its parts, and the samples of each part.
+
+A part is one configuration: the main part, and smaller ones that tracks only test on. Keys, labels and folds follow
+from it by rule, so that a submission is scored without any data.
+"""
+
+import hashlib
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.config.classes import classes_of, label
+from lowalt.config.layers import overlaid
+from lowalt.config.plan import Plan
+from lowalt.config.splits import fold
+from lowalt.recognition.samples import Facts
+from lowalt.shards.sample_record import sample_key
+from lowalt.targets.records import records_of
+
+VERSION = "lowalt-40 v1"
+RUN = VERSION.replace(" ", "-")
+REFERENCE = f"results/reference/{RUN}"
+"""Folder of what is kept of this version: checksums, the table, and what the baselines got right."""
+MAIN = "main"
+PARTS = (MAIN, "low-snr", "town", "fr2")
+
+
+def root_seed(text: str | bytes) -> int:
+    """Return the root seed that a text stands for: the first eight hexadecimal digits of its SHA-256.
+
+    >>> root_seed("lowalt-40 v1")
+    467398228
+    """
+    return int(hashlib.sha256(text.encode() if isinstance(text, str) else text).hexdigest()[:8], 16)
+
+
+def named_seed(part: str) -> int:
+    """Return the root seed of a part: that of the version's name, followed by the part's unless it is the main one."""
+    return root_seed(VERSION if part == MAIN else f"{VERSION} {part}")
+
+
+def overlays(part: str) -> list[str]:
+    """Return the overlays on the default that make up a part's configuration."""
+    return [f"config/{RUN}.yaml", *([] if part == MAIN else [f"config/{RUN}/{part}.yaml"])]
+
+
+def config_of(part: str) -> dict:
+    """Return the merged configuration of a part."""
+    return overlaid(overlays(part))
+
+
+def run_name(part: str) -> str:
+    """Return the name of the run that makes a part's data, results/NAME."""
+    return RUN if part == MAIN else f"{RUN}-{part}"
+
+
+class Truth(NamedTuple):
+    """The samples of a part in a fixed order: facts without places, and the classes by label."""
+
+    facts: Facts
+    classes: tuple[str, ...]
+
+
+@cache
+def truth(part: str) -> Truth:
+    """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
+    config = config_of(part)
+    published = {name: record["published"] for name, record in records_of(config["targets"]).items()}
+    plan, classes = Plan.of(config, published), classes_of(published)
+    rows = [
+        (sample_key(name, model, snr), name, model, snr, group, of_model, number)
+        for group, names in plan.groups.items()
+        for name in names
+        for number in [label(classes, {"subtype": name, **published[name]})]
+        for model in range(plan.models)
+        for of_model in [fold(plan.split, plan.seed, name, model)]
+        for snr in plan.snrs
+    ]  # fmt: skip
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    nowhere = np.full((len(rows), len(config["network"]["stations"])), np.nan)
+    return Truth(Facts(*columns, range_m=nowhere, aspect_rad=nowhere), classes)

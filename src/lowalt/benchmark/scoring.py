@@ -1,0 +1,124 @@
+"""Scores of a submission: the track's headline number, macro F1, paired differences to the kept baselines.
+
+Every headline number is a weighted mean of one value per motion model. For accuracy the value is the model's share of
+correct samples. AUROC is the mean, over both strata (trained classes, held-out class), of the share of the other
+stratum that a sample is ranked correctly against; the value is 2 V - AUROC, with V the model's mean share, so that the
+spread of the weighted mean is that of AUROC to first order. Intervals resample training seeds, motion models and, where
+results should hold for other subtypes, whole subtypes (`intervals.strict_difference`).
+Source: DeLong, DeLong and Clarke-Pearson, Biometrics 44, 1988 (components of AUROC).
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.benchmark.benchmark_tracks import UNKNOWN, Track
+from lowalt.benchmark.definition import MAIN, named_seed
+from lowalt.numerics.streams import stream
+from lowalt.recognition import predictions
+from lowalt.recognition.intervals import Interval, model_shares, strict_difference
+from lowalt.recognition.macro_f1 import f1_by_snr
+from lowalt.recognition.predictions import Predictions
+from lowalt.recognition.samples import Facts
+from lowalt.recognition.statistics import accuracy_by
+
+
+class Values(NamedTuple):
+    """One value per motion model and training seed, (seeds, models); the weight (models,) and subtype (models,) of each
+    motion model, in the order of their names."""
+
+    values: np.ndarray
+    weight: np.ndarray
+    subtypes: np.ndarray
+
+
+def _above(scores: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Share (n,) of `others` (m,) that lie below each of `scores` (n,); equal ones count half."""
+    ordered = np.sort(others)
+    return (np.searchsorted(ordered, scores, "left") + np.searchsorted(ordered, scores, "right")) / (2 * len(ordered))
+
+
+def ranked(scores: np.ndarray, held_out: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return AUROC and each sample's share of the other stratum against which it is ranked correctly, (n,).
+
+    scores (n,): how strongly a sample is held to be of no trained class; held_out (n,) bool: whether it is.
+    """
+    share = np.empty(len(scores))
+    share[held_out] = _above(scores[held_out], scores[~held_out])
+    share[~held_out] = 1 - _above(scores[~held_out], scores[held_out])
+    return float(share[held_out].mean()), share
+
+
+def tested(track: Track, facts: Facts, probabilities: np.ndarray) -> Predictions:
+    """Return the predictions of a track's test samples."""
+    return predictions.from_facts(facts, track.stations, probabilities)
+
+
+def values_of(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> Values:
+    """Return the values of which the headline number is the weighted mean; parts: of each training seed."""
+    first = parts[0]
+    if track.headline == "accuracy":
+        place, count, shares = model_shares(first.motion, [part.correct for part in parts])
+        return Values(shares, count.astype(float), first.subtype[place])
+    label = classes.index(UNKNOWN)
+    held_out = first.label == label
+    shares = []
+    for part in parts:
+        area, share = ranked(part.probabilities[:, label], held_out)
+        shares.append(2 * share - area)
+    place, count, means = model_shares(first.motion, shares)
+    strata = held_out[place]
+    totals = np.where(strata, count[strata].sum(), count[~strata].sum())
+    return Values(means, len(first) / 2 * count / totals, first.subtype[place])
+
+
+def difference(track: Track, first: Values, second: np.ndarray) -> Interval:
+    """Return the mean of first - second in percent with its 95 % interval; second: values (seeds, models)."""
+    generator = stream(named_seed(MAIN), "benchmark", track.name)
+    found = strict_difference(first.values, second, first.weight, first.subtypes, track.whole, generator)
+    return Interval(*(100 * value for value in found))
+
+
+def headline(track: Track, found: Values) -> Interval:
+    """Return the headline number in percent with its 95 % interval.
+
+    It is the difference to a method that gets nothing right, so both intervals are computed alike.
+    """
+    return difference(track, found, np.zeros((1, found.values.shape[1])))
+
+
+def kept_share(part: Predictions, label: int, accepted: float = 0.95) -> float:
+    """Return the share of the held-out class that is rejected where a share `accepted` of the trained classes is
+    accepted; label: of the held-out class."""
+    scores, held_out = part.probabilities[:, label], part.label == label
+    return float(np.mean(scores[held_out] > np.quantile(scores[~held_out], accepted)))
+
+
+def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndarray]) -> dict:
+    """Return all scores of a method; answers: probabilities (samples, classes) of each training seed.
+
+    baselines: kept values (seeds, models) by the baseline's name.
+    """
+    every, classes = track.truth()
+    facts = every.take(track.numbers("test"))
+    parts = [tested(track, facts, np.asarray(shares, float)) for shares in answers]
+    found = values_of(track, parts, classes)
+    generator = stream(named_seed(MAIN), "benchmark-f1", track.name)
+    f1 = f1_by_snr(parts, len(classes), track.whole, generator)
+    right = np.mean([part.correct for part in parts], axis=0)
+    share: Callable = lambda groups: {  # noqa: E731
+        f"{name:g}" if isinstance(name, float) else name: 100 * value
+        for name, (value, _) in accuracy_by(groups, right).items()
+    }
+    more = {}
+    if track.headline == "AUROC":
+        label = classes.index(UNKNOWN)
+        more["rejected_percent"] = 100 * float(np.mean([kept_share(part, label) for part in parts]))
+    return {
+        "track": track.name, "headline": track.headline, "samples": len(facts), "seeds": len(parts),
+        "percent": headline(track, found), "accuracy_percent": 100 * float(right.mean()),
+        "macro_f1_percent": Interval(*(100 * value for value in f1["avg"])), **more,
+        "by_snr_percent": share(facts.snr_db), "by_subtype_percent": share(facts.subtype),
+        "differences": {name: difference(track, found, kept) for name, kept in baselines.items()},
+    }  # fmt: skip

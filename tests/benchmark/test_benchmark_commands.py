@@ -1,0 +1,160 @@
+"""The benchmark as a stranger uses it, on a small copy of its definition: data, examples, scores, confirmation."""
+
+import importlib.util
+import json
+import runpy
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import small_benchmark
+from lowalt import benchmark
+from lowalt.__main__ import main
+from lowalt.benchmark import confirm, definition, frozen_bytes
+from lowalt.benchmark.benchmark_tracks import TRACKS
+from lowalt.commands import workflow
+from lowalt.files.errors import InputError
+
+ROOT = Path(__file__).parents[2]
+ZOO = ROOT / "results/zoo/default-unseen.safetensors"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with the data of the main part and of the part low-snr of a small benchmark."""
+    folder = tmp_path_factory.mktemp("benchmark")
+    with pytest.MonkeyPatch.context() as patch:
+        small_benchmark.shrink(patch)
+        for part in ("main", "low-snr"):
+            small_benchmark.write(folder / "results", part)
+    definition.truth.cache_clear()
+    return folder
+
+
+@pytest.fixture
+def small(made, monkeypatch):
+    """The small benchmark, in a current folder that holds its data."""
+    small_benchmark.shrink(monkeypatch)
+    monkeypatch.chdir(made)
+    yield made
+    definition.truth.cache_clear()
+
+
+def test_samples_of_a_track_are_those_of_its_keys(small):
+    train, test = benchmark.load("unseen", "train"), benchmark.load("unseen", "test")
+    assert train.images.shape == (64, 9, 24, 24) and test.signals.shape == (16, 3, 400)
+    data = small_benchmark.Dataset(definition.config_of("main"))
+    for samples, number in ((train, 5), (test, 7)):
+        key = samples.key[number]
+        found = next(one for one in range(len(data)) if data.key(one) == key)
+        signal = data.signal(found)
+        level = np.linalg.norm(signal, axis=-1, keepdims=True) / np.sqrt(signal.shape[-1])
+        assert samples.signals[number] == pytest.approx(signal / level, rel=1e-5)
+        assert np.array_equal(samples.images[number], small_benchmark.resized(data, found))
+        assert samples.classes[samples.labels[number]] == data.record(found)["category"]
+    alone = benchmark.load("one-station", "test")
+    assert np.array_equal(alone.images, test.images[:, :3]) and np.array_equal(alone.signals, test.signals[:, :1])
+    assert set(benchmark.load("low-snr", "test").facts.snr_db.tolist()) == {3, 18}
+
+
+def test_data_that_nobody_made_are_asked_for_by_name(small):
+    with pytest.raises(InputError, match="lowalt benchmark make --track town"):
+        benchmark.load("town", "test")
+    with pytest.raises(InputError, match="expected perhaps \\['unseen'\\]"):
+        benchmark.load("unsen")
+
+
+@pytest.mark.parametrize("name", ["benchmark_predict", "benchmark_features"])
+@pytest.mark.parametrize("track", ["unseen", "low-snr"])
+def test_an_example_writes_a_submission_that_is_scored(small, name, track, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", track])
+    assert len((ROOT / f"examples/{name}.py").read_text().splitlines()) <= 30
+    runpy.run_path(str(ROOT / f"examples/{name}.py"))
+    assert main(["benchmark", "score", "predictions.csv", "--track", track, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["samples"] == len(benchmark.load(track, "test")) and found["percent"][0] > 35
+
+
+def test_the_example_of_a_network_is_a_backbone_and_its_overlay_names_it():
+    spec = importlib.util.spec_from_file_location("own", ROOT / "examples/benchmark_network.py")
+    own = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(own)
+    import torch
+
+    assert own.small(24)(torch.zeros(2, 3, 24, 24)).shape == (2, 64)
+    config = small_benchmark.overlaid([*definition.overlays("main"), str(ROOT / "examples/benchmark_network.yaml")])
+    assert config["data"] == definition.RUN
+    assert config["recognition"]["network"]["backbone"] == "examples/benchmark_network.py:small"
+
+
+def test_score_prints_intervals_and_every_baseline(small, capsys):
+    test = benchmark.load("unseen", "test")
+    benchmark.write("mine.csv", test, np.eye(4)[test.labels])
+    assert main(["benchmark", "score", "mine.csv", "mine.csv", "--track", "unseen"]) == 0
+    text = capsys.readouterr().out
+    assert "16 samples, training seeds: 2" in text and "accuracy 100.0 (100.0 to 100.0)" in text
+    assert main(["benchmark", "score", "absent.csv", "--track", "unseen"]) == 2
+    assert main(["benchmark", "score", "mine.csv", "--track", "unsen"]) == 2
+
+
+def test_make_compares_with_the_kept_checksums(small, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(workflow, "ended", lambda options: {"status": 0})
+    monkeypatch.setattr(frozen_bytes, "REFERENCE", str(tmp_path))
+    monkeypatch.setattr(frozen_bytes, "PARTS", ("main",))
+    frozen_bytes.write("results", tmp_path)
+    assert main(["benchmark", "make"]) == 0
+    assert "are equal to the kept checksums" in capsys.readouterr().out
+    table = next(Path("results/lowalt-40-v1/motion").glob("*.csv"))
+    whole = table.read_text()
+    table.write_text(whole.replace("1", "2", 1))
+    assert main(["benchmark", "make"]) == 1
+    assert f"main/motion/{table.name} differs" in capsys.readouterr().out
+    table.unlink()
+    assert main(["benchmark", "make"]) == 1
+    assert f"main/motion/{table.name} is missing" in capsys.readouterr().out
+    table.write_text(whole)
+
+
+def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(confirm, "USUAL", 2)
+    track = TRACKS["unseen"]
+    first = confirm.confirm(ZOO, track)
+    assert first == confirm.confirm(ZOO, track)
+    assert first.samples == 4 * 4 * 2 and first.percent.value > 60
+    assert first.seed == definition.root_seed(ZOO.read_bytes() + b"lowalt-40 v1")
+    # Another seed gives other motion of the same subtypes.
+    rows = [confirm.dataset(track, seed).record(0)["motion"] for seed in (first.seed, first.seed + 1)]
+    assert rows[0] != rows[1]
+    assert set(confirm.dataset(track, 1).plan.groups["unseen"]) == {
+        "DJI Mini 4 Pro",
+        "Owl",
+        "NIO ET5T 2023",
+        "Walking Pedestrian 5",
+    }
+    with pytest.raises(InputError, match="stations"):
+        confirm.confirm(ZOO, TRACKS["one-station"])
+    with pytest.raises(InputError, match="cannot be confirmed"):
+        confirm.confirm(ZOO, TRACKS["forty"])
+
+
+def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "studies")
+    monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
+    import study
+
+    monkeypatch.setattr(study, "OUT", tmp_path / "out")
+    monkeypatch.setattr(study, "REFERENCE", str(tmp_path))
+    for method in ("majority class", "nearest centroid on moments", "logistic regression on features"):
+        for track in ("unseen", "open-set", "one-station"):
+            study.one((method, track, 0), "results")
+    rows = study.tables(tmp_path)
+    assert {row["track"] for row in rows} == {"unseen", "open-set", "one-station"} and len(rows) == 9
+    by = {(row["track"], row["method"]): row for row in rows}
+    assert by["unseen", "majority class"]["percent"] == 25 and by["open-set", "majority class"]["percent"] == 50
+    assert by["unseen", "logistic regression on features"]["percent"] > 60
+    with np.load(tmp_path / "unseen.npz") as kept:
+        assert kept["majority class"].shape == (1, 8)
+    shutil.rmtree(tmp_path / "out")
