@@ -79,7 +79,7 @@ def test_the_temperature_makes_probabilities_true():
 
 # Two minutes on a busy machine.
 @pytest.mark.slow
-def test_a_record_becomes_a_network_that_predicts(tmp_path, capsys):
+def test_a_record_becomes_a_network_that_predicts_in_any_folder(tmp_path, capsys, monkeypatch):
     block = load_yaml("config/measured/recognition.yaml") | {"size": 24, "receivers": 1}
     block |= {"echoes": {"train": 2, "validation": 2}}
     block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
@@ -90,6 +90,7 @@ def test_a_record_becomes_a_network_that_predicts(tmp_path, capsys):
     about = {"file": "walk.wav", "carrier_hz": 10.525e9, "channel": "real",
              "twin": {**SAID, "classes": ["Pedestrian", "Vehicle"]}}  # fmt: skip
     (tmp_path / "walk.yaml").write_text(yaml.safe_dump(about))
+    monkeypatch.chdir(tmp_path)
     line = ["recording", "train", str(tmp_path / "walk.yaml"), "--out", str(tmp_path / "mine"), "--recognition",
             str(tmp_path / "recognition.yaml")]  # fmt: skip
     assert lowalt(line) == 0

@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import of_run
@@ -108,7 +109,7 @@ def library_of(record: Record, twin: Twin, snr_db: list[float], name: str) -> tu
     receiver = RECEIVER | {"snr_db": snr_db}
     scenes = {label: [{**_scene(scene, said), "receiver": receiver} for scene in block["scenes"][label]]
               for label in classes}  # fmt: skip
-    records = load_records(block["targets"]["table"], block["targets"]["records"])
+    records = load_records(shipped(block["targets"]["table"]), [shipped(path) for path in block["targets"]["records"]])
     return Library(int(block["seed"]), {name: twin}, {name: []}, {name: scenes}, records), classes
 
 

@@ -36,7 +36,8 @@ def settings(path: str | Path = RECOGNITION) -> dict:
         default = load_yaml(shipped(block["default"]))
         result = merge(default["recognition"], {key: block[key] for key in ("size", "training", "augmentation")})
         simulation = {key: block[key] for key in ("scheme", "echoes", "receivers", "seeds")}
-        return {**result, **simulation, "images": default["images"], "seed": default["seed"]}
+        table = str(shipped(result["table"]))
+        return {**result, **simulation, "table": table, "images": default["images"], "seed": default["seed"]}
     except KeyError as error:
         raise InputError(f"{path}: key {error} is missing") from None
 
