@@ -4,7 +4,8 @@ A file of sets holds records whose `file` is a pattern inside the set's folder. 
 both halves by name; a file that is in neither list is a test file. A record next to a file (any .yaml in the set's
 folder) takes precedence over the set's pattern, so a file of any name, rate and channel can be added.
 
-Three keys stand only in records of sets: `rates_hz`, the possible rates of the set's files, of which each file's sample
+Four keys stand only in records of sets: `radar`, the record in `config/measured/radars` of the radar that they are
+of; `rates_hz`, the possible rates of the set's files, of which each file's sample
 times select one; `carrier_ghz_in_name`, a regular expression whose group is the carrier (GHz) in the file's name,
 where `carrier_hz` serves files without one; and `device`, the radar that recorded them where another set has it too.
 Another folder becomes a set by its file `set.yaml`: `like`, a set of the same radar, and `files`, its records.
@@ -39,7 +40,8 @@ SETS, SPLIT = (Path(__file__).parent / f"measured/{name}.yaml" for name in ("set
 
 
 class Measured(NamedTuple):
-    """One recording of a set: `half` is "tuning" or "test", `like` the known set of the same radar.
+    """One recording of a set: `half` is "tuning" or "test", `like` the known set of the same radar, `radar` the name
+    of that radar's record.
 
     rates_hz: possible rates (Hz), of which the file has one; none where its record alone says it. of: the radar that
     recorded it, where another set has it too.
@@ -49,6 +51,7 @@ class Measured(NamedTuple):
     half: str
     record: Record
     like: str
+    radar: str
     rates_hz: tuple[float, ...] = ()
     of: str = ""
 
@@ -67,10 +70,9 @@ class Measured(NamedTuple):
 
         Raises: InputError where no radar of the library has this set.
         """
-        for name, sets in library.sets.items():
-            if self.like in sets:
-                return library.twins[name].at_carrier(self.record.carrier_hz)
-        raise InputError(f"set {self.like!r}: no twin, expected one of {[*library.sets.values()]}")
+        if self.radar not in library.twins:
+            raise InputError(f"set {self.set!r}: no radar {self.radar!r}, expected one of {sorted(library.twins)}")
+        return library.twins[self.radar].at_carrier(self.record.carrier_hz)
 
     def read(self) -> Baseband:
         """Return the recording's samples, at the one of its possible rates that the file has.
@@ -122,7 +124,7 @@ class _File(NamedTuple):
 
 def _of_pattern(block: dict, path: Path, where: str) -> _File:
     """The file of a set's pattern, its carrier read from its name where the set says so."""
-    keys = {key: item for key, item in block.items() if key not in ("carrier_ghz_in_name", "rates_hz", "device")}
+    keys = {key: item for key, item in block.items() if key not in ("radar", "carrier_ghz_in_name", "rates_hz", "device")}
     carrier = re.search(block.get("carrier_ghz_in_name", "(?!)"), path.name)
     if carrier:
         keys["carrier_hz"] = float(carrier[1]) * 1e9
@@ -176,12 +178,13 @@ def recordings(inputs: str | Path, sets: str | Path = SETS, split: str | Path = 
     file fits two patterns of its set.
     """
     blocks, half_of, result = _blocks(Path(inputs), sets), halves(split), []
+    radars = {name: patterns[0]["radar"] for name, (like, patterns) in blocks.items() if like == name}
     for name, (like, patterns) in blocks.items():
         where = f"{sets}: {name}" if like == name else str(Path(inputs) / name / SET_FILE)
         tuning = half_of.get(name, {}).get("tuning", ())
         for file, found in sorted(_files(Path(inputs) / name, patterns, where).items()):
             half = "tuning" if file in tuning else "test"
-            result.append(Measured(name, half, found.record, like, found.rates_hz, found.device))
+            result.append(Measured(name, half, found.record, like, radars[like], found.rates_hz, found.device))
     if not result:
         raise InputError(f"{inputs}: no recordings of {sorted(blocks)}, expected a folder a set")
     return result

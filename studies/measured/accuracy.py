@@ -103,7 +103,7 @@ def radar_rows(
     models: where the networks go, one folder a seed; out: where a picture of every recording's spectra goes; reuse:
     take the networks that are there and train none.
     """
-    measured = heard([recording for recording in recordings if recording.like in library.sets[name]], library, block)
+    measured = heard([recording for recording in recordings if recording.radar == name], library, block)
     if not measured:
         return []
     for recording, windows in measured:

@@ -130,7 +130,7 @@ def distance_rows(
     recorded: scenes as they were in front of the radar; library: those that networks learn from.
     The interval resamples whole recordings: windows of one are not independent.
     """
-    measured = _measured([recording for recording in recordings if recording.like in library.sets[name]], library)
+    measured = _measured([recording for recording in recordings if recording.radar == name], library)
     if not measured:
         return []
     before = {label: [unmended(scene, mended) for scene in scenes] for label, scenes in recorded.scenes[name].items()}

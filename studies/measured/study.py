@@ -22,11 +22,10 @@ from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
+from lowalt.recordings.twin import RADARS
 from lowalt.recordings.twin_scenes import Library
-from lowalt.targets.records import load_records
 
 HERE = Path(__file__).parent
-TWINS = Path("config/measured/twins.yaml")
 PAIRS = HERE / "pictures.yaml"
 
 
@@ -43,17 +42,17 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
     line = argparse.ArgumentParser(f"study.py {name}", description=description)
     line.add_argument("--inputs", required=True, type=Path, help="folder of the measured sets")
     line.add_argument("--out", required=True, type=Path, help="folder to write")
-    line.add_argument("--twins", type=Path, default=TWINS, help="radars and scenes")
+    line.add_argument("--radars", type=Path, default=RADARS, help="folder of the records of radars")
     if name == "compare":
         line.add_argument("--count", type=int, default=60, help="simulated windows a class")
     if trains:
         line.add_argument("--models", required=True, type=Path, help="folder of the networks")
-        line.add_argument("--recognition", type=Path, default=TWINS.with_name("recognition.yaml"))
+        line.add_argument("--recognition", type=Path, default=Path("config/measured/recognition.yaml"))
     if name == "recognise":
         line.add_argument("--reuse", action="store_true", help="take the networks that --models holds, train none")
         line.add_argument("--jobs", type=int, default=os.cpu_count(), help="radars at a time")
     options = line.parse_args(arguments)
-    library = Library.read(options.twins)
+    library = Library.read(options.radars)
     return Inputs(options, library, usable(recordings(options.inputs), library))
 
 
@@ -77,7 +76,7 @@ def pairs(arguments: list[str]) -> None:
     from lowalt.recordings.twin import Twin
 
     inputs, block = _inputs("pairs", pairs.__doc__, arguments), load_yaml(PAIRS)
-    records = load_records(block["targets"]["table"], block["targets"]["records"])
+    records = inputs.library.records
     files = {(recording.set, recording.name): recording for recording in inputs.recordings}
     for name, pair in block["pairs"].items():
         recording, twin = files.get((pair["set"], pair["file"])), Twin.from_settings(pair["radar"])
@@ -102,7 +101,8 @@ def compare(arguments: list[str]) -> None:
     from comparison import DISTANCES, FIGURES, FILES, distance_rows, figure_rows
 
     inputs, block = _inputs("compare", compare.__doc__, arguments), load_yaml(PAIRS)
-    options, library, recorded = inputs.options, inputs.library, Library.read(HERE / "recorded.yaml")
+    options, library = inputs.options, inputs.library
+    recorded = Library.read(options.radars, load_yaml(HERE / "recorded.yaml"))
     parts = [
         figure_rows(name, pair, inputs.recordings, library.records, block) for name, pair in block["pairs"].items()
     ]
@@ -125,13 +125,13 @@ def presence(arguments: list[str]) -> None:
     """Compute measured-presence.csv: false alarms in simulated noise, and simulated targets that are found."""
     line = argparse.ArgumentParser("study.py presence", description=presence.__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder to write")
-    line.add_argument("--twins", type=Path, default=TWINS, help="radars and scenes")
+    line.add_argument("--radars", type=Path, default=RADARS, help="folder of the records of radars")
     line.add_argument("--noises", type=int, default=40, help="recordings of noise a row")
     line.add_argument("--scenes", type=int, default=5, help="recordings of a category")
     options = line.parse_args(arguments)
     from presence_rates import PRESENCE, noise_rows, target_rows
 
-    library = Library.read(options.twins)
+    library = Library.read(options.radars)
     rows = [row for name in library.twins for row in noise_rows(name, library, options.noises)]
     rows += [row for name in library.twins for row in target_rows(name, library, options.scenes)]
     _write(options.out, "presence", PRESENCE, rows)

@@ -30,7 +30,7 @@ study = runpy.run_path(str(HERE / "study.py"))["main"]
 
 @pytest.fixture(scope="module")
 def library():
-    return Library.read("config/measured/twins.yaml")
+    return Library.read()
 
 
 def drive(folder, rate, **more):
@@ -46,7 +46,8 @@ def drive(folder, rate, **more):
 
 def test_the_files_are_whole_and_halves_share_no_recording(library):
     sets, split = load_yaml(SETS), halves()
-    assert sorted(name for names in library.sets.values() for name in names) == sorted(sets) == sorted(split)
+    assert sorted(sets) == sorted(split)
+    assert {record["radar"] for records in sets.values() for record in records} == set(library.twins)
     for block in (block for name, block in split.items() if name != "car_24ghz"):
         assert block["tuning"] and block["test"] and not set(block["tuning"]) & set(block["test"])
     for pair in load_yaml(HERE / "pictures.yaml")["pairs"].values():
@@ -237,15 +238,15 @@ def test_a_recording_counts_once_under_two_names(tmp_path, capsys, library):
 
 def libraries():
     """The scenes that networks learn from, and those as they were recorded."""
-    return Library.read("config/measured/twins.yaml"), Library.read(HERE / "recorded.yaml")
+    return Library.read(), Library.read(over=load_yaml(HERE / "recorded.yaml"))
 
 
 def test_scenes_as_recorded_lie_over_those_that_networks_learn_from():
     learnt, recorded = libraries()
-    assert recorded.twins == learnt.twins and recorded.sets == learnt.sets and recorded.seed == learnt.seed
-    kinds = {name: {block["label"] for block in blocks} for name, blocks in load_yaml(SETS).items()}
-    for twin, sets in recorded.sets.items():
-        held = set().union(*(kinds[name] for name in sets))
+    assert recorded.twins == learnt.twins and recorded.seed == learnt.seed
+    every = [block for blocks in load_yaml(SETS).values() for block in blocks]
+    for twin in recorded.twins:
+        held = {block["label"] for block in every if block["radar"] == twin}
         for category, scenes in recorded.scenes[twin].items():
             plain = [{key: item for key, item in scene.items() if key != "receiver"} for scene in scenes]
             wider = [

@@ -14,7 +14,7 @@ from lowalt.recordings.twin_scenes import Library
 
 @pytest.fixture(scope="module")
 def library():
-    return Library.read("config/measured/twins.yaml")
+    return Library.read()
 
 
 def raw(folder, values, rate):
@@ -22,7 +22,7 @@ def raw(folder, values, rate):
     np.save(folder / "noise.npy", values)
     block = {"file": "noise.npy", "carrier_hz": 24e9, "channel": "real", "rate_hz": rate, "label": "Vehicle",
              "source": "made here", "licence": "MIT"}  # fmt: skip
-    return Measured("made", "tuning", record(block, folder, "here"), "vehicle_24ghz")
+    return Measured("made", "tuning", record(block, folder, "here"), "vehicle_24ghz", "cw_24ghz")
 
 
 @pytest.mark.parametrize("slow_db", [8.0, 25.0])

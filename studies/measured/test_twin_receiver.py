@@ -20,7 +20,7 @@ LOOKING = Twin(24.0e9, "real", 6000.0, 1 / 3000.0, 400, "one_sided", 0.4, 15.0)
 
 @pytest.fixture(scope="module")
 def library():
-    return Library.read("config/measured/twins.yaml")
+    return Library.read()
 
 
 def test_the_high_pass_has_half_the_power_at_its_corner_and_falls_by_its_order():

@@ -168,7 +168,7 @@ def with_extra(radar: Radar, library: Library, block: dict, folder: Path) -> Rad
 def known_parts(radar: Radar, library: Library, inputs: Path) -> list[Part]:
     """Return the parts of the recordings that a network knows, one a category: windows that hold a target."""
     every, parts = recorded_sets.recordings(inputs), []
-    of_radar = [recording for recording in every if recording.like in library.sets[radar.name]]
+    of_radar = [recording for recording in every if recording.radar == radar.name]
     for label, category in enumerate(CATEGORIES):
         of_category = []
         for recording in of_radar:
@@ -230,7 +230,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--foreign", type=Path, required=True, help="folder of the files that foreign.yaml names")
     line.add_argument("--out", type=Path, required=True, help="table to write (.csv)")
     given = line.parse_args(arguments)
-    library = Library.read(FOLDER / "twins.yaml")
+    library = Library.read()
     rows = [
         row for name in library.twins for row in rows_of(opened(name), library, given.inputs, given.foreign, MODELS)
     ]

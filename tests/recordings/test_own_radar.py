@@ -11,8 +11,10 @@ from lowalt.__main__ import main as lowalt
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings.files import Baseband
-from lowalt.recordings.own_radar import library_of, snr_range, temperature, twin_of
+from lowalt.recordings.own_radar import snr_range, temperature
 from lowalt.recordings.record import record
+from lowalt.recordings.twin import twin_of
+from lowalt.recordings.twin_scenes import Library
 
 SAID = {"waveform": "cw", "distance_m": [2, 10], "height_m": [-1, 1], "beam_deg": 60}
 
@@ -44,9 +46,9 @@ def test_what_is_missing_is_asked_for_in_one_sentence(tmp_path):
 
 def test_scenes_stand_at_the_distances_and_heights_of_the_record(tmp_path):
     about = stated(tmp_path, classes=["UAV", "Pedestrian"], height_m=[3, 4])
-    library, classes = library_of(about, twin_of(about, 12000), [0.0, 20.0], "mine")
-    assert classes == ("UAV", "Pedestrian")
-    scenes = [scene for label in classes for scene in library.scenes["mine"][label]]
+    library = Library.of({"mine": (about, twin_of(about, 12000), [0.0, 20.0])})
+    assert list(library.scenes["mine"]) == ["UAV", "Pedestrian"]
+    scenes = [scene for scenes in library.scenes["mine"].values() for scene in scenes]
     assert all(scene["height_m"] == [3, 4] and scene["beam"]["width_deg"] == 60 for scene in scenes)
     assert all(scene["receiver"]["snr_db"] == [0.0, 20.0] for scene in scenes)
     (walk,) = (scene for scene in scenes if scene["course"] == "to_and_fro")
@@ -95,6 +97,6 @@ def test_a_record_becomes_a_network_that_predicts_in_any_folder(tmp_path, capsys
             str(tmp_path / "recognition.yaml")]  # fmt: skip
     assert lowalt(line) == 0
     assert "of 4 simulated windows right (Pedestrian " in capsys.readouterr().out
-    assert {path.name for path in tmp_path.glob("mine*")} == {"mine.safetensors", "mine.md", "mine-training"}
+    assert {path.name for path in tmp_path.glob("mine*")} == {"mine.safetensors", "mine.md"}
     assert lowalt(["predict", str(tmp_path / "mine"), str(tmp_path / "walk.yaml")]) == 0
     assert re.search(r"windows hold a target: Pedestrian \d, Vehicle \d", capsys.readouterr().out)

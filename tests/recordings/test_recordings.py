@@ -163,18 +163,24 @@ def test_a_record_needs_three_keys_and_takes_numbers_in_any_writing(tmp_path):
             read_record(path)
 
 
-def test_a_radar_of_twins_takes_numbers_in_any_writing_and_is_refused_by_key(tmp_path):
-    path, known = tmp_path / "twins.yaml", asdict(radars()["uav_3ghz"])
-    path.write_text(f"twins: {{mine: {{radar: {known | {'carrier_hz': 3.3e9}}}}}}".replace("3300000000.0", "3.3e9"))
-    assert "3.3e9" in path.read_text() and asdict(radars(path)["mine"]) == known
-    for change, words in (({"carrier_hz": ".inf"}, "carrier_hz"), ({"sampling": [1]}, "sampling")):
-        path.write_text(f"twins: {{mine: {{radar: {known | change}}}}}".replace("'.inf'", ".inf"))
-        with pytest.raises(InputError, match=rf"twins\.yaml: mine: {words}: value "):
-            radars(path)
-    for text in ("twins: []", "twins: {mine: 1}"):
-        path.write_text(text)
-        with pytest.raises(InputError, match="expected under twins"):
-            radars(path)
+def test_the_record_of_a_radar_takes_numbers_in_any_writing_and_is_refused_by_key(tmp_path):
+    path, known = tmp_path / "mine.yaml", Path("config/measured/radars/uav_3ghz.yaml").read_text()
+    path.write_text(known.replace("3.3e+9", "3.3e9"))
+    assert radars(tmp_path) == {"mine": radars()["uav_3ghz"]}
+    for line, change, words in (("carrier_hz: 3.3e+9", "carrier_hz: .inf", "carrier_hz: value "),
+                                ("sampling: bare", "sampling: [1]", "twin.sampling: value "),
+                                ("rate_hz: 5000.1", "", r"missing key\(s\) \['file'\], expected it, or twin and rate_hz"),
+                                ("simulated_hz: 5000.1", "simulated_hz: 100", "expected at least a sample a value"),
+                                ("tip: [2.0", "tips: [2.0", r"twin.scenes.UAV.0: unknown key\(s\) \['tips'\]"),
+                                ("leak_db: [10.0", "leak_db: [1000", "twin.receiver.leak_db")):  # fmt: skip
+        assert known.count(line) >= 1
+        path.write_text(known.replace(line, change, 1))
+        with pytest.raises(InputError, match=rf"mine\.yaml: .*{words}") as refused:
+            radars(tmp_path)
+        assert len(str(refused.value)) <= 400
+    path.unlink()
+    with pytest.raises(InputError, match="no record of a radar, expected files such as"):
+        radars(tmp_path)
 
 
 @pytest.mark.parametrize("sampling", ["anti_aliased", "bare"])

@@ -153,7 +153,7 @@ def _texts() -> list[Reader]:
     from lowalt.motion import read_table, write_table
     from lowalt.recognition import freeze, paper_claims, schemes
     from lowalt.recordings.record import read_record
-    from lowalt.recordings.twin import radars
+    from lowalt.recordings.twin_scenes import Library
     from lowalt.shards import manifest
     from lowalt.targets.records import load_records, load_table
     from lowalt.workflow.run import Run
@@ -170,6 +170,10 @@ def _texts() -> list[Reader]:
         (path.parent / "a").touch()
         return freeze.verify(path)
 
+    def scenes(path: Path) -> object:
+        """The twin and the scenes of the record of a radar."""
+        return Library.read(path.parent)
+
     record = yaml.safe_dump({"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"})
     return [
         Reader("configuration", "a.yaml", Path("config/default.yaml").read_bytes(),
@@ -179,7 +183,8 @@ def _texts() -> list[Reader]:
         Reader("whole configuration", "a.yaml", Path("config/default.yaml").read_bytes(), run, seal=YAML),
         Reader("record of a target", "a.yaml", Path("config/targets/pedestrian.yaml").read_bytes(),
                lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p]), seal=YAML),
-        Reader("twins", "a.yaml", Path("config/measured/twins.yaml").read_bytes(), radars, seal=YAML),
+        Reader("record of a radar", "a.yaml", Path("config/measured/radars/cw_24ghz.yaml").read_bytes(), scenes,
+               seal=YAML),
         Reader("table of targets", "a.csv", table, load_table),
         Reader("schemes", "a.csv", Path("config/schemes.csv").read_bytes(), lambda p: schemes.read(p, "ABC")),
         Reader("published accuracies", "a.csv", Path("config/published_accuracy.csv").read_bytes(),

@@ -13,7 +13,10 @@ from lowalt.files.yaml_files import load_yaml
 
 @dataclass(frozen=True)
 class Record:
-    """One recording: the keys of a record, `file` with its folder, None where left out."""
+    """One recording: the keys of a record, `file` with its folder, None where left out.
+
+    The record of a radar without a recording has itself as its file.
+    """
 
     file: Path
     carrier_hz: float
@@ -42,12 +45,15 @@ class Record:
 
 
 def record(block: dict, folder: Path, where: str) -> Record:
-    """Return the record in a mapping; its file is relative to `folder`.
+    """Return the record in a mapping; its file and its own targets are relative to `folder`.
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
     block = with_numbers({key: value for key, value in block.items() if value is not None}, of_brought("recording"))
     check_brought("recording", block, where)
+    if "file" not in block and not {"twin", "rate_hz"} <= set(block):
+        raise InputError(f"{where}: missing key(s) ['file'], expected it, or twin and rate_hz of a radar without any "
+                         "recording")  # fmt: skip
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":
         for key in ("moves", "layout", "chirps"):
@@ -57,7 +63,10 @@ def record(block: dict, folder: Path, where: str) -> Record:
         if len(columns) > 1:
             raise InputError(f"{where}: columns is {list(columns)}, expected one for channel 'real'")
     hertz = {key: float(block[key]) for key in ("carrier_hz", "rate_hz") if key in block}
-    return Record(**{**block, **hertz, "file": folder / block["file"], "columns": columns or None})
+    if "targets" in block.get("twin", {}):
+        block["twin"] = {**block["twin"], "targets": [str(folder / name) for name in block["twin"]["targets"]]}
+    file = folder / block["file"] if "file" in block else Path(where)
+    return Record(**{**block, **hertz, "file": file, "columns": columns or None})
 
 
 def read_record(path: str | Path) -> Record:

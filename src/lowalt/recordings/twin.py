@@ -7,17 +7,21 @@ complex channel, or one real channel of which only the real part is kept.
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import pick
 from lowalt.config.layers import load_yaml, merge
 from lowalt.config.network import SPEED_OF_LIGHT, Network
-from lowalt.config.schema import check_brought, of_brought, with_numbers
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.recordings.channel import EDGE, ONE_SIDED_EDGE, SAMPLINGS
+from lowalt.recordings.record import Record, record
 from lowalt.spectra import Fourier, Spectra, Transfer
 
 CHANNELS = ("complex", "real")
-TWINS = "config/measured/twins.yaml"
+RADARS = "config/measured/radars"
+"""Folder of the records of the measured radars: each says what `lowalt recording train` makes its network of."""
 TRAINED_RATIO = 1.25
 """Largest ratio of a recording's carrier and the radar's: speeds in a spectrum scale with it."""
 
@@ -109,27 +113,71 @@ class Twin:
         return {name: asdict(settings) for name, settings in self.spectra().items()}
 
 
-def settings_of(path: str | Path = TWINS) -> dict:
-    """Return the configuration of twins in a YAML file.
+ASKED = ("waveform", "distance_m", "height_m", "beam_deg")
+"""Keys of the block `twin` that nothing else can say; the last three where a category has no scenes of its own."""
+FASTEST_MPS, WINDOW_S = 20.0, 0.4
+LEAST_SYMBOLS, MOST_SYMBOLS = 400, 1200
+"""Symbols of a window: the spectra need 400; more than 1200 add time and no class."""
+SLOWEST_MPS, DETECT_DB = 0.4, 12.0
+WHOLE = 0.02
+"""How far the symbol rate may be moved for a whole number of samples a symbol."""
+MOST_SAMPLES = 1_000_000
+"""Largest number of simulated samples of a window."""
 
-    A file with the key `base` is merged over the file that it names, key by key; a list replaces the base's list.
-    Raises: InputError where it is missing or no mapping.
+
+def twin_of(record: Record, rate_hz: float) -> Twin:
+    """Return the twin of the radar that made a recording at `rate_hz` samples (or chirps, or OFDM symbols) a second.
+
+    The symbol rate keeps speeds up to the block's `fastest_mps` apart where the radar is fast enough for it.
+    Raises: InputError naming the keys of the block `twin` that are missing, a sampling that the channel has not, or
+    rates that do not go together.
     """
-    block = load_yaml(shipped(path), "twins")
-    return merge(load_yaml(shipped(block.pop("base")), "twins"), block) if "base" in block else block
+    said = record.twin or {}
+    usual_scenes = [label for label in said.get("classes", CATEGORIES) if label not in said.get("scenes", {})]
+    missing = [key for key in (ASKED if usual_scenes else ASKED[:1]) if key not in said]
+    if missing:
+        raise InputError(f"{record.file}: the record says nothing of {', '.join(missing)}, expected a block twin "
+                         "such as {waveform: cw, distance_m: [2, 10], height_m: [-1, 2], beam_deg: 60}")  # fmt: skip
+    one_sided = record.channel == "real" and said.get("sampling", "one_sided") == "one_sided"
+    # Unambiguous are lambda / 4 T of a complex channel, twice that of a one-sided one.
+    wanted_hz = (2 if one_sided else 4) * said.get("fastest_mps", FASTEST_MPS) * record.carrier_hz / SPEED_OF_LIGHT
+    every = max(1.0, rate_hz / wanted_hz)
+    every = round(every) if abs(every - round(every)) < WHOLE * every else every
+    interval_s = said.get("symbol_interval_s", every / rate_hz)
+    usual = "one_sided" if one_sided else "anti_aliased"
+    sampling = said.get("sampling", usual if rate_hz * interval_s > 1 + 1e-9 or one_sided else "bare")
+    length = round(said.get("window_s", WINDOW_S) / interval_s)
+    symbols = said.get("symbols", int(np.clip(length, LEAST_SYMBOLS, MOST_SYMBOLS)))
+    simulated_hz = said.get("simulated_hz", 1 / interval_s if sampling == "bare" else min(rate_hz, 2 / interval_s))
+    if not 1 - 1e-9 <= simulated_hz * interval_s <= MOST_SAMPLES / symbols:
+        raise InputError(f"{record.file}: {symbols} values of {interval_s:.4g} s, simulated at {simulated_hz:.6g} Hz, "
+                         f"expected at least a sample a value and at most {MOST_SAMPLES} samples a window")  # fmt: skip
+    slowest_mps, detect_db = said.get("slowest_mps", SLOWEST_MPS), said.get("detect_db", DETECT_DB)
+    return Twin(
+        record.carrier_hz, record.channel, simulated_hz, interval_s, symbols, sampling, slowest_mps, detect_db
+    )
 
 
-def radars(path: str | Path = TWINS) -> dict[str, Twin]:
-    """Return the radars of a configuration of twins by name.
+def records(folder: str | Path = RADARS, over: dict | None = None) -> dict[str, Record]:
+    """Return the records of radars in a folder by name, by rising carrier.
 
-    Raises: InputError naming the key that is missing or wrong.
+    over: for some of these radars, keys of the block `twin` to lay over those of the record.
+    Raises: InputError naming the file and the key that is missing or wrong.
     """
-    try:
-        blocks = {str(name): twin["radar"] for name, twin in settings_of(path)["twins"].items()}
-    except KeyError as error:
-        raise InputError(f"{path}: key {error} is missing") from None
-    except (TypeError, AttributeError):
-        raise InputError(f"{path}: expected under twins the name of each radar with a block radar") from None
-    for name, block in blocks.items():
-        check_brought("radar", with_numbers(block, of_brought("radar")), f"{path}: {name}")
-    return {name: Twin.from_settings(block) for name, block in blocks.items()}
+    folder, found = shipped(folder), {}
+    for path in sorted(folder.glob("*.yaml")):
+        block = merge(load_yaml(path, "record of a radar"), {"twin": (over or {}).get(path.stem, {})})
+        found[path.stem] = record(block, folder, str(path))
+        if found[path.stem].rate_hz is None:
+            raise InputError(f"{path}: missing key(s) ['rate_hz']")
+    if not found:
+        raise InputError(f"{folder}: no record of a radar, expected files such as cw_24ghz.yaml")
+    return dict(sorted(found.items(), key=lambda pair: pair[1].carrier_hz))
+
+
+def radars(folder: str | Path = RADARS) -> dict[str, Twin]:
+    """Return the twins of the records of radars in a folder by name.
+
+    Raises: InputError as `records` and `twin_of`.
+    """
+    return {name: twin_of(about, float(about.rate_hz or 0)) for name, about in records(folder).items()}

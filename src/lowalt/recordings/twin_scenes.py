@@ -1,12 +1,12 @@
 """Scenes of a twin: targets in front of the radar and their courses, drawn from the ranges of a configuration.
 
-A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene:
+A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene (`scene` in brought.schema.yaml):
     subtypes       names of targets, one drawn a sample
     course         hover | pass | to_and_fro, and the course's own keys:
                    hover: distance_m, height_m, sway_m, sway_hz, rock_deg
                    pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol)
                    to_and_fro: near_m, far_m, height_m, speed_mps, turn_s
-    rate_hz        of rotors or wings; wheels roll with the speed
+    rate_hz        of rotors or wings (optional: the target's own); wheels roll with the speed
     spread, wander of the rotors' rates, as the effect `rotor_spread` has them (both optional)
     strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
     texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
@@ -15,7 +15,7 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
     second         share of samples with a second target of the same scene, and its level_db (optional)
-    receiver       settings of `twin_receiver.Receiver` (in a twin: only those that differ from its receiver)
+    receiver       settings of `twin_receiver.Receiver` that differ from those of the radar (optional)
 """
 
 import math
@@ -24,13 +24,16 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.config.classes import CATEGORIES
+from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.portable import rms
 from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.presence import present
-from lowalt.recordings.twin import Twin, radars, settings_of
+from lowalt.recordings.record import Record
+from lowalt.recordings.twin import RADARS, Twin, records, twin_of
 from lowalt.recordings.twin_courses import Course, hover, straight, to_and_fro
 from lowalt.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
 from lowalt.recordings.twin_receiver import Receiver, received
@@ -87,10 +90,15 @@ def _course(scene: dict, cloud: Cloud, times_s: np.ndarray, rng: np.random.Gener
 
 
 def _rate(scene: dict, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
-    """The rate (Hz) of rotors, wings or wheels; wheels roll at the speed (m/s)."""
+    """The rate (Hz) of rotors, wings or wheels; wheels roll at the speed (m/s).
+
+    Rotors and wings take the rates of the table of targets where the scene says none.
+    """
     if cloud.like == "Vehicle":
         return speed / (math.pi * cloud.record["wheel_diameter_m"])
-    return value(scene["rate_hz"], rng) if "rate_hz" in scene else 0.0
+    if "rate_hz" in scene or cloud.like not in AIRBORNE:
+        return value(scene.get("rate_hz", 0.0), rng)
+    return value([cloud.record["published"][key] or 0.0 for key in ("freq_lo_hz", "freq_hi_hz")], rng)
 
 
 def heard(
@@ -196,39 +204,83 @@ def intervals(
     return result, names
 
 
+SCENES = "config/measured/scenes.yaml"
+"""What stands in front of any radar, and its receiver, where the record of a radar says nothing else."""
+ROOM_M = 2.5
+"""Least distance between the ends of a walk."""
+
+
+def _placed(scene: dict, said: dict) -> dict:
+    """A scene of the usual ones, with the distances, heights and beam of a record's block `twin`."""
+    near, far = said["distance_m"]
+    scene = {**scene, "height_m": said["height_m"]}
+    scene["beam"] = {"width_deg": said["beam_deg"], "floor_db": -20.0}
+    if scene["course"] == "hover":
+        scene["distance_m"] = [near, far]
+    elif scene["course"] == "pass":
+        scene |= {"lateral_m": [near, max(near, far / 3)], "ahead_m": [-far / 4, far]}
+    else:
+        last = near + 0.2 * (far - near)
+        scene |= {"near_m": [near, last], "far_m": [max(last + ROOM_M, 0.6 * far), max(last + ROOM_M, far)]}
+    return scene
+
+
+def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, list[dict]]:
+    """Return the scenes of each category of a record, their receivers filled in.
+
+    snr_db: range of SNR (dB); usual: the content of `SCENES`, for whatever the record's block `twin` does not say.
+    """
+    said = record.twin or {}
+    receiver = usual["receiver"] | said.get("receiver", {}) | {"snr_db": snr_db}
+    # Values are drawn in this order, whatever the order of the files is.
+    receiver = {key: receiver[key] for key in Receiver.__dataclass_fields__ if key in receiver}
+    result = {}
+    for label in said.get("classes", CATEGORIES):
+        scenes = said.get("scenes", {}).get(label)
+        if scenes is None:
+            scenes = [_placed(scene, said) for scene in usual["scenes"][label]]
+        elif scenes == "usual":
+            scenes = usual["scenes"][label]
+        if names := said.get("subtypes", {}).get(label):
+            scenes = [{**scene, "subtypes": names} for scene in scenes]
+        result[label] = [{**scene, "receiver": receiver | scene.get("receiver", {})} for scene in scenes]
+    return result
+
+
 @dataclass(frozen=True)
 class Library:
-    """All twins of a configuration: name -> twin, its measured sets, and category -> scenes, receivers filled in."""
+    """All twins of some radars: name -> twin, and category -> scenes, receivers filled in; records: of all targets."""
 
     seed: int
     twins: dict[str, Twin]
-    sets: dict[str, list[str]]
     scenes: dict[str, dict[str, list[dict]]]
     records: dict[str, dict]
 
     @classmethod
-    def read(cls, path: str | Path) -> "Library":
-        """Return the library in a YAML file such as `config/measured/twins.yaml`, read by `twin.settings_of`.
+    def of(cls, radars: dict[str, tuple[Record, Twin, list[float]]]) -> "Library":
+        """Return the library of radars by name, each with its record, its twin and its range of SNR (dB).
 
-        Raises: InputError naming the key that is missing or wrong.
+        Raises: InputError where the record of an own target is wrong.
         """
-        block, twins = settings_of(path), radars(path)
-        try:
-            records = load_records(block["targets"]["table"], block["targets"]["records"])
-            sets = {name: list(twin["sets"]) for name, twin in block["twins"].items()}
-            scenes = {
-                name: {
-                    category: [
-                        {**scene, "receiver": twin["receiver"] | scene.get("receiver", {})}
-                        for scene in {**block["scenes"], **twin.get("scenes", {})}[category]
-                    ]
-                    for category in CATEGORIES
-                }
-                for name, twin in block["twins"].items()
-            }
-            return cls(int(block["seed"]), twins, sets, scenes, records)
-        except KeyError as error:
-            raise InputError(f"{path}: key {error} is missing") from None
+        usual = load_yaml(shipped(SCENES), "usual scenes")
+        own = dict.fromkeys(name for about, *_ in radars.values() for name in (about.twin or {}).get("targets", []))
+        table, records = usual["targets"]["table"], usual["targets"]["records"]
+        known = load_records(shipped(table), [*map(shipped, records), *own])
+        scenes = {name: scenes_of(about, snr_db, usual) for name, (about, _, snr_db) in radars.items()}
+        return cls(int(usual["seed"]), {name: twin for name, (_, twin, _) in radars.items()}, scenes, known)
+
+    @classmethod
+    def read(cls, folder: str | Path = RADARS, over: dict | None = None) -> "Library":
+        """Return the library of the records of radars in a folder, by rising carrier.
+
+        over: as `twin.records`. Raises: InputError as `twin.records` and `of`, and for a record without snr_db.
+        """
+        radars = {}
+        for name, about in records(folder, over).items():
+            if "snr_db" not in (about.twin or {}):
+                raise InputError(f"{about.file}: the record says nothing of twin.snr_db, expected a range in dB")
+            radars[name] = about, twin_of(about, float(about.rate_hz or 0)), about.twin["snr_db"]
+        return cls.of(radars)
 
     def simulated(self, twin: str, category: str, count: int, purpose: str, receivers: int = 1):
         """Return simulated intervals (count, receivers, symbols) of a category, and the names of their subtypes.
