@@ -6,7 +6,7 @@ from pathlib import Path
 from setuptools import setup
 from setuptools.command.build_py import build_py
 
-SHIPPED = ("Snakefile", "workflow", "config", "profiles", "envs", "results/reference")
+SHIPPED = ("Snakefile", "workflow", "config", "profiles", "envs", "results/reference", "results/zoo")
 
 
 class BuildWithWorkflow(build_py):

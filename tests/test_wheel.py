@@ -32,7 +32,8 @@ def installed(tmp_path_factory):
     tree = folder / "checkout"
     ignored = shutil.ignore_patterns("__pycache__", ".*", "*.egg-info", "results", "site")
     shutil.copytree(ROOT, tree, ignore=ignored)
-    shutil.copytree(ROOT / "results/reference", tree / "results/reference")
+    for name in ("reference", "zoo"):
+        shutil.copytree(ROOT / "results" / name, tree / "results" / name)
     with tarfile.open(built("sdist", tree, folder)) as archive:
         archive.extractall(folder / "unpacked", filter="data")
     (unpacked,) = (folder / "unpacked").iterdir()
@@ -44,7 +45,7 @@ def installed(tmp_path_factory):
 
 def test_the_wheel_holds_the_workflow_and_says_that_it_is_typed(installed):
     package = installed / "lowalt"
-    for name in ("Snakefile", "config", "workflow", "profiles", "envs", "results/reference"):
+    for name in ("Snakefile", "config", "workflow", "profiles", "envs", "results/reference", "results/zoo"):
         files = [path for path in [ROOT / name, *(ROOT / name).rglob("*")] if path.is_file()]
         kept = {str(path.relative_to(ROOT)) for path in files if "__pycache__" not in path.parts}
         assert kept and all((package / "shipped" / path).read_bytes() == (ROOT / path).read_bytes() for path in kept)

@@ -141,6 +141,13 @@ def test_names_of_columns_outrank_guesses_and_contradictions_are_refused(tmp_pat
     assert read(stated(path, rate_hz=None)).rate_hz == pytest.approx(RATE, rel=1e-6)
 
 
+def first_of(path, carrier):
+    """The first reading of a file of captures that do not belong together, which an inspection points out."""
+    seen = inspect_recording(path, carrier, RATE)
+    assert "the record takes the first" in " ".join(seen.notes)
+    return seen.readings[0]
+
+
 def test_captures_apart_are_not_joined(tmp_path):
     pytest.importorskip("sigmf")
     values = echo()
@@ -152,9 +159,21 @@ def test_captures_apart_are_not_joined(tmp_path):
     with pytest.raises(InputError, match="capture at sample 5000 begins 3599 s after the samples before it end"):
         read(stated(path))
     np.testing.assert_allclose(read(stated(path, capture=1)).values, values[5000:], rtol=1e-5)
+    assert first_of(path, CARRIER).keys["capture"] == 0
+    other = [{"core:sample_start": 0, "core:frequency": CARRIER}, {"core:sample_start": 5000, "core:frequency": 3.6e9}]
+    path.write_text(json.dumps({**about, "captures": other}))
+    for carrier in (None, CARRIER):
+        assert len(first_of(path, carrier).values) == 5000
     about["captures"][1]["core:datetime"] = "2026-01-01T00:00:01Z"
     path.write_text(json.dumps(about))
     assert len(read(stated(path)).values) == len(values)
+
+
+def test_a_wav_of_one_channel_is_one_real_channel_even_where_its_numbers_repeat(tmp_path):
+    tone = np.sin(2 * np.pi * 60 * np.arange(88_200) / 44_100)
+    wavfile.write(tmp_path / "a.wav", 44_100, np.rint(20_000 * tone).astype(np.int16))
+    first = inspect_recording(tmp_path / "a.wav", 24e9).readings[0]
+    assert first.keys == {"channel": "real"} and first.said and first.line_hz == pytest.approx(60, abs=0.5)
 
 
 def test_a_wav_without_samples_is_refused(tmp_path):

@@ -10,6 +10,7 @@ from lowalt.commands.command_line import Answer, add_command, positive
 from lowalt.commands.command_table import COMMANDS
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
 from lowalt.recordings.file_inspection import FileInspection, Seen, inspect_recording
 
 DRAFTED = "# Drafted by `lowalt recording inspect`."
@@ -34,7 +35,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     inspect.add_argument("--out", type=Path, help="record to write (default: the file's name and .yaml, here)")
     meaning = "simulate the radar of a record, train a network for it, and say which accuracy to expect"
     train = add_command(actions, "train", _train, meaning, "lowalt recording train walk.yaml --out my_radar")
-    train.add_argument("record", type=Path, help="record of a recording, with the block twin")
+    train.add_argument("record", type=Path, help="record of a recording, or of a radar without one, with the block "
+                       "twin")  # fmt: skip
     train.add_argument("--out", type=Path, required=True, help="network to write, my_radar for my_radar.safetensors")
     train.add_argument("--recognition", default="config/measured/recognition.yaml", help="network and training")
 
@@ -150,7 +152,7 @@ def _train(options: argparse.Namespace) -> Answer:
     from lowalt.recordings.record import read_record
     from lowalt.recordings.twin_training import settings
 
-    record = read_record(options.record)
+    record = read_record(shipped(options.record))
     facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition))
     each = ", ".join(f"{label} {percent:.0f}" for label, percent in facts["percent_by_class"].items())
     lines = [

@@ -3,14 +3,15 @@
 from pathlib import Path
 
 from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED, shipped
 
 ZOO = Path("results/zoo")
-"""Where entries lie, from the folder of the checkout."""
+"""Where entries lie, from the working directory or, for those that come with the package, from its folder."""
 
 
 def names(zoo: Path = ZOO) -> list[str]:
     """Return the names of all entries, sorted."""
-    return sorted(path.stem for path in zoo.glob("*.safetensors"))
+    return sorted({path.stem for folder in (zoo, SHIPPED / zoo) for path in folder.glob("*.safetensors")})
 
 
 def path_of(model: str | Path, zoo: Path = ZOO) -> Path:
@@ -25,4 +26,4 @@ def path_of(model: str | Path, zoo: Path = ZOO) -> Path:
         return path.with_name(f"{path.name}.safetensors")
     if str(model) not in names(zoo):
         raise InputError(f"model {str(model)!r}: not a file, and {zoo} has {names(zoo)}")
-    return zoo / f"{model}.safetensors"
+    return shipped(zoo / f"{model}.safetensors")

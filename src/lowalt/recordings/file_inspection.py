@@ -1,7 +1,7 @@
 """A recording of unknown layout: every reading that fits, with its strongest line, and what is wrong with the best."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -145,8 +145,22 @@ def _arrays(path: Path) -> tuple[list[tuple[dict, np.ndarray]], float | None]:
     return [({"variable": name} if len(arrays) > 1 else {}, value) for name, value in arrays.items()], rate
 
 
-def _candidates(path: Path) -> tuple[list[Candidate], float | None, float | None]:
-    """Readings of a file, and the rate and carrier (Hz) that it says."""
+def _table(path: Path, carrier_hz: float | None) -> tuple[Table, dict]:
+    """The table of a file that states its columns, and the keys that it needs: those of SigMF's first capture where its
+    captures do not follow on one another at one carrier."""
+    record = _record(path, {"channel": "complex"}, carrier_hz, None)
+    try:
+        table = table_of(record)
+        carrier = table.carrier_hz if carrier_hz is None else None
+        return (table if carrier is None else table_of(replace(record, carrier_hz=carrier))), {}
+    except InputError:
+        if not path.suffix.lower().startswith(".sigmf"):
+            raise
+        return table_of(replace(record, capture=0)), {"capture": 0}
+
+
+def _candidates(path: Path, carrier_hz: float | None) -> tuple[list[Candidate], float | None, float | None]:
+    """Readings of a file, and the rate and carrier (Hz) that it says; carrier_hz: as its reader says it."""
     kind, rate, carrier, result = path.suffix.lower(), None, None, []
     if kind in RAW:
         return _of_raw(path), None, None
@@ -161,12 +175,15 @@ def _candidates(path: Path) -> tuple[list[Candidate], float | None, float | None
             found = _of_chirps(array) if long >= 2 else _of_columns(Table(list(columns.T)))
             result += [one._replace(keys={**keys, **one.keys}) for one in found]
     else:
-        table = table_of(_record(path, {"channel": "complex"}, math.nan, None))
+        table, keys = _table(path, carrier_hz)
         times = times_of(table, _record(path, {"channel": "complex"}, math.nan, None))
         carrier, rate = table.carrier_hz, table.rate_hz
         if rate is None and times is not None:
             rate = faults.agreed_rate(path, None, None, times)
-        result = _of_columns(table)
+        result = [one._replace(keys={**one.keys, **keys}) for one in _of_columns(table)]
+        if kind == ".wav" and len(table.columns) == 1:
+            # A WAV file states its channels.
+            result = [one._replace(said=one.keys["channel"] == "real") for one in result]
     return result, rate, carrier
 
 
@@ -218,7 +235,7 @@ def inspect_recording(
     if path.suffix.lower() not in READERS:
         raise InputError(f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}")
     try:
-        candidates, own_rate, own_carrier = _candidates(path)
+        candidates, own_rate, own_carrier = _candidates(path, carrier_hz)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a readable {path.suffix} file ({error})") from error
     said = tuple(name for name, given, own in (("carrier_hz", carrier_hz, own_carrier), ("rate_hz", rate_hz, own_rate))
@@ -231,7 +248,8 @@ def inspect_recording(
         except (InputError, *UNREADABLE):
             continue
         if len(found) == 1 and "chirps" not in one.keys:
-            found = [*_in_chirps(path, one, found[0], rate_hz or 1.0), *found]
+            chirped = _in_chirps(path, one, found[0], rate_hz or 1.0)
+            found = [*found, *chirped] if one.said else [*chirped, *found]
     if not found:
         raise InputError(f"{path}: nothing in it reads as a signal, expected samples of one or two channels")
     notes = _notes(path, found[0], rate_hz, carrier_hz)
@@ -246,7 +264,11 @@ def _in_chirps(path: Path, one: Candidate, seen: Seen, rate_hz: float) -> list[S
     chirps = {"samples": samples, "receivers": receivers_of(seen.values, samples)}
     keys = {**one.keys, "channel": "complex", "chirps": chirps}
     whole = len(seen.values) // (samples * chirps["receivers"]) * samples * chirps["receivers"]
-    return [_seen(path, Candidate(keys, one.bits - strength), rate_hz, seen.values[:whole])]
+    try:
+        return [_seen(path, Candidate(keys, one.bits - strength), rate_hz, seen.values[:whole])]
+    except InputError:
+        # A signal that repeats exactly stands still from chirp to chirp.
+        return []
 
 
 def _decibels(ratio: float) -> float:
@@ -257,6 +279,9 @@ def _decibels(ratio: float) -> float:
 def _notes(path: Path, seen: Seen, rate_hz: float | None, carrier_hz: float | None) -> list[str]:
     """Sentences on faults of a reading: clipping, a constant part, hum of the mains, a mirrored sign, refusals."""
     values, notes = seen.values[:LONGEST], []
+    if "capture" in seen.keys:
+        notes.append("its captures do not follow on one another at one carrier: the record takes the first, `capture: "
+                     "1` the next")  # fmt: skip
     spread, mean = values.std(), values.mean()
     constant = _decibels(abs(mean) ** 2 / spread**2)
     if constant > DC_DB:
