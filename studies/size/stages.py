@@ -19,7 +19,8 @@ COLUMNS = (
     "stage", "jobs", "clock_s", "processor_s", "processor_s_per_million", "peak_mib", "bytes_per_sample", "samples",
     "hardware",
 )  # fmt: skip
-FILES = {"echo": "echo/*/*.npy", "noise": "noisy/*.npy", "shard": "shards/*.tar", "motion": "motion/*.csv"}
+FILES = {"cloud": "clouds/*.npz", "motion": "motion/*.csv", "echo": "echo/*/*.npy", "noise": "noisy/*.npy",
+         "shard": "shards/*.tar", "index": "shards/index.json"}  # fmt: skip
 """What a stage leaves on disk."""
 
 
@@ -31,11 +32,10 @@ def main(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     samples = len(ShardSet(given.run / "shards/index.json", check=False))
     rows = []
-    for stage in stage_times(sorted((given.run / "benchmarks").rglob("*.jsonl"))):
-        if stage["rule"] not in ("cloud", "index", *FILES):
-            continue
-        stored = sum(path.stat().st_size for path in given.run.glob(FILES.get(stage["rule"], "")) if path.is_file())
-        rows.append([stage["rule"], stage["jobs"], f"{stage['wall_s']:.0f}", f"{stage['cpu_s']:.0f}",
+    found = {one["rule"]: one for one in stage_times(sorted((given.run / "benchmarks").rglob("*.jsonl")))}
+    for name in (name for name in FILES if name in found):
+        stage, stored = found[name], sum(path.stat().st_size for path in given.run.glob(FILES[name]))
+        rows.append([name, stage["jobs"], f"{stage['wall_s']:.0f}", f"{stage['cpu_s']:.0f}",
                      f"{1e6 * stage['cpu_s'] / samples:.0f}", f"{stage['peak_mib']:.0f}", f"{stored / samples:.0f}",
                      samples, describe()])  # fmt: skip
     write_csv(given.out, COLUMNS, rows)
