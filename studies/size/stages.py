@@ -1,6 +1,6 @@
 """What each stage of a finished data set took, for a million samples.
 
-    python studies/size/stages.py --run results/paper-signals --out studies/size/results/stages.csv
+    python studies/size/stages.py --run results/paper --out studies/size/results/stages.csv
 
 Reads the measurements that Snakemake leaves of each job. Processor time is sampled, so jobs of less than a second have
 none; their time by the clock is an upper bound for it. Both are sums over the jobs of a stage.

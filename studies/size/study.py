@@ -2,10 +2,10 @@
 
     python studies/size/study.py --out studies/size/results/size.csv
 
-Reads the run `paper-signals` (`config.yaml`): the caches of views that `--files` lists. Each training takes the first
-motion models of each trained subtype, so a smaller part is contained in each larger one. All trainings are validated
-and tested on the same samples: the first TEST_CHUNKS chunks of the folds that no training reads. Finished trainings are
-kept in results/paper-signals/size.
+Reads the data set of `config/paper.yaml`: the caches of views that `--files` lists and `config.yaml` makes. A training
+takes the first motion models of each trained subtype, so a smaller part is contained in each larger one. All trainings
+are validated and tested on the same samples: the first TEST_CHUNKS chunks of the folds that no training reads. Finished
+trainings are kept in results/size.
 """
 
 import argparse
@@ -21,6 +21,7 @@ import numpy as np
 import trainings
 from lowalt.config.command import run
 from lowalt.files.csv_tables import write_csv
+from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions, runs
 from lowalt.recognition.intervals import Interval, model_shares, strict_difference
@@ -29,7 +30,7 @@ from lowalt.recognition.samples import ViewSamples
 from lowalt.recognition.schemes import TABLE, named
 
 HERE = Path(__file__).parent
-DATA = trainings.ROOT / "results/paper-signals"
+DATA = trainings.ROOT / "results/paper"
 TEST_CHUNKS = 12
 """Chunks of 50 motion models per subtype whose validation and test folds are read."""
 SCHEMES = "ABC:VRP+TRP+VT", "A:VRP+TRP+VT"
@@ -52,7 +53,10 @@ class Trial(NamedTuple):
     @property
     def path(self) -> Path:
         """Prediction file of the training."""
-        return DATA / f"size/{self.scheme.partition(':')[0]}-{self.models}-{self.steps}/{self.seed}/predictions.csv"
+        return (
+            trainings.ROOT
+            / f"results/size/{self.scheme.partition(':')[0]}-{self.models}-{self.steps}/{self.seed}/predictions.csv"
+        )
 
 
 def trials() -> list[Trial]:
@@ -62,9 +66,9 @@ def trials() -> list[Trial]:
     return equal + [Trial(scheme, 6000, 18000, 0) for scheme in SCHEMES]
 
 
-def chunks_of(config: dict, models: int) -> int:
-    """Return how many chunks hold the first motion models of each subtype."""
-    return -(-models // config["motion"]["models_per_chunk"])
+def chunks_of(models: int) -> int:
+    """Return how many chunks of the data set hold the first motion models of each subtype."""
+    return -(-models // load_yaml(trainings.ROOT / "config/paper.yaml")["motion"]["models_per_chunk"])
 
 
 def files_of(config: dict, group: str, fold: str, chunks: int) -> list[Path]:
@@ -91,7 +95,7 @@ def answered(trial: Trial, config: dict) -> Path:
     settings = trainings.settings_of(config, DATA, scheme, trial.seed)
     settings["training"] = settings["training"] | {"steps": trial.steps, "validate_every": trial.steps // 4}
     read = partial(samples_of, config, columns=scheme.columns)
-    samples = {"train": read("train", chunks=chunks_of(config, trial.models)),
+    samples = {"train": read("train", chunks=chunks_of(trial.models)),
                "validation": read("validation", chunks=TEST_CHUNKS)}  # fmt: skip
     runs.train(samples, scheme, "unseen", settings, trial.path.parent)
     model = runs.load(trial.path.parent / "model.pt")
@@ -158,9 +162,9 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--workers", type=int, default=os.cpu_count(), help="trainings side by side (default: the cores)")
     line.add_argument("--out", type=Path, default=HERE / "results/size.csv", help="table to write (.csv)")
     given = line.parse_args(arguments)
-    config = trainings.config_of(HERE / "config.yaml")
+    config = trainings.config_of()
     if given.files:
-        most = chunks_of(config, max(one.models for one in trials()))
+        most = chunks_of(max(one.models for one in trials()))
         asked = (("seen", "train", most), *((*pair, TEST_CHUNKS) for pair in
                  (("seen", "val"), ("seen", "test"), ("unseen", "test"))))  # fmt: skip
         print(*(path.relative_to(trainings.ROOT) for ask in asked for path in files_of(config, *ask)), sep="\n")
