@@ -124,7 +124,8 @@ class _File(NamedTuple):
 
 def _of_pattern(block: dict, path: Path, where: str) -> _File:
     """The file of a set's pattern, its carrier read from its name where the set says so."""
-    keys = {key: item for key, item in block.items() if key not in ("radar", "carrier_ghz_in_name", "rates_hz", "device")}
+    of_sets = ("radar", "carrier_ghz_in_name", "rates_hz", "device")
+    keys = {key: item for key, item in block.items() if key not in of_sets}
     carrier = re.search(block.get("carrier_ghz_in_name", "(?!)"), path.name)
     if carrier:
         keys["carrier_hz"] = float(carrier[1]) * 1e9

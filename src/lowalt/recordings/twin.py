@@ -153,9 +153,7 @@ def twin_of(record: Record, rate_hz: float) -> Twin:
         raise InputError(f"{record.file}: {symbols} values of {interval_s:.4g} s, simulated at {simulated_hz:.6g} Hz, "
                          f"expected at least a sample a value and at most {MOST_SAMPLES} samples a window")  # fmt: skip
     slowest_mps, detect_db = said.get("slowest_mps", SLOWEST_MPS), said.get("detect_db", DETECT_DB)
-    return Twin(
-        record.carrier_hz, record.channel, simulated_hz, interval_s, symbols, sampling, slowest_mps, detect_db
-    )
+    return Twin(record.carrier_hz, record.channel, simulated_hz, interval_s, symbols, sampling, slowest_mps, detect_db)
 
 
 def records(folder: str | Path = RADARS, over: dict | None = None) -> dict[str, Record]:
