@@ -9,6 +9,7 @@ from fnmatch import fnmatchcase
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -182,6 +183,12 @@ def gain(kept):
     return dict(zip(names, (f"{value:z.2f}" for value in found), strict=True))
 
 
+def layout(kept, tmp_path):
+    module, snr_db = program("benchmarks/recording_layouts.py"), int(kept["snr_db"])
+    values = module.echo(kept["echo"], snr_db, np.random.default_rng([snr_db, len(kept["echo"])]))
+    return {"tries": module.tries(module.written(kept["layout"], values, tmp_path), values)}
+
+
 REMADE = {
     "results/reference/scene_cells.csv": cells, "results/reference/scale.csv": scale,
     "results/reference/observed_truth.csv": truth,
@@ -189,6 +196,7 @@ REMADE = {
     "results/benchmarks/planted_faults.csv": fault, "results/benchmarks/rounding.csv": rounding,
     "results/benchmarks/scene_levels.csv": scene_level, "results/benchmarks/target_levels.csv": target_level,
     "results/benchmarks/training_memory.csv": memory, "studies/detection/results/detection.csv": looks,
+    "results/benchmarks/recording_layouts.csv": layout,
     "results/benchmarks/sampling_gain.csv": gain, "results/benchmarks/signal_precision.csv": precision,
     "studies/detection/results/neighbours.csv": neighbours,
     "studies/rotors/results/made.csv": made_rotors,

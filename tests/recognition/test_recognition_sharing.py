@@ -145,7 +145,7 @@ def test_an_entry_of_the_zoo_is_small_measured_and_predicts_by_name(finished, vi
     assert f"| 8 bits | {content.measured['percent']:.3f} |" in card
     capsys.readouterr()
     assert main(["predict", "yours", "a.npy"]) == 2
-    assert "'yours'" in (told := capsys.readouterr().err) and "['mine']" in told
+    assert "'yours'" in (told := capsys.readouterr().err) and "'mine'" in told
 
 
 def test_an_entry_that_loses_accuracy_or_is_large_or_ill_named_is_not_written(finished, views, tmp_path, monkeypatch):

@@ -10,9 +10,9 @@ from scipy.io import wavfile
 from lowalt.__main__ import main as lowalt
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings.files import Baseband
-from lowalt.recordings.own_radar import snr_range, temperature
-from lowalt.recordings.record import record
+from lowalt.recordings.files import Baseband, read
+from lowalt.recordings.own_radar import snr_range, temperature, trained_radar
+from lowalt.recordings.record import read_record, record
 from lowalt.recordings.twin import twin_of
 from lowalt.recordings.twin_scenes import Library
 
@@ -53,6 +53,40 @@ def test_scenes_stand_at_the_distances_and_heights_of_the_record(tmp_path):
     assert all(scene["receiver"]["snr_db"] == [0.0, 20.0] for scene in scenes)
     (walk,) = (scene for scene in scenes if scene["course"] == "to_and_fro")
     assert walk["near_m"][0] == 2 and walk["far_m"][1] == 10 and walk["far_m"][0] - walk["near_m"][1] >= 2.49
+
+
+def test_a_record_says_targets_scenes_and_receiver_of_its_own(tmp_path):
+    line = ["target", "drone", "--rotors", "6", "--diagonal", "1.13", "--propeller", "0.53", "--blades", "2", "--rate",
+            "50:60", "--speed", "18", "--subtype", "Mine", "--out", str(tmp_path / "mine.yaml")]  # fmt: skip
+    assert lowalt(line) == 0
+    hover = {"subtypes": ["Mine"], "course": "hover", "distance_m": 3, "height_m": 0, "sway_m": 0, "sway_hz": 1,
+             "rock_deg": 0}  # fmt: skip
+    about = stated(tmp_path, targets=["mine.yaml"], classes=["UAV", "Bird"], subtypes={"Bird": ["Crow"]},
+                   scenes={"UAV": [hover], "Bird": "usual"}, receiver={"highpass_hz": 5, "hum_db": -90},
+                   slowest_mps=0, simulated_hz=6000, symbol_interval_s=1e-3, symbols=256)  # fmt: skip
+    twin = twin_of(about, 12000)
+    assert (twin.slowest_mps, twin.rate_hz, twin.symbol_interval_s, twin.symbols) == (0, 6000, 1e-3, 256)
+    library = Library.of({"mine": (about, twin, [5.0, 6.0])})
+    (mine,), (bird,) = library.scenes["mine"].values()
+    assert {**mine, "receiver": 0} == {**hover, "receiver": 0} and bird["subtypes"] == ["Crow"] and "beam" not in bird
+    assert (mine["receiver"]["highpass_hz"], mine["receiver"]["hum_db"]) == (5, -90)
+    # Values are drawn in one order, whatever the order in the record is.
+    assert list(mine["receiver"])[0] == "snr_db" and list(mine["receiver"])[-1] == "highpass_hz"
+    windows, names = library.simulated("mine", "UAV", 2, "test")
+    assert windows.shape == (2, 1, 256) and names == ["Mine", "Mine"]
+
+
+def test_a_radar_without_a_recording_says_its_rate_and_snr(tmp_path):
+    block = {"carrier_hz": 24e9, "channel": "real", "rate_hz": 6000, "twin": SAID}
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(block))
+    about = read_record(tmp_path / "mine.yaml")
+    with pytest.raises(InputError, match=r"mine\.yaml: no recording to measure the noise in, expected `file`, or twin"):
+        trained_radar(about, tmp_path / "mine", {"seeds": [0]})
+    with pytest.raises(InputError, match=r"mine\.yaml: the record of a radar without any recording, expected the key"):
+        read(about)
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump({**block, "twin": None}))
+    with pytest.raises(InputError, match=r"missing key\(s\) \['file'\], expected it, or twin and rate_hz"):
+        read_record(tmp_path / "mine.yaml")
 
 
 def test_the_snr_of_the_recording_is_measured(tmp_path):
