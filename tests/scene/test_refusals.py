@@ -118,13 +118,3 @@ def test_the_schema_knows_every_setting_and_each_effect_names_its_source(name):
     assert module.SOURCE and f".{PLACES[name]}." in module.__name__
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "IDLE", ()))
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "PARTS", {}).values())
-
-
-def test_a_scene_imports_the_effects_that_it_names_alone():
-    for name in list(sys.modules):
-        if name.startswith("lowalt.scene.effects.receiver."):
-            del sys.modules[name]
-    called({"adc": {}})
-    assert {name for name in sys.modules if name.startswith("lowalt.scene.effects.receiver.")} == {
-        "lowalt.scene.effects.receiver.adc"
-    }

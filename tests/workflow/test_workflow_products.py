@@ -63,11 +63,12 @@ def test_what_is_prepared_is_all_that_trainings_and_the_page_wait_for():
     assert not {name for name in without.prepared(CHUNK) if "/views/" in name}
 
 
-def test_stages_before_the_first_training_do_without_torch():
+def test_stages_before_the_first_training_and_tables_do_without_torch():
     """In a process of its own: torch is not to be found there, as while `make` is still fetching it."""
     stages = ["targets", "targets.gallery", "motion", "echo", "noise", "tiles", "shards", "shards.card", "recognition"]
     stages += ["recognition.views", "recognition.freeze", "recognition.distances", "measure.echo_cost"]
     stages += ["report.figures.cost_plots", "config.layers", "workflow.run"]
+    stages += [f"recognition.{name}" for name in ("sample_sources", "evaluated", "tables", "score", "augment")]
     program = "import sys; sys.modules['torch'] = sys.modules['timm'] = None; import importlib as i"
     program += f"; [i.import_module('lowalt.' + name) for name in {stages}]"
     environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
