@@ -31,8 +31,9 @@ MOST_POINTS = 4000
 WORDS = {
     "front": {"front", "fore", "fwd", "forward", "nose", "fl", "fr", "lf", "rf"},
     "rear": {"rear", "back", "aft", "tail", "rl", "rr", "bl", "br", "lb", "rb"},
-    "left": {"left", "fl", "rl", "bl", "lf", "lb"}, "right": {"right", "fr", "rr", "br", "rf", "rb"},
-}  # fmt: skip
+    "left": {"left", "fl", "rl", "bl", "lf", "lb"},
+    "right": {"right", "fr", "rr", "br", "rf", "rb"},
+}
 """Words in the names of parts that say where a part is."""
 
 

@@ -328,8 +328,9 @@ def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: in
 
 def _are_arms(groups: list[Group], up: int) -> bool:
     """Whether all groups are slender pieces that point at the middle between them and reach near it."""
-    centres, extents = (np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1)
-                        for name in ("centre", "extent"))  # fmt: skip
+    centres, extents = (
+        np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1) for name in ("centre", "extent")
+    )
     away = centres - centres.mean(axis=0)
     reach = np.linalg.norm(away, axis=1)
     along = np.array([np.delete(group[0].along, up) for group in groups])

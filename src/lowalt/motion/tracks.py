@@ -199,6 +199,7 @@ def model_rows(
     else:
         cadence = settings["cadence"]
         if not airborne:
-            path = path._replace(place_m=path.place_m * [1, 1, 0] + [0, 0, height_m],
-                                 velocity_mps=path.velocity_mps * [1, 1, 0])  # fmt: skip
+            path = path._replace(
+                place_m=path.place_m * [1, 1, 0] + [0, 0, height_m], velocity_mps=path.velocity_mps * [1, 1, 0]
+            )
     return [{**row, "track": track} for row in rows_along(cloud, row, path, look_s, cadence)]

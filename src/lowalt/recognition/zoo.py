@@ -86,7 +86,7 @@ def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trust
 
 def kept(
     content: ModelFile, model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = ""
-) -> dict:  # fmt: skip
+) -> dict:
     """Write a model's content in 8 bits as NAME.safetensors and NAME.md and return the measurements, as `entry` does.
 
     samples: those that both sets of weights answer. Raises: InputError as `entry`, for size and accuracy.

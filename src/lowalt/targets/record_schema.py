@@ -37,8 +37,9 @@ def check(section: str, record: dict, where: str) -> dict:
 
 def figures(model: str) -> dict[str, str]:
     """Return the figures that a built-in model needs by name, each a length, ratio, offset, count or whole number."""
-    sets = [schema()["figures"][item] if isinstance(item, str) else item
-            for item in schema()["models"][model]["figures"]]  # fmt: skip
+    sets = [
+        schema()["figures"][item] if isinstance(item, str) else item for item in schema()["models"][model]["figures"]
+    ]
     return {name: kind for needed in sets for name, kind in needed.items()}
 
 

@@ -149,8 +149,9 @@ def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
     known = [column for column in COLUMNS if column not in ("name", "idx")]
     if not isinstance(cells, dict) or set(cells) - set(known):
         raise InputError(f"{where}: row is {cells!r}, expected cells of the columns {known}")
-    changed = {column: None if cell is None else _cell(f"{where}: row", column, str(cell))
-               for column, cell in cells.items()}  # fmt: skip
+    changed = {
+        column: None if cell is None else _cell(f"{where}: row", column, str(cell)) for column, cell in cells.items()
+    }
     blank = dict.fromkeys(COLUMNS) | {"name": name, "unseen_protocol": "seen", "points_in_published_cloud_approx": 150}
     result = (row or blank) | changed
     if not result["category"] or result["unseen_protocol"] not in ("seen", "unseen"):
