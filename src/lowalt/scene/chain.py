@@ -159,7 +159,9 @@ class SceneSample:
 
         Without an effect on time samples, the responses of all echoes are added and no samples are made.
         """
-        still = [scatter(self.view, self.draws(name)) for name, scatter in self.all("scatter").items()]
+        from_sender = self.only("from_sender")
+        still = [from_sender(self.view)] if from_sender else []
+        still += [scatter(self.view, self.draws(name)) for name, scatter in self.all("scatter").items()]
         unknown = [heard(self) for heard in self.all("heard").values()]
         if self.only("instants") or self.only("late_samples"):
             samples = sum(map(self._standing, still), sum(map(self._samples, self.targets)))
