@@ -13,7 +13,7 @@ from lowalt.commands.data_sheet import add_sheets
 from lowalt.config.command import warn_in_one_line
 from lowalt.drafting.inspection import Inspection, described, inspect_mesh
 from lowalt.drafting.new import SEED, Asked, draft
-from lowalt.files.atomic import replacing, slug
+from lowalt.files.atomic import slug, write_file
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
@@ -89,8 +89,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 def _write(path: Path, data: bytes) -> Path:
     """Write a file and return its path."""
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
+    write_file(path, data)
     return path
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from lowalt.config.command import parser, pick, run
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.machine.hardware import describe
 from lowalt.machine.timing import least_s
 from lowalt.recognition import recipe, recogniser
@@ -108,8 +108,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, help="record to write (.json)")
     options = line.parse_args(arguments)
     record = measure(*with_scheme(options.settings))
-    with replacing(options.out) as temporary:
-        temporary.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
+    write_file(options.out, json.dumps(record, indent=1, sort_keys=True) + "\n")
 
 
 if __name__ == "__main__":

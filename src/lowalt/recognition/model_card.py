@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from lowalt import __version__
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.recognition.model_file import EIGHT, ModelFile, run_folder
 from lowalt.recognition.schemes import SPECTRA
@@ -140,6 +140,5 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
 def write(out: str | Path, content: ModelFile, accuracy: list[dict[str, str]]) -> Path:
     """Write the card next to the model file `out`, as .md, and return its path."""
     path = Path(out).with_suffix(".md")
-    with replacing(path) as temporary:
-        temporary.write_text(card(content, accuracy, path.stem))
+    write_file(path, card(content, accuracy, path.stem))
     return path

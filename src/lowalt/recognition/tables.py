@@ -32,7 +32,6 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition.evaluated import Evaluated, difference, whole_subtypes
-from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.paper_claims import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.statistics import (
@@ -43,6 +42,7 @@ from lowalt.recognition.statistics import (
     alarm_rates,
     calibration,
     confusion,
+    f1_by_snr,
     measurable,
     threshold,
 )

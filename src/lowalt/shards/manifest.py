@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lowalt.config.command import run
-from lowalt.files.atomic import replacing, sha256, text_of
+from lowalt.files.atomic import sha256, text_of, write_file
 from lowalt.files.errors import InputError
 
 STAGES = {
@@ -91,8 +91,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--without", nargs="*", default=[], choices=list(STAGES), help="stages that left no files")
     options = line.parse_args(arguments)
     if options.command == "write":
-        with replacing(options.manifest) as temporary:
-            temporary.write_text(text(options.run))
+        write_file(options.manifest, text(options.run))
         return
     lines = faults(options.manifest, options.run, ("tiles", *options.without))
     for fault in lines:

@@ -36,7 +36,7 @@ CMU_HZ = 120
 """Rate of CMU's recordings, which their files do not say."""
 
 LONG = 20
-"""A recording that is more times longer than the cycle used is told so: it may hold other motions."""
+"""A recording longer than this many times the cycle used gives a warning, because it may hold other motions."""
 
 
 def check_record(merged: dict, where: str) -> dict:

@@ -108,7 +108,7 @@ def load_records(
 ) -> dict[str, dict]:
     """Return every subtype's merged and checked record, in the table's order; new rows come last.
 
-    fall_back: where a record names files that the folder `inputs` lacks, take the subtype's record before it.
+    fall_back: if a record names files that the folder `inputs` lacks, use the subtype's previous record.
 
     A merged record is the record as written, with `subtype`, `category`, `group` (seen or unseen), `published` (the
     table's row), and the defaults of `points` (the published count) and `rcs_m2_per_point` (1 m2).
