@@ -229,9 +229,8 @@ def drafted(
              "Confirm each line that is marked, then remove the mark."]  # fmt: skip
     settings = {
         "unit": f"{inspection.unit}{CONFIRM * inspection.unit_from.startswith('guessed')}",
-        "up": f"{inspection.up}{up_mark}",
-        "front": f"{inspection.front}{inspection.front_from.comment}",
+        "up": f"{inspection.up}{up_mark}", "front": f"{inspection.front}{inspection.front_from.comment}",
         "size_is": size_word(category, extent, hubs),
         "licence": "unknown  # the licence of the mesh",
-    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})
+    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})  # fmt: skip
     return record_text(about, subtype, row, settings, parts)

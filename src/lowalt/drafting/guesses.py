@@ -50,9 +50,8 @@ least area that the end spans, as a share of the bounding box: CUT for a plane a
 anywhere."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
-"""An arm, unlike a blade, has a spread across its length of at most SLENDER times that along it, points at the middle
-of the craft with a cosine of at least RADIAL, and has its inner end at most INWARD times as far from there as its
-centre."""
+"""An arm, unlike a blade, is at most SLENDER times as wide as long (by spread), points at the middle of the craft with
+a cosine of at least RADIAL, and has its inner end at most INWARD times as far from there as its centre."""
 
 IN_LINE = 0.9
 """Least cosine of the angle between a blade and the line to the other blade of the same rotor."""

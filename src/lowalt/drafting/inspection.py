@@ -151,9 +151,8 @@ def inspect_mesh(
         usual = "z"
     height, unit_vectors = "xyz".index(up[-1]), np.eye(3)
     upward = unit_vectors[height] * (-1 if up[0] == "-" else 1)
-    hubs = [
-        Turning(group[0].piece, group.centre, unit_vectors[turning_axis(group, height, low, high)]) for group in groups
-    ]
+    hubs = [Turning(group[0].piece, group.centre, unit_vectors[turning_axis(group, height, low, high)])
+            for group in groups]  # fmt: skip
     shape = Shape(category, upward, points, _places(parts, named), hubs)
     front = front_of(shape, axes[1], usual, guessed_axes(high - low, category, height)[1])
     sides_seen = category != "Bird" or None not in axes or front.words != NOTHING_TELLS
@@ -161,9 +160,8 @@ def inspect_mesh(
     cut = cut_axis(mesh, points, ends)
     kind = {"UAV": "rotor", "Vehicle": "wheel"}.get(category, "")
     turning = {part.number for group in groups for part in group}
-    listed = [
-        (", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres(unit)) for piece in named
-    ]
+    listed = [(", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres(unit))
+              for piece in named]  # fmt: skip
     return Inspection(
         path, unit, source, low, high, len(mesh.faces), up, front.axis,
         listed, [replace(part, guess=kind if part.number in turning else "") for part in parts],

@@ -20,10 +20,9 @@ from lowalt.numerics import portable
 
 KINDS = (".urdf", ".sdf", ".xml", ".mjcf", ".world")
 TEMPLATES = {
-    ".xacro": "xacro FILE > robot.urdf",
-    ".jinja": "the project's own script (PX4: jinja_gen.py FILE)",
+    ".xacro": "xacro FILE > robot.urdf", ".jinja": "the project's own script (PX4: jinja_gen.py FILE)",
     ".erb": "erb FILE > robot.sdf",
-}
+}  # fmt: skip
 """Templates of descriptions by suffix, and what expands them."""
 UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
 """Elements inside a description that say nothing about shapes and joints; macros in them do no harm."""
@@ -193,11 +192,10 @@ class _Links:
         visual = "visual" if any(link.find("visual") is not None for _, link, _ in self.links) else "collision"
         for name, link, base in self.links:
             self.robot.surfaces[name] = [
-                shown(
-                    _geometry(view.find("geometry"), base, self.files), portable.product(self.place(name), _pose(view))
-                )
+                shown(_geometry(view.find("geometry"), base, self.files),
+                       portable.product(self.place(name), _pose(view)))
                 for view in link.findall(visual)
-            ]
+            ]  # fmt: skip
         for name, scope, ends, joint, axis, frame, limits in self.joints:
             parent, child = (scope + end if scope + end in self.robot.surfaces else end for end in ends)
             if joint.get("type") not in ("revolute", "continuous"):

@@ -120,9 +120,8 @@ class Files:
         Raises: InputError where several fit. Warns: InputWarning naming the file that is taken.
         """
         if self.listed is None:
-            found = (
-                Path(folder, entry) for folder, folders, files in os.walk(self.inputs) for entry in (*folders, *files)
-            )
+            found = (Path(folder, entry) for folder, folders, files in os.walk(self.inputs)
+                     for entry in (*folders, *files))  # fmt: skip
             self.listed = [path.relative_to(self.inputs).parts for path in islice(found, MOST_SEARCHED)]
         parts = Path(location).parts
         for tail in (parts, parts[1:]):
@@ -132,9 +131,8 @@ class Files:
                 shown = ", ".join(str(Path(*path)) for path in fits[:3])
                 raise InputError(f"{name!r}: {len(fits)} files below the folder of inputs fit ({shown}), expected one")
             if fits:
-                warnings.warn(
-                    f"{name!r} is taken from {Path(*fits[0])}, the only file that fits", InputWarning, stacklevel=2
-                )
+                warnings.warn(f"{name!r} is taken from {Path(*fits[0])}, the only file that fits", InputWarning,
+                              stacklevel=2)  # fmt: skip
                 return self.inputs.joinpath(*fits[0]).resolve()
         return None
 

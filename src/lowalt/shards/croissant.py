@@ -95,11 +95,10 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     classes = ", ".join(f"{number} {name}" for number, name in enumerate(stated(index)))
     kind, inside = index["kind"], [{"@id": entry["name"]} for entry in index["shards"]]
     files = [
-        _file(
-            entry, "application/x-tar", f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold."
-        )
+        _file(entry, "application/x-tar",
+              f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold.")
         for entry in index["shards"]
-    ]
+    ]  # fmt: skip
     files.append(_file({**table, "name": table["path"]}, "text/csv", "One row per sample: key, class, SNR, shard."))
     mime, meaning = MEDIA[kind]
     size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])

@@ -127,7 +127,6 @@ def assemble(parts: list[Part], record: dict, rng: np.random.Generator) -> Cloud
             matrix = np.eye(3) if copy == 0 else turn(np.array(part.axis), 2 * np.pi * copy / part.copies)
             centre = np.zeros(3) if copy == 0 else np.array(part.hinge)
             turned.append((portable.applied(matrix, points - centre) + centre, portable.applied(matrix, normals)))
-        samples.append(
-            (np.concatenate([points for points, _ in turned]), np.concatenate([normals for _, normals in turned]))
-        )
+        samples.append((np.concatenate([points for points, _ in turned]),
+                        np.concatenate([normals for _, normals in turned])))  # fmt: skip
     return cloud_of_parts(parts, samples, record)

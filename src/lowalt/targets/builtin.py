@@ -55,9 +55,8 @@ def check_record(merged: dict, where: str) -> dict:
     if wrong := sorted(set(kinds) ^ set(figures)):
         raise InputError(f"{where}: figures {wrong} missing or unknown, expected exactly {sorted(kinds)}")
     sources, share = merged.get("sources", {}), merged.get("moving_share", MODULES[category].MOVING_SHARE)
-    resolved = {
-        name: _figure(figure, kinds[name], sources, f"{where}: figures.{name}") for name, figure in figures.items()
-    }
+    resolved = {name: _figure(figure, kinds[name], sources, f"{where}: figures.{name}")
+                for name, figure in figures.items()}  # fmt: skip
     result = merged | {"figures": resolved, "moving_share": share}
     if fault := MODULES[category].fault(result):
         raise InputError(f"{where}: {fault}")

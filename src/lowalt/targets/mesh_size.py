@@ -63,9 +63,8 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
     elif kind == "rotor":
         reach, away = float((high - low).max()), float(np.linalg.norm(middle - pool.hinge))
         if away > OFF_HUB * reach:
-            return (
-                f"hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected the hub"
-            )
+            return (f"hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
+                    "the hub")  # fmt: skip
     else:
         hinge, centre = (place[0] - body[:, 0].mean() for place in (pool.hinge, pool.points.mean(axis=0)))
         if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
@@ -237,6 +236,5 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str], category:
         facts["origin_height_m"] = float(middle[2] - ground)
     if category == "Bird":
         facts |= {"flap": bird.FLAP | record.get("flap", {}), "wing_span_m": float(high[0] - low[0])}
-    return {
-        name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle) for name, pool in result.items()
-    }, facts
+    return {name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle)
+            for name, pool in result.items()}, facts  # fmt: skip

@@ -189,9 +189,8 @@ def read_joints(path: str | Path) -> tuple[dict[str, np.ndarray], float | None]:
         with np.load(path, allow_pickle=False) as data:
             rates = [float(data[key]) for key in ("mocap_framerate", "mocap_frame_rate", "fps") if key in data.files]
             if "joints" not in data.files:
-                raise ValueError(
-                    f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body model makes them of poses"
-                )
+                raise ValueError(f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body model makes "
+                                 "them of poses")  # fmt: skip
             places = np.asarray(data["joints"], float)
             names = [str(name) for name in data["names"]] if "names" in data.files else SMPL
     except (*UNREADABLE, zipfile.BadZipFile, TypeError, MemoryError) as error:

@@ -37,9 +37,8 @@ def check(section: str, record: dict, where: str) -> dict:
 
 def figures(model: str) -> dict[str, str]:
     """Return the figures that a built-in model needs by name, each a length, ratio, offset, count or whole number."""
-    sets = [
-        schema()["figures"][item] if isinstance(item, str) else item for item in schema()["models"][model]["figures"]
-    ]
+    sets = [schema()["figures"][item] if isinstance(item, str) else item
+            for item in schema()["models"][model]["figures"]]  # fmt: skip
     return {name: kind for needed in sets for name, kind in needed.items()}
 
 
