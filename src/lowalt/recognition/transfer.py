@@ -2,7 +2,7 @@
 
 Both models classify the same test samples, and their results are compared sample by sample.
 
-transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over the SNRs):
+transfer.csv, one row per protocol, scheme, other run and SNR ("avg": mean over SNRs):
     trained_on                   the other run
     accuracy_percent             of the other run's model on this run's test samples, several seeds averaged
     own_percent                  of this run's own model

@@ -1,6 +1,6 @@
 """Records of all subtypes, read from the table of published values and from record files.
 
-A record file is YAML, one record a name. Later files replace earlier ones, whole records at a time; files of the
+A record file is YAML, one record per name. Later files replace earlier ones, whole records at a time; files of the
 configuration's key `targets.own` come last. A record may have a key `row`, whose cells replace those of the subtype's
 row in the table of targets or make a new row: one file is then a whole new target. Keys of one source alone (a mesh's
 unit, the frames of a recording) are checked by that source's own `check_record`.
@@ -46,14 +46,14 @@ def load_table(path: str | Path) -> dict[str, dict]:
     """
     rows = read_csv(path, what="table of published targets")
     if not rows:
-        raise InputError(f"{path}: no row, expected one row a subtype")
+        raise InputError(f"{path}: no row, expected one row per subtype")
     if wrong := sorted(set(rows[0]) ^ set(COLUMNS)):
         raise InputError(f"{path}: columns {wrong} missing or unknown")
     table: dict[str, dict] = {}
     for row in rows:
         name, where = row["name"], f"{path}: {row['name']}"
         if name in table:
-            raise InputError(f"{where}: named twice, expected one row a subtype")
+            raise InputError(f"{where}: named twice, expected one row per subtype")
         if row["unseen_protocol"] not in ("seen", "unseen"):
             raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
         table[name] = {column: _cell(where, column, text) for column, text in row.items()}
