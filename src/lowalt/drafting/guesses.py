@@ -50,8 +50,8 @@ least area that the end spans, as a share of the bounding box: CUT for a plane a
 anywhere."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
-"""An arm, unlike a blade, is at most SLENDER times as wide as long (by spread), points at the middle of the craft with
-a cosine of at least RADIAL, and has its inner end at most INWARD times as far from there as its centre."""
+"""An arm, unlike a blade, is at most SLENDER times as wide as long (by spread). It points at the middle of the craft
+with a cosine of at least RADIAL, and its inner end is at most INWARD times as far from there as its centre."""
 
 IN_LINE = 0.9
 """Least cosine of the angle between a blade and the line to the other blade of the same rotor."""
@@ -251,9 +251,9 @@ def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
 def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
     """Return the axis of the file about which a rotor or wheel turns: the one along which it is thinnest.
 
-    Two blades may be thinner along their chord than along their axis. A rotor wider than half the craft, whose corners
-    are `low` and `high` (3,) m, is therefore taken to turn about the axis `up`, and a tail rotor about the horizontal
-    axis across the tail.
+    Two blades may be thinner along their chord than along their axis. A rotor wider than half the craft is therefore
+    taken to turn about the axis `up`, and a tail rotor about the horizontal axis across the tail. low, high: (3,) m,
+    corners of the craft.
     """
     order, extent = np.argsort(group.extent, kind="stable"), high - low
     if up in order[:2] and group.extent.max() > WIDE_ROTOR * extent.max():

@@ -1,7 +1,7 @@
 """Tracks: motion models that are looked at again and again, on a drawn path that turns or on that of a flight log.
 
 The path of a look is the cubic with the places and velocities of both its ends, and its heading turns at a constant
-rate, so place, velocity and heading go on from look to look without a jump; rotors, wheels, wings and gait go on too.
+rate. Place, velocity, heading, rotors, wheels, wings and gait therefore continue from look to look without a jump.
 """
 
 import math
