@@ -9,7 +9,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import paper_claims, predictions, samples, schemes, tables, transfer
 from lowalt.recognition.evaluated import Evaluated
-from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
+from lowalt.recognition.statistics import f1_by_snr, macro_f1
 from made_predictions import read_rows, run_files
 
 SNRS = (3.0, np.inf)
