@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text())
 RECIPE = yaml.safe_load((ROOT / "envs/conda-forge/recipe.yaml").read_text())
+CATALOGUE = yaml.safe_load((ROOT / ".snakemake-workflow-catalog.yml").read_text())
 CONDA_NAMES = {"matplotlib": "matplotlib-base", "snakemake": "snakemake-minimal"}
 """Names of packages on conda-forge that differ from those on PyPI."""
 
@@ -73,6 +74,23 @@ def test_what_the_recipe_tries_runs(tmp_path):
         ended = subprocess.run(line, shell=True, cwd=tmp_path, capture_output=True, text=True)
         assert ended.returncode == 0, ended.stderr
     assert list((tmp_path / "sample").glob("dji-mini-2-000000-*.png"))
+
+
+def test_the_catalogue_of_workflows_finds_what_it_lists():
+    """Its conditions for standardised usage. Source: README of snakemake/snakemake-workflow-catalog."""
+    text = (ROOT / "README.md").read_text().lower()
+    assert "snakemake" in text and "workflow" in text
+    assert (ROOT / "workflow/Snakefile").is_file() and (ROOT / "config/README.md").is_file()
+    rules = [path.name for path in (ROOT / "workflow/rules").iterdir() if path.is_file()]
+    assert rules and all(name.endswith(".smk") for name in rules)
+    usage = CATALOGUE["usage"]
+    assert set(usage) == {"mandatory-flags", "software-stack-deployment", "report"}
+    assert set(usage["mandatory-flags"]) == {"desc", "flags"}
+    assert set(usage["software-stack-deployment"]) == {"conda", "apptainer", "apptainer+conda"}
+    if usage["software-stack-deployment"]["conda"]:
+        texts = [path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk")]
+        named = {name for text in texts for name in re.findall(r'conda:\n +"(.+)"', text)}
+        assert named and all((ROOT / "workflow/rules" / name).is_file() for name in named)
 
 
 @pytest.mark.slow
