@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from emulation import EMULATED, able, run
+from lowalt.benchmark import frozen_bytes
 from lowalt.config.layers import load
 from lowalt.shards import build, manifest
 from lowalt.shards.dataset import Dataset
@@ -70,3 +71,12 @@ def test_the_tiny_data_set_has_the_bytes_of_its_manifest(name, threads, tmp_path
     run(name, "-m", "lowalt.shards.build", "--config", *config, "--out", str(tmp_path / "run"), threads=threads)
     # Echoes and noisy signals stay in memory here; the shards follow from them.
     assert manifest.faults(REFERENCE, tmp_path / "run", ("echo", "noise", "tiles")) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_samples_of_the_benchmark_have_their_kept_checksums_on_another_processor(name, tmp_path):
+    """One sample of each subtype and some of every other part; natively `tests/benchmark` makes them again."""
+    run(name, "-m", "lowalt.benchmark", "results", "--samples", "--out", str(tmp_path))
+    expected = ROOT / frozen_bytes.REFERENCE / frozen_bytes.SAMPLES
+    assert (tmp_path / frozen_bytes.SAMPLES).read_text() == expected.read_text()
