@@ -78,5 +78,9 @@ def test_the_tiny_data_set_has_the_bytes_of_its_manifest(name, threads, tmp_path
 def test_samples_of_the_benchmark_have_their_kept_checksums_on_another_processor(name, tmp_path):
     """One sample of each subtype and some of every other part; natively `tests/benchmark` makes them again."""
     run(name, "-m", "lowalt.benchmark", "results", "--samples", "--out", str(tmp_path))
-    expected = ROOT / frozen_bytes.REFERENCE / frozen_bytes.SAMPLES
-    assert (tmp_path / frozen_bytes.SAMPLES).read_text() == expected.read_text()
+    made, kept = ((folder / frozen_bytes.SAMPLES).read_text().splitlines()
+                  for folder in (tmp_path, ROOT / frozen_bytes.REFERENCE))  # fmt: skip
+    assert len(made) == len(kept) == 64
+    # The town has effects: `test_bytes_effects.py` says how far they are apart without AVX2.
+    exact = [line for line in kept if name != "x86-64-v2" or "  town/" not in line]
+    assert len(exact) >= 56 and set(exact) <= set(made)

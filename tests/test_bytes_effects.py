@@ -77,3 +77,24 @@ def test_signals_of_scenes_agree_but_for_the_last_bit_of_few(tmp_path):
     assert here.shape == (2, 3, 400) and abs(here).min(axis=(1, 2)).max() > 0
     assert (here != there).mean() < 0.1
     assert (abs(here - there).max(axis=(1, 2)) < CLOSE * abs(here).max(axis=(1, 2))).all()
+
+
+TOWN = """
+import sys
+import numpy as np
+from lowalt.benchmark.definition import config_of
+from lowalt.shards.dataset import Dataset
+dataset = Dataset(config_of("town"))
+images, signals, _ = zip(*(dataset.made(number) for number in (0, len(dataset) // 2)))
+np.savez(sys.argv[1], images=np.stack(images), signals=np.stack(signals))
+"""
+
+
+@pytest.mark.slow
+def test_without_avx2_samples_of_the_benchmark_s_town_differ_in_the_last_bit_of_few_values_and_in_no_pixel(tmp_path):
+    for name in ("native", "x86-64-v2"):
+        run(name, "-c", TOWN, str(tmp_path / f"{name}.npz"))
+    here, there = (np.load(tmp_path / f"{name}.npz") for name in ("native", "x86-64-v2"))
+    apart = abs(here["signals"] - there["signals"])
+    assert (apart <= 2 * np.finfo(np.float32).eps * abs(here["signals"])).all() and (apart > 0).mean() < 0.01
+    assert (here["images"] == there["images"]).all() and here["images"].std() > 0
