@@ -61,8 +61,9 @@ def tables(rows: list[dict]) -> list[list[tuple[str, ...]]]:
         for name in sorted(by_method, key=lambda name: -np.mean(percents[name] or [0])):
             own = by_method[name]
             results = (result(own[track]) if track in own else "-" for track in tracks)
-            seeds = " to ".join(sorted({row["seeds"] for row in own.values()}))
+            seeds = sorted({row["seeds"] for row in own.values()})
+            counts = " to ".join(dict.fromkeys((seeds[0], seeds[-1])))
             costs = (_mean(list(own.values()), column) for column in ("train_core_s", "test_core_s_per_1000"))
-            lines.append((name, *results, seeds, *costs))
+            lines.append((name, *results, counts, *costs))
         found += [lines] if tracks else []
     return found
