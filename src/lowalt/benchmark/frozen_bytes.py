@@ -55,7 +55,6 @@ def faults(part: str, folder: str | Path) -> list[str]:
     found = of_part(part, folder)
     wanted = {name: digest for name, digest in kept().items() if name.startswith(f"{part}/")}
     words = {name: "is missing" for name in wanted if name not in found}
-    # Effects may differ in last bits on other processors.
     hint = " (last bits may: docs/benchmark.md, Size and versions)" if config_of(part)["effects"] else ""
     words |= {name: f"differs{hint}" for name, digest in found.items() if wanted.get(name, digest) != digest}
     words |= {name: "is not among the kept files" for name in found if name not in wanted}
