@@ -85,7 +85,7 @@ import numpy as np
 from lowalt.benchmark.definition import config_of
 from lowalt.shards.dataset import Dataset
 dataset = Dataset(config_of("town"))
-images, signals, _ = zip(*(dataset.made(number) for number in (0, len(dataset) // 2)))
+images, signals, _ = zip(*(dataset.made(dataset.place(number)) for number in (0, len(dataset) // 2)))
 np.savez(sys.argv[1], images=np.stack(images), signals=np.stack(signals))
 """
 
