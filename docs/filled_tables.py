@@ -70,18 +70,11 @@ def presets(prefix: str) -> str:
     return text
 
 
-TRACKS = (("seen", "unseen", "one-station", "few-shot-1", "few-shot-5", "few-shot-20"),
-          ("forty", "open-set", "low-snr", "town", "fr2"))  # fmt: skip
-"""Tracks of the benchmark's tables, side by side."""
-
-
 def benchmark(prefix: str) -> str:
     """Return the tables of the benchmark's baselines from {prefix}table.csv."""
     rows = baseline_table.read(prefix)
-    has = {row["track"] for row in rows}
-    shown = [[track for track in tracks if track in has] for tracks in TRACKS]
-    text = "\n\n".join(baseline_table.markdown(rows, tracks) for tracks in shown if tracks)
-    return f"{text}\n\nMeasured on {'; and '.join(dict.fromkeys(row['hardware'] for row in rows))}.\n"
+    tables = [_head(list(head)) + "".join(map(_line, lines)) for head, *lines in baseline_table.tables(rows)]
+    return "\n".join(tables) + f"\nMeasured on {'; and '.join(dict.fromkeys(row['hardware'] for row in rows))}.\n"
 
 
 MAKERS = {"schemes": schemes, "presets": presets, "benchmark": benchmark}

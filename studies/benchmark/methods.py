@@ -4,9 +4,8 @@ majority class                  the class with the most training samples, always
 nearest centroid on moments     distance to each class's mean of the power spectrum's moments
 ... on features                 classical methods on the physical features of `features.py` (`classical.py`)
 small CNN on images             the default's network: the reference
-mean fusion, soft voting, ...   the same backbone with other fusions (`fusions.py`)
 ... on signals                  networks on the stations' complex signals (`signal_networks.py`)
-audio-spectrogram transformer, transformer behind convolutions    on images (`backbones.py`)
+audio-spectrogram transformer   on images (`backbones.py`)
 """
 
 from collections.abc import Callable
@@ -25,7 +24,6 @@ from lowalt.recognition.schemes import Scheme
 
 Answer = Callable[[TrackSamples], np.ndarray]
 """Class probabilities (samples, classes) of samples."""
-OWN = "studies/benchmark/backbones.py:"
 LEVELS = 2
 """SNRs of each motion model that a classical method trains on, drawn by the training seed."""
 
@@ -95,13 +93,11 @@ def network(given: Given, scheme: Scheme, build: Callable, source: Callable[[Tra
     return lambda samples: runs.answers(trained, source(samples), settings, Machine.here(settings["precision"]))
 
 
-def on_images(fusion: str, backbone: str, given: Given) -> Answer:
-    """Train a network on images."""
-    import fusions  # noqa: F401  registers its fusions
-
+def on_images(backbone: str, given: Given) -> Answer:
+    """Train a network on images; backbone: as a scheme names it, "" for the default's."""
     from lowalt.recognition.recogniser import built
 
-    scheme = Scheme(f"images {fusion}", given.train.track.stations, (0, 1, 2), fusion, backbone)
+    scheme = Scheme("images attention", given.train.track.stations, (0, 1, 2), backbone=backbone)
     return network(given, scheme, built, lambda samples: samples)
 
 
@@ -121,20 +117,16 @@ def on_signals(backbone: str, given: Given) -> Answer:
 METHODS: dict[str, Callable[[Given], Answer]] = {
     "majority class": majority,
     "nearest centroid on moments": centroid,
-    "small CNN on images": lambda given: on_images("attention", "", given),
+    "small CNN on images": lambda given: on_images("", given),
     "gradient boosting on features": lambda given: on_features("boosting", given),
     "RBF-SVM on features": lambda given: on_features("svm", given),
     "random forest on features": lambda given: on_features("forest", given),
     "logistic regression on features": lambda given: on_features("logistic", given),
     "CNN on signals": lambda given: on_signals("cnn", given),
-    "CNN on images, mean fusion": lambda given: on_images("mean", "", given),
     "complex-valued CNN on signals": lambda given: on_signals("complex", given),
     "XGBoost on features": lambda given: on_features("xgboost", given),
-    "audio-spectrogram transformer": lambda given: on_images("attention", f"{OWN}ast_micro", given),
-    "transformer behind convolutions": lambda given: on_images("attention", f"{OWN}dc_former_micro", given),
+    "audio-spectrogram transformer": lambda given: on_images("studies/benchmark/backbones.py:ast_micro", given),
     "transformer on signals": lambda given: on_signals("transformer", given),
-    "CNN on images, concatenation": lambda given: on_images("concatenation", "", given),
-    "CNN on images, soft voting": lambda given: on_images("voting", "", given),
 }
 """In the order in which a study trains them."""
 TOLD = (("moments", spectral_moments), ("features", features))

@@ -1,39 +1,48 @@
 """The baselines of the benchmark: trained, tested on every track, and written into its table.
 
-    python studies/benchmark/study.py [--methods NAME ...] [--tracks NAME ...] [--seeds 0 1 2] [--table]
+    python studies/benchmark/study.py [--methods NAME ...] [--tracks NAME ...] [--seeds 0 1 2] [--table | --confirm]
 
 Each training is tested on all tracks that it serves, and finished ones are kept in results/lowalt-40-v1-baselines, so
 that an interrupted study goes on where it was. The table and what each baseline got right are written at the end of
-every call, of the methods that are finished on all tracks of the table; `--table` trains nothing.
+every call, of the methods that are finished on all tracks of the table; `--table` trains nothing. `--confirm` keeps the
+first training of each method of CONFIRMED in the zoo, and writes its confirmed result into the table.
 """
 
 import argparse
 import json
+import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
 
+import kept_results
 import numpy as np
 from methods import METHODS, SEEDLESS, TOLD, Given
 from signals import cost_s, told
 
 import trainings
-from lowalt.benchmark import baseline_table, baselines, scoring
+from lowalt.benchmark import baseline_table, scoring
 from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
+from lowalt.benchmark.confirm import confirm
 from lowalt.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
 from lowalt.benchmark.part_samples import TrackSamples
 from lowalt.config.command import run
 from lowalt.files.atomic import replacing, slug
 from lowalt.machine.hardware import describe
+from lowalt.recognition import model_file
 from lowalt.recognition.predictions import Predictions
+from lowalt.recognition.zoo import kept as keep
+from lowalt.recognition.zoo_files import ZOO
 
 OUT = Path(f"results/{RUN}-baselines")
 FIRST = "majority class"
 """The table has the tracks on which this method is finished, and the methods that are finished on all of them."""
+CONFIRMED = {("unseen", "small CNN on images"): f"{RUN}-unseen"}
+"""Rows with a confirmed result: the name of the model in the zoo by track and method."""
 
 
 def closed(samples: TrackSamples) -> TrackSamples:
@@ -107,14 +116,18 @@ def one(job: tuple[str, str, int], data: str) -> Path:
 
 def finished(method: str, track: Track) -> Iterator[tuple[dict, Predictions]]:
     """Yield the record and the predictions of each finished training of a method that serves a track."""
-    every, _ = track.truth()
-    facts = every.take(track.numbers("test"))
+    facts = track.samples().facts
     for seed in range(100):
         folder = place(method, track.trains_as, seed)
         if (folder / "tested.json").is_file():
             with np.load(folder / "answers.npz", allow_pickle=False) as data:
                 shares = data[track.name].astype(float)
-            yield json.loads((folder / "tested.json").read_text()), scoring.tested(track, facts, shares)
+            about = json.loads((folder / "tested.json").read_text())
+            # A call that finds the network trained measures no training; `runs.train` has kept its time.
+            if (folder / "run.json").is_file():
+                training_s = json.loads((folder / "run.json").read_text())["train_processor_s"]
+                about["train_core_s"] = max(about["train_core_s"], training_s)
+            yield about, scoring.tested(track, facts, shares)
 
 
 def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], group: int) -> dict:
@@ -128,8 +141,8 @@ def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], grou
         cells |= dict(zip(columns, interval, strict=True))
     test_s = np.mean([one["test_core_s"][track.name] for one in about])
     return {
-        "track": track.name, "method": method, "seeds": len(parts), **cells, "group": group,
-        "train_core_s": float(np.mean([one["train_core_s"] for one in about])),
+        "track": track.name, "method": method, "seeds": "none" if method in SEEDLESS else len(parts),
+        **cells, "group": group, "train_core_s": float(np.mean([one["train_core_s"] for one in about])),
         "test_core_s_per_1000": float(1000 * test_s / len(parts[0])), "hardware": about[0]["hardware"],
     }  # fmt: skip
 
@@ -148,10 +161,10 @@ def tables(out: Path) -> list[dict]:
             continue
         first = next(iter(found.values()))
         values = {name: one.values for name, one in found.items()}
-        numbers = baseline_table.groups(track, first.weight, first.subtypes, values)
+        numbers = kept_results.groups(track, first.weight, first.subtypes, values)
         rows += [row_of(track, method, one, numbers[method]) for method, one in runs.items()]
-        arrays = {name: baselines.packed(track, [part for _, part in one], classes) for name, one in runs.items()}
-        baselines.write(track, arrays, out)
+        arrays = {name: kept_results.packed(track, [part for _, part in one], classes) for name, one in runs.items()}
+        kept_results.write_values(track, arrays, out)
     return rows
 
 
@@ -161,22 +174,30 @@ def shown_tracks() -> list[Track]:
             if (place(FIRST, track.trains_as, 0) / "tested.json").is_file()]  # fmt: skip
 
 
+def kept_rows(out: Path) -> dict[tuple[str, str], dict]:
+    """Return the rows of the table that is already there, by track and method."""
+    rows = baseline_table.read(out) if (out / baseline_table.TABLE).is_file() else []
+    return {(row["track"], row["method"]): row for row in rows}
+
+
 def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
     """Return the rows with the confirmed results that the table has already."""
-    rows_kept = baseline_table.read(out) if (out / baseline_table.TABLE).is_file() else []
-    kept = {(row["track"], row["method"]): row for row in rows_kept}
-    names = ("confirmed_percent", "confirmed_low", "confirmed_high")
+    kept, names = kept_rows(out), ("confirmed_percent", "confirmed_low", "confirmed_high")
     return [row | {name: kept[row["track"], row["method"]][name] for name in names}
             if (row["track"], row["method"]) in kept else row for row in rows]  # fmt: skip
 
 
-def each(call: Callable, jobs: list, workers: int | None) -> None:
-    """Do all jobs, one after the other in this process or several side by side."""
-    if workers == 1:
-        for job in jobs:
-            call(job)
-    else:
-        trainings.side_by_side(call, jobs, workers)
+def confirmed(rows: list[dict], data: str, zoo: Path) -> list[dict]:
+    """Keep the models of CONFIRMED in a zoo, and return the rows with their confirmed results."""
+    for (name, method), entry in CONFIRMED.items():
+        model, config = place(method, name, 0) / "model.pt", config_of(MAIN)
+        content = replace(model_file.of_run(model), input={block: config[block] for block in model_file.INPUT})
+        keep(content, model, TrackSamples(named(name), "validation", data), entry, zoo)
+        found = confirm(zoo / f"{entry}.safetensors", named(name)).percent
+        print(f"{name}, {method}: {entry} confirmed at {baseline_table.words(found)} %")
+        cells = dict(zip(("confirmed_percent", "confirmed_low", "confirmed_high"), found, strict=True))
+        rows = [row | cells if (row["track"], row["method"]) == (name, method) else row for row in rows]
+    return rows
 
 
 def main(arguments: list[str]) -> None:
@@ -189,18 +210,24 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--data", default="results", help="folder of the benchmark's runs (default: results)")
     line.add_argument("--workers", type=int, help="trainings side by side (default: the cores)")
     line.add_argument("--table", action="store_true", help="train nothing, write the table")
-    given = line.parse_args(arguments)
+    line.add_argument("--confirm", action="store_true", help="train nothing, confirm results of the kept table")
+    given, out = line.parse_args(arguments), Path(REFERENCE)
+    if given.confirm:
+        rows = [{**row, "percent": float(row["percent"])} for row in kept_rows(out).values()]
+        kept_results.write_table(confirmed(rows, given.data, ZOO), out)
+        return
+    # Threads of OpenMP spin while they wait for each other, and that would count as processor time.
+    os.environ["OMP_NUM_THREADS"] = "1"
     jobs = [(method, track, seed) for seed, method, track in product(given.seeds, given.methods, given.tracks)
             if seed == 0 or method not in SEEDLESS]  # fmt: skip
     if not given.table:
         chunks = sorted(path for part in PARTS for path in Path(given.data, run_name(part), "noisy").glob("*.npy"))
         for word, told_of in TOLD:
             if any(method.endswith(word) for method in given.methods):
-                each(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
-        each(partial(one, data=given.data), jobs, given.workers)
-    out = Path(REFERENCE)
+                trainings.side_by_side(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
+        trainings.side_by_side(partial(one, data=given.data), jobs, given.workers)
     rows = with_confirmed(tables(out), out)
-    baseline_table.write(rows, out)
+    kept_results.write_table(rows, out)
     print(f"{out / baseline_table.TABLE}: {len(rows)} rows")
 
 

@@ -13,7 +13,7 @@ import pytest
 import small_benchmark
 from lowalt import benchmark
 from lowalt.__main__ import main
-from lowalt.benchmark import confirm, definition, frozen_bytes
+from lowalt.benchmark import baseline_table, confirm, definition, frozen_bytes
 from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
 from lowalt.files.errors import InputError
@@ -140,6 +140,15 @@ def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeyp
         confirm.confirm(ZOO, TRACKS["forty"])
 
 
+@pytest.mark.slow
+def test_a_confirmed_row_of_the_table_is_what_the_command_finds_again(capsys):
+    (row,) = [row for row in baseline_table.read() if row["confirmed_percent"]]
+    assert main(["benchmark", "confirm", f"{definition.RUN}-{row['track']}", "--track", row["track"], "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["percent"]
+    # One answer of thousands may depend on the processor's arithmetic.
+    assert found == pytest.approx([float(row[f"confirmed_{name}"]) for name in ("percent", "low", "high")], abs=0.1)
+
+
 def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "studies")
     monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
@@ -150,11 +159,15 @@ def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatc
     for method in ("majority class", "nearest centroid on moments", "logistic regression on features"):
         for track in ("unseen", "open-set", "one-station"):
             study.one((method, track, 0), "results")
+    # A call that found the network trained measured no training, so the time that the training kept counts.
+    (study.place("logistic regression on features", "unseen", 0) / "run.json").write_text('{"train_processor_s": 1000}')
     rows = study.tables(tmp_path)
     assert {row["track"] for row in rows} == {"unseen", "open-set", "one-station"} and len(rows) == 9
     by = {(row["track"], row["method"]): row for row in rows}
     assert by["unseen", "majority class"]["percent"] == 25 and by["open-set", "majority class"]["percent"] == 50
     assert by["unseen", "logistic regression on features"]["percent"] > 60
+    assert by["unseen", "logistic regression on features"]["train_core_s"] == 1000
+    assert by["unseen", "majority class"]["seeds"] == "none"
     with np.load(tmp_path / "unseen.npz") as kept:
         assert kept["majority class"].shape == (1, 8)
     shutil.rmtree(tmp_path / "out")

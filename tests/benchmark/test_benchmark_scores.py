@@ -1,27 +1,27 @@
 """Submissions, their scores and the groups of the table."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from sklearn.metrics import f1_score, roc_auc_score
 
-from lowalt.benchmark import baseline_table, baselines, scoring
+from lowalt.benchmark import baselines, scoring
 from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN
 from lowalt.benchmark.submission import read
 from lowalt.files.errors import InputError
 from lowalt.recognition.predictions import probability_columns
 
+sys.path.append(str(Path(__file__).parents[2] / "studies/benchmark"))
+import kept_results
+
 UNSEEN, OPEN = TRACKS["unseen"], TRACKS["open-set"]
-
-
-def facts_of(track):
-    """Facts of the test samples of a track, and its classes."""
-    facts, classes = track.truth()
-    return facts.take(track.numbers("test")), classes
 
 
 def answers(track, seed, skill=2.0):
     """Probabilities that are right rather often."""
-    facts, classes = facts_of(track)
+    facts, classes = track.samples()
     logits = np.random.default_rng(seed).normal(size=(len(facts), len(classes)))
     logits[np.arange(len(facts)), facts.label] += skill
     shares = np.exp(logits)
@@ -30,7 +30,7 @@ def answers(track, seed, skill=2.0):
 
 def submission(path, track, shares, extra=""):
     """Write a submission line by line."""
-    facts, classes = facts_of(track)
+    facts, classes = track.samples()
     lines = [",".join(("key", *probability_columns(classes)))]
     lines += [",".join((key, *map(repr, row))) for key, row in zip(facts.key.tolist(), shares.tolist(), strict=True)]
     path.write_text("\n".join(lines) + "\n" + extra)
@@ -81,7 +81,7 @@ def test_samples_that_are_not_tested_may_stand_in_a_submission(tmp_path):
 
 
 def test_headline_and_f1_are_those_of_the_definitions():
-    shares, (facts, _) = answers(UNSEEN, 1), facts_of(UNSEEN)
+    shares, (facts, _) = answers(UNSEEN, 1), UNSEEN.samples()
     found = scoring.scores(UNSEEN, [shares], {})
     guesses = shares.argmax(1)
     assert found["percent"].value == pytest.approx(100 * np.mean(guesses == facts.label))
@@ -95,7 +95,7 @@ def test_headline_and_f1_are_those_of_the_definitions():
 
 
 def test_the_interval_of_a_headline_number_ends_at_0_and_100():
-    facts, classes = facts_of(UNSEEN)
+    facts, classes = UNSEEN.samples()
     # All subtypes but two are right in every sample, so an interval that is symmetric passes 100 percent.
     wrong = np.isin(facts.subtype, ["EH 216 S", "Sparrow"])
     for right, end in ((~wrong, "high"), (wrong, "low")):
@@ -107,7 +107,7 @@ def test_the_interval_of_a_headline_number_ends_at_0_and_100():
 
 
 def test_auroc_is_the_area_under_the_curve_and_its_interval_covers_it():
-    shares, (facts, classes) = answers(OPEN, 2, 1.0), facts_of(OPEN)
+    shares, (facts, classes) = answers(OPEN, 2, 1.0), OPEN.samples()
     held_out = facts.label == classes.index(UNKNOWN)
     found = scoring.scores(OPEN, [shares], {})
     area = 100 * roc_auc_score(held_out, shares[:, classes.index(UNKNOWN)])
@@ -128,9 +128,9 @@ def test_equal_scores_count_half():
 
 @pytest.mark.parametrize("track", [UNSEEN, OPEN], ids=["accuracy", "AUROC"])
 def test_what_is_kept_of_a_baseline_gives_its_difference_back(track, tmp_path, monkeypatch):
-    facts, classes = facts_of(track)
+    facts, classes = track.samples()
     parts = [scoring.tested(track, facts, answers(track, seed)) for seed in (3, 4)]
-    baselines.write(track, {"some method": baselines.packed(track, parts, classes)}, tmp_path)
+    kept_results.write_values(track, {"some method": kept_results.packed(track, parts, classes)}, tmp_path)
     monkeypatch.setattr(baselines, "path_of", lambda track: tmp_path / f"{track.name}.npz")
     kept = baselines.kept(track)
     found = scoring.scores(track, [part.probabilities for part in parts], kept)
@@ -146,5 +146,5 @@ def test_a_group_ends_where_a_difference_is_certain():
     draw = np.random.default_rng(0).random((4, 1000))
     levels = {"best": 0.92, "near": 0.915, "worse": 0.7, "also worse": 0.69}
     values = {name: (draw[number] < level)[None].astype(float) for number, (name, level) in enumerate(levels.items())}
-    found = baseline_table.groups(UNSEEN, np.ones(1000), subtypes, values)
+    found = kept_results.groups(UNSEEN, np.ones(1000), subtypes, values)
     assert found == {"best": 1, "near": 1, "worse": 2, "also worse": 2}

@@ -166,7 +166,7 @@ def test_an_entry_that_loses_accuracy_or_is_large_or_ill_named_is_not_written(fi
     assert not list(tmp_path.glob("*.safetensors"))
 
 
-@pytest.mark.parametrize("name", ["default-seen", "default-unseen"])
+@pytest.mark.parametrize("name", ["default-seen", "default-unseen", "lowalt-40-v1-unseen"])
 def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     assert name in zoo_files.names()

@@ -72,4 +72,5 @@ def test_the_report_s_files_are_a_manifest_that_the_report_takes():
         assert kept == {f"kept_{name}" for name in KEPT}
         assert names == (set(files) & set(OPTIONAL)) - {"published", "predictions"} - kept
         assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
+    assert parts({"run": "lowalt-40-v1"})[1].report(CHUNK)["benchmark"].endswith("lowalt-40-v1/table.csv")
     assert "src/lowalt/report/sections/accuracy.html" in products.page_templates(CHUNK)

@@ -1,17 +1,7 @@
 """The tracks of the benchmark: which samples train, validate and test, what is predicted, and which number counts.
 
-| track | trains on | is tested on |
-|---|---|---|
-| seen | fold train, all subtypes | fold test, all subtypes |
-| unseen | fold train of the seen subtypes | folds val and test of the unseen subtypes |
-| one-station | as unseen, station A alone | as unseen |
-| few-shot-1, -5, -20 | as unseen, and so many motion models of each unseen subtype | as unseen |
-| open-set | as seen without birds | as seen, with birds |
-| forty | as seen, the label is the subtype | as seen |
-| low-snr, town, fr2 | as seen | all samples of the part of this name |
-
 The samples that train and validate are always those of the main part. Validation uses fold val of the subtypes that
-train.
+train. docs/benchmark.md lists the tracks.
 """
 
 from dataclasses import dataclass, replace
@@ -63,6 +53,11 @@ class Track:
         order = np.argsort(first)
         return Truth(replace(facts, label=np.argsort(order)[labels]), tuple(names[order].tolist()))
 
+    def samples(self, use: str = "test") -> Truth:
+        """Return the samples of a use, and their classes. Raises: as `numbers`."""
+        every, classes = self.truth(self.part if use == "test" else MAIN)
+        return Truth(every.take(self.numbers(use)), classes)
+
     def numbers(self, use: str) -> np.ndarray:
         """Return which samples of `truth(MAIN)` train or validate, or which of `truth()` test, as numbers.
 
@@ -92,11 +87,6 @@ def _first(facts: Facts, count: int) -> np.ndarray:
     return chosen
 
 
-def _few(shots: int, serves: str) -> Track:
-    """The track with `shots` motion models of each unseen subtype."""
-    return Track(f"few-shot-{shots}", serves, "unseen", shots=shots)
-
-
 TRACKS = {
     track.name: track
     for track in (
@@ -104,9 +94,9 @@ TRACKS = {
         Track("unseen", "Serves surveillance: no training has seen these types.", "unseen"),
         Track("one-station", "Serves operators of a single radar: unseen types, station A alone.", "unseen",
               stations=(0,)),
-        _few(1, "Serves whoever has one recorded flight of each new type."),
-        _few(5, "Serves whoever has five recorded flights of each new type."),
-        _few(20, "Serves whoever has twenty recorded flights of each new type."),
+        Track("few-shot-1", "Serves whoever has one recorded flight of each new type.", "unseen", shots=1),
+        Track("few-shot-5", "Serves whoever has five recorded flights of each new type.", "unseen", shots=5),
+        Track("few-shot-20", "Serves whoever has twenty recorded flights of each new type.", "unseen", shots=20),
         Track("open-set", "Serves operators who need an alarm instead of a wrong class: birds are held out.",
               headline="AUROC"),
         Track("forty", "Serves forensics: which of the forty types was it?", subtypes=True),

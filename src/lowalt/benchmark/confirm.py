@@ -1,10 +1,7 @@
 """A test set that nobody can have tuned on: its root seed follows from the model that it tests.
 
 The seed is the first eight hexadecimal digits of the SHA-256 of the model file's bytes followed by the version of the
-benchmark. Whoever wants another test set must change the model. Trying n model files and showing the best raises a
-result by about the standard error of one set times sqrt(2 ln n): the set is large enough that a hundred tries gain
-about three standard errors, which the interval states.
-Source: David and Nagaraja, Order Statistics, 2003, ch. 10 (expected largest of n normal numbers).
+benchmark. docs/benchmark.md says how much trying many model files can gain.
 """
 
 import hashlib

@@ -35,15 +35,10 @@ def of_part(part: str, folder: str | Path) -> dict[str, str]:
     return {f"{part}/{path.relative_to(run).as_posix()}": sha256(path) for path in paths}
 
 
-def _read(name: str) -> dict[str, str]:
-    """A kept file of checksums: SHA-256 by name."""
+def kept(name: str = WHOLE) -> dict[str, str]:
+    """Return the kept checksums of all parts by PART/FILE, or by PART/KEY for the name SAMPLES."""
     lines = text_of(shipped(f"{REFERENCE}/{name}"), "checksums").splitlines()
     return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
-
-
-def kept() -> dict[str, str]:
-    """Return the kept checksums by PART/FILE, of all parts."""
-    return _read(WHOLE)
 
 
 def _write(path: Path, sums: dict[str, str]) -> None:
@@ -60,7 +55,8 @@ def faults(part: str, folder: str | Path) -> list[str]:
     found = of_part(part, folder)
     wanted = {name: digest for name, digest in kept().items() if name.startswith(f"{part}/")}
     words = {name: "is missing" for name in wanted if name not in found}
-    words |= {name: "differs" for name, digest in found.items() if wanted.get(name, digest) != digest}
+    hint = " (last bits may: docs/benchmark.md, Size and versions)" if config_of(part)["effects"] else ""
+    words |= {name: f"differs{hint}" for name, digest in found.items() if wanted.get(name, digest) != digest}
     words |= {name: "is not among the kept files" for name in found if name not in wanted}
     return [f"{name} {words[name]}" for name in {**wanted, **found} if name in words]
 
@@ -89,9 +85,3 @@ def samples(part: str) -> Iterator[tuple[str, str]]:
         record.pop("versions")
         text = json.dumps(record, sort_keys=True).encode()
         yield record["key"], hashlib.sha256(text + signal.tobytes() + image.tobytes()).hexdigest()
-
-
-def kept_samples(part: str) -> list[tuple[str, str]]:
-    """Return keys and checksums of a part's kept samples."""
-    return [(name.removeprefix(f"{part}/"), digest) for name, digest in _read(SAMPLES).items()
-            if name.startswith(f"{part}/")]  # fmt: skip

@@ -39,8 +39,7 @@ class TrackSamples(Samples):
         """
         self.track = track
         source = track.part if part == "test" else MAIN
-        every, self.classes = track.truth(source)
-        self.facts, self.config = every.take(track.numbers(part)), config_of(source)
+        (self.facts, self.classes), self.config = track.samples(part), config_of(source)
         self.run, self.size = Path(folder) / run_name(source), self.config["recognition"]["size"]
         if not self.run.is_dir():
             raise InputError(

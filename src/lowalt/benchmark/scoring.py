@@ -8,7 +8,6 @@ results should hold for other subtypes, whole subtypes (`intervals.strict_differ
 Source: DeLong, DeLong and Clarke-Pearson, Biometrics 44, 1988 (components of AUROC).
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -54,22 +53,29 @@ def tested(track: Track, facts: Facts, probabilities: np.ndarray) -> Predictions
     return predictions.from_facts(facts, track.stations, probabilities)
 
 
+def models_of(track: Track, samples: Facts | Predictions, classes: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return weight and subtype (models,) of the motion models of test samples, in the order of their names.
+
+    The weight is the model's number of samples. For AUROC it is scaled so that the held-out class and the trained ones
+    weigh the same.
+    """
+    _, first, count = np.unique(samples.motion, return_index=True, return_counts=True)
+    if track.headline == "accuracy":
+        return count.astype(float), samples.subtype[first]
+    held_out = samples.label[first] == classes.index(UNKNOWN)
+    totals = np.where(held_out, count[held_out].sum(), count[~held_out].sum())
+    return len(samples) / 2 * count / totals, samples.subtype[first]
+
+
 def values_of(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> Values:
     """Return the values of which the headline number is the weighted mean; parts: of each training seed."""
-    first = parts[0]
     if track.headline == "accuracy":
-        place, count, shares = model_shares(first.motion, [part.correct for part in parts])
-        return Values(shares, count.astype(float), first.subtype[place])
-    label = classes.index(UNKNOWN)
-    held_out = first.label == label
-    shares = []
-    for part in parts:
-        area, share = ranked(part.probabilities[:, label], held_out)
-        shares.append(2 * share - area)
-    place, count, means = model_shares(first.motion, shares)
-    strata = held_out[place]
-    totals = np.where(strata, count[strata].sum(), count[~strata].sum())
-    return Values(means, len(first) / 2 * count / totals, first.subtype[place])
+        shares = [part.correct for part in parts]
+    else:
+        label = classes.index(UNKNOWN)
+        found = [ranked(part.probabilities[:, label], part.label == label) for part in parts]
+        shares = [2 * share - area for area, share in found]
+    return Values(model_shares(parts[0].motion, shares)[2], *models_of(track, parts[0], classes))
 
 
 def difference(track: Track, first: Values, second: np.ndarray) -> Interval:
@@ -101,17 +107,17 @@ def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndar
 
     baselines: kept values (seeds, models) by the baseline's name.
     """
-    every, classes = track.truth()
-    facts = every.take(track.numbers("test"))
+    facts, classes = track.samples()
     parts = [tested(track, facts, np.asarray(shares, float)) for shares in answers]
     found = values_of(track, parts, classes)
     generator = stream(named_seed(MAIN), "benchmark-f1", track.name)
     f1 = f1_by_snr(parts, len(classes), track.whole, generator)
     right = np.mean([part.correct for part in parts], axis=0)
-    share: Callable = lambda groups: {  # noqa: E731
-        f"{name:g}" if isinstance(name, float) else name: 100 * value
-        for name, (value, _) in accuracy_by(groups, right).items()
-    }
+    shares = {
+        name: {f"{key:g}" if isinstance(key, float) else key: 100 * share
+               for key, (share, _) in accuracy_by(groups, right).items()}
+        for name, groups in (("by_snr_percent", facts.snr_db), ("by_subtype_percent", facts.subtype))
+    }  # fmt: skip
     more = {}
     if track.headline == "AUROC":
         label = classes.index(UNKNOWN)
@@ -120,6 +126,5 @@ def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndar
         "track": track.name, "headline": track.headline, "samples": len(facts), "seeds": len(parts),
         "percent": headline(track, found), "accuracy_percent": 100 * float(right.mean()),
         "macro_f1_percent": Interval(*(100 * value for value in f1["avg"])), **more,
-        "by_snr_percent": share(facts.snr_db), "by_subtype_percent": share(facts.subtype),
-        "differences": {name: difference(track, found, kept) for name, kept in baselines.items()},
+        **shares, "differences": {name: difference(track, found, kept) for name, kept in baselines.items()},
     }  # fmt: skip

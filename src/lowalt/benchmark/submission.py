@@ -43,8 +43,8 @@ def read(path: str | Path, track: Track) -> np.ndarray:
     Raises: InputError in one sentence for a missing column, a value that is no probability, a row that does not sum to
     one, and a key that is unknown, stands twice, or is missing.
     """
+    tested = track.samples().facts.key.tolist()
     facts, classes = track.truth()
-    tested = facts.take(track.numbers("test")).key.tolist()
     columns, known, found = probability_columns(classes), set(facts.key.tolist()), {}
     for line, row in enumerate(read_csv(path, "key", *columns, what="submission"), start=2):
         key, where = row["key"], f"{path} line {line}"

@@ -1,7 +1,6 @@
 """The command `lowalt benchmark`: data, tracks, scores of submissions, confirmed results, the table of baselines."""
 
 import argparse
-import shutil
 from pathlib import Path
 
 from lowalt.benchmark import baseline_table, frozen_bytes
@@ -48,8 +47,7 @@ def tracks(options: argparse.Namespace) -> Answer:
          **{use: len(track.numbers(use)) for use in ("train", "validation", "test")}}
         for track in TRACKS.values()
     ]  # fmt: skip
-    counts = [f"{one['train']:6} train {one['validation']:6} validate {one['test']:6} test" for one in facts]
-    lines = [f"{one['track']:12} {count}  {one['serves']}" for one, count in zip(facts, counts, strict=True)]
+    lines = ["{track:12} {train:6} train {validation:6} validate {test:6} test {serves}".format(**one) for one in facts]
     return Answer(facts, "\n".join(lines))
 
 
@@ -73,13 +71,8 @@ def make(options: argparse.Namespace) -> Answer:
     return Answer({"parts": facts}, "\n".join(lines), int(any(facts.values())))
 
 
-def _words(interval: Interval) -> str:
-    """A value with its 95 % interval."""
-    return f"{interval.value:.1f} ({interval.low:.1f} to {interval.high:.1f})"
-
-
-def _against(name: str, lead: Interval, width: int) -> str:
-    """One line of comparison with a baseline."""
+def against(name: str, lead: Interval, width: int) -> str:
+    """Return a line on the difference to a method, or on a track; name: of either, padded to a width."""
     verdict = "better" if lead.low > 0 else "worse" if lead.high < 0 else "not distinguishable"
     return f"  {name:{width}}  {lead.value:+6.1f} ({lead.low:+.1f} to {lead.high:+.1f})  {verdict}"
 
@@ -99,20 +92,18 @@ def _report(track: Track, facts: dict) -> str:
     counts = f"{facts['samples']} samples, training seeds: {facts['seeds']}"
     lines = [
         f"{VERSION}, track {track.name}, {counts}; percent, with 95 % intervals",
-        f"{facts['headline']} {_words(facts['percent'])}, macro F1 {_words(facts['macro_f1_percent'])}",
+        "{} {}, macro F1 {}".format(
+            facts["headline"], *map(baseline_table.words, (facts["percent"], facts["macro_f1_percent"]))
+        ),
     ]
     if "rejected_percent" in facts:
         lines.append(f"rejected of the held-out class at 95 % acceptance: {facts['rejected_percent']:.1f}")
     lines.append("by SNR: " + ", ".join(f"{snr} dB {share:.1f}" for snr, share in facts["by_snr_percent"].items()))
     worst = sorted(facts["by_subtype_percent"].items(), key=lambda pair: pair[1])
     lines.append("lowest subtypes: " + ", ".join(f"{name} {share:.1f}" for name, share in worst[:5]))
-    width = max(map(len, facts["differences"]), default=0)
-    if facts["differences"]:
-        lines.append("against the baselines, paired difference:")
-    lines += [
-        _against(name, lead, width)
-        for name, lead in sorted(facts["differences"].items(), key=lambda pair: -pair[1].value)
-    ]
+    leads = sorted(facts["differences"].items(), key=lambda pair: -pair[1].value)
+    lines += ["against the baselines, paired difference:"] if leads else []
+    lines += [against(name, lead, 31) for name, lead in leads]
     return "\n".join(lines)
 
 
@@ -121,7 +112,7 @@ def confirmed(options: argparse.Namespace) -> Answer:
     from lowalt.benchmark.confirm import confirm
 
     found = confirm(options.model, named(options.track), options.backbone)
-    text = (f"{VERSION} {found.track}, confirmed: {_words(found.percent)} % of {found.samples} samples, "
+    text = (f"{VERSION} {found.track}, confirmed: {baseline_table.words(found.percent)} % of {found.samples} samples, "
             f"root seed {found.seed}, model {found.sha256}")  # fmt: skip
     return Answer(found._asdict(), text)
 
@@ -132,7 +123,4 @@ def shown(options: argparse.Namespace) -> Answer:
     rows = [row for row in baseline_table.read() if row["track"] in names]
     if not rows:
         raise InputError(f"{baseline_table.TABLE}: no row of {names}, expected a track with baselines")
-    wide = shutil.get_terminal_size().columns
-    lines = [f"{row['track']:12} {row['method'][: wide - 50]:40} {float(row['percent']):5.1f} "
-             f"({float(row['low']):.1f} to {float(row['high']):.1f})" for row in rows]  # fmt: skip
-    return Answer(rows, "\n".join(lines))
+    return Answer(rows, "\n".join(f"{row['track']:12} {row['method']:31} {baseline_table.result(row)}" for row in rows))

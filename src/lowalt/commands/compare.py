@@ -1,4 +1,4 @@
-"""The command `lowalt compare`: two finished runs side by side: configuration, accuracy, time, bytes."""
+"""The command `lowalt compare`: two finished runs side by side, or two methods of the benchmark's table."""
 
 import argparse
 from collections.abc import Iterator
@@ -17,7 +17,8 @@ MEASURED = ("accuracy_percent", "processor_s", "data")
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `compare` to a parser's commands."""
     line = add_command(commands, name, run)
-    line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
+    about = "folder of a finished run, or a method of the benchmark's table, such as 'RBF-SVM on features'"
+    line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help=about)
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
@@ -79,8 +80,22 @@ def _change(part: str, first: object, second: object) -> str:
     return f"   {second - first:+.4g}{share}"
 
 
+def methods(first: str, second: str) -> Answer:
+    """Compare two methods of the benchmark's table, track by track. Raises: InputError for an unknown method."""
+    from lowalt.benchmark.baseline_table import words
+    from lowalt.benchmark.baselines import compared
+    from lowalt.commands.benchmark import against
+
+    facts = compared(first, second)
+    lines = [f"{against(track, one['difference'], 12)}; {words(one['first'])} | {words(one['second'])}"
+             for track, one in facts.items()]  # fmt: skip
+    return Answer({"tracks": facts}, "\n".join([f"paired difference in percent: {first} | {second}", *lines]))
+
+
 def run(options: argparse.Namespace) -> Answer:
-    """Compare two runs. Raises: as `compared`."""
+    """Compare two runs, or two methods of the benchmark. Raises: as `compared` and `methods`."""
+    if not any(map(Path.exists, options.runs)):
+        return methods(*map(str, options.runs))
     pairs, blocks = compared(*options.runs), []
     for part, rows in pairs.items():
         wide = max(map(len, rows), default=0)

@@ -20,7 +20,7 @@ LISTS = ("clouds", "benchmarks")
 """Names that every manifest has, with a list of files each."""
 KEPT = {"accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv"}
 """Tables in results/reference that the page shows if the run has none: file by the name of the run's table."""
-OPTIONAL = ("published", "predictions", "transfer", *KEPT, *(f"kept_{name}" for name in KEPT))
+OPTIONAL = ("published", "predictions", "transfer", "benchmark", *KEPT, *(f"kept_{name}" for name in KEPT))
 """Optional names; without the file or files, the page has no such section."""
 
 

@@ -10,6 +10,7 @@ from lowalt.report.plots import Plot, plotted
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections import (
     accuracy,
+    benchmark_results,
     comparisons,
     confusion,
     made_with,
@@ -41,7 +42,7 @@ class Section(NamedTuple):
 PARTS = (
     PagePart("run", "This run", (overview,)),
     PagePart("samples", "Samples", (sample_viewer,)),
-    PagePart("results", "Results", (subtypes, confusion, accuracy, comparisons, other_runs)),
+    PagePart("results", "Results", (subtypes, confusion, accuracy, comparisons, other_runs, benchmark_results)),
     PagePart("cost", "What accuracy costs in time", (recognition_cost, simulation_cost)),
     PagePart("effects", "The scene", (scene_verdict,)),
     PagePart("provenance", "Provenance", (made_with,)),

@@ -114,6 +114,10 @@ class Products(DataProducts):
             for name, file in KEPT.items()
             if shipped(f"{REFERENCE}/{file}").is_file()
         }
+        # A benchmark's data set has a kept table of baselines.
+        baselines = shipped(f"{REFERENCE}/{self._run.data}/table.csv")
+        if baselines.is_file():
+            files["benchmark"] = str(baselines)
         if self._run.trainings:
             files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
         asked = {"accuracy_cost": block["accuracy"], "echo_cost": block["cost"]}

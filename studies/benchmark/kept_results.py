@@ -1,0 +1,56 @@
+"""What the study keeps in results/reference: the table with its groups, and what each method got right.
+
+Methods are sorted by their headline number. Going down, a method belongs to the group of the one that opened the group
+unless the interval of their difference excludes zero; otherwise it opens the next group.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.benchmark.baseline_table import COLUMNS, TABLE
+from lowalt.benchmark.benchmark_tracks import TRACKS, Track
+from lowalt.benchmark.scoring import Values, difference, values_of
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import write_csv
+from lowalt.recognition.predictions import Predictions
+
+
+def groups(track: Track, weight: np.ndarray, subtypes: np.ndarray, values: dict[str, np.ndarray]) -> dict[str, int]:
+    """Return the number of each method's group, from 1, best methods first.
+
+    weight, subtypes (models,): of the motion models; values: (seeds, models) by method.
+    """
+    average = {name: float(np.average(array.mean(0), weights=weight)) for name, array in values.items()}
+    found: dict[str, int] = {}
+    opener, count = "", 0
+    for name in sorted(values, key=lambda name: -average[name]):
+        lead = difference(track, Values(values[opener], weight, subtypes), values[name]) if opener else None
+        if lead is None or lead.low > 0:
+            opener, count = name, count + 1
+        found[name] = count
+    return found
+
+
+def write_table(rows: list[dict], folder: str | Path) -> None:
+    """Write the table, rows as dicts of COLUMNS, sorted by track and then by percent."""
+    order = list(TRACKS)
+    rows = sorted(rows, key=lambda row: (order.index(row["track"]), -row["percent"], row["method"]))
+    plain = [
+        {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()} for row in rows
+    ]
+    write_csv(Path(folder) / TABLE, COLUMNS, plain)
+
+
+def packed(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> np.ndarray:
+    """Return what is kept of a method: counts (seeds, models) uint8, or values float16; parts: of each seed."""
+    found: Values = values_of(track, parts, classes)
+    if track.headline != "accuracy":
+        return found.values.astype(np.float16)
+    return np.rint(found.values * found.weight).astype(np.uint8)
+
+
+def write_values(track: Track, arrays: dict[str, np.ndarray], folder: str | Path) -> None:
+    """Write the arrays of a track's baselines by their names."""
+    with replacing(Path(folder) / f"{track.name}.npz") as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)
