@@ -1,6 +1,7 @@
 """Diffraction at one edge of a wide screen: the effect `town`, Sionna RT and the approximation of ITU-R P.526.
 
-One row for each edge, distance and place behind it: the field over that in free space, in dB. The ray tracer's
+One row for each edge, distance and place behind it: the field over that in free space, in dB. `bend_deg` is the angle
+by which a ray past the edge bends. The ray tracer's
 diffraction is that of a half plane by the uniform theory of diffraction, ours Kirchhoff's integral.
 """
 
@@ -26,7 +27,7 @@ AWAY_M = ((100.0, 100.0), (200.0, 30.0))
 """Distances of the station and of the places from the screen."""
 OFF_M = (-30.0, -20.0, -15.0, -10.0, -5.0, -2.0, 0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0)
 """Places beyond the edge: those below zero are behind the screen."""
-COLUMNS = ("edge", "station_m", "place_m", "beyond_m", "nu", "lowalt_db", "sionna_db", "p526_db")
+COLUMNS = ("edge", "station_m", "place_m", "beyond_m", "bend_deg", "nu", "lowalt_db", "sionna_db", "p526_db")
 SCENE = """<scene version="2.1.0">
 <bsdf type="itu-radio-material" id="mat-metal"><string name="type" value="metal"/></bsdf>
 <shape type="ply" id="screen"><string name="filename" value="screen.ply"/><ref id="mat-metal"/></shape>
@@ -118,7 +119,8 @@ def main(arguments: list[str]) -> None:
                 fields = of_lowalt(ours, mast, places), of_sionna(rt, theirs.parent, mast, places)
                 for beyond, *both in zip(OFF_M, *fields, strict=True):
                     nu = nu_of(station_m, place_m, beyond)
-                    values = (nu, *(20 * np.log10(abs(value)) for value in both), p526_db(nu))
+                    bend_deg = np.degrees(np.arctan(UNDER_M / station_m) - np.arctan(beyond / place_m))
+                    values = (bend_deg, nu, *(20 * np.log10(abs(value)) for value in both), p526_db(nu))
                     rows.append((edge, station_m, place_m, beyond, *(f"{value:.2f}" for value in values)))
     write_csv(options.out, COLUMNS, rows)
 

@@ -1,6 +1,7 @@
 """Diffraction of the direct ray over roofs and around vertical edges: knife edges and screens of finite width.
 
-A building near or across a ray is a screen with a top and two upright edges. By Babinet's principle the field
+A building near or across a ray is a screen with a top and two upright edges. Its outline (4, 3) m holds the ends of the
+top edge, then a place each on the left and the right edge. By Babinet's principle the field
 behind it is 1 - (1 - F(left) - F(right)) (1 - F(top)) of that in free space, where F is Fresnel's integral of an edge's
 parameter nu, which is positive in the shadow: the wave passes over the top and around both sides.
 Of several buildings the one that weakens most counts in full, and on each side of it the next one as seen from its
@@ -8,7 +9,6 @@ edge (Deygout's construction). The field changes smoothly across the border of t
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import fresnel
@@ -37,15 +37,6 @@ FAR_M = 1e5
 """Beyond this no wave passes around an edge."""
 
 
-class Screen(NamedTuple):
-    """The outline of a building across a ray: its top edge (2, 3) m, None for none, and the places (2,) m, in the plan,
-    of its left and right edges."""
-
-    top: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
-
-
 @INNER
 def _along(start, way, place):
     """Where a place projects onto a way (3,) from a start (3,) in the plan, as a share of the way, and how far to the
@@ -62,42 +53,41 @@ def _nu(off_m, share, length_m, wavelength_m):
 
 
 @INNER
-def _over(screen, start, way):
+def _over(outline, start, way):
     """By how far a screen's top edge is above a way (3,) from a start (3,), at which share of the way, and which share
     of the edge."""
-    near, far = _along(start, way, screen.top[0])[1], _along(start, way, screen.top[1])[1]
+    low, high = outline[0], outline[1]
+    near, far = _along(start, way, low)[1], _along(start, way, high)[1]
     part = near / (near - far if abs(near - far) > 1e-9 else 1e-9)
-    x = screen.top[0, 0] + part * (screen.top[1, 0] - screen.top[0, 0])
-    y = screen.top[0, 1] + part * (screen.top[1, 1] - screen.top[0, 1])
-    z = screen.top[0, 2] + part * (screen.top[1, 2] - screen.top[0, 2])
-    share = _along(start, way, (x, y))[0]
+    share = _along(start, way, (low[0] + part * (high[0] - low[0]), low[1] + part * (high[1] - low[1])))[0]
     length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
-    return (z - start[2] - share * way[2]) * math.sqrt(max(1.0 - (way[2] / length) ** 2, 0.0)), share, part
+    rise_m = low[2] + part * (high[2] - low[2]) - start[2] - share * way[2]
+    return rise_m * math.sqrt(max(1.0 - (way[2] / length) ** 2, 0.0)), share, part
 
 
 @PLAIN
-def _edges_nu(screen, start, ends, wavelength_m, result):
+def _edges_nu(outline, start, ends, wavelength_m, result):
     """Fill result (3, R) with the nu of the top, left and right edge for rays from a start (3,) to ends (R, 3)."""
     way = np.empty(3)
     for r in range(len(ends)):
         for i in range(3):
             way[i] = ends[r, i] - start[i]
         length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
-        over, share, _ = _over(screen, start, way)
+        over, share, _ = _over(outline, start, way)
         result[0, r] = _nu(over, share, length, wavelength_m)
-        share, left = _along(start, way, screen.left)
-        result[1, r] = _nu(left, share, length, wavelength_m)
-        share, left = _along(start, way, screen.right)
-        result[2, r] = _nu(-left, share, length, wavelength_m)
+        for side in range(1, 3):
+            share, left = _along(start, way, outline[1 + side])
+            result[side, r] = _nu(left if side == 1 else -left, share, length, wavelength_m)
 
 
 @PLAIN
-def _detour(screen, start, end, nu):
-    """The point (3,) m of a screen's outline by which the strongest wave passes; nu (3,): those of its edges."""
-    way = end - start
-    if nu[0] <= min(nu[1], nu[2]):
-        return screen.top[0] + _over(screen, start, way)[2] * (screen.top[1] - screen.top[0])
-    side = screen.left if nu[1] < nu[2] else screen.right
+def _detour(outline, start, end, wavelength_m):
+    """The point (3,) m of a screen's outline by which the strongest wave passes from start to end."""
+    way, nu = end - start, np.empty((3, 1))
+    _edges_nu(outline, start, end.reshape(1, 3), wavelength_m, nu)
+    if nu[0, 0] <= nu[1:].min():
+        return outline[0] + _over(outline, start, way)[2] * (outline[1] - outline[0])
+    side = outline[2] if nu[1, 0] < nu[2, 0] else outline[3]
     return np.array([side[0], side[1], start[2] + _along(start, way, side)[0] * way[2]])
 
 
@@ -126,14 +116,14 @@ def _beside(edge, k, start, way, other, corner):
 
 @PLAIN
 def _outline(edges, start, end, wavelength_m, outline):
-    """Fill outline (4, 3) with the screen that edges (E, 2, 3) are to a ray: `Screen`; return whether there is one."""
+    """Fill outline (4, 3) of the screen that edges (E, 2, 3) are to a ray; return whether any is beside it."""
     way, corner, crossing = end - start, np.empty(3), np.empty(3)
     length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
     most, least, highest, crossed, any_edge = -np.inf, np.inf, -np.inf, False, False
     # A screen that no top shows is as low as can be.
-    outline[0], outline[1] = 0.5 * (start + end), 0.5 * (start + end)
+    outline[0], outline[1] = start, start
+    outline[1, 0], outline[1, 1] = start[0] - way[1], start[1] + way[0]
     outline[0, 2] = outline[1, 2] = -FAR_M
-    outline[1, 0], outline[1, 1] = outline[0, 0] - way[1], outline[0, 1] + way[0]
     for edge in edges:
         first, left = _along(start, way, edge[0])
         last, right = _along(start, way, edge[1])
@@ -162,57 +152,41 @@ def _outline(edges, start, end, wavelength_m, outline):
     return any_edge
 
 
-def screen(edges: np.ndarray, start: np.ndarray, end: np.ndarray, wavelength_m: float) -> Screen | None:
-    """Return the screen that a building's edges (E, 2, 3) m are to the ray from start to end, (3,) m each.
-
-    None where no edge is across or beside the ray between its ends.
-    """
-    outline = np.empty((4, 3))
-    if not _outline(edges, start, end, wavelength_m, outline):
-        return None
-    return Screen(outline[:2], outline[2, :2], outline[3, :2])
-
-
 def behind(
     edges: np.ndarray, start: np.ndarray, ends: np.ndarray, wavelength_m: float
-) -> tuple[Screen, np.ndarray, np.ndarray] | None:
-    """Return the screen that edges (E, 2, 3) m are to rays from start to ends (..., 3) m, the field there over that in
-    free space, and the least nu of its edges; None where no ray comes near an edge."""
-    shape = screen(edges, start, ends.reshape(-1, 3).mean(axis=0), wavelength_m)
-    if shape is None:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return the outline of the screen that a building's edges (E, 2, 3) m are to rays from start to ends (..., 3) m,
+    the field there over that in free space, and the least nu of its edges; None where no ray comes near an edge."""
+    outline, rays = np.empty((4, 3)), np.ascontiguousarray(ends).reshape(-1, 3)
+    if not _outline(edges, start, rays.mean(axis=0), wavelength_m, outline):
         return None
-    nu = nu_of(shape, start, ends, wavelength_m)
+    nu = np.empty((3, len(rays)))
+    _edges_nu(outline, start, rays, wavelength_m, nu)
+    nu = nu.reshape(3, *ends.shape[:-1])
     least = nu.min(axis=0)
     if least.max() <= CLEAR:
         return None
     top, left, right = field(nu)
-    return shape, 1.0 - (1.0 - left - right) * (1.0 - top), least
-
-
-def nu_of(shape: Screen, start: np.ndarray, ends: np.ndarray, wavelength_m: float) -> np.ndarray:
-    """Return the nu (3, ...) of the top, the left and the right edge for rays from a start (3,) to ends (..., 3) m."""
-    result = np.empty((3, *ends.shape[:-1]))
-    _edges_nu(shape, start, np.ascontiguousarray(ends).reshape(-1, 3), wavelength_m, result.reshape(3, -1))
-    return result
+    return outline, 1.0 - (1.0 - left - right) * (1.0 - top), least
 
 
 def _block(
     town: Town, buildings: np.ndarray, station_m: np.ndarray, places: np.ndarray, lit: np.ndarray, wavelength_m: float
 ) -> np.ndarray:
     """The direct ray's field (n, L) at places (n, L, 3) of a few symbols, past some buildings; lit: (n, L) bool."""
-    middle, found = places.mean(axis=(0, 1)), []
+    found = []
     for building in buildings:
         edges = town.edges[town.of_building == building]
         if (near := behind(edges, station_m, places, wavelength_m)) is not None:
-            shape, behind_it, least = near
+            outline, behind_it, least = near
             # An outline knows no gateways: where a ray passes through one, the building is no screen.
             behind_it = np.where(lit & (least > SURE), 1.0, behind_it)
-            found.append((float(abs(behind_it).mean()), shape, edges, behind_it, least))
+            found.append((float(abs(behind_it).mean()), outline, edges, behind_it, least))
     if not found:
         return lit.astype(np.complex128)
     found.sort(key=lambda each: each[0])
-    _, shape, _, result, least = found[0]
-    top = _detour(shape, station_m, middle, nu_of(shape, station_m, middle, wavelength_m))
+    _, outline, _, result, least = found[0]
+    top = _detour(outline, station_m, places.mean(axis=(0, 1)), wavelength_m)
     before, after = [np.ones(())], [np.ones(result.shape)]
     for _, _, edges, _, _ in found[1:] if abs(result).mean() < 1.0 and least.max() > 0.0 else ():
         for start, seen, factors in ((station_m, top, before), (top, places, after)):
