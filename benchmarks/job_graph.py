@@ -2,7 +2,7 @@
 
     python benchmarks/job_graph.py --out results/benchmarks/job_graph.csv
 
-Builds the graph of `config/paper.yaml` with signal shards and the groups of `profiles/slurm`, and runs no job.
+Builds the graph of `config/paper.yaml` with the groups of `profiles/slurm`, and runs no job.
 The simulated queue gives each submission one core of a node of its own, and Snakemake notices its end at the latest
 after the profile's longest wait. A job takes its stage's time (results/benchmarks/stages.csv, evenly over the jobs of
 the stage) and one start of Snakemake, because the executor for Slurm starts it again for every job of a group. The time
@@ -64,9 +64,9 @@ class Graph(NamedTuple):
 
 
 def graph(models_per_chunk: int, chunks: int) -> Graph:
-    """Snakemake's graph of the paper's data set as signals, in the profile's groups with `chunks` chunks each."""
+    """Snakemake's graph of the paper's data set, in the profile's groups with `chunks` chunks each."""
     profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text())
-    given = {"shards": {"kind": "signal"}, "motion": {"models_per_chunk": models_per_chunk}}
+    given = {"motion": {"models_per_chunk": models_per_chunk}}
     # A dry run prints every job, in spite of `quiet`.
     with (
         Path(os.devnull).open("w") as nothing,

@@ -20,6 +20,8 @@ from lowalt.recognition.schemes import named
 from lowalt.targets.records import records_of
 
 DATA_RULES = ("motion", "echo", "noise", "tiles", "shard", "index")
+UNUSED = {"image": set(), "signal": {"tiles"}, "recipe": {"tiles", "noise"}}
+"""Data stages that a kind of shards does without."""
 COLUMNS = (
     "configuration", "motion_models", "samples", "core_hours", "shards_gb", "noisy_gb", "measured_on",
     "trainings", "training_core_hours", "training_measured_on",
@@ -83,7 +85,8 @@ def estimate(
         raise InputError(f"stages: no row for {missing}, expected a finished run's stages.csv")
     measured = int(stages[0]["samples"])
     models, samples = samples_of(config)
-    core_hours = sum(seconds[rule] for rule in DATA_RULES) / measured * samples / 3600
+    made = set(DATA_RULES) - UNUSED[config["shards"]["kind"]]
+    core_hours = sum(seconds[rule] for rule in made) / measured * samples / 3600
     signal = 8 * config["network"]["symbols"] * len(config["network"]["stations"])
     levels = len(config["noise"]["snr_db"])
     by_kind = {"image": float(stages[0]["sample_bytes"]), "signal": signal, "recipe": signal / levels}

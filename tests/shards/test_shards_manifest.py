@@ -1,5 +1,7 @@
 """A manifest of a run: which lines are taken, and which stages a comparison leaves out."""
 
+import subprocess
+
 import pytest
 
 from lowalt.files.errors import InputError
@@ -73,3 +75,29 @@ def test_faults_are_told_in_the_order_of_the_stages_and_the_first_stage_by_its_n
     assert said.err.strip() == "first stage that differs: motion"
     with pytest.raises(InputError, match="folder of a run"):
         manifest.text(tmp_path / "nowhere")
+
+
+def test_a_manifest_by_groups_has_the_checksums_of_sha256sum_and_notices_each_change(tmp_path, options, capsys):
+    run = tmp_path / "run"
+    for name in ("clouds/b.npz", "motion/seen-00001.csv", "shards/seen-train-00000.tar", "shards/seen-train-00001.tar"):
+        (run / name).parent.mkdir(exist_ok=True)
+        (run / name).write_text(name)
+    manifest.main(["write", *options, "--by-groups"])
+    groups = (
+        "clouds/*.npz motion/seen-*.csv echo/A/seen-*.npy noisy/seen-*.npy shards/seen-train-*.tar shards/index.json"
+    )
+    assert list(manifest.read(tmp_path / "run.sha256")) == groups.split()
+    for pattern, digest in manifest.read(tmp_path / "run.sha256").items():
+        again = "| sha256sum" if "*" in pattern else ""
+        told = subprocess.run(f"sha256sum {pattern} {again}", shell=True, cwd=run, capture_output=True, text=True)
+        assert told.stdout.split()[0] == digest, pattern
+    manifest.main(["check", *options])
+    assert "all 6 groups are equal" in capsys.readouterr().out
+    (run / "motion/seen-00001.csv").unlink()
+    (run / "noisy/unseen-00000.npy").write_text("more")
+    (run / "shards/seen-train-00001.tar").write_text("other")
+    with pytest.raises(SystemExit):
+        manifest.main(["check", *options])
+    assert capsys.readouterr().out.splitlines() == [
+        "motion: motion/seen-*.csv differs", "noise: noisy/unseen-00000.npy is not in the manifest",
+        "shards: shards/seen-train-*.tar differs"]  # fmt: skip

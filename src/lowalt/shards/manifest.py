@@ -1,13 +1,18 @@
 """The manifest of a run: the SHA-256 of every file that configuration and version determine.
 
 One line per file in the format of `sha256sum`, in the order of the stages. The comparison of a rebuilt run names the
-first stage that differs, because all later stages then differ too.
+first stage that differs, because all later stages then differ too. In a manifest by groups a line stands for all files
+of a pattern, such as `shards/seen-train-*.tar`; its checksum is that of their lines in a manifest by files, so that
+`sha256sum shards/seen-train-*.tar | sha256sum` gives it too.
 """
 
 import argparse
+import hashlib
 import re
 import sys
+from collections import defaultdict
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lowalt.config.command import run
@@ -29,19 +34,39 @@ def files(folder: str | Path) -> Iterator[str]:
             yield from sorted(path.relative_to(folder).as_posix() for path in folder.glob(pattern))
 
 
+def _line(folder: str | Path, name: str) -> str:
+    """Return the line of a file in a run's folder."""
+    return f"{sha256(Path(folder) / name)}  {name}\n"
+
+
 def text(folder: str | Path) -> str:
     """Return the manifest of a run's folder.
 
     Raises: InputError where the folder has none of the covered files.
     """
-    lines = [f"{sha256(Path(folder) / name)}  {name}\n" for name in files(folder)]
+    lines = [_line(folder, name) for name in files(folder)]
     if not lines:
         raise InputError(f"{folder}: no cloud, motion table, signal or shard, expected the folder of a run")
     return "".join(lines)
 
 
+def _checksum(name: str, lines: list[str]) -> str:
+    """Return what a manifest holds for a file or a pattern, of whose files `lines` are in a manifest by files."""
+    return hashlib.sha256("".join(lines).encode()).hexdigest() if "*" in name else lines[0].partition(" ")[0]
+
+
+def by_groups(text: str) -> str:
+    """Return a manifest with one line for each group of files whose names differ in the number of the chunk alone; the
+    clouds are one group."""
+    groups = defaultdict(list)
+    for line in text.splitlines(keepends=True):
+        name = line.split("  ", 1)[1].strip()
+        groups["clouds/*.npz" if stage_of(name) == "clouds" else re.sub(r"-\d{5}", "-*", name)].append(line)
+    return "".join(f"{_checksum(name, lines)}  {name}\n" for name, lines in groups.items())
+
+
 def read(path: str | Path) -> dict[str, str]:
-    """Return the checksums of a manifest by file.
+    """Return the checksums of a manifest by file or pattern of files.
 
     Raises: InputError naming the file and the line that is no checksum and name, or whose file no stage makes.
     """
@@ -69,15 +94,18 @@ def faults(path: str | Path, folder: str | Path, temporary: tuple[str, ...] = ("
     Files of the stages in `temporary` may be missing. An empty list means that all bytes are equal.
     Raises: InputError where the manifest cannot be read.
     """
-    expected, present = read(path), set(files(folder))
+    expected, present = read(path), list(files(folder))
     lines = []
     for stage in STAGES:
+        unnamed = [name for name in present if stage_of(name) == stage]
         for name in [name for name in expected if stage_of(name) == stage]:
-            if name not in present:
+            found = [file for file in unnamed if fnmatchcase(file, name)]
+            unnamed = [file for file in unnamed if file not in found]
+            if not found:
                 lines += [] if stage in temporary else [f"{stage}: {name} is missing"]
-            elif sha256(Path(folder) / name) != expected[name]:
+            elif _checksum(name, [_line(folder, file) for file in found]) != expected[name]:
                 lines.append(f"{stage}: {name} differs")
-        extra = sorted(name for name in present - set(expected) if stage_of(name) == stage)
+        extra = sorted(unnamed)
         lines += [] if stage in temporary else [f"{stage}: {name} is not in the manifest" for name in extra]
     return lines
 
@@ -88,11 +116,13 @@ def main(arguments: list[str]) -> None:
     line.add_argument("command", choices=("write", "check"))
     line.add_argument("--run", required=True, help="folder of the run, such as results/default")
     line.add_argument("--manifest", required=True, help="manifest, such as results/reference/default.sha256")
+    line.add_argument("--by-groups", action="store_true", help="write one line for each group of files")
     line.add_argument("--without", nargs="*", default=[], choices=list(STAGES), help="stages that left no files")
     options = line.parse_args(arguments)
     if options.command == "write":
         with replacing(options.manifest) as temporary:
-            temporary.write_text(text(options.run))
+            found = text(options.run)
+            temporary.write_text(by_groups(found) if options.by_groups else found)
         return
     lines = faults(options.manifest, options.run, ("tiles", *options.without))
     for fault in lines:
@@ -100,7 +130,9 @@ def main(arguments: list[str]) -> None:
     if lines:
         print(f"first stage that differs: {lines[0].partition(':')[0]}", file=sys.stderr)
         raise SystemExit(1)
-    print(f"{options.run}: all {len(read(options.manifest))} files are equal to {options.manifest}")
+    expected = read(options.manifest)
+    count = f"{len(expected)} {'groups' if any('*' in name for name in expected) else 'files'}"
+    print(f"{options.run}: all {count} are equal to {options.manifest}")
 
 
 if __name__ == "__main__":

@@ -9,9 +9,12 @@ import numpy as np
 
 from lowalt.files.atomic import sha256
 from lowalt.files.errors import InputError
-from lowalt.shards import checksums, manifest
+from lowalt.shards import checksums
 from lowalt.shards.index import load
 from lowalt.shards.sample_table import map_samples, table_path
+
+FROZEN = "clouds", "motion"
+"""Folders of a run whose files the first training freezes."""
 
 
 def faults(index_path: str | Path) -> Iterator[str]:
@@ -27,7 +30,7 @@ def faults(index_path: str | Path) -> Iterator[str]:
         yield from shard_faults(folder / entry["path"], entry)
     yield from checksums.faults(index_path, index)
     run = folder.resolve().parent
-    present = set(manifest.files(run))
+    present = {f"{stage}/{path.name}" for stage in FROZEN for path in (run / stage).glob("*")}
     for name, checksum in frozen(index_path).items():
         if name not in present:
             yield f"../{name}: missing"
@@ -42,7 +45,7 @@ def frozen(index_path: str | Path) -> dict[str, str]:
     """
     path = Path(index_path).resolve().parent.parent / checksums.NAME
     lines = checksums.LINE.findall(path.read_text(errors="replace")) if path.is_file() else []
-    return {name: checksum for checksum, name in lines if manifest.stage_of(name) in ("clouds", "motion")}
+    return {name: checksum for checksum, name in lines if name.partition("/")[0] in FROZEN}
 
 
 def shard_faults(path: Path, entry: dict) -> Iterator[str]:
