@@ -135,6 +135,8 @@ def accuracies(found: dict[tuple[str, str], list[Evaluated]], seed: int) -> list
     rows, (reference, *_) = [], found.values()
     for part, belongs in parts().items():
         inside = {name for name, record in records().items() if belongs(record)}
+        if not inside & set(reference[0].test.motion.tolist()):
+            continue
         for (scene, trained_on), networks in found.items():
             shares = []
             for each in (networks, reference):
@@ -193,10 +195,10 @@ def cell_rows(seed: int) -> list[list]:
 def seen_rows(seed: int) -> list[list]:
     """Return the rows of seen.csv, of all motion models of the town."""
     rows = []
-    for part, belongs in parts().items():
-        targets = {name: record for name, record in records().items() if belongs(record)}
-        stations = list(next(iter(records().values()))["paths"]["stations"])
-        for station, rays in product(stations if targets else (), SIGHTS):
+    for part in ("outside", "on the ground", *HEIGHTS_M):
+        targets = {name: record for name, record in records().items() if parts()[part](record)}
+        stations = list(next(iter(targets.values()))["paths"]["stations"])
+        for station, rays in product(stations, SIGHTS):
             values = {name: [float(sight(record, station) == rays)] for name, record in targets.items()}
             rows.append([part, station, rays, *shares_of(values, seed, "seen", part, station, rays)])
     return rows
