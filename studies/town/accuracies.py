@@ -147,6 +147,7 @@ def accuracies(found: dict[tuple[str, str], list[Evaluated]], seed: int) -> list
             subtype = networks[0].test.subtype[chosen][first]
             draws = partial(stream, seed, "town", part, scene, trained_on)
             alone = strict_difference(ours, np.zeros_like(ours), count, subtype, True, draws("accuracy"))
+            alone = np.clip(alone, 0.0, 1.0)
             over = strict_difference(ours, theirs, count, subtype, True, draws("difference"))
             rows.append([part, scene, trained_on, len(count), *(f"{100 * one:.2f}" for one in (*alone, *over))])
     return rows
@@ -213,7 +214,7 @@ def draw(tables: Path, path: Path) -> None:
 
     accuracy, seen = (read_csv(tables / f"{name}.csv", "part") for name in ("accuracy", "seen"))
     heights = ["on the ground", *HEIGHTS_M]
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 3.8), layout="constrained", width_ratios=[1.25, 1])
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.3), layout="constrained", width_ratios=[1.25, 1])
     asked = [("paper", "paper"), ("urban", "paper"), ("blocks", "paper"), ("blocks", "blocks")]
     for number, (scene, trained_on) in enumerate(asked):
         keys = [(part, scene, trained_on) for part in heights]
@@ -221,11 +222,11 @@ def draw(tables: Path, path: Path) -> None:
         numbers = [[float(row[name]) for row in rows] for name in ("accuracy_percent", "low", "high")]
         value, low, high = np.clip(numbers, 0.0, 100.0)
         where = np.arange(len(heights)) + 0.2 * (number - 1.5)
-        left.bar(where, value, 0.18, color=f"C{number}", label=f"in {scene}, trained in {trained_on}")
+        left.bar(where, value, 0.18, color=f"C{number}", label=f"tried in {scene}, trained in {trained_on}")
         left.errorbar(where, value, [value - low, high - value], fmt="none", ecolor="0.3", linewidth=0.8)
     left.set(xticks=range(len(heights)), ylabel="right answers (%)", ylim=(0, 105))
-    left.set_xticklabels([part.replace(" m over", " m\nover") for part in heights], fontsize=8)
-    left.legend(fontsize=7, loc="lower right")
+    names = [part.replace(" over", "\nover").replace(" and more", "\nand more") for part in heights]
+    left.set_xticklabels(names, fontsize=8)
     stations = list(dict.fromkeys(row["station"] for row in seen))
     places = list(product(heights, stations))
     bottom = np.zeros(len(places))
@@ -238,9 +239,10 @@ def draw(tables: Path, path: Path) -> None:
         bottom += shares
     for part, station in places:
         right.text(heights.index(part) + 0.28 * (stations.index(station) - 1), 2, station, ha="center", fontsize=8)
-    right.set(xticks=range(len(heights)), ylabel="targets (%)", title="by which rays a station sees them")
-    right.set_xticklabels([part.replace(" m over", " m\nover") for part in heights], fontsize=8)
-    right.legend(fontsize=7, loc="lower right")
+    right.set(xticks=range(len(heights)), ylabel="targets (%)", title="rays from a station to them")
+    right.set_xticklabels(names, fontsize=8)
+    for axes, columns in ((left, 2), (right, 3)):
+        axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns)
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=110)
 

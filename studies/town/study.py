@@ -96,15 +96,16 @@ def draw(config: dict, out: Path) -> None:
                              / np.linalg.norm(route.images[0, 0] - mast))  # fmt: skip
         names = " and ".join("ground" if k == len(found.town.facets.offset) - 1 else "wall" for k in route.facets)
         # Paths over each other in the plan are dashes of different colours.
-        plan.plot(*path[:, :2].T, color=f"C{number}", linestyle=(4 * number, (4, 4 * (len(routes) - 1))), linewidth=1.8,
-                  label=f"{names}, {loss:.0f} dB")  # fmt: skip
+        plan.plot(*path[:, :2].T, color=f"C{number}", linestyle=(4 * number, (4, 4 * (len(routes) - 1))), linewidth=1.8)
+        plan.plot([], color=f"C{number}", linewidth=1.8, label=f"{names}, {loss:.0f} dB")
     plan.plot(*mast[:2], "r^", markersize=9)
     plan.plot(x, y, "bo", markersize=6)
     plan.annotate(f" {SUBTYPE}, {z:g} m", (x, y), color="blue")
     plan.annotate(f" station {station.name}, {mast[2]:g} m", mast[:2], color="red", ha="left", va="top")
-    low, high = np.concatenate(bends)[:, :2].min(axis=0) - 50.0, np.concatenate(bends)[:, :2].max(axis=0) + 50.0
+    shown = np.concatenate(bends)[:, :2]
+    low, high = shown.min(axis=0) - (80.0, 50.0), shown.max(axis=0) + np.array([120.0, 50.0])
     plan.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    plan.legend(loc="upper right", fontsize=7)
+    plan.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8)
     clouds = {sample.cloud.subtype: sample.cloud}
     without = {name: block for name, block in config["effects"].items() if name != "town"}
     signals = {"free": received_signal(explanation.scene_of(config | {"effects": without}), station, *sample, clouds),
