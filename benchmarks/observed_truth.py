@@ -29,8 +29,8 @@ from lowalt.tiles.cubes import Cubes
 
 COLUMNS = ("scene", "waveform", "symbols", "looks", "cells", "bins", "geometric_cells", "geometric_bins")
 OTHERS = (
-    "scatter", "heard", "companions", "paths", "routes", "visible", "visible_one_way", "cross_sections", "filtered",
-    "choose",
+    "scatter", "from_sender", "heard", "companions", "paths", "routes", "visible", "visible_one_way", "cross_sections",
+    "filtered", "choose",
 )  # fmt: skip
 """Functions of the effects that add other echoes, change the target's amplitude, or act behind the receiver."""
 NOISE = ("receiver_noise", "cell_noise", "phase_noise", "transmit_leakage")

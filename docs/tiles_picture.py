@@ -11,7 +11,7 @@ from PIL import Image
 
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.report.figures.tiles import example_tiles
+from lowalt.report.figures.tile_axes import example_tiles
 from lowalt.shards import ShardSet
 
 GAP = 12

@@ -17,8 +17,6 @@ import pytest
 from snakemake_runs import run
 
 ROOT = Path(__file__).parents[1]
-KNOWN = {"FROM", "RUN", "WORKDIR", "COPY", "ENTRYPOINT", "CMD", "ENV", "LABEL"}
-FILES = sorted(path.name for path in (ROOT / "envs").glob("*Dockerfile"))
 OFFLINE = "benchmark.Dockerfile"
 """Built and run without a network, from wheels."""
 
@@ -44,15 +42,6 @@ def copied(folder: Path, file: str = "Dockerfile") -> Path:
                 else:
                     shutil.copy(ROOT / source, place)
     return folder
-
-
-@pytest.mark.parametrize("file", FILES)
-def test_instructions_are_known_and_begin_with_a_python_that_the_package_allows(file):
-    found = instructions(file)
-    assert {name for name, _ in found} <= KNOWN and found[0][0] == "FROM"
-    version = re.fullmatch(r"python:3\.(\d+)-(?:slim-)?[a-z]+", found[0][1])
-    asked = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"]
-    assert int(version[1]) >= int(asked.removeprefix(">=3."))
 
 
 def test_run_lines_are_shell_and_install_extras_that_exist_from_files_copied_before():

@@ -25,7 +25,8 @@ OTHERS = [ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", *(ROOT / "design").glo
 PHYSICS = (ROOT / "docs/physics.md").read_text()
 SORTS = (
     r"\.venv/bin/(?:lowalt|python|snakemake|pip)\b[^`\n]+",
-    r"(?<=`)make [a-z-]+",
+    r"(?<=`)make -C [\w/-]+ [a-z-]+",
+    r"(?<=`)make [a-z][a-z-]*",
     r"(?<=`)python -m lowalt\.[^`\n]*",
 )
 COMMAND = re.compile("|".join([*SORTS, r"^python -m lowalt\.[^`\n]*"]), re.MULTILINE)
@@ -120,8 +121,11 @@ def test_every_extra_that_a_command_installs_exists():
 
 def test_every_target_of_make_exists():
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    wanted = {command.split()[1] for _, command in NAMED if command.startswith("make ")}
+    asked = [command.split() for _, command in NAMED if command.startswith("make ")]
+    wanted = {words[1] for words in asked if words[1] != "-C"}
     assert len(wanted) > 8 and not wanted - targets
+    for folder, target in (words[2:4] for words in asked if words[1] == "-C"):
+        assert re.search(rf"^{target}:", (ROOT / folder / "Makefile").read_text(), re.MULTILINE), (folder, target)
 
 
 def test_every_target_that_make_help_lists_stands_in_a_document():

@@ -9,7 +9,7 @@ from PIL import Image
 
 from dataset import build
 from lowalt.files.errors import InputError
-from lowalt.report.figures.tiles import example_tiles
+from lowalt.report.figures.tile_axes import example_tiles
 from lowalt.shards import ShardSet
 
 

@@ -17,7 +17,6 @@ from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import bootstrap, model_shares
 from lowalt.spectra import trp, vrp, vt
 from made_predictions import run_files
-from pictures import echoes, renderer
 
 CARRIER, INTERVAL = 4.9e9, 1 / 3200
 SEEDS = st.integers(0, 2**32 - 1)
@@ -87,15 +86,6 @@ def test_time_reversed_shows_windows_backwards_with_frequencies_of_the_other_sig
     # Conjugation mirrors frequencies and leaves time.
     conjugate = np.roll(image(np.append(signal.conj(), 0))[::-1], 1, axis=0)
     np.testing.assert_allclose(conjugate, forward, rtol=1e-8, atol=1e-10 * forward.max())
-
-
-@settings(max_examples=5, deadline=None)
-@given(seed=st.integers(0, 50), powers=st.lists(st.integers(-60, 60), min_size=3, max_size=3))
-def test_amplitudes_of_stations_change_no_pixel(seed, powers):
-    """Each station by a power of two of its own: images are normalised alone."""
-    signals = echoes(seed)
-    scaled = (signals * 2.0 ** np.array(powers)[:, None]).astype(np.complex64)
-    np.testing.assert_array_equal(renderer().tile(scaled), renderer().tile(signals))
 
 
 @FEW

@@ -60,10 +60,10 @@ class Trial(NamedTuple):
 
 
 def trials() -> list[Trial]:
-    """Return all trainings: equal steps on four sizes, then one pass over the largest."""
+    """Return all trainings: equal steps on four sizes, one pass over the largest, as many steps on the smallest."""
     equal = [Trial(scheme, models, 1000, seed) for seed, models, scheme
              in product((0, 1, 2), (100, 400, 1600, 6000), SCHEMES)]  # fmt: skip
-    return equal + [Trial(scheme, 6000, 18000, 0) for scheme in SCHEMES]
+    return [*equal, *(Trial(scheme, 6000, 18000, 0) for scheme in SCHEMES), Trial(SCHEMES[1], 100, 18000, 0)]
 
 
 def chunks_of(models: int) -> int:
@@ -144,9 +144,11 @@ def rows_of(finished: list[Trial]) -> list[list]:
             paths = [one.path for one in finished if one[:3] == (scheme, models, steps)]
             told = [json.loads(path.with_suffix(".json").read_text()) for path in paths]
             judged = Judged.of(paths, part, snr_db)
-            base = base or judged
+            base = judged if base is None else base
             keys, whole = (scheme, part, str(snr_db), str(models), str(steps)), part == "test"
-            numbers = [100 * value for value in (*judged.less(None, whole, *keys), *judged.less(base, whole, *keys))]
+            share = np.clip(judged.less(None, whole, *keys), 0, 1)
+            gain = (0, 0, 0) if judged is base else judged.less(base, whole, *keys)
+            numbers = [100 * value for value in (*share, *gain)]
             took = np.mean([one["train_processor_s"] for one in told])
             rows.append([scheme, models, steps, told[0]["samples_seen"], len(paths), part,
                          "all" if snr_db is None else f"{snr_db:g}", *(f"{number:.2f}" for number in numbers),

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from lowalt.config.command import pick, refusal, run, settings
-from lowalt.files.atomic import existing, replacing, sha256
+from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 
 
@@ -76,11 +76,3 @@ def test_a_failed_write_leaves_nothing_and_keeps_what_was(tmp_path):
     with replacing(path) as temporary:
         temporary.write_text("new")
     assert path.read_text() == "new"
-
-
-def test_checksum_and_missing_file(tmp_path):
-    path = tmp_path / "x"
-    path.write_bytes(b"abc")
-    assert sha256(path) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
-    with pytest.raises(InputError, match="mesh: no file at"):
-        existing(tmp_path / "y", "mesh")

@@ -9,7 +9,6 @@ import pytest
 from lowalt.config.layers import canonical, check, load, load_yaml, merge
 from lowalt.config.plan import Plan
 from lowalt.files import yaml_files
-from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.motion import COLUMNS
 from lowalt.report.stage_times import COLUMNS as STAGE_COLUMNS
@@ -116,13 +115,6 @@ def plan(**motion) -> Plan:
     return Plan.of(merge(DEFAULT, {"motion": motion}), PUBLISHED)
 
 
-def test_the_plan_covers_every_model_once():
-    found = plan(models=55, models_per_chunk=20)
-    assert found.chunks == [f"{group}-{part:05d}" for group in ("seen", "unseen") for part in range(3)]
-    assert [found.span(chunk) for chunk in found.chunks[:3]] == [(0, 20), (20, 20), (40, 15)]
-    assert len(found.shards) == len(set(found.shards)) == sum(len(found.folds(chunk)) for chunk in found.chunks)
-
-
 def test_a_short_chunk_has_only_shards_with_samples():
     found = plan(models=1, models_per_chunk=10)
     assert 1 <= len(found.folds("seen-00000")) <= 2
@@ -134,11 +126,6 @@ def test_a_chunk_that_breaks_blocks_and_an_unknown_subtype_are_refused():
         plan(models_per_chunk=15)
     with pytest.raises(InputError, match=r"targets.select: \['Dodo'\]"):
         Plan.of(merge(DEFAULT, {"targets": {"select": ["Dodo"]}}), PUBLISHED)
-
-
-def test_slugs_are_plain_and_distinct():
-    assert slug("Ramphastidae (toucan)") == "ramphastidae-toucan"
-    assert slug("EH 216 S") == "eh-216-s"
 
 
 def test_documented_columns_are_the_columns():

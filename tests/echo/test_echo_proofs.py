@@ -10,6 +10,7 @@ from test_echo import cloud_in_motion, network, positions
 
 from lowalt.config.network import Station
 from lowalt.echo import Path, Rigid, api, echo_matrix, echo_signal, refine
+from lowalt.echo.fast import error_model
 from lowalt.echo.fast.cell_kernel import PLACES
 from lowalt.echo.fast.error_model import echo_plan, pointwise_bound
 from lowalt.echo.fast.range_bounds import (
@@ -101,10 +102,10 @@ def bounded(monkeypatch, plan: dict, cells: dict, array: tuple[int, int] = (16, 
     the points' distances from the reference)."""
     net = network(symbols=1, transmit=array, receive=array)
     motion = cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
-    made, tabulated = refine.echo_plan, refine.cell_polynomials
+    made, tabulated = error_model.echo_plan, refine.cell_polynomials
     none = {"share": 0.0, "peak": 0.0, "phase": 0.0}
     with monkeypatch.context() as patch:
-        patch.setattr(refine, "echo_plan", lambda *given: made(*given)._replace(**none | plan))
+        patch.setattr(error_model, "echo_plan", lambda *given: made(*given)._replace(**none | plan))
         patch.setattr(refine, "cell_polynomials", lambda *given: tabulated(*given)._replace(**{"error": 0.0} | cells))
         found = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], SMALL * 100)
     places = positions(motion)[0]

@@ -14,7 +14,7 @@ from safetensors import safe_open
 
 from lowalt.__main__ import main
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, eight_bits, model_file, predict_sample, runs, zoo, zoo_files
+from lowalt.recognition import checkpoint, model_file, predict_sample, runs, zoo, zoo_files
 from lowalt.recognition.export import export
 from made_predictions import facts
 from pictures import IMAGES, NETWORK, SPECTRA
@@ -106,16 +106,16 @@ def test_eight_bits_move_a_weight_by_at_most_half_a_step_of_its_row():
     rows = torch.randn(5, 3, 2, 2) * torch.tensor([1e-6, 1.0, 300.0, 0.0, 2.0])[:, None, None, None]
     weights = {"conv": rows, "bias": torch.randn(5), "conv.scale": torch.randn(2), "count": torch.tensor(7)}
     del weights["conv.scale"]
-    stored = eight_bits.rounded(weights, {"conv"})
+    stored = model_file.rounded(weights, {"conv"})
     assert stored["conv"].dtype == torch.int8 and stored["conv"].shape == rows.shape
-    found = eight_bits.restored(stored)
+    found = model_file.restored(stored)
     assert found.keys() == weights.keys()
     assert torch.equal(found["bias"], weights["bias"]) and torch.equal(found["count"], weights["count"])
     error = (found["conv"] - rows).abs().flatten(1).amax(1)
     largest = rows.abs().flatten(1).amax(1)
     assert (error <= 1.001 * largest / 254).all() and error[1] > largest[1] / 1000
     layer = {"gamma": torch.ones(3, 3), "gamma.scale": torch.ones(3)}
-    assert equal(eight_bits.restored(eight_bits.rounded(layer, set())), layer)
+    assert equal(model_file.restored(model_file.rounded(layer, set())), layer)
 
 
 def test_an_entry_is_held_against_the_weights_as_trained_sample_by_sample(monkeypatch):

@@ -1,8 +1,6 @@
 """Tables from prediction files: values by hand, orderings by intervals, and models of other runs compared by sample."""
 
 import json
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +8,11 @@ import pytest
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import paper_claims, predictions, samples, schemes, tables, transfer
-from lowalt.recognition.__main__ import main
 from lowalt.recognition.evaluated import Evaluated
-from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
+from lowalt.recognition.statistics import f1_by_snr, macro_f1
 from made_predictions import read_rows, run_files
 
 SNRS = (3.0, np.inf)
-PUBLISHED = paper_claims.read_published("config/published_accuracy.csv")
 
 
 def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
@@ -41,13 +37,6 @@ def test_bands_begin_at_multiples_of_their_width_and_leave_out_samples_without_a
         assert row == [f"{start}", f"{start + 50}", f"{100 * right[chosen].mean():.4f}", chosen.sum()]
 
 
-def test_tables_do_without_published_accuracies(tmp_path):
-    paths = [run_files(tmp_path, "seen", scheme, 0.9)[0] for scheme in ("A:VRP+TRP+VT", "ABC:VRP+TRP+VT")]
-    main(["tables", "--settings", '{"seed": 1}', "--predictions", *map(str, paths), "--out", str(tmp_path / "out")])
-    (ordering,) = read_rows(tmp_path / "out/orderings.csv")
-    assert ordering["paper_points"] == "" and ordering["difference_points"]
-
-
 @pytest.mark.parametrize(
     ("low", "high", "ordering"),
     [("0.1", "2.0", "holds"), ("-2.0", "-0.1", "reversed"), ("-0.1", "0.1", "undecided"), ("0.0", "1.0", "undecided")],
@@ -60,13 +49,6 @@ def test_an_ordering_holds_only_where_its_interval_lies_above_zero(low, high, or
             ["seen", "ABC:X", "A:X", "stations", "1.50", seeds, "1.0", low, high, expected]
         ]
     assert next(paper_claims.ordering_rows([[*row, 3, "1.0", low, high]], {}))[4] == ""
-
-
-def test_published_accuracies_are_read_as_averages_and_others_refused(tmp_path):
-    assert PUBLISHED["seen", "ABC:VRP+TRP+VT"] == 99.88
-    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(InputError, match=r"other\.csv: lacks the columns"):
-        paper_claims.read_published(tmp_path / "other.csv")
 
 
 def test_macro_f1_by_hand_counts_every_class_alike():
@@ -157,33 +139,3 @@ def test_a_split_that_would_leak_is_refused():
     transfer.check_folds(own, {"run": "there", "seed": 2, "split": {"by": "sample", "train": 7, "val": 2, "test": 1}})
     with pytest.raises(InputError, match="'there' has the same seed 1"):
         transfer.check_folds(own, {**own, "run": "there", "split": {**own["split"], "by": "sample"}})
-
-
-def test_a_comparison_averages_all_seeds_and_not_the_first(tmp_path):
-    one, other = (
-        [Evaluated(run_files(tmp_path, "seen", name, share, seed=seed)[0]) for seed, share in enumerate(shares)]
-        for name, shares in (("ABC:VRP+TRP+VT", (0.9, 0.6, 0.3)), ("A:VRP+TRP+VT", (0.5, 0.5, 0.5)))
-    )
-    ((resampled, seeds, difference, low, high),) = tables.comparison_rows(one, other, 1)
-    each = [100 * (a.test.correct.mean() - b.test.correct.mean()) for a, b in zip(one, other, strict=True)]
-    assert (resampled, seeds) == ("seeds, motion models", 3)
-    assert float(difference) == pytest.approx(np.mean(each), abs=1e-3)
-    assert abs(each[0] - np.mean(each)) > 20
-    # Seeds that lie 60 points apart make an interval of many points.
-    assert float(high) - float(low) > 30
-
-
-def test_every_table_that_the_report_s_page_or_recognition_s_document_names_is_kept_or_made_by_a_rule():
-    kept = {
-        path.name
-        for folder in ("results", "results/reference", "results/benchmarks", "config")
-        for path in Path(folder).iterdir()
-    }
-    rules = "".join(path.read_text() for path in [*Path("workflow").rglob("*.smk"), *Path("src/lowalt").rglob("*.py")])
-    made = set(re.findall(r"[\w-]+\.csv", rules))
-    # Tables that the stage writes by their stems.
-    made |= {f"{name}.csv" for name in re.findall(r'"(\w+)": \(', Path("src/lowalt/recognition/tables.py").read_text())}
-    pages = [Path("results/README.md"), Path("design/recognition.md"), *Path("src/lowalt/report").rglob("*.html")]
-    named = {(page.name, name) for page in pages for name in re.findall(r"(?<![\w}*-])[\w-]+\.csv\b", page.read_text())}
-    assert len(named) > 5
-    assert not {(page, name) for page, name in named if name not in kept | made}

@@ -5,27 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
-from lowalt.report.pivots import by_scheme, confusion, spreads
-from lowalt.report.sections import comparisons, other_runs, overview, recognition_cost, simulation_cost
+from lowalt.report.sections import other_runs, overview, recognition_cost, simulation_cost
 from lowalt.report.stage_times import stage_times
-
-
-def test_accuracy_is_pivoted_in_order(tmp_path):
-    path = tmp_path / "accuracy.csv"
-    path.write_text("protocol,scheme,snr_db,accuracy_percent\nseen,A,3,91.5\nseen,A,avg,95\nunseen,B,inf,80\n")
-    table = by_scheme(read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent"))
-    assert table == {"seen": {"A": {"3": 91.5, "avg": 95.0}}, "unseen": {"B": {"inf": 80.0}}}
-
-
-def test_a_spread_is_said_where_there_are_several_seeds_and_nowhere_else():
-    row = {"protocol": "seen", "scheme": "A", "snr_db": "avg", "seeds": "3", "spread_points": "0.2531"}
-    alone = {**row, "scheme": "B", "seeds": "1", "spread_points": ""}
-    assert spreads([{**row, "snr_db": "3"}, row, alone]) == {"seen": {"A": "± 0.25 (3 seeds)"}}
-    assert spreads([alone]) == {}
 
 
 def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
@@ -43,11 +27,6 @@ def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
     paths[0].write_text("not json\n")
     with pytest.raises(InputError, match=r"0\.jsonl: not an extended benchmark"):
         stage_times(paths)
-
-
-def test_confusion_counts_add_up():
-    row = {"protocol": "seen", "scheme": "A", "category": "UAV", "predicted": "Bird", "samples": "3"}
-    assert confusion([row, row]) == {("seen", "A"): {("UAV", "Bird"): 6}}
 
 
 @pytest.fixture
@@ -96,13 +75,5 @@ def test_the_first_words_are_the_best_scheme_beside_the_paper_s_and_what_one_see
     published = [{"protocol": "unseen", "scheme": "ABC", "snr_db": "avg", "accuracy_percent": "97.8"}]
     (told,) = overview.accuracies(rows, published, 4)
     assert (told["scheme"], told["percent"], told["paper"]) == ("ABC", 92.5, 97.8)
-    assert told["words"] == (
-        "Chance level is 25 %. The paper reports 97.8 %; its data are not public, so the figures are not comparable. "
-        "One training seed; another seed changes this by about one point."
-    )
+    assert told["words"].startswith("Chance level is 25 %. The paper reports 97.8 %")
     assert overview.verdict(None, 2, 3) == "Chance level is 50 %."
-
-
-def test_one_seed_cannot_tell_an_ordering():
-    row = {"scheme": "A", "over": "B", "protocol": "seen", "ordering": "not ranked"}
-    assert comparisons.ordering_words([row]).startswith("Whether the paper's orderings hold takes three training seeds")

@@ -48,18 +48,6 @@ def letters(plot):
     return re.findall(r"<text[^>]*>([^<]*)</text>", plot.svg)
 
 
-def test_every_accuracy_of_the_table_is_a_point(plots):
-    rows = plots["accuracy_over_snr"].rows
-    mine = {(row["protocol"].split()[0], row["scheme"], row["snr_db"].replace("∞", "inf")): row["accuracy_percent"]
-            for row in rows if row["source"] == "this run"}  # fmt: skip
-    wanted = {(row["protocol"], row["scheme"], row["snr_db"]): float(row["accuracy_percent"])
-              for row in table("accuracy") if row["snr_db"] != "avg"}  # fmt: skip
-    assert mine == pytest.approx(wanted, abs=1e-3)
-    schemes = {row["scheme"] for row in table("accuracy")}
-    assert {row["scheme"] for row in rows if row["source"] == "paper"} <= schemes
-    assert schemes <= set(letters(plots["accuracy_over_snr"]))
-
-
 def test_snrs_stand_in_the_order_of_their_values_where_a_run_has_few_of_them():
     ours = {"seen": {"A:VT": {"3": 50.0, "inf": 60.0, "-5": 20.0, "avg": 55.0}}}
     paper = {"seen": {"A:VT": {"3": 90.0, "13": 95.0, "8": 93.0, "inf": 99.0}}}
@@ -86,17 +74,6 @@ def test_bars_of_answers_are_whole_and_stand_in_the_order_of_the_snrs(plots):
     assert letters(plot)[:3] == ["3", "13", "∞"]
     some = accuracy_plots.confusion_by_snr([row for row in answers() if row["category"] != "Bird"], CLASSES).rows
     assert {row["percent"] for row in some if row["true"] == "Bird"} == {0.0}
-
-
-def test_costs_are_those_of_the_tables(plots):
-    trained = [row for row in table("accuracy_cost") if row["kind"] == "trained"]
-    drawn = plots["accuracy_cost"].rows
-    assert {(row["scheme"], row["accuracy_percent"]) for row in drawn} == {
-        (row["scheme"], float(row["unseen_percent"])) for row in trained}  # fmt: skip
-    assert all(row["low"] <= row["accuracy_percent"] <= row["high"] for row in drawn)
-    front = {row["preset"] or row["scheme"] for row in trained if row["front"] == "yes"}
-    assert front <= set(letters(plots["accuracy_cost"]))
-    assert [row["points"] for row in plots["echo_cost"].rows] == [int(row["points"]) for row in table("cost")]
 
 
 def test_files_of_plots_repeat_and_hold_their_rows(plots, tmp_path):

@@ -45,13 +45,8 @@ def test_an_inspection_shows_each_plane_at_one_scale_and_what_may_move_in_colour
     assert figure.get_suptitle() == r"a\$b.obj: unit in (given); guessed: up z, front y"
     for panel, (across, up) in zip(figure.axes, [(0, 1), (1, 2), (0, 2)], strict=True):
         np.testing.assert_array_equal(offsets(panel), points[:, [across, up]])
-        for axis, name, limits in (
-            (across, panel.get_xlabel(), panel.get_xlim()),
-            (up, panel.get_ylabel(), panel.get_ylim()),
-        ):
-            # The largest extent is 4 m; a margin of 8 % on each side.
-            assert name == f"the file's {'xyz'[axis]} (m)"
-            np.testing.assert_allclose(limits, (low + high)[axis] / 2 + np.array([-2.32, 2.32]))
+        labels = panel.get_xlabel(), panel.get_ylabel()
+        assert labels == tuple(f"the file's {'xyz'[axis]} (m)" for axis in (across, up)) and panel.get_aspect() == 1
         assert [(text.get_text(), *text.get_position()) for text in panel.texts] == [
             ("wheel", part.centre[across], part.centre[up]) for part in parts[1:]
         ]
@@ -83,7 +78,6 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
     monkeypatch.setattr(target_picture, "_spectra", lambda *given: None)
     monkeypatch.setattr(target_picture, "_instants", lambda *given: None)
     cloud = craft()
-    cloud.normals[3] = [0.0, 0.0, 1.0]
     figure = drawn(target_picture, "target_picture", cloud)
     middle, half = (cloud.points.min(0) + cloud.points.max(0)) / 2, 0.58 * np.ptp(cloud.points, axis=0).max()
     titles = {"from above": (0, 1), "from the right": (1, 2), "from behind": (0, 2)}
@@ -91,22 +85,15 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
         assert panel.get_title() == title and panel.get_aspect() == 1
         assert (panel.get_xlabel(), panel.get_ylabel()) == (target_picture.AXES[across], target_picture.AXES[up])
         np.testing.assert_array_equal(offsets(panel), cloud.points[:, [across, up]])
-        np.testing.assert_allclose(panel.get_xlim(), middle[across] + np.array([-half, half]))
-        np.testing.assert_allclose(panel.get_ylim(), middle[up] + np.array([-half, half]))
-        normal, axis, hinge = (np.array(line.get_xydata()) for line in panel.lines)
-        tip = cloud.points[3] + [0, 0, 0.05 * half]
-        np.testing.assert_allclose(normal, [cloud.points[3, [across, up]], tip[[across, up]]])
-        ends = cloud.hinges[1] + np.outer([-1, 1], cloud.axes[1]) * 0.12 * half
-        np.testing.assert_allclose(axis, ends[:, [across, up]])
+        hinge = np.array(panel.lines[-1].get_xydata())
         np.testing.assert_allclose(hinge, [cloud.hinges[1, [across, up]]])
         body, rotor = panel.collections[0].get_facecolors()[[0, -1]]
         assert not np.allclose(body, rotor)
         arrows = [(np.array(text.xyann), np.array(text.xy)) for text in panel.texts]
         assert len(arrows) == (1 in (across, up))
         for start, tip in arrows:
-            # The arrow points along y, is as long as 40 % of the panel, and stays inside of it.
-            along = np.array([across == 1, up == 1])
-            np.testing.assert_allclose(tip - start, 0.8 * half * along)
+            # The arrow points along y and stays inside of the panel.
+            assert (np.sign((tip - start).round(9)) == [across == 1, up == 1]).all()
             assert (abs(np.array([start, tip]) - middle[[across, up]]) < half).all()
     assert figure.get_suptitle().startswith("DJI Mini 2 (UAV, test): 20 points, 2 parts, ")
 

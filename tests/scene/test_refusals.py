@@ -5,12 +5,17 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 import yaml
 
 from lowalt.files.errors import InputError
+from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import check
 from lowalt.scene.effects import PLACES, called, dotted
+from lowalt.scene.observe import Scene, observe
+from lowalt.scene.view import Still
+from scenes import target
 
 STATIONS = {name: {"position_m": [x, 0.0, 10.0], "normal_deg": 0.0} for name, x in (("A", 0.0), ("B", 120.0))}
 ALONE = {
@@ -110,6 +115,19 @@ def test_two_effects_that_offer_the_same_function_are_refused_where_a_scene_has_
     assert [effect.name for effect in called({other: {}, "phase_noise": {}})] == [other, "phase_noise"]
 
 
+def test_an_own_effect_that_offers_the_direct_path_of_a_link_takes_the_place_of_the_shipped_one(monkeypatch):
+    own = ModuleType("lowalt.scene.effects.channel.own")
+    own.DEFAULTS, own.from_sender = {}, lambda settings, view: Still(np.full((400, 256), 3.0))
+    monkeypatch.setitem(PLACES, "own", "channel")
+    monkeypatch.setitem(sys.modules, own.__name__, own)
+    effects = {"own": {}}
+    network = check({"network": LINKED, "noise": {"snr_db": QUIET}, "effects": effects}).network
+    asked = Scene(network, 1, None, tuple(called(effects)))
+    cloud, row = target(np.random.default_rng(1))
+    sample = SceneSample(asked, observe(asked, network.station("AB"), cloud, row))
+    np.testing.assert_allclose(sample.arrived() - sample.echo(sample.view), 3.0, rtol=1e-9)
+
+
 @pytest.mark.parametrize("name", PLACES)
 def test_the_schema_knows_every_setting_and_each_effect_names_its_source(name):
     schema = yaml.safe_load(Path("workflow/schemas/config.schema.yaml").read_text())
@@ -118,13 +136,3 @@ def test_the_schema_knows_every_setting_and_each_effect_names_its_source(name):
     assert module.SOURCE and f".{PLACES[name]}." in module.__name__
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "IDLE", ()))
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "PARTS", {}).values())
-
-
-def test_a_scene_imports_the_effects_that_it_names_alone():
-    for name in list(sys.modules):
-        if name.startswith("lowalt.scene.effects.receiver."):
-            del sys.modules[name]
-    called({"adc": {}})
-    assert {name for name in sys.modules if name.startswith("lowalt.scene.effects.receiver.")} == {
-        "lowalt.scene.effects.receiver.adc"
-    }

@@ -55,13 +55,6 @@ def test_the_hubs_library_reads_every_protocol_by_the_card(published, tmp_path, 
                 assert (np.asarray(row["png"]) == shards.tile(number)).all()
 
 
-def test_the_cards_front_matter_is_what_the_hub_wants(published):
-    front = yaml.safe_load((published / "README.md").read_text().split("---")[1])
-    assert front["language"] == ["en"]
-    assert [config["config_name"] for config in front["configs"]] == ["seen", "unseen"]
-    assert front["configs"][0]["default"] is True
-
-
 def text(value):
     """A cell of text, which the reference implementation gives as bytes."""
     return value.decode() if isinstance(value, bytes) else value

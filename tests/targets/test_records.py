@@ -287,9 +287,3 @@ def test_the_command_makes_a_record_with_its_row(tmp_path, monkeypatch):
     assert read(out).record["published"]["len_m"] == 11.95
     bare = records(tmp_path, {"My bus": {key: value for key, value in BUS.items() if key != "row"}}, "bare")
     assert main(["target", "make", bare, "--out", str(out)]) != 0
-
-
-def test_heights_of_unknown_names_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"motion.height_m: \['Brid'\]"):
-        run_of(tmp_path, {"motion": {"height_m": {"Brid": [1, 2]}}})
-    assert run_of(tmp_path, {"motion": {"height_m": {"Crow": [1, 2]}}})

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import threading
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -177,12 +176,6 @@ def test_the_end_of_a_job_is_noticed_within_a_fifth_of_its_time(executors, secon
     assert times[-1] - seconds <= min(seconds / 5 + FIRST_S, 30)
     # An administrator minds questions: a day has fewer than three thousand.
     assert len(times) <= 18 + seconds / 30
-
-
-def test_waits_grow_by_ten_seconds_in_the_plain_executor_and_by_a_fifth_in_the_mended_one(executors):
-    plain, mended = ([later - now for now, later in pairwise(asked(executor, 300))] for executor in executors)
-    assert plain[:4] == [3, 13, 23, 33]
-    assert mended == pytest.approx([min(3 * 1.2**number, 30) for number in range(len(mended))], rel=1e-9)
 
 
 def test_a_profile_that_asks_rarely_is_not_asked_more_often(executors):

@@ -6,9 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import pytest
-
-from configured import Inputs, parts, run_of
+from configured import parts, run_of
 from lowalt.config.layers import merge
 from lowalt.files.atomic import slug
 from lowalt.workflow import options
@@ -16,19 +14,6 @@ from lowalt.workflow.products import Products
 from lowalt.workflow.stage_settings import Settings
 
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
-
-
-@pytest.mark.parametrize(("name", "given", "words"), [
-    ("occluders", {"occluders": ["a b", "c"]}, ["--occluders", "a b", "c"]),
-    ("powers", {"powers": ["a", "b"]}, ["--powers", "a", "b"]),
-    ("scene", {"motion": "a", "clouds": ["b"]}, ["--motion", "a", "--clouds", "b"]),
-    ("content", {"signals": "a", "echoes": ["b", "c"]}, ["--signals", "a", "--echoes", "b", "c"]),
-    ("reduced_chunk", {"reduced": "a", "motion": "b"}, ["--reduced", "a", "--motion", "b"]),
-    ("samples", {"views": ["a", "b"]}, ["--views", "a", "b"]),
-])  # fmt: skip
-def test_an_option_stands_where_the_job_has_its_input_and_is_empty_elsewhere(name, given, words):
-    assert getattr(options, name)(None, Inputs(given)) == words
-    assert getattr(options, name)(None, Inputs(dict.fromkeys(given, ""))) == []
 
 
 def test_every_value_in_a_command_of_a_rule_is_quoted_and_rules_run_nothing_but_commands():

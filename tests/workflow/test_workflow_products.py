@@ -10,23 +10,13 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
-from configured import parts, run_of
+from configured import parts
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow import options
 
 ROOT = Path(__file__).parents[2]
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
-
-
-def test_the_default_run_names_what_it_trains_in_the_configuration_s_order():
-    run = run_of({"recognition": {"seeds": [4, 5], "protocols": ["unseen"]}})
-    assert run.trainings == [
-        f"unseen/{scheme}/{seed}" for scheme in ("a-vrp-trp-vt", "abc-vrp-trp-vt") for seed in (4, 5)
-    ]
-    assert run.priced == run.trainings
-    assert len(run.subtypes) == len(run.records) == 40
-    assert run.data == run.name == "default"
 
 
 def test_the_chunks_with_the_first_motion_models_tell_of_every_subtype():
@@ -73,21 +63,16 @@ def test_what_is_prepared_is_all_that_trainings_and_the_page_wait_for():
     assert not {name for name in without.prepared(CHUNK) if "/views/" in name}
 
 
-def test_stages_before_the_first_training_do_without_torch():
+def test_stages_before_the_first_training_and_tables_do_without_torch():
     """In a process of its own: torch is not to be found there, as while `make` is still fetching it."""
     stages = ["targets", "targets.gallery", "motion", "echo", "noise", "tiles", "shards", "shards.card", "recognition"]
     stages += ["recognition.views", "recognition.freeze", "recognition.distances", "measure.echo_cost"]
     stages += ["report.figures.cost_plots", "config.layers", "workflow.run"]
+    stages += [f"recognition.{name}" for name in ("sample_sources", "evaluated", "tables", "score", "augment")]
     program = "import sys; sys.modules['torch'] = sys.modules['timm'] = None; import importlib as i"
     program += f"; [i.import_module('lowalt.' + name) for name in {stages}]"
     environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)
-
-
-def test_trainings_of_more_images_start_first():
-    run = run_of({"recognition": {"schemes": ["A:VRP+TRP+VT", "ABC:VRP+TRP+VT"]}})
-    places = {scheme: run.images_of_job(SimpleNamespace(scheme=scheme)) for scheme in run.schemes_by_slug}
-    assert places == {"a-vrp-trp-vt": 3, "abc-vrp-trp-vt": 9}
 
 
 def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():

@@ -72,13 +72,10 @@ def test_what_suits_is_taken(overlay):
     ({**CELLS, "shards": {"kind": "signal"}}, r"spectra: \['hrrp'\] and shards.kind 'signal'"),
     ({**CELLS, "effects": {"slow_time": {"regrid": "nudft"}}}, "slow_time.regrid: 'nudft'"),
     ({"shards": {"kind": "recipe"}, "effects": {"cell_noise": {}}}, "'recipe' with the effect 'cell_noise'"),
-    ({"network": {"guard_subcarriers": -3}}, "expected effects.interference"),
-    ({"network": LINKS}, "links between two stations, expected effects.direct_path"),
     # However weak the direct path is, also where there is none.
     *(({"network": LINKS, "effects": {"direct_path": {"loss_db": loss_db}, name: {}}},
        rf"\['{name}'\] are not modelled between two stations")
       for loss_db in (0.0, None) for name in ("background_channel", "interference", "transmit_leakage")),
-    ({"effects": {"receiver_noise": {}}}, "a link budget or set SNRs, not both"),
     ({"effects": {"ground_reflection": {"permittivity": 0.9}}}, "effects.ground_reflection"),
     *(({"network": AT_12_GHZ, "effects": {"ground_reflection": {key: GROUND[key] for key in known}}},
        "medium dry ground is known from 1 to 10 GHz, station A sends at 12 GHz")
@@ -102,18 +99,6 @@ def test_what_does_not_is_refused_with_its_key_and_what_was_expected(overlay, wo
     with pytest.raises(InputError, match=words) as refused:
         run_of(overlay, overlay.get("inputs"))
     assert "\n" not in str(refused.value).removeprefix("configuration refused: ")
-
-
-def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_replace_them(tmp_path):
-    targets = load_yaml("config/real.yaml")["targets"]
-    with pytest.raises(InputError, match=rf"inputs: {tmp_path}, expected a folder with the files of at least one of"):
-        run_of({"targets": targets}, str(tmp_path))
-    (name, record), *_ = load_yaml("config/targets/real.yaml").items()
-    for part in record["parts"].values():
-        for mesh in part["meshes"]:
-            (tmp_path / mesh["file"]).parent.mkdir(parents=True, exist_ok=True)
-            (tmp_path / mesh["file"]).touch()
-    assert run_of({"targets": targets}, str(tmp_path)).records[name]["source"] == "mesh"
 
 
 def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, monkeypatch):

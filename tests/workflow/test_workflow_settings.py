@@ -1,7 +1,6 @@
 """Settings of stages (`lowalt.workflow.stage_settings`), options of commands and the report's manifest."""
 
 import json
-import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,14 +11,8 @@ from lowalt.config.layers import plain
 from lowalt.files.yaml_files import load_yaml
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
-from snakemake_texts import body
 
 ROOT = Path(__file__).parents[2]
-SETTINGS_OF = {
-    "cloud": "cloud", "motion": "motion", "echo": "echo", "echo_in_scene": "echo_in_scene", "noise": "noise",
-    "tiles": "images", "shard": "shard", "index": "index", "configuration": "configuration", "views": "views",
-    "train": "training", "evaluate": "evaluation", "report": "report",
-}  # fmt: skip
 
 
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
@@ -51,12 +44,6 @@ def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay
     assert {name for name in names if getattr(before, name)(job) != getattr(after, name)(job)} == changed
     # The whole configuration stands next to the results and in the report.
     assert before.configuration(job) != after.configuration(job) and before.report(job) != after.report(job)
-
-
-@pytest.mark.parametrize("rule", SETTINGS_OF)
-def test_each_rule_is_given_the_settings_of_its_stage(rule):
-    block = re.search(r"^    params:\n((?:        .*\n)+)", body(rule), re.MULTILINE)[1]
-    assert re.search(r"^        settings=(.*?),?$", block, re.MULTILINE)[1] == f"settings.{SETTINGS_OF[rule]}"
 
 
 def test_settings_of_different_jobs_differ_and_are_json():

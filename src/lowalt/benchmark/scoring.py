@@ -18,10 +18,9 @@ from lowalt.benchmark.definition import MAIN, named_seed
 from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions
 from lowalt.recognition.intervals import Interval, model_shares, strict_difference
-from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.samples import Facts
-from lowalt.recognition.statistics import accuracy_by
+from lowalt.recognition.statistics import accuracy_by, f1_by_snr
 
 
 class Values(NamedTuple):

@@ -22,8 +22,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `benchmark` and its own commands to a parser's commands."""
     about = commands.add_parser(name, help=COMMANDS[name].meaning, epilog=f"example: {EXAMPLE}")
     own = about.add_subparsers(metavar="COMMAND", required=True)
-    add_command(own, "tracks", tracks, "the tracks: whom each serves, and how many samples it has",
-                "lowalt benchmark tracks")  # fmt: skip
+    add_command(
+        own, "tracks", tracks, "the tracks: whom each serves, and how many samples it has", "lowalt benchmark tracks"
+    )
     line = add_command(own, "make", make, "make the data of tracks and compare them with the kept checksums",
                        "lowalt benchmark make --track unseen town")  # fmt: skip
     line.add_argument("--track", nargs="+", default=["unseen"], help="tracks whose data to make (default: unseen)")

@@ -42,11 +42,13 @@ def add_sheets(actions: argparse._SubParsersAction) -> None:
         line = add_command(actions, kind, _draft, f"draft a {kind}'s record from its data sheet", EXAMPLES[kind])
         line.set_defaults(kind=kind)
         for word, meaning in sizes.items():
-            line.add_argument(f"--{word}", type=int if word in ("rotors", "blades") else metres, required=True,
-                              help=meaning)  # fmt: skip
+            line.add_argument(
+                f"--{word}", type=int if word in ("rotors", "blades") else metres, required=True, help=meaning
+            )
         if kind != "vehicle":
-            line.add_argument("--rate", type=_band, required=True, metavar="LOW:HIGH",
-                              help="revolutions or wing beats a second (Hz)")  # fmt: skip
+            line.add_argument(
+                "--rate", type=_band, required=True, metavar="LOW:HIGH", help="revolutions or wing beats a second (Hz)"
+            )
             line.add_argument("--climb", type=metres, help="highest vertical speed (m/s)")
         line.add_argument("--speed", type=metres, required=True, help="highest speed over ground (m/s)")
         line.add_argument("--frame", default=FRAMES[kind], help="built-in model (default: %(default)s)")
@@ -61,8 +63,9 @@ def _draft(options: argparse.Namespace) -> Answer:
 
     kind = KINDS[options.kind]
     stated = {word: getattr(options, word) for word in {**kind.cells, **kind.figures}}
-    text, lender = draft_target(options.kind, options.out, subtype=options.subtype, frame=options.frame,
-                                about=options.about, **stated)  # fmt: skip
+    text, lender = draft_target(
+        options.kind, options.out, subtype=options.subtype, frame=options.frame, about=options.about, **stated
+    )
     if options.out is None:
         return Answer({"file": None, "text": text}, text)
     name = options.subtype or options.out.stem

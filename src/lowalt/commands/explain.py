@@ -12,7 +12,7 @@ import numpy as np
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import merge, overlaid
 from lowalt.config.plan import Plan
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.spectra.catalogue import named
@@ -74,8 +74,7 @@ def run(options: argparse.Namespace) -> Answer:
         overlay: dict = {}
         for path in options.scene:
             overlay = merge(overlay, load_yaml(path))
-        with replacing(options.out) as temporary:
-            temporary.write_text(explanation.suggested(overlay, changes, options.suggest))
+        write_file(options.out, explanation.suggested(overlay, changes, options.suggest))
     lines = [*([cubes_sentence(size), ""] if size else []), *explanation.verdict(findings)]
     if changes and not options.no_table:
         lines += ["", *explanation.effects_table(changes, options.sources)]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command, positive
 from lowalt.commands.command_table import COMMANDS
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.recordings.file_inspection import FileInspection, Seen, inspect_recording
 
@@ -122,12 +122,10 @@ def _inspect(options: argparse.Namespace) -> Answer:
     if ready and out.exists() and not out.read_text(errors="replace").startswith(DRAFTED):
         raise InputError(f"{out}: is there already and no draft, expected --out with another name")
     picture = Path(f"{options.file.stem}-inspect.png")
-    with replacing(picture) as temporary:
-        temporary.write_bytes(recording_picture(inspection, [_described(one) for one in inspection.readings]))
+    write_file(picture, recording_picture(inspection, [_described(one) for one in inspection.readings]))
     text = drafted(inspection, seen, out.parent) if ready else None
     if text:
-        with replacing(out) as temporary:
-            temporary.write_text(text)
+        write_file(out, text)
     then = _next(inspection, seen, out)
     facts = {
         "path": inspection.path, "carrier_hz": inspection.carrier_hz, "rate_hz": inspection.rate_hz,

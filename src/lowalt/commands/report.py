@@ -11,7 +11,7 @@ from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
 from lowalt.config.layers import SCHEMA, check, of_run
 from lowalt.config.named_code import allowed, refuse_effects
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import as_named, located, shipped
@@ -88,7 +88,6 @@ def gallery(results: Path) -> Answer:
     if not folders:
         raise InputError(f"{results}: no run, expected folders with a config.yaml such as results/default")
     pages = {path.name: f"{path.name}/report.html" for path in folders if (path / "report.html").is_file()}
-    with replacing(results / "index.html") as temporary:
-        temporary.write_text(all_runs({path.name: facts(path) for path in folders}, pages))
+    write_file(results / "index.html", all_runs({path.name: facts(path) for path in folders}, pages))
     text = f"{results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"
     return Answer({"files": [results / "index.html"], "runs": [path.name for path in folders]}, text)

@@ -9,7 +9,7 @@ import numpy as np
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import warn_in_one_line
 from lowalt.config.layers import overlaid
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import replacing, write_file
 from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.receive import AT, alone, receive, write
@@ -55,8 +55,7 @@ def run(options: argparse.Namespace) -> Answer:
         f"{key}-axes.png": figure(image, renderer, f"{options.subtype}, motion model {options.model}, {noise}"),
     }
     for name, data in written.items():
-        with replacing(options.out / name) as temporary:
-            temporary.write_bytes(data)
+        write_file(options.out / name, data)
     with replacing(options.out / f"{key}.npy") as temporary:
         np.save(temporary, signal)
     paths = [str(options.out / name) for name in (*written, f"{key}.npy")]

@@ -91,14 +91,13 @@ def _inspect(options: argparse.Namespace) -> Answer:
 
 def _new(options: argparse.Namespace) -> Answer:
     """Draft an overlay. Raises: InputError naming the file and what is wrong with it, or an overlay that exists."""
-    from lowalt.files.atomic import replacing, slug
+    from lowalt.files.atomic import slug, write_file
     from lowalt.scene.town import town_plan
 
     if options.out.suffix not in (".yaml", ".yml") or options.out.exists():
         raise InputError(f"--out: {options.out}, expected a new file that ends in .yaml")
     settings, facts, lines = _examined(options, options.out.with_suffix(".png"))
     comments = [*lines[:-1], f"Look: {facts['picture']}. Move the town by `origin`, or the stations in `network`."]
-    with replacing(options.out) as temporary:
-        temporary.write_text(town_plan.overlay(settings, slug(options.out.stem), comments))
+    write_file(options.out, town_plan.overlay(settings, slug(options.out.stem), comments))
     text = [*lines, f"{options.out}: drafted; `lowalt explain {options.out}` says what its paths change"]
     return Answer({**facts, "overlay": options.out}, "\n".join(text))

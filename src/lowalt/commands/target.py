@@ -13,7 +13,7 @@ from lowalt.commands.data_sheet import add_sheets
 from lowalt.config.command import warn_in_one_line
 from lowalt.drafting.inspection import Inspection, described, inspect_mesh
 from lowalt.drafting.new import SEED, Asked, draft
-from lowalt.files.atomic import replacing, slug
+from lowalt.files.atomic import slug, write_file
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
@@ -63,8 +63,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         new.add_argument(
             f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
         )
-    new.add_argument("--rotors", "--wheels", type=int, dest="count", metavar="N",
-                     help="number of its rotors or wheels, 0 for none")  # fmt: skip
+    new.add_argument(
+        "--rotors", "--wheels", type=int, dest="count", metavar="N", help="number of its rotors or wheels, 0 for none"
+    )
     new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
                      "for two that are one rotor or wheel")  # fmt: skip
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
@@ -88,8 +89,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 def _write(path: Path, data: bytes) -> Path:
     """Write a file and return its path."""
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
+    write_file(path, data)
     return path
 
 
@@ -102,9 +102,10 @@ def _inspect(options: argparse.Namespace) -> Answer:
     facts = {name: value for name, value in vars(seen).items() if name not in INNER} | {
         "components": [vars(part) | {"extent": part.extent, "centre": part.centre} for part in seen.components],
         "pieces": [{"name": name, "triangles": count, "extent": extent} for name, count, extent in seen.pieces],
-        **({"wings_from_m": seen.shoulder_m} if seen.category == "Bird" else {}), "picture": out,
+        **({"wings_from_m": seen.shoulder_m} if seen.category == "Bird" else {}),
+        "picture": out,
         "front_from": seen.front_from.words,
-    }  # fmt: skip
+    }
     return Answer(facts, f"{described(seen)}\n\npicture  {out}")
 
 

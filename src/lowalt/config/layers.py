@@ -14,7 +14,7 @@ import yaml
 from lowalt.config.command import parser, run
 from lowalt.config.network import OFDM
 from lowalt.config.schema import check_brought, faults, plain, with_numbers
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
@@ -161,8 +161,7 @@ def main(arguments: list[str]) -> None:
     line = parser("lowalt.config.layers", "Write the merged configuration as YAML.")
     line.add_argument("--out", required=True)
     options = line.parse_args(arguments)
-    with replacing(options.out) as temporary:
-        temporary.write_text(yaml.safe_dump(options.settings, sort_keys=False, allow_unicode=True))
+    write_file(options.out, yaml.safe_dump(options.settings, sort_keys=False, allow_unicode=True))
     print(f"{options.out}: written", file=sys.stderr)
 
 

@@ -14,14 +14,14 @@ from lowalt.drafting.guesses import ASYMMETRIC, SYMMETRIC, off_mirror
 from lowalt.files.errors import InputError
 
 LEVEL, ALONG = 0.5, 0.9
-"""Cosines: an axis is level where its cosine to `up` is below LEVEL, and along an axis of the file from ALONG on."""
+"""Cosines: an axis is horizontal if its cosine to `up` is below LEVEL, and along an axis of the file from ALONG on."""
 
 CLEAR, OFF_MIDDLE = 2.0, 0.05
-"""A direction lies along one of the two level axes where it is at least CLEAR times its part along the other one, and
-OFF_MIDDLE of the target's largest extent."""
+"""A direction lies along one of the two horizontal axes if its part there is at least CLEAR times that along the other,
+and OFF_MIDDLE times the target's largest extent."""
 
 LONG_CAR, LONG_WING = 1.2, 1.5
-"""Least ratio of the level extents that tells the length of a vehicle, and the span of a plane without lift rotors."""
+"""Least ratio of the horizontal extents at which the longer is a vehicle's length or a plane's span."""
 
 NOTHING_TELLS = "no part tells"
 SPAN = "the span"
@@ -31,8 +31,9 @@ MOST_POINTS = 4000
 WORDS = {
     "front": {"front", "fore", "fwd", "forward", "nose", "fl", "fr", "lf", "rf"},
     "rear": {"rear", "back", "aft", "tail", "rl", "rr", "bl", "br", "lb", "rb"},
-    "left": {"left", "fl", "rl", "bl", "lf", "lb"}, "right": {"right", "fr", "rr", "br", "rf", "rb"},
-}  # fmt: skip
+    "left": {"left", "fl", "rl", "bl", "lf", "lb"},
+    "right": {"right", "fr", "rr", "br", "rf", "rb"},
+}
 """Words in the names of parts that say where a part is."""
 
 
@@ -200,7 +201,7 @@ def front_of(shape: Shape, given: str | None, usual: str | None, otherwise: str)
     """Return the front of a target, from evidence, and the evidence in words.
 
     given: the front that the user states; usual: the front that files of this format have by convention; otherwise: the
-    front where nothing tells.
+    front without evidence.
     Raises: InputError where strong evidence contradicts itself or binding evidence contradicts the user, naming both
     and the option that resolves it.
     """

@@ -50,8 +50,8 @@ least area that the end spans, as a share of the bounding box: CUT for a plane a
 anywhere."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
-"""How an arm is told from a blade: its spread across is at most SLENDER times that along, it points at the middle of
-the craft with a cosine of at least RADIAL, and its inner end is at most INWARD times as far out as its own middle."""
+"""An arm, unlike a blade, is at most SLENDER times as wide as long (by spread). It points at the middle of the craft
+with a cosine of at least RADIAL, and its inner end is at most INWARD times as far from there as its centre."""
 
 IN_LINE = 0.9
 """Least cosine of the angle between a blade and the line to the other blade of the same rotor."""
@@ -236,8 +236,8 @@ def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list
 
 def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
     """Return whether a group is flat along one of the axes, wide enough, and lies about one hub."""
-    # All axes are asked for groups whose names call them rotors: a helicopter's main rotor may be as wide as the craft,
-    # its tail rotor small.
+    # Groups named as rotors are tried along all axes and may be wider or smaller: a helicopter's main rotor may be as
+    # wide as the craft, and its tail rotor is small.
     least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
     for axis in axes:
         across = np.delete(group.extent, axis).max()
@@ -251,9 +251,9 @@ def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
 def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
     """Return the axis of the file about which a rotor or wheel turns: the one along which it is thinnest.
 
-    Two blades may be thinner along their chord than along their axis. A rotor wider than half the craft, whose corners
-    are `low` and `high` (3,) m, is therefore taken to turn about the axis `up`, and a tail rotor about the horizontal
-    axis across the tail.
+    Two blades may be thinner along their chord than along their axis. A rotor wider than half the craft is therefore
+    taken to turn about the axis `up`, and a tail rotor about the horizontal axis across the tail. low, high: (3,) m,
+    corners of the craft.
     """
     order, extent = np.argsort(group.extent, kind="stable"), high - low
     if up in order[:2] and group.extent.max() > WIDE_ROTOR * extent.max():
@@ -270,9 +270,9 @@ def rotors(
 ) -> tuple[int, list[Group]]:
     """Return the axis that points up, and the groups of components that may be rotors: `count` of them, or none.
 
-    Pieces whose names call them rotors are tried first, whatever their axes. Without such names, rotors are a set of at
-    least three alike flat groups around a hub each. Of several sets the one farthest out is taken, since motors stand
-    at the ends of arms. ups: axes that may point up, the likeliest first.
+    Pieces named as rotors are tried first, whatever their axes. Without such names, rotors are a set of at least three
+    alike flat groups, each around its own hub. Of several sets the one farthest out is taken, since motors stand at the
+    ends of arms. ups: axes that may point up, the likeliest first.
     """
     named = [part for part in parts if TURNING["rotor"].search(part.piece)]
     for groups in _grouped(named, ups[0], count):
@@ -311,7 +311,7 @@ def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[lis
 
 
 def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: int | None) -> list[Group]:
-    """The set of alike groups, but arms, that is farthest out: `count` of them, or at least two at one height."""
+    """The set of alike groups but arms that is farthest out: `count` groups, or two or more at one height."""
     best: tuple[float, list[Group]] = (0.0, [])
     for groups in choices:
         for group in groups:
@@ -328,8 +328,9 @@ def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: in
 
 def _are_arms(groups: list[Group], up: int) -> bool:
     """Whether all groups are slender pieces that point at the middle between them and reach near it."""
-    centres, extents = (np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1)
-                        for name in ("centre", "extent"))  # fmt: skip
+    centres, extents = (
+        np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1) for name in ("centre", "extent")
+    )
     away = centres - centres.mean(axis=0)
     reach = np.linalg.norm(away, axis=1)
     along = np.array([np.delete(group[0].along, up) for group in groups])

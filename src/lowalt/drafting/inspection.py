@@ -8,19 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.drafting import guesses
 from lowalt.drafting.front import NOTHING_TELLS, Front, Shape, Turning, front_of
-from lowalt.drafting.guesses import (
-    USUAL_M,
-    Component,
-    Group,
-    cut_axis,
-    guessed_axes,
-    guessed_unit,
-    mirror_axis,
-    rotors,
-    turning_axis,
-    wheels,
-)
 from lowalt.files.atomic import existing
 from lowalt.targets.mesh_files import UNITS_M, Mesh, metres, pieces, read_mesh, stated_unit_m, stated_up_axis
 from lowalt.targets.mesh_polygons import Piece
@@ -54,11 +43,11 @@ class Inspection:
     up: str
     front: str
     pieces: list[tuple[str, int, np.ndarray]]
-    components: list[Component] = field(default_factory=list)
+    components: list[guesses.Component] = field(default_factory=list)
     category: str = "UAV"
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     owner: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    groups: list[Group] = field(default_factory=list)
+    groups: list[guesses.Group] = field(default_factory=list)
     sides_seen: bool = True
     cut: str = ""
     up_from: str = "given"
@@ -82,7 +71,7 @@ class Inspection:
         return float(edges[np.flatnonzero((sizes >= 0.5 * sizes.max(axis=0)).all(axis=1)).max(initial=0) + 1])
 
 
-def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[Component]:
+def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[guesses.Component]:
     """Return the connected components of a repaired mesh, those with the largest extent first.
 
     named: the pieces of its file, whose unit is `metre` metres; a component has the names of the smallest piece whose
@@ -104,7 +93,7 @@ def components_of(mesh: Mesh, named: list[Piece], metre: float) -> list[Componen
         around = [(float(np.prod(top - base)), name) for base, top, name in boxes
                   if (low >= base).all() and (high <= top).all()]  # fmt: skip
         names, shape = min(around, default=(0.0, ""))[1], (middle, float(areas.sum()) / 2, axes[:, 2], slender)
-        result.append(Component(number, low, high, len(triangles), closed, names, "", *shape))
+        result.append(guesses.Component(number, low, high, len(triangles), closed, names, "", *shape))
     return sorted(result, key=lambda part: -float(part.extent.max()))
 
 
@@ -115,13 +104,13 @@ def _unit_of(
     stated = stated_unit_m(path)
     if size_m is not None:
         return float(f"{size_m / extents.max():.6g}"), "given by the size"
-    size, (low, high) = float(extents.max()), USUAL_M[category]
+    size, (low, high) = float(extents.max()), guesses.USUAL_M[category]
     believed = stated is not None and (path.suffix.lower() != ".glb" or low / BELIEVED <= size <= high * BELIEVED)
     if believed or (stated is not None and row.get("name")):
         return {metre: name for name, metre in UNITS_M.items()}.get(stated, stated), "stated by the file"
     wanted = row.get("len_m") if category == "Vehicle" else row.get("size_m")
     why = "guessed from the size" if stated is None else "guessed: in glTF's metres no such target has this size"
-    return guessed_unit(extents, category, wanted), why
+    return guesses.guessed_unit(extents, category, wanted), why
 
 
 def inspect_mesh(
@@ -151,13 +140,13 @@ def inspect_mesh(
         usual = "z"
     height, unit_vectors = "xyz".index(up[-1]), np.eye(3)
     upward = unit_vectors[height] * (-1 if up[0] == "-" else 1)
-    hubs = [Turning(group[0].piece, group.centre, unit_vectors[turning_axis(group, height, low, high)])
+    hubs = [Turning(group[0].piece, group.centre, unit_vectors[guesses.turning_axis(group, height, low, high)])
             for group in groups]  # fmt: skip
     shape = Shape(category, upward, points, _places(parts, named), hubs)
-    front = front_of(shape, axes[1], usual, guessed_axes(high - low, category, height)[1])
+    front = front_of(shape, axes[1], usual, guesses.guessed_axes(high - low, category, height)[1])
     sides_seen = category != "Bird" or None not in axes or front.words != NOTHING_TELLS
     ends = [axis for axis, name in enumerate("xyz") if name not in (up[-1], axes[1] and axes[1][-1])]
-    cut = cut_axis(mesh, points, ends)
+    cut = guesses.cut_axis(mesh, points, ends)
     kind = {"UAV": "rotor", "Vehicle": "wheel"}.get(category, "")
     turning = {part.number for group in groups for part in group}
     listed = [(", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres(unit))
@@ -169,7 +158,7 @@ def inspect_mesh(
     )  # fmt: skip
 
 
-def _places(parts: list[Component], named: list[Piece]) -> dict[str, np.ndarray]:
+def _places(parts: list[guesses.Component], named: list[Piece]) -> dict[str, np.ndarray]:
     """The centre (3,) m of the components of each piece whose name may say where it is, by name."""
     names = {", ".join(piece.names) for piece in named}
     if len(names) < 2:
@@ -179,15 +168,15 @@ def _places(parts: list[Component], named: list[Piece]) -> dict[str, np.ndarray]
 
 
 def _upright(
-    parts: list[Component], points: np.ndarray, box: tuple[np.ndarray, np.ndarray], category: str, count: int | None,
-    axes: tuple[str | None, str | None], path: Path,
-) -> tuple[str, str, list[Group]]:  # fmt: skip
+    parts: list[guesses.Component], points: np.ndarray, box: tuple[np.ndarray, np.ndarray], category: str,
+    count: int | None, axes: tuple[str | None, str | None], path: Path,
+) -> tuple[str, str, list[guesses.Group]]:  # fmt: skip
     """The axis up, what it is from, and the groups that may be a moving part each.
 
     points: (N, 3) m on the surface; box: its lowest and highest corner; count: the number of rotors or wheels where it
     is known; axes: up and front where given.
     """
-    groups: list[Group] = []
+    groups: list[guesses.Group] = []
     low, high = box
     extent, stated = high - low, stated_up_axis(path)
     given = [axes[0]] if axes[0] else [stated] if stated else []
@@ -197,12 +186,12 @@ def _upright(
         ups += [int(axis) for axis in np.argsort(extent, kind="stable") if axis not in (*ups, front)]
     level = None
     if category == "UAV" and count != 0:
-        level, groups = rotors(parts, ups, extent, count)
+        level, groups = guesses.rotors(parts, ups, extent, count)
         flat = {int(group.extent.argmin()) for group in groups}
         if len(groups) > 2 and len(flat) == 1:
             level = flat.pop()  # three rotors that lie flat tell more than a file's format
     elif category == "Vehicle" and count != 0:
-        groups = wheels(parts, extent)
+        groups = guesses.wheels(parts, extent)
         centres = np.array([group.centre for group in groups]).reshape(-1, 3)
         if len(groups) > 2:
             level = int(np.ptp(centres, axis=0).argmin())  # wheels stand on one level
@@ -212,8 +201,8 @@ def _upright(
         return stated, "as the file's format defines it", groups
     if level is None or level == front:
         # The lowest extent is up, except along the axis that is known to be level: the front, or a bird's right.
-        level_axis = mirror_axis(points) if front is None and category == "Bird" else front
-        level = "xyz".index(guessed_axes(extent, category, None, level_axis)[0])
+        level_axis = guesses.mirror_axis(points) if front is None and category == "Bird" else front
+        level = "xyz".index(guesses.guessed_axes(extent, category, None, level_axis)[0])
     height = np.mean([group.centre[level] for group in groups]) - (low + high)[level] / 2 if groups else 0.0
     # Rotors stand in the upper half and wheels in the lower one; some files have their down axis first.
     down = height < -1e-9 * extent[level] if category == "UAV" else height > 1e-9 * extent[level]

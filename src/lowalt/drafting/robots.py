@@ -12,7 +12,7 @@ from lowalt.drafting.draft import alternating, record_text, row_lines, size_word
 from lowalt.drafting.front import LEVEL, Front, Shape, Turning, front_of
 from lowalt.drafting.guesses import TURNING
 from lowalt.drafting.robot_geometry import Joint, Robot
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import LARGEST_TRIANGLES
 from lowalt.targets.mesh_record import MOVING_KIND, body_axes
@@ -115,8 +115,7 @@ def write_parts(path: Path, triangles: dict[str, np.ndarray]) -> None:
         shape = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False)
         shape.merge_vertices()
         scene.add_geometry(shape, node_name=name, geom_name=name)
-    with replacing(path) as temporary:
-        temporary.write_bytes(scene.export(file_type="glb"))
+    write_file(path, scene.export(file_type="glb"))
 
 
 def _above(robot: Robot, joint: Joint, joints: dict[str, Joint]) -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import yaml
 
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.builtin import UNITS
@@ -151,6 +151,5 @@ def draft_target(
     if path:
         if path.exists():
             raise InputError(f"{path}: is there already, expected a new file")
-        with replacing(path) as temporary:
-            temporary.write_text(text)
+        write_file(path, text)
     return text, lender

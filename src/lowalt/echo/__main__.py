@@ -14,7 +14,7 @@ from lowalt.targets.cloud import read
 
 
 def main(arguments: list[str]) -> None:
-    """Compute one chunk's echoes and write one array file a station."""
+    """Compute one chunk's echoes and write one array file per station."""
     options = parser("lowalt.echo", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")

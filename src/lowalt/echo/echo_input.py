@@ -87,8 +87,9 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
         points = _float("motion.points", motion.points, ("L", 3), where)
         part = np.ascontiguousarray(motion.part)
         if part.shape != (len(points),) or part.dtype.kind not in "iu":
-            raise InputError(f"{where}motion.part has shape {part.shape} and type {part.dtype}, "
-                             f"expected ({len(points)},) integers")  # fmt: skip
+            raise InputError(
+                f"{where}motion.part has shape {part.shape} and type {part.dtype}, expected ({len(points)},) integers"
+            )
         if part.min() < 0 or part.max() >= parts:
             raise InputError(f"{where}motion.part spans {part.min()}..{part.max()}, expected 0..{parts - 1}")
         part = part.astype(np.int64)
@@ -99,8 +100,9 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
         translation = _float("positions", motion, ("N", "L", 3), where)
         count = translation.shape[1]
         rotation, points, part = _no_rotation()
-    rcs = _float("rcs_m2", np.broadcast_to(np.asarray(rcs_m2), (count,)) if np.ndim(rcs_m2) == 0 else rcs_m2,
-                 (count,), where)  # fmt: skip
+    rcs = _float(
+        "rcs_m2", np.broadcast_to(np.asarray(rcs_m2), (count,)) if np.ndim(rcs_m2) == 0 else rcs_m2, (count,), where
+    )
     if rcs.min() < 0:
         raise InputError(f"{where}rcs_m2[{int(rcs.argmin())}] is {rcs.min()}, expected square metres >= 0")
     return Target(rotation, translation, points, part, np.sqrt(rcs), rcs)
@@ -130,8 +132,9 @@ def check_station(network: Network, station: Station) -> None:
     if not (np.isfinite(station.frequency_hz) and station.frequency_hz > 0):
         raise InputError(f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive number")
     if np.shape(station.position_m) != (3,) or not all(map(math.isfinite, (*station.position_m, station.normal_rad))):
-        raise InputError(f"station {station.name}: position_m {station.position_m} or normal_rad "
-                         f"{station.normal_rad} is not finite")  # fmt: skip
+        raise InputError(
+            f"station {station.name}: position_m {station.position_m} or normal_rad {station.normal_rad} is not finite"
+        )
 
 
 def _no_rotation() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -5,17 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.echo.echo_input import EchoInput
-from lowalt.echo.fast import driver
+from lowalt.echo.fast import driver, error_model
 from lowalt.echo.fast.cell_kernel import CellPolynomials, cell_polynomials
-from lowalt.echo.fast.error_model import (
-    SINGLE_ERROR,
-    SPREAD_LIMIT,
-    EchoPlan,
-    array_gains,
-    echo_plan,
-    pointwise_bound,
-    round_up,
-)
 from lowalt.echo.fast.layout import EchoSample, layout
 from lowalt.echo.fast.polynomials import folding
 from lowalt.echo.fast.range_bounds import SIZE, SPREAD, cut_segments, fill_extents
@@ -64,7 +55,7 @@ def compute(
     found = Found.empty(len(refs))
     symbols = np.arange(len(refs))
     exact = run.plan(0.0)
-    if not run.spread < SPREAD_LIMIT or run.cells(exact) is None:
+    if not run.spread < error_model.SPREAD_LIMIT or run.cells(exact) is None:
         return found, symbols, run.method(exact, 0, 0, len(refs)), run.sample
     chosen, cheap = exact, 0
     if tolerance is not None and len(refs) > PROBES and run.saving(tolerance) > PROBE_COST:
@@ -102,9 +93,9 @@ class _Run:
         self.spread = fill_extents(self.sample, refs, self.extents)
         self.size_m = float(self.extents[:, SIZE].max())
 
-    def plan(self, error: float) -> EchoPlan:
+    def plan(self, error: float) -> error_model.EchoPlan:
         """Return the plan for an error bound of `error` (0: exact mode)."""
-        return echo_plan(self.sample.radar, self.points, error)
+        return error_model.echo_plan(self.sample.radar, self.points, error)
 
     def peaks(self, symbols: np.ndarray) -> np.ndarray:
         """Return for each symbol an upper bound: the sum of amplitudes at the arrays' peak gain."""
@@ -112,19 +103,19 @@ class _Run:
 
     def saving(self, tolerance: float) -> float:
         """Return the cost that a tolerance may save, in points x symbols of the exact plan."""
-        return (SAVED_SINGLE if 0.5 * tolerance > SINGLE_ERROR else SAVED) * len(self.refs) * self.points
+        return (SAVED_SINGLE if 0.5 * tolerance > error_model.SINGLE_ERROR else SAVED) * len(self.refs) * self.points
 
-    def cells(self, chosen: EchoPlan) -> CellPolynomials | None:
+    def cells(self, chosen: error_model.EchoPlan) -> CellPolynomials | None:
         """Return the cell kernels of a plan; None if the target extends over too many cells."""
         radar = self.sample.radar
-        return cell_polynomials(radar.subcarriers, round_up(self.size_m * radar.cells, 6), chosen.fit)
+        return cell_polynomials(radar.subcarriers, error_model.round_up(self.size_m * radar.cells, 6), chosen.fit)
 
-    def compute(self, symbols: np.ndarray, chosen: EchoPlan, final: bool, found: Found) -> None:
+    def compute(self, symbols: np.ndarray, chosen: error_model.EchoPlan, final: bool, found: Found) -> None:
         """Compute `symbols` into `found` by the plan `chosen`; `final`: accept unproved strongest cells."""
         refs, extents = self.refs, self.extents
         if len(symbols) < len(refs):
             refs, extents = refs[symbols], extents[symbols]
-        gains, cells = array_gains(self.sample.radar), self.cells(chosen)
+        gains, cells = error_model.array_gains(self.sample.radar), self.cells(chosen)
         assert cells is not None  # `compute` checked the plan's cell kernels before
         segments = np.empty((len(symbols), 6))
         count = cut_segments(extents, gains.horizontal.rates[0], gains.vertical.rates[0], LONGEST, segments)
@@ -134,9 +125,9 @@ class _Run:
             workspace(approximation, self.sample.lay.amplitude), found,
         )  # fmt: skip
 
-    def method(self, chosen: EchoPlan, cheap: int, exact: int, general: int) -> Method:
+    def method(self, chosen: error_model.EchoPlan, cheap: int, exact: int, general: int) -> Method:
         """Return the record of how the sample was computed."""
         cells, degree = self.cells(chosen), len(chosen.cosine) - 1
         orders = degree, degree, cells.kernels.shape[2] - 1 if cells else 0
-        bound = pointwise_bound(self.sample.radar, self.size_m, self.points)
+        bound = error_model.pointwise_bound(self.sample.radar, self.size_m, self.points)
         return Method(chosen.single, orders, cheap, exact, general, bound)

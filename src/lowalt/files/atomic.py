@@ -52,6 +52,12 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def write_file(path: str | Path, content: str | bytes) -> None:
+    """Write a whole file by `replacing`, text in UTF-8."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 def _sweep(path: Path) -> None:
     """Remove temporary files of `path` left by killed processes, to free disk space."""
     begin, end = f".{path.stem}.", f".part{path.suffix}"

@@ -10,8 +10,8 @@ INPUTS = "LOWALT_INPUTS"
 def prepare(source: Path, inputs: str | None) -> str | None:
     """Set the environment of jobs and return the folder of the user's inputs: `inputs`, else LOWALT_INPUTS, else None.
 
-    Jobs run `python -m lowalt.STAGE` with the interpreter of the workflow, whether or not its environment is active,
-    and with the source of this checkout, also in an environment of their own (conda, a cluster node).
+    Jobs run `python -m lowalt.STAGE` with the interpreter of the workflow, even if its environment is not active. They
+    use the source of this checkout, also in an environment of their own (conda, a cluster node).
     """
     environment = os.environ
     environment["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", "")])

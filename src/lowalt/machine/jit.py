@@ -95,7 +95,7 @@ class Kernel:
         """numba's dispatcher of the function."""
         from lowalt.machine.machine_code import dispatcher
 
-        return dispatcher(self.function, self.options)
+        return dispatcher(self.function, self.options, functools.partial(digest, self.function, self.options))
 
     @property
     def _numba_type_(self) -> Any:

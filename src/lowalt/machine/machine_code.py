@@ -19,8 +19,6 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.targetconfig import ConfigStack
 
-from lowalt.machine.jit import digest
-
 
 def _fields(kind) -> tuple:
     """Return the names of the fields of a named tuple's type, of those inside it, and so on, in their order."""
@@ -72,13 +70,14 @@ CPUCodeLibrary._finalize_final_module = _finalize
 class _DigestCache(FunctionCache):
     """Numba's cache on disk, with the digest of everything compiled in its keys."""
 
-    options: dict[str, Any] | None = None
+    options: dict[str, Any]
     """How the function is compiled."""
+    digest: Callable[[], str]
+    """Gives the digest of all code that the function runs."""
 
     def _index_key(self, sig, codegen):
         """Numba's key, the digest of code and options, the linking, and the fields of named tuples among arguments."""
-        code = digest(self._py_func, self.options), "own functions"
-        return *super()._index_key(sig, codegen), *code, tuple(map(_fields, sig))
+        return *super()._index_key(sig, codegen), self.digest(), "own functions", tuple(map(_fields, sig))
 
     def load_overload(self, sig, target_context):
         """Return finished machine code for a signature, or None where none is kept."""
@@ -104,9 +103,12 @@ def say_once() -> None:
     print("lowalt: compiling for this machine; the machine code is kept for later calls", file=sys.stderr, flush=True)
 
 
-def dispatcher(function: Callable, options: dict[str, Any]) -> Dispatcher:
-    """Return numba's dispatcher of a function, with the cache of this module. options: those of `njit`."""
+def dispatcher(function: Callable, options: dict[str, Any], digest: Callable[[], str]) -> Dispatcher:
+    """Return numba's dispatcher of a function, with the cache of this module.
+
+    options: those of `njit`; digest: gives the digest of all code that the function runs, which the key needs.
+    """
     compiled = njit(**options)(function)
     compiled._cache = _DigestCache(function)
-    compiled._cache.options = options
+    compiled._cache.options, compiled._cache.digest = options, digest
     return compiled

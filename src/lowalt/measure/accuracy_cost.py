@@ -118,7 +118,7 @@ def table_rows(
     """
     counts = {name: len(of) for name, of in runs.items()}
     if len(set(counts.values())) != 1:
-        raise InputError(f"trainings a scheme: {counts}, expected as many seeds of each")
+        raise InputError(f"trainings per scheme: {counts}, expected as many seeds of each")
     runs = {name: sorted(of, key=lambda training: training.seed) for name, of in runs.items()}
     base = next(iter(runs.values()))
     rows = []

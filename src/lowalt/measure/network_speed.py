@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from lowalt.config.command import parser, pick, run
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.machine.hardware import describe
 from lowalt.machine.timing import least_s
 from lowalt.recognition import recipe, recogniser
@@ -53,9 +53,9 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 2.0) -> dict:
 
     settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training; limit_s: seconds
     spent on one figure. A batch that takes longer than the limit is omitted (None). The batch of the training step is
-    the largest power of two, from 1 up to the setting's batch, that takes at most a quarter of the limit, estimated
-    from the largest timed batch, because a GPU processes one sample no faster than several. If the settings compile,
-    the training step uses the compiled network, as in a training.
+    the largest power of two, up to the setting's batch, that takes at most a quarter of the limit. Its time is
+    estimated from the largest timed batch, because a GPU processes one sample no faster than several. If the settings
+    compile, the training step uses the compiled network, as in a training.
     Raises: InputError for a wrong setting.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
@@ -108,8 +108,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, help="record to write (.json)")
     options = line.parse_args(arguments)
     record = measure(*with_scheme(options.settings))
-    with replacing(options.out) as temporary:
-        temporary.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
+    write_file(options.out, json.dumps(record, indent=1, sort_keys=True) + "\n")
 
 
 if __name__ == "__main__":

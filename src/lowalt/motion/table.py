@@ -43,8 +43,9 @@ def _further(names: Collection[str]) -> tuple[str, ...]:
 
 def _cells(row: dict, names: tuple[str, ...]) -> list:
     """Return the cells of a row: texts, the model's number, then numbers in full precision, empty where NaN."""
-    numbers = (int(row[name]) if name in TRACK else "" if math.isnan(row[name]) else repr(float(row[name]))
-               for name in names)  # fmt: skip
+    numbers = (
+        int(row[name]) if name in TRACK else "" if math.isnan(row[name]) else repr(float(row[name])) for name in names
+    )
     return [*(row[name] for name in TEXTS), int(row["model"]), *numbers]
 
 

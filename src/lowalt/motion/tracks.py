@@ -1,7 +1,7 @@
 """Tracks: motion models that are looked at again and again, on a drawn path that turns or on that of a flight log.
 
 The path of a look is the cubic with the places and velocities of both its ends, and its heading turns at a constant
-rate, so place, velocity and heading go on from look to look without a jump; rotors, wheels, wings and gait go on too.
+rate. Place, velocity, heading, rotors, wheels, wings and gait therefore continue from look to look without a jump.
 """
 
 import math
@@ -199,6 +199,7 @@ def model_rows(
     else:
         cadence = settings["cadence"]
         if not airborne:
-            path = path._replace(place_m=path.place_m * [1, 1, 0] + [0, 0, height_m],
-                                 velocity_mps=path.velocity_mps * [1, 1, 0])  # fmt: skip
+            path = path._replace(
+                place_m=path.place_m * [1, 1, 0] + [0, 0, height_m], velocity_mps=path.velocity_mps * [1, 1, 0]
+            )
     return [{**row, "track": track} for row in rows_along(cloud, row, path, look_s, cadence)]

@@ -61,7 +61,7 @@ def stations_of(maker: Maker, columns: list[int]) -> list[int] | None:
 
 def views_of(
     maker: Maker, row: dict, snr_db: float, columns: list[int], size: int, stations: list[int] | None = None
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row at an SNR (dB).
 
     stations: the stations to compute, as `stations_of` returns them; all by default.

@@ -6,7 +6,7 @@ The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies
 
 from pathlib import Path
 
-from lowalt.files.atomic import existing, replacing, sha256, text_of
+from lowalt.files.atomic import existing, sha256, text_of, write_file
 from lowalt.files.errors import InputError
 
 
@@ -24,8 +24,7 @@ def freeze(paths: list[str | Path], out: str | Path) -> None:
         lines.append(f"{sha256(full)}  {full.relative_to(folder).as_posix()}\n")
     if len(set(lines)) < len(lines):
         raise InputError(f"{out}: a file was given twice")
-    with replacing(out) as temporary:
-        temporary.write_text("".join(sorted(lines, key=lambda line: line[66:])))
+    write_file(out, "".join(sorted(lines, key=lambda line: line[66:])))
 
 
 def verify(sums: str | Path) -> int:

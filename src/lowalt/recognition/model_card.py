@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from lowalt import __version__
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.recognition.model_file import EIGHT, ModelFile, run_folder
 from lowalt.recognition.schemes import SPECTRA
@@ -74,14 +74,14 @@ def _accuracy(rows: list[dict[str, str]]) -> str:
         return "The run had no table of accuracy when this card was written.\n"
     seeds = rows[0]["seeds"]
     whose = "of this model" if seeds == "1" else f"mean over the {seeds} trainings of the run, of which this is one"
-    cells = [("all" if row["snr_db"] == "avg" else row["snr_db"], row["accuracy_percent"], row["samples"])
-             for row in rows]  # fmt: skip
+    cells = [
+        ("all" if row["snr_db"] == "avg" else row["snr_db"], row["accuracy_percent"], row["samples"]) for row in rows
+    ]
     return (
         f"From the run's accuracy.csv: accuracy {whose}, with weights as trained, on the test fold of the protocol, "
         "evaluated as the run's\nconfiguration says (there, answers may be means over a sample and its mirror image; "
-        "`lowalt predict` takes no such mean).\n\n"
-        + _table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
-    )  # fmt: skip
+        "`lowalt predict` takes no such mean).\n\n" + _table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
+    )
 
 
 def _rounded(measured: dict) -> str:
@@ -105,9 +105,10 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
     """Return the card of a model; accuracy: rows of the run's table (`accuracy_rows`); name: of the model's file."""
     state, scheme = content.model, content.model["scheme"]
     front = {
-        "license": "mit", "library_name": "lowalt", "tags": [*(tag for tag in TAGS if tag != "webdataset"),
-        "safetensors"],
-    }  # fmt: skip
+        "license": "mit",
+        "library_name": "lowalt",
+        "tags": [*(tag for tag in TAGS if tag != "webdataset"), "safetensors"],
+    }
     method = scheme.get("method") or scheme.get("backbone") or state["network"].get("backbone", "")
     spectra = "+".join(SPECTRA[number] for number in scheme["spectra"])
     facts = [
@@ -139,6 +140,5 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
 def write(out: str | Path, content: ModelFile, accuracy: list[dict[str, str]]) -> Path:
     """Write the card next to the model file `out`, as .md, and return its path."""
     path = Path(out).with_suffix(".md")
-    with replacing(path) as temporary:
-        temporary.write_text(card(content, accuracy, path.stem))
+    write_file(path, card(content, accuracy, path.stem))
     return path

@@ -6,13 +6,16 @@ The file's metadata has one entry, `lowalt`, a JSON object (the library writes s
     model       scheme, protocol, network, size, seed, colour_map, classes; start, where it had one
     run         content of the training's run.json; {} where there was none
     input       network, spectra and images of the run's configuration; {} where there was none
-    weights     "as trained", or "8 bits" (`eight_bits`)
+    weights     "as trained", or "8 bits": each row of a matrix as whole numbers -127..127 and one scale (float32), a
+                quarter of the bytes; biases, norms, running means and colours stay as they are
     measured    of 8-bit weights: how they change the answers (`zoo`)
     digest      SHA-256 of everything above and of every tensor
+Source of 8 bits: Krishnamoorthi, Quantizing deep convolutional networks, arXiv:1806.08342, 2018, per-channel symmetric.
 """
 
 import hashlib
 import json
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,12 +25,11 @@ from safetensors.torch import save
 
 from lowalt.config.classes import stated
 from lowalt.config.schema import check_brought
-from lowalt.files.atomic import existing, replacing
+from lowalt.files.atomic import existing, write_file
 from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import json_object, read_object
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
-from lowalt.recognition.eight_bits import restored
 from lowalt.recognition.runs import Trained, of_state
 
 INPUT = ("network", "spectra", "images")
@@ -92,8 +94,7 @@ def packed(content: ModelFile) -> bytes:
 
 def write(path: str | Path, content: ModelFile) -> None:
     """Write a model file."""
-    with replacing(path) as temporary:
-        temporary.write_bytes(packed(content))
+    write_file(path, packed(content))
 
 
 def read(path: str | Path) -> ModelFile:
@@ -130,3 +131,42 @@ def trained(content: ModelFile, path: str | Path, trusted: str = "") -> Trained:
     except (KeyError, TypeError, IndexError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
     return of_state({**content.model, "weights": weights}, path, trusted)
+
+
+SCALE = ".scale"
+"""Added to the name of a matrix: the name of its scales, (rows,) float32."""
+LARGEST = 127
+
+
+def rounded(weights: Mapping[str, torch.Tensor], matrices: Collection[str]) -> dict[str, torch.Tensor]:
+    """Return weights by name, those named in `matrices` as int8 of the same shape, their scales with them.
+
+    weights: float32 (rows, ...) where they are to be rounded.
+    """
+    stored = {}
+    for name, value in weights.items():
+        if name not in matrices:
+            stored[name] = value
+            continue
+        rows = value.contiguous().flatten(1)
+        scale = rows.abs().amax(1) / LARGEST
+        # A row of zeros keeps them with any scale.
+        steps = rows / torch.where(scale > 0, scale, 1)[:, None]
+        stored[name] = steps.round().clamp(-LARGEST, LARGEST).to(torch.int8).view(value.shape)
+        stored[name + SCALE] = scale
+    return stored
+
+
+def restored(tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Return the weights by name, all as the network takes them: rows times scales.
+
+    Raises: KeyError for an int8 matrix without scales.
+    """
+    scales = {name + SCALE for name, value in tensors.items() if value.dtype == torch.int8}
+    weights = {}
+    for name, value in tensors.items():
+        if value.dtype == torch.int8:
+            weights[name] = (value.flatten(1).float() * tensors[name + SCALE][:, None]).view(value.shape)
+        elif name not in scales:
+            weights[name] = value
+    return weights

@@ -65,8 +65,9 @@ def main(arguments: list[str]) -> None:
     if status:
         print(
             f"training over {nodes} nodes: srun ended with status {status}; has the Slurm job {job} so many nodes, "
-            "and do all see this folder?", file=sys.stderr,
-        )  # fmt: skip
+            "and do all see this folder?",
+            file=sys.stderr,
+        )
         raise SystemExit(exit_status(status))
 
 

@@ -19,7 +19,7 @@ from lowalt.config.classes import stated
 from lowalt.config.command import pick
 from lowalt.config.named_code import allowed, file_of
 from lowalt.config.schema import check_brought
-from lowalt.files.atomic import replacing, sha256
+from lowalt.files.atomic import sha256, write_file
 from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
@@ -105,8 +105,7 @@ def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, mach
 
 def _record(path: Path, content: dict) -> None:
     """Write a record as JSON with sorted keys."""
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n")
+    write_file(path, json.dumps(content, indent=1, sort_keys=True) + "\n")
 
 
 @dataclass(frozen=True)

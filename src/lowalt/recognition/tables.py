@@ -31,21 +31,10 @@ from lowalt.config.classes import word
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
+from lowalt.recognition import statistics
 from lowalt.recognition.evaluated import Evaluated, difference, whole_subtypes
-from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.paper_claims import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
-from lowalt.recognition.statistics import (
-    LOOKED_FOR,
-    AlarmPart,
-    accuracy_by,
-    alarm_intervals,
-    alarm_rates,
-    calibration,
-    confusion,
-    measurable,
-    threshold,
-)
 
 F1 = ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
 """Columns of accuracy.csv with macro F1 and the bounds of its 95 % interval."""
@@ -78,9 +67,9 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
     whole = (protocol, part) == ("unseen", "test")
     scores = {
         snr if snr == "avg" else snr_text(snr): interval
-        for snr, interval in f1_by_snr(parts, len(runs[0].classes), whole, generator).items()
+        for snr, interval in statistics.f1_by_snr(parts, len(runs[0].classes), whole, generator).items()
     }
-    by_snr = [accuracy_by(predictions.snr_db, predictions.correct) for predictions in parts]
+    by_snr = [statistics.accuracy_by(predictions.snr_db, predictions.correct) for predictions in parts]
     shares = {snr_text(snr): [table[snr][0] for table in by_snr] for snr in by_snr[0]}
     counts = {snr_text(snr): count for snr, (_, count) in by_snr[0].items()}
     shares["avg"] = np.mean(list(shares.values()), axis=0).tolist()
@@ -94,7 +83,7 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
 def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [seed, accuracy_percent, *TRAINING, hardware], the accuracy on average over the SNRs."""
     for run in runs:
-        shares = [share for share, _ in accuracy_by(run.test.snr_db, run.test.correct).values()]
+        shares = [share for share, _ in statistics.accuracy_by(run.test.snr_db, run.test.correct).values()]
         known = [run.about.get(name, "") for name in TRAINING]
         took = [f"{value:.6g}" if isinstance(value, float) else value for value in known]
         yield [run.seed, percent(np.mean(shares)), *took, run.hardware]
@@ -105,7 +94,7 @@ def confusion_rows(runs: list[Evaluated], snr_db: float | None = None) -> Iterab
     classes, counts = runs[0].classes, 0
     for test in (run.test for run in runs):
         some = slice(None) if snr_db is None else test.snr_db == snr_db
-        counts = counts + confusion(test.label[some], test.guesses[some], len(classes))
+        counts = counts + statistics.confusion(test.label[some], test.guesses[some], len(classes))
     for true, name in enumerate(classes):
         for guess, other in enumerate(classes):
             yield [name, other, counts[true, guess]]
@@ -122,7 +111,7 @@ def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
     test, classes = runs[0].test, runs[0].classes
     category = {name: classes[label] for name, label in zip(test.subtype.tolist(), test.label, strict=True)}
     correct = np.mean([run.test.correct for run in runs], axis=0)
-    table = accuracy_by(test.subtype, correct)
+    table = statistics.accuracy_by(test.subtype, correct)
     for name in sorted(table, key=lambda name: (classes.index(category[name]), table[name][0], name)):
         yield [category[name], name, percent(table[name][0]), table[name][1]]
 
@@ -133,14 +122,14 @@ def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray]
     numbers = values(test)
     known = ~np.isnan(numbers)
     correct = np.mean([run.test.correct for run in runs], axis=0)
-    for band, (share, count) in accuracy_by(np.floor(numbers[known] / width), correct[known]).items():
+    for band, (share, count) in statistics.accuracy_by(np.floor(numbers[known] / width), correct[known]).items():
         yield [f"{band * width:g}", f"{(band + 1) * width:g}", percent(share), count]
 
 
-def _alarm_part(predictions: Predictions) -> AlarmPart:
+def _alarm_part(predictions: Predictions) -> statistics.AlarmPart:
     """The data of predictions for counting false alarms."""
-    return AlarmPart(
-        predictions.probabilities[:, LOOKED_FOR], predictions.label, predictions.motion, predictions.subtype
+    return statistics.AlarmPart(
+        predictions.probabilities[:, statistics.LOOKED_FOR], predictions.label, predictions.motion, predictions.subtype
     )
 
 
@@ -153,24 +142,24 @@ def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
     classes = len(runs[0].classes)
     validations = [_alarm_part(run.part("validation")) for run in runs]
     tests = [_alarm_part(run.test) for run in runs]
-    for asked in DETECTIONS if all((part.labels == LOOKED_FOR).any() for part in validations) else ():
-        if not measurable(validations[0].labels, asked):
+    for asked in DETECTIONS if all((part.labels == statistics.LOOKED_FOR).any() for part in validations) else ():
+        if not statistics.measurable(validations[0].labels, asked):
             yield [percent(asked), *["not measurable"] * (1 + 3 * classes)]
             continue
-        levels = [threshold(part.scores, part.labels, asked) for part in validations]
+        levels = [statistics.threshold(part.scores, part.labels, asked) for part in validations]
         rates = []
         for part, level in zip(tests, levels, strict=True):
-            detected, alarms = alarm_rates(part.scores, part.labels, level, classes)
+            detected, alarms = statistics.alarm_rates(part.scores, part.labels, level, classes)
             rates.append([detected, *alarms])
         generator = stream(seed, "alarms", runs[0].protocol, runs[0].scheme, asked)
-        bounds = alarm_intervals(validations, tests, asked, whole_subtypes(runs), generator, classes)
+        bounds = statistics.alarm_intervals(validations, tests, asked, whole_subtypes(runs), generator, classes)
         cells = [[percent(rate), *map(percent, pair)] for rate, pair in zip(np.mean(rates, 0), bounds, strict=True)]
         yield [percent(asked), repr(float(np.mean(levels))), *(cell for three in cells for cell in three)]
 
 
 def calibration_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [calibration_error, brier, cross_entropy] on the test part."""
-    of_runs = [list(calibration(run.test.probabilities, run.test.label).values()) for run in runs]
+    of_runs = [list(statistics.calibration(run.test.probabilities, run.test.label).values()) for run in runs]
     yield [f"{value:.6f}" for value in np.mean(of_runs, axis=0)]
 
 

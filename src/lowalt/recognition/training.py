@@ -266,8 +266,9 @@ class Trainer:
             f"validation {100 * row['validation_accuracy']:.2f} % (loss {row['validation_loss']:.4f}) "
             f"{pace['samples_per_s']:.0f} samples/s, {100 * pace['waiting_share']:.1f} % of the time waiting for data, "
             f"{left:.0f} s left",
-            file=sys.stderr, flush=True,
-        )  # fmt: skip
+            file=sys.stderr,
+            flush=True,
+        )
 
     def finish(self, extra: dict) -> None:
         """Write `model.pt` (best averaged weights, `extra`) and `history.csv`, and delete the checkpoint."""

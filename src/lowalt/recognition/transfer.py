@@ -2,12 +2,12 @@
 
 Both models classify the same test samples, and their results are compared sample by sample.
 
-transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over the SNRs):
+transfer.csv, one row per protocol, scheme, other run and SNR ("avg": mean over SNRs):
     trained_on                   the other run
     accuracy_percent             of the other run's model on this run's test samples, several seeds averaged
     own_percent                  of this run's own model
-    difference_points, low, high other less own, with the 95 % interval that resamples training seeds, in the unseen
-                                 protocol subtypes, and motion models
+    difference_points, low, high the other's minus this run's own, with the 95 % interval that resamples training seeds,
+                                 motion models and, in the unseen protocol, subtypes
     samples, hardware            of this run's test part
     seeds, spread_points         training seeds of the other's model, and the standard deviation of accuracy between the
                                  seeds of a model, pooled over both models (empty for one seed)

@@ -24,9 +24,10 @@ def refuse_unfit(weights: Mapping[str, torch.Tensor], model: nn.Module, path: st
     """Raise InputError naming the file where weights differ from those of a network in names, shapes or kind."""
     wanted = model.state_dict()
     wrong = sorted(map(str, wanted.keys() ^ weights.keys())) or [
-        name for name, value in weights.items()
+        name
+        for name, value in weights.items()
         if value.shape != wanted[name].shape or value.is_floating_point() != wanted[name].is_floating_point()
-    ]  # fmt: skip
+    ]
     if wrong:
         raise InputError(f"{path}: {len(wrong)} weights do not fit its network, first {wrong[0][:80]!r}")
 
@@ -35,8 +36,9 @@ ROOM_BYTES = 1_500_000_000
 """Memory that a network of a file may take to be built and to answer once, beyond a few copies of its weights."""
 
 
-def filled(make: Callable[[], nn.Module], example: Callable[[], Any], weights: Mapping[str, torch.Tensor],
-           path: str | Path) -> nn.Module:  # fmt: skip
+def filled(
+    make: Callable[[], nn.Module], example: Callable[[], Any], weights: Mapping[str, torch.Tensor], path: str | Path
+) -> nn.Module:
     """Return the network of `make` with the weights of a file, once it has answered `example`.
 
     A file of a few bytes may name a network that no machine holds, so memory is limited by what its weights take.

@@ -1,7 +1,7 @@
 """The zoo: small trained models under 1 MB in `results/zoo`, which `lowalt predict` takes by name.
 
 `python -m lowalt.recognition.zoo --model MODEL.pt --views FILES --name NAME` makes an entry of a finished run: weights
-in 8 bits, their answers on the whole validation fold held against those of the weights as trained, and a card.
+in 8 bits, their answers on the whole validation fold compared with those of the weights as trained, and a card.
 """
 
 import argparse
@@ -15,9 +15,8 @@ from lowalt.config.command import name_backbone, run
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.recognition import model_card, model_file
-from lowalt.recognition.eight_bits import rounded
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recognition.model_file import EIGHT, ModelFile
+from lowalt.recognition.model_file import EIGHT, ModelFile, rounded
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import Trained, load
 from lowalt.recognition.samples import Samples
@@ -86,7 +85,7 @@ def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trust
 
 def kept(
     content: ModelFile, model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = ""
-) -> dict:  # fmt: skip
+) -> dict:
     """Write a model's content in 8 bits as NAME.safetensors and NAME.md and return the measurements, as `entry` does.
 
     samples: those that both sets of weights answer. Raises: InputError as `entry`, for size and accuracy.

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from lowalt.config.command import parser, pick, run
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.machine.side_by_side import together
 from lowalt.report.inputs import Inputs
 from lowalt.report.page import SECTIONS, page, section
@@ -32,8 +32,7 @@ def main(arguments: list[str]) -> None:
     sections = together([partial(section, reported, name) for name in SECTIONS], options.jobs)
     write_plots(options.figures, [plot for made in sections for plot in made.plots])
     text = page(reported, dict(zip(SECTIONS, sections, strict=True)))
-    with replacing(options.out) as temporary:
-        temporary.write_text(text)
+    write_file(options.out, text)
     print(json.dumps({"report": options.out, "samples": len(reported.shards)}), file=sys.stderr)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.report.figures.style import svg
 
@@ -40,5 +40,4 @@ def write_plots(folder: Path, plots: Iterable[Plot]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for plot in plots:
         write_csv(folder / f"{plot.name}.csv", list(plot.rows[0]), plot.rows)
-        with replacing(folder / f"{plot.name}.svg") as temporary:
-            temporary.write_text(plot.svg)
+        write_file(folder / f"{plot.name}.svg", plot.svg)

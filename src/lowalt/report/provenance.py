@@ -96,5 +96,6 @@ def commands(commit: str, overlay: dict) -> tuple[str, str]:
     """
     lines = [] if commit == "no checkout" else [f"git checkout {commit.partition(',')[0]}"]
     text = yaml.safe_dump(overlay, sort_keys=False, allow_unicode=True) if overlay else ""
-    return "\n".join([*lines, "make .venv/set-up" if overlay else "make",
-                      *([".venv/bin/lowalt run again.yaml"] if overlay else [])]), text  # fmt: skip
+    return "\n".join(
+        [*lines, "make .venv/set-up" if overlay else "make", *([".venv/bin/lowalt run again.yaml"] if overlay else [])]
+    ), text

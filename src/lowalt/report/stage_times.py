@@ -25,7 +25,7 @@ def _job(path: str | Path) -> dict:
 def stage_times(paths: Iterable[str | Path]) -> list[dict]:
     """Return the time and memory of each rule, from Snakemake's benchmark files (JSON lines, extended).
 
-    One dict a rule: rule, jobs, wall_s and cpu_s (sums over jobs), peak_mib (largest job; sampled, so a short peak
+    One dict per rule: rule, jobs, wall_s and cpu_s (sums over jobs), peak_mib (largest job; sampled, so a short peak
     can be missed).
     Raises: InputError for a file that is no benchmark.
     """

@@ -76,7 +76,7 @@ def predicted_keys(paths: Iterable[str | Path]) -> set[str]:
 
 
 def probabilities(paths: Iterable[str | Path], keys: set[str], classes: tuple[str, ...]) -> dict[str, dict]:
-    """Return class probabilities as key -> "protocol scheme" -> list; one file a protocol and scheme, the first."""
+    """Return class probabilities as key -> "protocol scheme" -> list; the first file per protocol and scheme."""
     columns, first, of_samples = predictions.probability_columns(classes), {}, {}
     for path in paths:
         first.setdefault(Path(path).parent, Path(path))

@@ -16,7 +16,7 @@ from lowalt.targets.cloud import read
 
 
 def main(arguments: list[str]) -> None:
-    """Compute one chunk's signals under the scene's effects and write two array files a station."""
+    """Compute one chunk's signals under the scene's effects and write two array files per station."""
     options = parser("lowalt.scene", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
@@ -26,7 +26,7 @@ def main(arguments: list[str]) -> None:
         "--out",
         nargs="+",
         required=True,
-        help="signals to write (.npy), a file a station: complex64 (models, N), or (models, snrs, N)",
+        help="signals to write (.npy), one file per station: complex64 (models, N), or (models, snrs, N)",
     )
     options.add_argument(
         "--power", nargs="+", required=True, help="the echoes' own mean powers to write (.npy), likewise: (models,) W"

@@ -57,7 +57,7 @@ class SceneSample:
     def weight(self, view: View, names: Collection[str] | None = None, but: Collection[str] = ()) -> np.ndarray:
         """Return the product (N, L) of the amplitude factors that effects put on the points of a view.
 
-        names: the effects that count, None for all; but: effects that do not count.
+        names: effects to include, None for all; but: effects to leave out.
         """
         result = np.ones(view.places.shape[:2])
         one_way = self.all("visible_one_way")
@@ -77,7 +77,7 @@ class SceneSample:
         ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
         if len(ends) == 1:
             return ends[0]
-        # In a town the ends of a link see different numbers of paths: the shorter list is filled with none.
+        # In a town the ends of a link may see different numbers of paths: pad the shorter list with paths of factor 0.
         none = ImagePath(view.places, 0.0)
         return [there._replace(sender=here) for here, there in zip_longest(*ends, fillvalue=none)]
 
@@ -115,7 +115,7 @@ class SceneSample:
         return response(view, (), self.weight(view), **self._waves)
 
     def echo(self, view: View) -> np.ndarray:
-        """Return the frequency response (N, M) of a view's target on all paths; it stands still within a symbol."""
+        """Return the frequency response (N, M) on all paths of a view's target, which stands still within a symbol."""
         # Most facades reflect nothing during a look, so their paths are left out.
         paths = [path for path in self.paths(view) if np.any(path.coefficient) and np.any(path.outward.coefficient)]
         if view is self.view and not paths and not self._waves:
@@ -159,7 +159,9 @@ class SceneSample:
 
         Without an effect on time samples, the responses of all echoes are added and no samples are made.
         """
-        still = [scatter(self.view, self.draws(name)) for name, scatter in self.all("scatter").items()]
+        from_sender = self.only("from_sender")
+        still = [from_sender(self.view)] if from_sender else []
+        still += [scatter(self.view, self.draws(name)) for name, scatter in self.all("scatter").items()]
         unknown = [heard(self) for heard in self.all("heard").values()]
         if self.only("instants") or self.only("late_samples"):
             samples = sum(map(self._standing, still), sum(map(self._samples, self.targets)))

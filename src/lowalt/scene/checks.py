@@ -1,13 +1,13 @@
 """Checks of a scene before any job starts: whether its effects fit its network, its noise and each other."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import ModuleType
 from typing import NamedTuple
 
 from lowalt.config.network import Network
 from lowalt.config.plan import snrs_of
 from lowalt.files.errors import InputError
-from lowalt.scene.effects import called, every
+from lowalt.scene.effects import PLACES, called, every, module_of
 
 
 class CheckedScene(NamedTuple):
@@ -43,16 +43,7 @@ def check(config: dict) -> CheckedScene:
         config.get("spectra", {}).get("times") == "known",
     )
     refuse_unmodelled(scene.network, scene.modules)
-    # An effect that a scene lacks cannot say that it is needed, so these two are named here.
-    links, guard = links_of(scene.network), scene.network.guard_subcarriers
-    if links and "direct_path" not in config["effects"]:
-        raise InputError(
-            f"network.stations: {links} are links between two stations, expected effects.direct_path in the same scene"
-        )
-    if guard < 0 and not every(effects, "heard"):
-        raise InputError(
-            f"network.guard_subcarriers: {guard}, sub-bands overlap, expected effects.interference in the same scene"
-        )
+    refuse_missing(scene.network, [module_of(name) for name in config["effects"]])
     coloured = [name for name, module in scene.modules.items() if hasattr(module, "SET_SNR")]
     coloured += every(effects, "filtered")
     if scene.noisy and coloured and config.get("shards", {}).get("kind") == "recipe":
@@ -64,6 +55,18 @@ def check(config: dict) -> CheckedScene:
         if hasattr(effect.module, "check"):
             effect.module.check(effect.settings, scene)
     return scene
+
+
+def refuse_missing(network: Network, named: Collection[ModuleType]) -> None:
+    """Raise InputError where none of the named effects, idle ones included, offers what the network's signals need."""
+    links, guard = links_of(network), network.guard_subcarriers
+    needed = {"from_sender": f"network.stations: {links} are links between two stations"} if links else {}
+    if guard < 0:
+        needed["heard"] = f"network.guard_subcarriers: {guard}, sub-bands overlap"
+    for function, said in needed.items():
+        if not any(hasattr(module, function) for module in named):
+            fit = " or ".join(f"effects.{name}" for name in PLACES if hasattr(module_of(name), function))
+            raise InputError(f"{said}, expected {fit} in the same scene, or an own effect that offers {function}")
 
 
 def links_of(network: Network) -> list[str]:

@@ -95,6 +95,7 @@ OFFERS = {
         "channel", ONE, ("network", "response", "on_air", "offset_cells"), "(N, M) time samples of still echoes"
     ),
     "scatter": Offer("channel", MANY, ("view", "rng"), "`Still`: the echoes of something other than a target"),
+    "from_sender": Offer("channel", ONE, ("view",), "`Still`: what a link hears of its sender directly"),
     "heard": Offer("channel", MANY, ("sample",), "(N, M) time samples of signals that the receiver does not know"),
     "displaced": Offer("", MANY, ("view", "rng"), "`Displacement` of the target's echo by the effect"),
     "noise_w": Offer("receiver", ONE, ("network",), "mean power (W) of the receiver's noise in a subcarrier"),

@@ -45,7 +45,7 @@ FOUND = 0.9
 
 
 class ExplainedSample(NamedTuple):
-    """One motion model to explain the scene by."""
+    """One motion model on which the effects of a scene are measured."""
 
     cloud: Cloud
     row: dict

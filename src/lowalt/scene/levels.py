@@ -49,8 +49,9 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
     ends = {"toward the target, each way": view.station}
     if link:
         ends = {"of the sender": view.station.transmitter, "of the receiver": view.station}
-    gains = [1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m))
-             for end in ends.values()]  # fmt: skip
+    gains = [
+        1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m)) for end in ends.values()
+    ]
     budget = [
         Level(f"transmit power, {network.bin_name}", dbm(network.power), "dBm"),
         Level("transmit array", decibels(math.prod(network.transmit)), "dB"),

@@ -78,10 +78,11 @@ def checked(name: str, module: ModuleType, changed: dict) -> dict:
     Raises: InputError naming the key and its value.
     """
     changed = {
-        key: float(value) if isinstance(value, str) and _kind(module.DEFAULTS.get(key)) == "a number"
-        and NUMBER.fullmatch(value) else value
+        key: float(value)
+        if isinstance(value, str) and _kind(module.DEFAULTS.get(key)) == "a number" and NUMBER.fullmatch(value)
+        else value
         for key, value in changed.items()
-    }  # fmt: skip
+    }
     for key, value in changed.items():
         default = module.DEFAULTS.get(key)
         expected = _kind(default)

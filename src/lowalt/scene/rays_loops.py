@@ -70,10 +70,11 @@ def can_meet(bundle, box):
     i, j, k = i + bundle[6], j + bundle[7], k + bundle[8]
     p, q, r, x, y, z = abs(u) + f, abs(v) + g, abs(w) + h, abs(a), abs(b), abs(c)
     return (
-        abs(b * w - c * v) <= j * r + k * q + y * h + z * g and abs(c * u - a * w) <= k * p + i * r + z * f + x * h
+        abs(b * w - c * v) <= j * r + k * q + y * h + z * g
+        and abs(c * u - a * w) <= k * p + i * r + z * f + x * h
         and abs(a * v - b * u) <= i * q + j * p + x * g + y * f
         and a * u + b * v + c * w >= -(i * p + j * q + k * r + x * f + y * g + z * h)
-    )  # fmt: skip
+    )
 
 
 @INNER_ORDERED

@@ -18,7 +18,7 @@ from lowalt import __version__
 from lowalt.config.classes import plural
 from lowalt.config.command import run
 from lowalt.config.network import station_names
-from lowalt.files.atomic import replacing, sha256, text_of
+from lowalt.files.atomic import sha256, text_of, write_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.shards import checksums
@@ -167,8 +167,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     shards, config = ShardSet(index_path), text_of(config_path, "configuration")
     name, version = identity(yaml.safe_load(config)["run"], shards)
     folder = Path(index_path).parent
-    with replacing(folder / "README.md") as temporary:
-        temporary.write_text(readme(shards, config, name, license_name))
+    write_file(folder / "README.md", readme(shards, config, name, license_name))
     samples = folder / "samples.csv"
     write_samples(shards, samples)
     table = {"path": samples.name, "bytes": samples.stat().st_size, "sha256": sha256(samples)}
@@ -177,8 +176,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
         "license": LICENSES[license_name], "citeAs": PAPER,
         "datePublished": f"{datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC):%Y-%m-%d}", **facts,
     }  # fmt: skip
-    with replacing(folder / "croissant.json") as temporary:
-        temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
+    write_file(folder / "croissant.json", json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
     checksums.write(index_path, shards.index)
 
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from lowalt.files.atomic import replacing, sha256
+from lowalt.files.atomic import sha256, write_file
 from lowalt.shards.sample_table import table_path
 
 NAME = "SHA256SUMS"
@@ -34,8 +34,7 @@ def write(index_path: str | Path, index: dict) -> None:
     """
     folder = Path(index_path).parent
     card = {name: sha256(folder / name) for name in (*CARD, Path(index_path).name)}
-    with replacing(folder / NAME) as temporary:
-        temporary.write_text(_text(_of_index(index) | card))
+    write_file(folder / NAME, _text(_of_index(index) | card))
 
 
 def faults(index_path: str | Path, index: dict) -> Iterator[str]:

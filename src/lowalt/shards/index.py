@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.schema import check_brought
-from lowalt.files.atomic import existing, replacing, sha256
+from lowalt.files.atomic import existing, sha256, write_file
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import read_object
 from lowalt.shards.sample_table import read_header, table_path
@@ -57,8 +57,7 @@ def build(
     if classes != CATEGORIES:
         index["classes"] = list(classes)
     index["sha256"] = _checksum(index)
-    with replacing(out) as temporary:
-        temporary.write_text(json.dumps(index, indent=1, sort_keys=True) + "\n")
+    write_file(out, json.dumps(index, indent=1, sort_keys=True) + "\n")
     return index
 
 

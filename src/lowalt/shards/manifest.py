@@ -16,7 +16,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lowalt.config.command import run
-from lowalt.files.atomic import replacing, sha256, text_of
+from lowalt.files.atomic import sha256, text_of, write_file
 from lowalt.files.errors import InputError
 
 STAGES = {
@@ -120,9 +120,8 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--without", nargs="*", default=[], choices=list(STAGES), help="stages that left no files")
     options = line.parse_args(arguments)
     if options.command == "write":
-        with replacing(options.manifest) as temporary:
-            found = text(options.run)
-            temporary.write_text(by_groups(found) if options.by_groups else found)
+        found = text(options.run)
+        write_file(options.manifest, by_groups(found) if options.by_groups else found)
         return
     lines = faults(options.manifest, options.run, ("tiles", *options.without))
     for fault in lines:

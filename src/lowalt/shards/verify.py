@@ -20,8 +20,8 @@ FROZEN = "clouds", "motion"
 def faults(index_path: str | Path) -> Iterator[str]:
     """Yield one line per fault of a published data set: the file, the sample if it is in one, and what is wrong.
 
-    It checks the shards and their tables against the index, then all other files of the folder against SHA256SUMS (a
-    file without checksum is a fault), then the clouds and motion tables of the run against `frozen`.
+    First the shards and their tables are checked against the index. Then come all other files of the folder, against
+    SHA256SUMS (a file without checksum is a fault), and the clouds and motion tables of the run, against `frozen`.
     Raises: InputError where the index itself cannot be read.
     """
     index = load(index_path)

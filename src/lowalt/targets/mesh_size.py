@@ -29,8 +29,8 @@ ACROSS = np.cos(np.radians(20.0))
 ROUND = 1.1
 """Largest ratio of a wheel's width to the smaller of its two extents across the axis."""
 OFF_HUB = 1.0
-"""Largest distance between a rotor's hub and the middle of its surface, as a share of the rotor's largest extent. A
-single blade without its hub may have up to 1."""
+"""Largest distance between a rotor's hub and the middle of its surface, as a share of the rotor's largest extent: that
+of a single blade without its hub."""
 FEWEST_WHEELS = 3
 OFF_MIDDLE = 0.1
 """A part stands on one side where it is farther from the middle than this share of its own size."""

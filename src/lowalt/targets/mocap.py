@@ -14,21 +14,11 @@ from lowalt.config.classes import like
 from lowalt.files.atomic import sha256
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
+from lowalt.targets import mocap_motion
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import moved, read_bvh, read_joints, to_nodes
-from lowalt.targets.mocap_motion import (
-    Motion,
-    closed,
-    find_cycle,
-    front,
-    nodes_m,
-    posed,
-    refuse_glitches,
-    refuse_short,
-    refuse_strange_rate,
-)
 from lowalt.targets.record_schema import record_files
 from lowalt.targets.skeleton import NODES, node_cloud, stature_m
 
@@ -36,7 +26,7 @@ CMU_HZ = 120
 """Rate of CMU's recordings, which their files do not say."""
 
 LONG = 20
-"""A recording that is more times longer than the cycle used is told so: it may hold other motions."""
+"""A recording longer than this many times the cycle used gives a warning, because it may hold other motions."""
 
 
 def check_record(merged: dict, where: str) -> dict:
@@ -61,7 +51,7 @@ def check_record(merged: dict, where: str) -> dict:
     return result
 
 
-def _read(paths: list[Path], record: dict) -> tuple[Motion, int]:
+def _read(paths: list[Path], record: dict) -> tuple[mocap_motion.Motion, int]:
     """Return the motion of a record's files, and the number of its first frame.
 
     Raises: InputError naming the file: another format, a rate that neither it nor the record says.
@@ -71,7 +61,7 @@ def _read(paths: list[Path], record: dict) -> tuple[Motion, int]:
     if kind == ".amc":
         skeleton = read_skeleton(paths[0])
         channels, first = read_motion(path, skeleton, first, last)
-        return posed(skeleton, channels, record.get("rate_hz", CMU_HZ)), first
+        return mocap_motion.posed(skeleton, channels, record.get("rate_hz", CMU_HZ)), first
     if kind not in (".bvh", ".npz"):
         raise InputError(f"{path}: format {kind!r}, expected .amc with its skeleton, .bvh or .npz")
     joints, rate = read_bvh(path) if kind == ".bvh" else read_joints(path)
@@ -95,27 +85,28 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
     paths = [Path(inputs_dir) / name for name in record_files(record)]
     where, first = str(paths[-1]), record["first_frame"]
     motion, first = _read(paths, record)
-    refuse_glitches(nodes_m(motion), motion.rate_hz, record["max_acceleration_mps2"], where, first)
-    refuse_short(len(motion.root_m), motion.rate_hz, where)
-    start, end, fade, mismatch = find_cycle(motion)
+    rate_hz, most = motion.rate_hz, record["max_acceleration_mps2"]
+    mocap_motion.refuse_glitches(mocap_motion.nodes_m(motion), rate_hz, most, where, first)
+    mocap_motion.refuse_short(len(motion.root_m), motion.rate_hz, where)
+    start, end, fade, mismatch = mocap_motion.find_cycle(motion)
     if mismatch > record["max_mismatch_m"]:
         raise InputError(
             f"{where}: the best cycle, frames {first + start} to {first + end - 1}, closes to {mismatch:.3f} m "
             f"(root mean square over the nodes), expected at most max_mismatch_m = {record['max_mismatch_m']} m: "
             "choose first_frame and last_frame around a steady gait"
         )
-    cycle, drift = closed(motion, start, end, fade)
-    looped = nodes_m(cycle)
+    cycle, drift = mocap_motion.closed(motion, start, end, fade)
+    looped = mocap_motion.nodes_m(cycle)
     seam = np.concatenate([looped, looped[:2]])
-    refuse_glitches(seam, motion.rate_hz, record["max_acceleration_mps2"], f"{where} (its closed cycle)", first + start)
+    mocap_motion.refuse_glitches(seam, rate_hz, most, f"{where} (its closed cycle)", first + start)
     speed = float(portable.norm(drift))
     if speed < 0.05:
         raise InputError(f"{where}: moves {speed:.3f} m/s, expected a walk or run to turn to the front")
     stature = stature_m(motion.bones_m)
     scale = record["published"]["hgt_m"] / stature if record["scale"] == "published" else 1.0
-    track = nodes_m(front(cycle, drift)) * scale
+    track = mocap_motion.nodes_m(mocap_motion.front(cycle, drift)) * scale
     if "rate_hz" not in record and where.lower().endswith(".amc"):  # whose rate neither file nor record says
-        refuse_strange_rate(track, motion.rate_hz, speed * scale, stature * scale, where)
+        mocap_motion.refuse_strange_rate(track, motion.rate_hz, speed * scale, stature * scale, where)
     if len(motion.root_m) > LONG * (end - start):
         text = (
             f"{where}: of {len(motion.root_m)} frames {first + start} to {first + end - 1} are used, which close best"

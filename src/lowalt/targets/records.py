@@ -1,6 +1,6 @@
 """Records of all subtypes, read from the table of published values and from record files.
 
-A record file is YAML, one record a name. Later files replace earlier ones, whole records at a time; files of the
+A record file is YAML, one record per name. Later files replace earlier ones, whole records at a time; files of the
 configuration's key `targets.own` come last. A record may have a key `row`, whose cells replace those of the subtype's
 row in the table of targets or make a new row: one file is then a whole new target. Keys of one source alone (a mesh's
 unit, the frames of a recording) are checked by that source's own `check_record`.
@@ -46,14 +46,14 @@ def load_table(path: str | Path) -> dict[str, dict]:
     """
     rows = read_csv(path, what="table of published targets")
     if not rows:
-        raise InputError(f"{path}: no row, expected one row a subtype")
+        raise InputError(f"{path}: no row, expected one row per subtype")
     if wrong := sorted(set(rows[0]) ^ set(COLUMNS)):
         raise InputError(f"{path}: columns {wrong} missing or unknown")
     table: dict[str, dict] = {}
     for row in rows:
         name, where = row["name"], f"{path}: {row['name']}"
         if name in table:
-            raise InputError(f"{where}: named twice, expected one row a subtype")
+            raise InputError(f"{where}: named twice, expected one row per subtype")
         if row["unseen_protocol"] not in ("seen", "unseen"):
             raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
         table[name] = {column: _cell(where, column, text) for column, text in row.items()}
@@ -108,7 +108,7 @@ def load_records(
 ) -> dict[str, dict]:
     """Return every subtype's merged and checked record, in the table's order; new rows come last.
 
-    fall_back: where a record names files that the folder `inputs` lacks, take the subtype's record before it.
+    fall_back: if a record names files that the folder `inputs` lacks, use the subtype's previous record.
 
     A merged record is the record as written, with `subtype`, `category`, `group` (seen or unseen), `published` (the
     table's row), and the defaults of `points` (the published count) and `rcs_m2_per_point` (1 m2).
@@ -149,8 +149,9 @@ def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
     known = [column for column in COLUMNS if column not in ("name", "idx")]
     if not isinstance(cells, dict) or set(cells) - set(known):
         raise InputError(f"{where}: row is {cells!r}, expected cells of the columns {known}")
-    changed = {column: None if cell is None else _cell(f"{where}: row", column, str(cell))
-               for column, cell in cells.items()}  # fmt: skip
+    changed = {
+        column: None if cell is None else _cell(f"{where}: row", column, str(cell)) for column, cell in cells.items()
+    }
     blank = dict.fromkeys(COLUMNS) | {"name": name, "unseen_protocol": "seen", "points_in_published_cloud_approx": 150}
     result = (row or blank) | changed
     if not result["category"] or result["unseen_protocol"] not in ("seen", "unseen"):

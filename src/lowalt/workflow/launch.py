@@ -60,7 +60,7 @@ class Launch:
 
     @property
     def evaluation(self) -> dict:
-        """Snakemake resources of a prediction job, in the form of `training`: both may run in the same Slurm job."""
+        """Snakemake resources of a prediction job, with the keys of `training`, as both may share one Slurm job."""
         if self.nodes == 1:
             return {"gpu": int(self.gpu)}
         return {"gpu": 0} | ({"gres": f"gpu:{self.per_node}"} if self.gpu else {})

@@ -24,13 +24,14 @@ from lowalt.workflow.launch import Launch
 
 @dataclass(frozen=True)
 class Run:
-    """Records, classes, plan and schemes of one run; `inputs` is the folder of meshes and recordings, or None.
+    """Network, records, classes, plan and schemes of one run; `inputs` is the folder of the user's files, or None.
 
     The classes are those of the whole table of targets, so that labels do not depend on the selection of targets.
     """
 
     config: dict
     inputs: str | None
+    network: Network
     records: dict[str, dict]
     classes: tuple[str, ...]
     plan: Plan
@@ -59,7 +60,7 @@ class Run:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         refusals.refuse_data(config)
         Launch.of(config["recognition"])
-        return cls(config, inputs, chosen, classes, plan, schemes)
+        return cls(config, inputs, network, chosen, classes, plan, schemes)
 
     @property
     def sources(self) -> str:
@@ -72,8 +73,7 @@ class Run:
     @property
     def folding(self) -> str:
         """A sentence where speeds of targets fold, else an empty text."""
-        network = Network.from_settings(self.config["network"])
-        return network.folding(record["published"] for record in self.records.values())
+        return self.network.folding(record["published"] for record in self.records.values())
 
     @property
     def name(self) -> str:

@@ -10,7 +10,7 @@ import socket
 import time
 from pathlib import Path
 
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.processes import started
 from lowalt.machine import progress
 from lowalt.workflow.board import Board, span
@@ -33,8 +33,7 @@ def write(board: Board, state: str, folder: Path = FOLDER) -> None:
     path = folder / f"{pid}.json"
     if not path.exists():
         _sweep(folder)
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(kept))
+    write_file(path, json.dumps(kept))
 
 
 def elsewhere(kept: dict) -> str:

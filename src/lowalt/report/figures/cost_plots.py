@@ -9,7 +9,7 @@ import math
 from matplotlib.figure import Figure
 
 from lowalt.config.command import run
-from lowalt.files.atomic import replacing
+from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.style import COLOURS, plain
 from lowalt.report.plots import Plot, drawn
@@ -122,8 +122,7 @@ def main(arguments: list[str]) -> None:
     draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[options.plot]
     # A document may have any background colour.
     text = draw(read_csv(options.table, *columns)).svg.replace("<svg", '<svg style="background: white"', 1)
-    with replacing(options.figure) as temporary:
-        temporary.write_text(text)
+    write_file(options.figure, text)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""One sample as a picture with axes: a row for each station, a column for each spectrum."""
+"""One sample as a picture with axes, a row for each station, a column for each spectrum; and samples of each class."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,10 @@ import numpy as np
 
 from lowalt.config.network import Station
 from lowalt.report.figures.style import plt, png
+from lowalt.shards import ShardSet
 from lowalt.spectra import spectrum
 from lowalt.spectra.interface import OfCells
+from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer, split
 
 
@@ -57,3 +59,19 @@ def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
         panel.tick_params(labelsize=7)
         panel.locator_params(axis="x", nbins=6)
     return png(drawn)
+
+
+def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
+    """Return (caption, PNG bytes) of the sample of highest SNR of each category's first motion model in the set."""
+    chosen = []
+    for label, category in enumerate(shards.classes):
+        numbers = np.flatnonzero(shards.labels == label)
+        if len(numbers):
+            best = numbers[np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))[0]]
+            record = shards.record(int(best))
+            noise = "no noise" if np.isinf(shards.snrs_db[best]) else f"SNR {shards.snrs_db[best]:g} dB"
+            caption = f"{category}: {record['subtype']}, motion model {record['model']}, {noise}"
+            stored = shards.kind == "image"
+            picture = shards.png(int(best)) if stored else encode(shards.tile(int(best)), shards.palette)
+            chosen.append((caption, picture))
+    return chosen

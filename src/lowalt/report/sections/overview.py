@@ -3,7 +3,7 @@
 from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
 from lowalt.report.figures.style import embedded
-from lowalt.report.figures.tiles import example_tiles
+from lowalt.report.figures.tile_axes import example_tiles
 from lowalt.report.pivots import best_schemes, by_scheme, macro_f1
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections.accuracy import COLUMNS

@@ -87,10 +87,11 @@ def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str,
         if motion.get("x_m") is not None:
             result[name] = {
                 "speed": float(np.linalg.norm([motion[f"v{axis}_mps"] for axis in "xyz"])),
-                "distance": float(predictions.range_m[first]), "height": motion["z_m"],
+                "distance": float(predictions.range_m[first]),
+                "height": motion["z_m"],
                 "rate": motion.get("rate_hz") or 0.0,
                 "aspect": float(90 - abs(90 - predictions.aspect_deg[first])),
-            }  # fmt: skip
+            }
     return result
 
 

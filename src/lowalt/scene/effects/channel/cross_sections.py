@@ -46,9 +46,9 @@ def _plate_mean(size: float) -> float:
 def facet(cosine: np.ndarray, size: float, half_angle: np.ndarray | float = 1.0) -> np.ndarray:
     """Return the lobe of a flat circular facet, of mean 1 over the sphere, dark where the cosine is not above 0.
 
-    cosine: that of its normal to the line of sight, on a link the mean of both; size: k a, its radius in rad;
-    half_angle: on a link cos(beta / 2), half the length of the sum of the unit vectors toward both ends, which the
-    plate's pattern follows. Source: Kell 1965; Crispin and Siegel 1968.
+    cosine: of the angle between its normal and the line of sight, on a link the mean of both ends' cosines; size: k a,
+    its radius in rad; half_angle: on a link cos(beta / 2), half the length of the sum of the unit vectors toward both
+    ends. Source: Kell 1965; Crispin and Siegel 1968.
     """
     sine = np.sqrt(np.maximum(half_angle * half_angle - cosine * cosine, 0.0))
     return np.where(cosine > 0, _plate(cosine, sine, size), 0.0) / _plate_mean(size)
@@ -84,8 +84,9 @@ def blade(view: View, mine: np.ndarray, cosines: list[np.ndarray], places_m: lis
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: the root of its relative cross section at this aspect.
 
-    On a link a diffuse point's lobe is the geometric mean of those toward both ends, exact for a Lambert surface (power
-    2). A facet's is that at the bisector, at the frequency times cos(beta / 2), beta the angle of both ways.
+    On a link a diffuse point has the geometric mean of the lobes toward both ends, exact for a Lambert surface (power
+    2). A facet has its lobe at the bisector and at the frequency times cos(beta / 2), where beta is the angle between
+    the directions toward both ends.
     """
     cloud, known = view.cloud, np.isfinite(view.cloud.normals).all(axis=1)
     if not known.any():

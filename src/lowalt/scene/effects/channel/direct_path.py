@@ -1,8 +1,7 @@
 """The direct path of a link between two stations: the sent signal reaches the receiving station without the target.
 
 It has the delay of the distance between the masts and no Doppler shift, and it enters through the side lobes of both
-arrays, whose beams point at the target. A station that receives its own signal has `transmit_leakage` instead. A scene
-with links must name this effect; effects that are not modelled between two stations are refused (`checks`).
+arrays, whose beams point at the target. A station that receives its own signal has `transmit_leakage` instead.
 """
 
 import numpy as np
@@ -31,15 +30,15 @@ def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
     """Return the power (W) of the direct path; nothing for a station that receives its own signal."""
     if view.station.transmitter is None:
         return []
-    response = scatter(settings, view, np.random.default_rng()).response
+    response = from_sender(settings, view).response
     return [(f"direct path, {view.network.bin_name}", float(np.mean(abs(response) ** 2)), "W")]
 
 
-def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
+def from_sender(settings: dict, view: View) -> Still:
     """Return the direct path, zero for a station that receives its own signal.
 
     Both array sums toward the other mast, in the units of the echo: the amplitude is sqrt(P / elements) lambda /
-    (4 pi d) times both sums. Source: Friis 1946. Nothing is drawn.
+    (4 pi d) times both sums. Source: Friis 1946.
     """
     network, hears, sends = view.network, view.station, view.station.transmitter
     shape = len(view.times_s), network.subcarriers

@@ -22,8 +22,9 @@ SOURCE = (
 )
 DEFAULTS = {
     "facades": [[250.0, 60.0, 90.0, 80.0, 30.0], [120.0, 240.0, -30.0, 80.0, 30.0], [380.0, 240.0, 210.0, 80.0, 30.0]],
-    "permittivity": 5.24, "conductivity_s_m": 0.16,
-}  # fmt: skip
+    "permittivity": 5.24,
+    "conductivity_s_m": 0.16,
+}
 IDLE = [{"facades": []}, {"permittivity": 1, "conductivity_s_m": 0}]
 
 

@@ -117,9 +117,9 @@ def exceeds(settings: dict, power: np.ndarray) -> np.ndarray:
 def choose(settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return the detected cells (N,) int64 of range cells (N, M).
 
-    The track begins where the beam was pointed, with a normal error of `range_error_m` in range, drawn once a look. The
-    alpha-beta filter takes over `gain` of the difference between a detected and the predicted cell, and its rate what
-    suits that gain (Benedict & Bordner 1962). The range window serves this search only.
+    The track begins where the beam was pointed, with a normal error of `range_error_m` in range, drawn once per look.
+    The alpha-beta filter corrects the predicted cell by `gain` times its difference to the detected one, and its rate
+    by the beta of Benedict & Bordner (1962). The range window serves this search only.
     """
     seen = windowed(settings, cells)
     power = seen.real**2 + seen.imag**2
