@@ -27,10 +27,13 @@ SLAB_M = 1000.0
 """Thickness of the ray tracer's walls, which here are half spaces; its default of 0.1 m changes reflections."""
 DELAY_S, ANGLE_DEG = 1e-9, 0.1
 """Paths match if they differ by less."""
+SAME_S, SAME_DEG = 1e-11, 0.01
+"""Paths of one side that differ by less are one path at surfaces that coincide: repeats."""
 HEIGHTS_M = {"drone": (30.0, 150.0), "car": (1.5, 1.5)}
 COLUMNS = (
-    "town", "target", "reflections", "positions", "lowalt", "sionna", "matched", "delay_ns_max", "angle_deg_max",
-    "gain_db_median", "gain_db_p95", "gain_db_max", "within_1_db", "only_lowalt_power", "only_sionna_power",
+    "town", "target", "reflections", "positions", "lowalt", "sionna", "lowalt_repeats", "sionna_repeats", "matched",
+    "delay_ns_max", "angle_deg_max", "gain_db_median", "gain_db_p95", "gain_db_max", "within_1_db", "only_lowalt_power",
+    "only_sionna_power",
 )  # fmt: skip
 
 
@@ -99,15 +102,25 @@ def of_sionna(rt, scene, mast: np.ndarray, places: np.ndarray, samples: int) -> 
     return result
 
 
+def apart_deg(first: tuple, second: tuple) -> float:
+    """Return the angle between the directions of two paths."""
+    return float(np.degrees(2 * np.arcsin(np.linalg.norm(first[2] - second[2]) / 2)))
+
+
+def once(paths: list[tuple]) -> tuple[list[tuple], int]:
+    """Return the paths of one order, the strongest first, without repeats, and the number of repeats."""
+    kept: list[tuple] = []
+    for path in sorted(paths, key=lambda path: -path[3]):
+        if not any(abs(path[1] - old[1]) < SAME_S and apart_deg(path, old) < SAME_DEG for old in kept):
+            kept.append(path)
+    return kept, len(paths) - len(kept)
+
+
 def matched(mine: list[tuple], theirs: list[tuple]) -> tuple[list[tuple], list[tuple], list[tuple]]:
-    """Return the pairs of paths that are one, and the paths that only either side has."""
+    """Return the pairs of paths of one order that are one, and the paths that only either side has."""
     pairs, left = [], list(theirs)
-    for path in sorted(mine, key=lambda path: -path[3]):
-        near = [
-            other for other in left
-            if other[0] == path[0] and abs(other[1] - path[1]) < DELAY_S
-            and np.degrees(np.arccos(np.clip(other[2] @ path[2], -1, 1))) < ANGLE_DEG
-        ]  # fmt: skip
+    for path in mine:
+        near = [other for other in left if abs(other[1] - path[1]) < DELAY_S and apart_deg(path, other) < ANGLE_DEG]
         if near:
             best = min(near, key=lambda other: abs(other[1] - path[1]))
             left = [other for other in left if other is not best]
@@ -119,7 +132,7 @@ def matched(mine: list[tuple], theirs: list[tuple]) -> tuple[list[tuple], list[t
 def main(arguments: list[str]) -> None:
     """Match the paths in the towns that are named, and write the table."""
     line = argparse.ArgumentParser(description=__doc__)
-    line.add_argument("--towns", nargs="+", default=["simple_street_canyon", "munich"])
+    line.add_argument("--towns", nargs="+", default=["simple_street_canyon", "munich", "etoile"])
     line.add_argument("--positions", type=int, default=25, help="of each kind of target")
     line.add_argument("--samples", type=int, default=1_000_000, help="rays that the ray tracer starts with")
     line.add_argument("--llvm", help="path of libLLVM.so of version 19")
@@ -153,7 +166,7 @@ def main(arguments: list[str]) -> None:
         rng = np.random.default_rng(63)
         for target, heights in HEIGHTS_M.items():
             places = drawn(rng, inside, heights, options.positions, town)
-            found: dict[int, list[list]] = defaultdict(lambda: [[], [], [], [], []])
+            found: dict[int, list[list]] = defaultdict(lambda: [[], [], [], [], [], [], []])
             for station in network.stations:
                 ground = middle + scale * (np.array(station.position_m[:2]) - corners.mean(axis=0))
                 above = roof_m(town.occluders, ground)
@@ -162,8 +175,10 @@ def main(arguments: list[str]) -> None:
                 for place, other in zip(places, theirs, strict=True):
                     mine = of_lowalt(town, epsilon, mast, place)
                     for count in range(3):
-                        both = [[path for path in side if path[0] == count] for side in (mine, other)]
-                        for held, new in zip(found[count], (*both, *matched(*both)), strict=True):
+                        sides = [once([path for path in side if path[0] == count]) for side in (mine, other)]
+                        both, repeats = zip(*sides, strict=True)
+                        news = (*both, *matched(*both), *([number] for number in repeats))
+                        for held, new in zip(found[count], news, strict=True):
                             held += new
             for count, sides in sorted(found.items()):
                 rows.append((name, target, count, len(places) * len(network.stations), *compared(*sides)))
@@ -173,10 +188,12 @@ def main(arguments: list[str]) -> None:
         writer.writerows([COLUMNS, *rows])
 
 
-def compared(ours: list, others: list, pairs: list, alone: list, missed: list) -> tuple:
-    """Return the columns of a line that say how well the paths agree."""
+def compared(
+    ours: list, others: list, pairs: list, alone: list, missed: list, repeats: list, others_repeats: list
+) -> tuple:
+    """Return the columns of a line that say how well the paths agree; repeats: numbers of them, left out before."""
     delays = [1e9 * abs(a[1] - b[1]) for a, b in pairs]
-    angles = [float(np.degrees(2 * np.arcsin(np.linalg.norm(a[2] - b[2]) / 2))) for a, b in pairs]
+    angles = [apart_deg(*pair) for pair in pairs]
     gains = [abs(20 * np.log10(a[3] / b[3])) for a, b in pairs]
     power = [sum(path[3] ** 2 for path in side) for side in (alone, missed, ours)]
     shares = [f"{part / power[2] if power[2] else 0.0:.2e}" for part in power[:2]]
@@ -185,7 +202,7 @@ def compared(ours: list, others: list, pairs: list, alone: list, missed: list) -
         numbers = [f"{np.max(delays):.4f}", f"{np.max(angles):.4f}"]
         numbers += [f"{np.percentile(gains, share):.3f}" for share in (50, 95, 100)]
         numbers.append(f"{np.mean(np.array(gains) < 1.0):.4f}")
-    return len(ours), len(others), len(pairs), *numbers, *shares
+    return len(ours), len(others), sum(repeats), sum(others_repeats), len(pairs), *numbers, *shares
 
 
 if __name__ == "__main__":

@@ -86,18 +86,26 @@ def draw(config: dict, out: Path) -> None:
                            edgecolors="face", clim=(0, 40))  # fmt: skip
     plan.add_collection(faces)
     direct_db = 20 * np.log10(abs(field[0, 0]))
-    plan.plot(*np.array([mast, PLACE_M])[:, :2].T, "k-" if lit[0, 0] else "k:", label=f"direct ray, {direct_db:.0f} dB")
-    for route in routes:
+    seen, style = ("free", "k-") if lit[0, 0] else ("past edges", "k:")
+    plan.plot(*np.array([mast, PLACE_M])[:, :2].T, style, label=f"direct, {seen}, {direct_db:.0f} dB")
+    bends = [np.array([mast, PLACE_M])]
+    for number, route in enumerate(routes):
         path = corners_of(found.town.facets, route, mast)
+        bends.append(path)
         loss = 20 * np.log10(abs(route.coefficient[0, 0]) * np.linalg.norm(mast - PLACE_M)
                              / np.linalg.norm(route.images[0, 0] - mast))  # fmt: skip
-        plan.plot(*path[:, :2].T, "-", linewidth=1.2, label=f"{len(route.facets)} reflected, {loss:.0f} dB")
+        names = " and ".join("ground" if k == len(found.town.facets.offset) - 1 else "wall" for k in route.facets)
+        # Paths over each other in the plan are dashes of different colours.
+        plan.plot(*path[:, :2].T, color=f"C{number}", linestyle=(4 * number, (4, 4 * (len(routes) - 1))), linewidth=1.8)
+        plan.plot([], color=f"C{number}", linewidth=1.8, label=f"{names}, {loss:.0f} dB")
     plan.plot(*mast[:2], "r^", markersize=9)
     plan.plot(x, y, "bo", markersize=6)
     plan.annotate(f" {SUBTYPE}, {z:g} m", (x, y), color="blue")
     plan.annotate(f" station {station.name}, {mast[2]:g} m", mast[:2], color="red", ha="left", va="top")
-    plan.set(xlim=(-60, 280), ylim=(-60, 350), xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    plan.legend(loc="upper right", fontsize=7)
+    shown = np.concatenate(bends)[:, :2]
+    low, high = shown.min(axis=0) - (80.0, 50.0), shown.max(axis=0) + np.array([120.0, 50.0])
+    plan.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x (m)", ylabel="y (m)", aspect="equal")
+    plan.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8)
     clouds = {sample.cloud.subtype: sample.cloud}
     without = {name: block for name, block in config["effects"].items() if name != "town"}
     signals = {"free": received_signal(explanation.scene_of(config | {"effects": without}), station, *sample, clouds),
@@ -109,7 +117,7 @@ def draw(config: dict, out: Path) -> None:
         power = 20 * np.log10(np.fft.fftshift(abs(power), axes=0) + 1e-30)
         top = power.max() if top is None else top
         speed = np.fft.fftshift(hz) * SPEED_OF_LIGHT / (2 * frequency)
-        mesh = axes[name].pcolormesh(at, speed, power - top, cmap="viridis", vmin=-60, vmax=0, shading="nearest")
+        mesh = axes[name].pcolormesh(at, speed, power - top, cmap="viridis", vmin=-70, vmax=0, shading="nearest")
         axes[name].set(title=title, xlabel="time (s)", ylabel="radial speed (m/s)")
     figure.colorbar(mesh, ax=[axes["free"], axes["town"]], label="power over the free peak (dB)")
     with replacing(out) as temporary:

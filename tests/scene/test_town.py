@@ -190,6 +190,21 @@ def test_the_field_is_smooth_across_the_border_of_the_shadow():
     assert field[-1, 0] == 1.0
 
 
+def test_an_upright_edge_diffracts_on_both_sides_of_its_shadow_and_by_a_wall_that_goes_on_past_the_target():
+    wall, mast = built([(0.0, 1000.0, 0.02, 2000.0, 9000.0)]), np.array([-200.0, 5.0, 30.0])
+    y = np.linspace(-2.0, 30.0, 600)
+    ends = np.stack([np.full(600, 30.0), y, np.full(600, 30.0)], axis=1)[:, None]
+    lit, field = image_paths.direct(wall, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    length = np.hypot(230.0, y - 5.0)
+    share = (200.0 * 230.0 - 5.0 * (y - 5.0)) / length**2
+    behind_m = (5.0 + 200.0 / 230.0 * (y - 5.0)) * 230.0 / length
+    nu = behind_m * np.sqrt(2 / (WAVELENGTH_M * length * share * (1 - share)))
+    assert 0 < (lit[:, 0] & (nu > -0.78)).sum() < lit.sum()
+    near = (nu > -0.78) & (nu < 3.0)
+    np.testing.assert_allclose(field[near, 0], knife_edge.field(nu[near]), atol=0.01)
+    np.testing.assert_allclose(abs(field[nu > 3.0, 0]), abs(knife_edge.field(nu[nu > 3.0])), rtol=0.02)
+
+
 def test_the_ply_the_geojson_and_the_mitsuba_version_of_a_town_have_equal_facades(tmp_path):
     files = {"ply": (ply(tmp_path / "town.ply", BOXES), None),
              "geojson": (geojson(tmp_path / "town.geojson", BOXES), ORIGIN),

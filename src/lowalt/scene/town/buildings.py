@@ -9,7 +9,7 @@ import numpy as np
 
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
-from lowalt.scene.town.facets import Town, corner_numbers, town
+from lowalt.scene.town.facets import Town, corner_numbers, sizes, town
 from lowalt.scene.town.materials import MATERIALS, named
 from lowalt.targets.mesh_files import SUFFIXES, metres, pieces
 
@@ -110,10 +110,11 @@ def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[
         corners, material = corners[which], material[which]
 
     keep(corners[..., 2].max(axis=1) >= FLOOR_M, "triangles of the ground")
-    numbers = corner_numbers(corners)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    ordered = np.sort(numbers, axis=1)
-    keep((area > 1e-6) & (ordered[:, 0] < ordered[:, 1]) & (ordered[:, 1] < ordered[:, 2]), "triangles without an area")
+    ordered = np.sort(corner_numbers(corners), axis=1)
+    keep(
+        (sizes(corners)[1] > 5e-7) & (ordered[:, 0] < ordered[:, 1]) & (ordered[:, 1] < ordered[:, 2]),
+        "triangles without an area",
+    )
     _, first = np.unique(np.sort(corner_numbers(corners), axis=1), axis=0, return_index=True)
     keep(np.isin(np.arange(len(corners)), first), "repeated triangles")
     if not len(corners):

@@ -48,7 +48,8 @@ class Town(NamedTuple):
     """A town as paths need it.
 
     material: (K,) number of each facet's material in `materials`; building: (F,) number of the building of each
-    triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet, and of_building (E,), their buildings.
+    triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet, and of_building (E,), their buildings;
+    pairs: by station's place (3,) m, pairs (P, 2) of facets by which a ray from it may go on, filled as they are asked.
     """
 
     facets: Facets
@@ -58,6 +59,7 @@ class Town(NamedTuple):
     building: np.ndarray
     edges: np.ndarray
     of_building: np.ndarray
+    pairs: dict[tuple[float, ...], np.ndarray]
 
 
 def corner_numbers(corners: np.ndarray) -> np.ndarray:
@@ -66,10 +68,12 @@ def corner_numbers(corners: np.ndarray) -> np.ndarray:
     return np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1, 3)
 
 
-def _normals(corners: np.ndarray) -> np.ndarray:
-    """Unit normals (F, 3) of triangles."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normal / np.linalg.norm(normal, axis=1)[:, None]
+def sizes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit normals (F, 3), NaN without an area, and areas (F,) m2 of triangles (F, 3, 3) m."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(across, axis=1)
+    with np.errstate(invalid="ignore"):
+        return across / twice[:, None], 0.5 * twice
 
 
 def _edges(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +87,7 @@ def labels(corners: np.ndarray, numbers: np.ndarray, material: np.ndarray) -> np
 
     A facet that is not flat, such as a finely divided dome, falls apart into its triangles.
     """
-    normal, (edges, owner) = _normals(corners), _edges(numbers)
+    (normal, area), (edges, owner) = sizes(corners), _edges(numbers)
     order = np.lexsort(edges.T)
     edges, owner = edges[order], owner[order]
     met = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
@@ -94,7 +98,6 @@ def labels(corners: np.ndarray, numbers: np.ndarray, material: np.ndarray) -> np
     graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     # The plane of a facet is that of its largest triangle.
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     order = np.lexsort((-area, label))
     leader = np.empty(label.max() + 1, np.int64)
     leader[label[order][::-1]] = order[::-1]
@@ -126,9 +129,9 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
     order = np.argsort(label, kind="stable")
     corners, numbers, material, label = corners[order], numbers[order], material[order], label[order]
     first = np.searchsorted(label, np.arange(label.max() + 2))
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    normal, area = sizes(corners)
     largest = np.array([a + area[a:b].argmax() for a, b in pairwise(first)])
-    normal = _normals(corners[largest])
+    normal = normal[largest]
     across = np.cross([0.0, 0.0, 1.0], normal)
     flat = np.linalg.norm(across, axis=1) < 1e-6
     across[flat] = [1.0, 0.0, 0.0]
@@ -153,7 +156,7 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
     edges, owner, building = _ridges(corners, numbers, label)
     return Town(
         facets, Occluders(tree.boxes, tree.triangles, of_tree), np.append(material[first[:-1]], names.index(ground)),
-        names, building, edges, owner,
+        names, building, edges, owner, {},
     )  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 The image method finds reflected rays. Every ray of every point and symbol is tested against all buildings.
 """
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -72,25 +71,14 @@ def epsilons(town: Town, frequency_hz: float, where: str) -> np.ndarray:
     return np.array(of_material)[town.material]
 
 
-@lru_cache(maxsize=16)
-def _pairs(station_m: tuple[float, ...], same: "_SameTown") -> np.ndarray:
+def _pairs(town: Town, station_m: np.ndarray) -> np.ndarray:
     """The pairs (P, 2) of facets by which a ray from a station may go on; they hold for all targets."""
-    facets, occluders = same.town.facets, same.town.occluders
-    place = np.array(station_m)
-    unseen = shadow_loops.hidden(facets, occluders, np.arange(len(facets.offset)), np.repeat(place[None], 8, axis=0))
-    return image_loops.ordered_pairs(facets, ~unseen, place, np.hypot(*facets.half.T))
-
-
-class _SameTown(NamedTuple):
-    """A town, told apart by which object it is."""
-
-    town: Town
-
-    def __hash__(self) -> int:
-        return id(self.town.facets.normal)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SameTown) and self.town.facets.normal is other.town.facets.normal
+    key, facets = tuple(station_m.tolist()), town.facets
+    if key not in town.pairs:
+        every, corners = np.arange(len(facets.offset)), np.repeat(station_m[None], 8, axis=0)
+        unseen = shadow_loops.hidden(facets, town.occluders, every, corners)
+        town.pairs[key] = image_loops.ordered_pairs(facets, ~unseen, station_m, np.hypot(*facets.half.T))
+    return town.pairs[key]
 
 
 def _unhidden(town: Town, routes: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -109,8 +97,8 @@ def candidates(town: Town, station_m: np.ndarray, places: np.ndarray, order: int
     if order >= 1:
         found.append(_unhidden(town, image_loops.single(town.facets, station_m, middle, radius)[:, None], low, high))
     if order >= 2:
-        pairs = _pairs(tuple(station_m.tolist()), _SameTown(town))
-        found.append(_unhidden(town, image_loops.double(town.facets, pairs, station_m, middle, radius), low, high))
+        double = image_loops.double(town.facets, _pairs(town, station_m), station_m, middle, radius)
+        found.append(_unhidden(town, double, low, high))
     return found
 
 

@@ -1,17 +1,19 @@
 """Diffraction of the direct ray over roofs and around vertical edges: knife edges and screens of finite width.
 
-A building near or across a ray is a screen with a top and two upright edges. By Babinet's principle the field
+A building near or across a ray is a screen with a top and two upright edges. Its outline (4, 3) m holds the ends of the
+top edge, then a place each on the left and the right edge. By Babinet's principle the field
 behind it is 1 - (1 - F(left) - F(right)) (1 - F(top)) of that in free space, where F is Fresnel's integral of an edge's
 parameter nu, which is positive in the shadow: the wave passes over the top and around both sides.
 Of several buildings the one that weakens most counts in full, and on each side of it the next one as seen from its
 edge (Deygout's construction). The field changes smoothly across the border of the shadow.
 """
 
-from typing import NamedTuple
+import math
 
 import numpy as np
 from scipy.special import fresnel
 
+from lowalt.machine.jit import INNER, PLAIN
 from lowalt.scene.town import shadow_loops
 from lowalt.scene.town.facets import Town
 
@@ -31,116 +33,165 @@ def field(nu: np.ndarray) -> np.ndarray:
     return 0.5 * (1.0 + 1.0j) * ((0.5 - cosine) - 1.0j * (0.5 - sine))
 
 
-class Screen(NamedTuple):
-    """The outline of a building across a ray: its top edge (2, 3) m, None for none, and the places (2,) m, in the plan,
-    of its left and right edges."""
-
-    top: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
+FAR_M = 1e5
+"""Beyond this no wave passes around an edge."""
 
 
-def _along(start: np.ndarray, ends: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where places (..., 2 or 3) project onto the ways from a start (3,) to ends (..., 3) in the plan, as shares of the
-    ways, and how far to the left of them the places are (m)."""
-    way, off = (ends - start)[..., :2], places[..., :2] - start[:2]
-    length = np.sqrt((way * way).sum(axis=-1))
-    left = (way[..., 0] * off[..., 1] - way[..., 1] * off[..., 0]) / length
-    return (way * off).sum(axis=-1) / length**2, left
+@INNER
+def _along(start, way, place):
+    """Where a place projects onto a way (3,) from a start (3,) in the plan, as a share of the way, and how far to the
+    left of the way it is (m)."""
+    x, y, length = place[0] - start[0], place[1] - start[1], math.sqrt(way[0] * way[0] + way[1] * way[1])
+    return (way[0] * x + way[1] * y) / length**2, (way[0] * y - way[1] * x) / length
 
 
-def _nu(off_m: np.ndarray, share: np.ndarray, length_m: np.ndarray, wavelength_m: float) -> np.ndarray:
+@INNER
+def _nu(off_m, share, length_m, wavelength_m):
     """The parameter nu of an edge `off_m` beyond a ray, at this share of its length. Source: P.526-15, equation 26."""
-    share = np.clip(share, 1e-4, 1.0 - 1e-4)
-    return off_m * np.sqrt(2.0 / (wavelength_m * length_m * share * (1.0 - share)))
+    share = min(max(share, 1e-4), 1.0 - 1e-4)
+    return off_m * math.sqrt(2.0 / (wavelength_m * length_m * share * (1.0 - share)))
 
 
-def _edges_nu(
-    screen: Screen, start: np.ndarray, ends: np.ndarray, wavelength_m: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The nu of the top, the left and the right edge for rays from a start (3,) to ends (..., 3)."""
-    length = np.linalg.norm(ends - start, axis=-1)
-    (_, left_p), (_, left_q) = _along(start, ends, screen.top[0]), _along(start, ends, screen.top[1])
-    apart = left_p - left_q
-    part = left_p / np.where(abs(apart) > 1e-9, apart, 1e-9)
-    crossing = screen.top[0] + part[..., None] * (screen.top[1] - screen.top[0])
-    share, _ = _along(start, ends, crossing)
-    rise = (ends - start)[..., 2]
-    over = (crossing[..., 2] - start[2] - share * rise) * np.sqrt(np.maximum(1.0 - (rise / length) ** 2, 0.0))
-    result = [_nu(over, share, length, wavelength_m)]
-    for place, sign in ((screen.left, 1.0), (screen.right, -1.0)):
-        share, left = _along(start, ends, place)
-        result.append(_nu(sign * left, share, length, wavelength_m))
-    return tuple(result)
+@INNER
+def _over(outline, start, way):
+    """By how far a screen's top edge is above a way (3,) from a start (3,), at which share of the way, and which share
+    of the edge."""
+    low, high = outline[0], outline[1]
+    near, far = _along(start, way, low)[1], _along(start, way, high)[1]
+    part = near / (near - far if abs(near - far) > 1e-9 else 1e-9)
+    share = _along(start, way, (low[0] + part * (high[0] - low[0]), low[1] + part * (high[1] - low[1])))[0]
+    length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    rise_m = low[2] + part * (high[2] - low[2]) - start[2] - share * way[2]
+    return rise_m * math.sqrt(max(1.0 - (way[2] / length) ** 2, 0.0)), share, part
 
 
-def screen(edges: np.ndarray, start: np.ndarray, end: np.ndarray, wavelength_m: float) -> Screen | None:
-    """Return the screen that a building's edges (E, 2, 3) m are to the ray from start to end, (3,) m each.
-
-    None where no edge crosses the upright plane through the ray between its ends.
-    """
-    share, left = _along(start, end, edges)
-    across = left[:, 0] * left[:, 1] < 0.0
-    between = (share > 0.0) & (share < 1.0)
-    if not (across & between.any(axis=1)).any() or not between.any():
-        return None
-    cut = np.flatnonzero(across & between.any(axis=1))
-    part = left[cut, 0] / (left[cut, 0] - left[cut, 1])
-    crossing = edges[cut, 0] + part[:, None] * (edges[cut, 1] - edges[cut, 0])
-    at, _ = _along(start, end, crossing)
-    length = np.linalg.norm(end - start)
-    over = np.where((at > 0.0) & (at < 1.0), crossing[:, 2] - start[2] - at * (end[2] - start[2]), -np.inf)
-    top = edges[cut[_nu(over, at, length, wavelength_m).argmax()]]
-    sides = np.where(between, _nu(left, share, length, wavelength_m), np.nan)
-    plan = edges[..., :2].reshape(-1, 2)
-    return Screen(top, plan[np.nanargmax(sides)], plan[np.nanargmin(sides)])
+@PLAIN
+def _edges_nu(outline, start, ends, wavelength_m, result):
+    """Fill result (3, R) with the nu of the top, left and right edge for rays from a start (3,) to ends (R, 3)."""
+    way = np.empty(3)
+    for r in range(len(ends)):
+        for i in range(3):
+            way[i] = ends[r, i] - start[i]
+        length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+        over, share, _ = _over(outline, start, way)
+        result[0, r] = _nu(over, share, length, wavelength_m)
+        for side in range(1, 3):
+            share, left = _along(start, way, outline[1 + side])
+            result[side, r] = _nu(left if side == 1 else -left, share, length, wavelength_m)
 
 
-def behind(shape: Screen, start: np.ndarray, ends: np.ndarray, wavelength_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the field at ends (..., 3) m behind a screen over that in free space, and the least nu of its edges."""
-    top, left, right = _edges_nu(shape, start, ends, wavelength_m)
-    dark = (1.0 - field(left) - field(right)) * (1.0 - field(top))
-    return 1.0 - dark, np.minimum(np.minimum(left, right), top)
-
-
-def _detour(shape: Screen, start: np.ndarray, end: np.ndarray, wavelength_m: float) -> np.ndarray:
+@PLAIN
+def _detour(outline, start, end, wavelength_m):
     """The point (3,) m of a screen's outline by which the strongest wave passes from start to end."""
-    top, left, right = _edges_nu(shape, start, end, wavelength_m)
-    if top <= min(left, right):
-        share, _ = _along(start, end, shape.top.mean(axis=0))
-        (_, left_p), (_, left_q) = (_along(start, end, corner) for corner in shape.top)
-        return shape.top[0] + left_p / (left_p - left_q) * (shape.top[1] - shape.top[0])
-    side = shape.left if left < right else shape.right
-    share, _ = _along(start, end, side)
-    return np.array([*side, start[2] + share * (end[2] - start[2])])
+    way, nu = end - start, np.empty((3, 1))
+    _edges_nu(outline, start, end.reshape(1, 3), wavelength_m, nu)
+    if nu[0, 0] <= nu[1:].min():
+        return outline[0] + _over(outline, start, way)[2] * (outline[1] - outline[0])
+    side = outline[2] if nu[1, 0] < nu[2, 0] else outline[3]
+    return np.array([side[0], side[1], start[2] + _along(start, way, side)[0] * way[2]])
+
+
+@INNER
+def _beside(edge, k, start, way, other, corner):
+    """Set corner (3,) to end k of an edge (2, 3); return whether it is beside the way (3,) from a start (3,) and what
+    `_along` says of it.
+
+    other: where the other end projects onto the way. An edge that leaves the stretch beside the way goes on without
+    end, so its corner is cut there and moved FAR_M to its side.
+    """
+    for i in range(3):
+        corner[i] = edge[k, i]
+    share, off = _along(start, way, corner)
+    if 0.0 < share < 1.0:
+        return True, share, off
+    part = (share - min(max(share, 0.0), 1.0)) / (share - other)
+    for i in range(3):
+        corner[i] += part * (edge[1 - k, i] - edge[k, i])
+    share, off = _along(start, way, corner)
+    further = math.copysign(FAR_M, off)
+    flat = math.sqrt(way[0] * way[0] + way[1] * way[1])
+    corner[0], corner[1] = corner[0] - further * way[1] / flat, corner[1] + further * way[0] / flat
+    return False, share, off + further
+
+
+@PLAIN
+def _outline(edges, start, end, wavelength_m, outline):
+    """Fill outline (4, 3) of the screen that edges (E, 2, 3) are to a ray; return whether any is beside it."""
+    way, corner, crossing = end - start, np.empty(3), np.empty(3)
+    length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    most, least, highest, crossed, any_edge = -np.inf, np.inf, -np.inf, False, False
+    # A screen that no top shows is as low as can be.
+    outline[0], outline[1] = start, start
+    outline[1, 0], outline[1, 1] = start[0] - way[1], start[1] + way[0]
+    outline[0, 2] = outline[1, 2] = -FAR_M
+    for edge in edges:
+        first, left = _along(start, way, edge[0])
+        last, right = _along(start, way, edge[1])
+        if (first <= 0.0 and last <= 0.0) or (first >= 1.0 and last >= 1.0):
+            continue
+        any_edge = True
+        for k in range(2):
+            inside, share, off = _beside(edge, k, start, way, first if k else last, corner)
+            side = _nu(off, share, length, wavelength_m)
+            if side > most:
+                most, outline[2] = side, corner
+            if side < least:
+                least, outline[3] = side, corner
+            over = _nu(corner[2] - start[2] - share * way[2], share, length, wavelength_m)
+            if inside and not crossed and over > highest:
+                # Beside the ray a screen is as high as its highest corner.
+                highest, outline[0], outline[1] = over, corner, corner
+                outline[1, 0], outline[1, 1] = corner[0] - way[1], corner[1] + way[0]
+        if left * right < 0.0:
+            for i in range(3):
+                crossing[i] = edge[0, i] + left / (left - right) * (edge[1, i] - edge[0, i])
+            share = _along(start, way, crossing)[0]
+            over = _nu(crossing[2] - start[2] - share * way[2], share, length, wavelength_m)
+            if 0.0 < share < 1.0 and (not crossed or over > highest):
+                crossed, highest, outline[0], outline[1] = True, over, edge[0], edge[1]
+    return any_edge
+
+
+def behind(
+    edges: np.ndarray, start: np.ndarray, ends: np.ndarray, wavelength_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return the outline of the screen that a building's edges (E, 2, 3) m are to rays from start to ends (..., 3) m,
+    the field there over that in free space, and the least nu of its edges; None where no ray comes near an edge."""
+    outline, rays = np.empty((4, 3)), np.ascontiguousarray(ends).reshape(-1, 3)
+    if not _outline(edges, start, rays.mean(axis=0), wavelength_m, outline):
+        return None
+    nu = np.empty((3, len(rays)))
+    _edges_nu(outline, start, rays, wavelength_m, nu)
+    nu = nu.reshape(3, *ends.shape[:-1])
+    least = nu.min(axis=0)
+    if least.max() <= CLEAR:
+        return None
+    top, left, right = field(nu)
+    return outline, 1.0 - (1.0 - left - right) * (1.0 - top), least
 
 
 def _block(
     town: Town, buildings: np.ndarray, station_m: np.ndarray, places: np.ndarray, lit: np.ndarray, wavelength_m: float
 ) -> np.ndarray:
     """The direct ray's field (n, L) at places (n, L, 3) of a few symbols, past some buildings; lit: (n, L) bool."""
-    middle, found = places.mean(axis=(0, 1)), []
+    found = []
     for building in buildings:
         edges = town.edges[town.of_building == building]
-        shape = screen(edges, station_m, middle, wavelength_m)
-        if shape is None:
-            continue
-        behind_it, least = behind(shape, station_m, places, wavelength_m)
-        if least.max() > CLEAR:
+        if (near := behind(edges, station_m, places, wavelength_m)) is not None:
+            outline, behind_it, least = near
             # An outline knows no gateways: where a ray passes through one, the building is no screen.
             behind_it = np.where(lit & (least > SURE), 1.0, behind_it)
-            found.append((float(abs(behind_it).mean()), shape, edges, behind_it, least))
+            found.append((float(abs(behind_it).mean()), outline, edges, behind_it, least))
     if not found:
         return lit.astype(np.complex128)
     found.sort(key=lambda each: each[0])
-    _, shape, _, result, least = found[0]
-    top = _detour(shape, station_m, middle, wavelength_m)
+    _, outline, _, result, least = found[0]
+    top = _detour(outline, station_m, places.mean(axis=(0, 1)), wavelength_m)
     before, after = [np.ones(())], [np.ones(result.shape)]
     for _, _, edges, _, _ in found[1:] if abs(result).mean() < 1.0 and least.max() > 0.0 else ():
-        for start, end, seen, factors in ((station_m, top, top, before), (top, middle, places, after)):
-            other = screen(edges, start, end, wavelength_m)
-            if other is not None:
-                factors.append(behind(other, start, seen, wavelength_m)[0])
+        for start, seen, factors in ((station_m, top, before), (top, places, after)):
+            if (other := behind(edges, start, seen, wavelength_m)) is not None:
+                factors.append(other[1])
     sides = [min(factors, key=lambda factor: float(abs(factor).mean())) for factors in (before, after)]
     result = result * sides[0] * sides[1]
     # A dark point that no outline covers gets nothing.

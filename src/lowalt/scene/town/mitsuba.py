@@ -21,15 +21,10 @@ MOST_SHAPES, LARGEST_BYTES = 20_000, 64 << 20
 
 def _numbers(element: Element, size: int, default: float) -> np.ndarray:
     """The numbers of an element: `value` with one or all, or x, y and z."""
-    if text := element.get("value"):
-        values = np.array([float(part) for part in text.replace(",", " ").split()])
-        return np.broadcast_to(values, size).copy() if len(values) in (1, size) else _refused(element)
-    return np.array([float(element.get(axis, default)) for axis in "xyz"])
-
-
-def _refused(element: Element) -> np.ndarray:
-    """Refuse an element's numbers."""
-    raise InputError(f"<{element.tag}> has {element.get('value')!r}, expected as many numbers as it takes")
+    text = element.get("value", "").replace(",", " ").split() or [element.get(axis, str(default)) for axis in "xyz"]
+    if len(text) not in (1, size):
+        raise InputError(f"<{element.tag}> has {element.get('value')!r}, expected as many numbers as it takes")
+    return np.broadcast_to(np.array([float(part) for part in text]), size).copy()
 
 
 def _place(shape: Element) -> np.ndarray:
