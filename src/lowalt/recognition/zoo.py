@@ -80,6 +80,16 @@ def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trust
     content = model_file.of_run(model)
     if content.identity.get("samples", {}).get("validation") != samples.sha256():
         raise InputError(f"{model}: was validated on other samples, expected the validation fold of its own run")
+    return kept(content, model, samples, name, zoo, trusted)
+
+
+def kept(
+    content: ModelFile, model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = ""
+) -> dict:
+    """Write a model's content in 8 bits as NAME.safetensors and NAME.md and return the measurements, as `entry` does.
+
+    samples: those that both sets of weights answer. Raises: InputError as `entry`, for size and accuracy.
+    """
     reduced = small(content, trusted)
     size = len(model_file.packed(reduced))
     if size >= LARGEST_BYTES:
