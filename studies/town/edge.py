@@ -1,18 +1,17 @@
 """Diffraction at one edge of a wide screen: the effect `town`, Sionna RT and the approximation of ITU-R P.526.
 
 One row for each edge, distance and place behind it: the field over that in free space, in dB. `bend_deg` is the angle
-by which a ray past the edge bends. The ray tracer's
-diffraction is that of a half plane by the uniform theory of diffraction, ours Kirchhoff's integral.
+by which a ray past the edge bends. The ray tracer's diffraction is that of a half plane by the uniform theory of
+diffraction, ours is Kirchhoff's integral.
 """
 
 import argparse
-import os
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from match import CARRIER_HZ, SLAB_M
+from match import CARRIER_HZ, SLAB_M, ray_tracer
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.csv_tables import write_csv
@@ -99,14 +98,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--llvm", help="path of libLLVM.so of version 19")
     line.add_argument("--out", type=Path, required=True)
     options = line.parse_args(arguments)
-    if options.llvm:
-        os.environ["DRJIT_LIBLLVM_PATH"] = options.llvm
-    import mitsuba
-
-    mitsuba.set_variant("llvm_ad_mono_polarized")
-    import sionna.rt as rt
-
-    rows = []
+    rt, rows = ray_tracer(options.llvm), []
     with TemporaryDirectory() as name:
         for edge in ("top", "side"):
             ours, theirs = Path(name) / "lowalt.ply", Path(name) / "screen.ply"

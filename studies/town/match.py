@@ -79,6 +79,18 @@ def of_lowalt(town: Town, epsilon: np.ndarray, mast: np.ndarray, place: np.ndarr
     return result
 
 
+def ray_tracer(llvm: str | None):
+    """Return the module of the ray tracer, on the CPU; llvm: path of its libLLVM.so, None for the one it finds."""
+    if llvm:
+        os.environ["DRJIT_LIBLLVM_PATH"] = llvm
+    import mitsuba
+
+    mitsuba.set_variant("llvm_ad_mono_polarized")
+    import sionna.rt
+
+    return sionna.rt
+
+
 def of_sionna(rt, scene, mast: np.ndarray, places: np.ndarray, samples: int) -> list[list[tuple]]:
     """Return the same of the ray tracer for each of some places (K, 3) m."""
     for name in [*scene.transmitters, *scene.receivers]:
@@ -138,13 +150,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--llvm", help="path of libLLVM.so of version 19")
     line.add_argument("--out", type=Path, required=True)
     options = line.parse_args(arguments)
-    if options.llvm:
-        os.environ["DRJIT_LIBLLVM_PATH"] = options.llvm
-    import mitsuba
-
-    mitsuba.set_variant("llvm_ad_mono_polarized")
-    import sionna.rt as rt
-
+    rt = ray_tracer(options.llvm)
     config = overlaid([])
     network = Network.from_settings(config["network"])
     corners = np.asarray(region_polygon(np.array(masts_m(config["network"]), float), None))

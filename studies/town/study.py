@@ -56,6 +56,22 @@ def corners_of(facets, route: image_paths.Route, mast: np.ndarray) -> np.ndarray
     return np.array([*points, image])
 
 
+def spectrograms(figure, axes: dict, signals: dict[str, np.ndarray], rate_hz: float, carrier_hz: float) -> None:
+    """Draw the spectrograms of the signals (symbols,) "free" and "town" into their axes, in dB over the peak of the
+    first."""
+    from scipy.signal import stft
+
+    top = None
+    for name, title in (("free", "without buildings"), ("town", "in the town")):
+        hz, at, power = stft(signals[name], rate_hz, nperseg=64, noverlap=60, return_onesided=False)
+        power = 20 * np.log10(np.fft.fftshift(abs(power), axes=0) + 1e-30)
+        top = power.max() if top is None else top
+        speed = np.fft.fftshift(hz) * SPEED_OF_LIGHT / (2 * carrier_hz)
+        mesh = axes[name].pcolormesh(at, speed, power - top, cmap="viridis", vmin=-70, vmax=0, shading="nearest")
+        axes[name].set(title=title, xlabel="time (s)", ylabel="radial speed (m/s)")
+    figure.colorbar(mesh, ax=[axes["free"], axes["town"]], label="power over the free peak (dB)")
+
+
 def draw(config: dict, out: Path) -> None:
     """Write the picture: the plan with all paths from the first station, and two spectrograms."""
     import matplotlib
@@ -63,7 +79,6 @@ def draw(config: dict, out: Path) -> None:
     matplotlib.use("agg")
     from matplotlib import pyplot
     from matplotlib.collections import PolyCollection
-    from scipy.signal import stft
 
     (sample,) = explanation.samples(config, None, [(SUBTYPE, 0)])
     x, y, z = PLACE_M
@@ -110,16 +125,8 @@ def draw(config: dict, out: Path) -> None:
     without = {name: block for name, block in config["effects"].items() if name != "town"}
     signals = {"free": received_signal(explanation.scene_of(config | {"effects": without}), station, *sample, clouds),
                "town": received_signal(scene, station, *sample, clouds)}  # fmt: skip
-    rate = 1.0 / scene.network.symbol_interval_s
-    top = None
-    for name, title in (("free", "without buildings"), ("town", "in the town")):
-        hz, at, power = stft(signals[name].signal, rate, nperseg=64, noverlap=60, return_onesided=False)
-        power = 20 * np.log10(np.fft.fftshift(abs(power), axes=0) + 1e-30)
-        top = power.max() if top is None else top
-        speed = np.fft.fftshift(hz) * SPEED_OF_LIGHT / (2 * frequency)
-        mesh = axes[name].pcolormesh(at, speed, power - top, cmap="viridis", vmin=-70, vmax=0, shading="nearest")
-        axes[name].set(title=title, xlabel="time (s)", ylabel="radial speed (m/s)")
-    figure.colorbar(mesh, ax=[axes["free"], axes["town"]], label="power over the free peak (dB)")
+    spectrograms(figure, axes, {name: one.signal for name, one in signals.items()},
+                 1.0 / scene.network.symbol_interval_s, frequency)  # fmt: skip
     with replacing(out) as temporary:
         figure.savefig(temporary, dpi=110)
 

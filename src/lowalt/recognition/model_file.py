@@ -32,6 +32,10 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
 from lowalt.recognition.runs import Trained, of_state
 
+SCALE = ".scale"
+"""Added to the name of a matrix: the name of its scales, (rows,) float32."""
+LARGEST = 127
+"""Largest whole number of an 8-bit weight."""
 INPUT = ("network", "spectra", "images")
 """Blocks of a configuration that say how a model's images are made of signals."""
 EXACT, EIGHT = "as trained", "8 bits"
@@ -131,11 +135,6 @@ def trained(content: ModelFile, path: str | Path, trusted: str = "") -> Trained:
     except (KeyError, TypeError, IndexError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
     return of_state({**content.model, "weights": weights}, path, trusted)
-
-
-SCALE = ".scale"
-"""Added to the name of a matrix: the name of its scales, (rows,) float32."""
-LARGEST = 127
 
 
 def rounded(weights: Mapping[str, torch.Tensor], matrices: Collection[str]) -> dict[str, torch.Tensor]:

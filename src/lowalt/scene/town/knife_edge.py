@@ -39,8 +39,7 @@ FAR_M = 1e5
 
 @INNER
 def _along(start, way, place):
-    """Where a place projects onto a way (3,) from a start (3,) in the plan, as a share of the way, and how far to the
-    left of the way it is (m)."""
+    """Project a place onto a way (3,) from a start (3,) in the plan: share of the way, and distance to its left (m)."""
     x, y, length = place[0] - start[0], place[1] - start[1], math.sqrt(way[0] * way[0] + way[1] * way[1])
     return (way[0] * x + way[1] * y) / length**2, (way[0] * y - way[1] * x) / length
 
@@ -54,8 +53,7 @@ def _nu(off_m, share, length_m, wavelength_m):
 
 @INNER
 def _over(outline, start, way):
-    """By how far a screen's top edge is above a way (3,) from a start (3,), at which share of the way, and which share
-    of the edge."""
+    """Height (m) of a screen's top edge above a way (3,) from a start (3,), and the shares of way and edge there."""
     low, high = outline[0], outline[1]
     near, far = _along(start, way, low)[1], _along(start, way, high)[1]
     part = near / (near - far if abs(near - far) > 1e-9 else 1e-9)
@@ -93,11 +91,11 @@ def _detour(outline, start, end, wavelength_m):
 
 @INNER
 def _beside(edge, k, start, way, other, corner):
-    """Set corner (3,) to end k of an edge (2, 3); return whether it is beside the way (3,) from a start (3,) and what
-    `_along` says of it.
+    """Set corner (3,) to end k of an edge (2, 3); return whether it projects onto the way (3,) from a start (3,), and
+    its share of the way and distance to the left (`_along`).
 
-    other: where the other end projects onto the way. An edge that leaves the stretch beside the way goes on without
-    end, so its corner is cut there and moved FAR_M to its side.
+    other: share of the way at which the other end projects. Where end k projects outside the way, the edge is cut at
+    the way's nearer end, and the corner moved FAR_M to its side, because the building goes on there.
     """
     for i in range(3):
         corner[i] = edge[k, i]
@@ -116,7 +114,8 @@ def _beside(edge, k, start, way, other, corner):
 
 @PLAIN
 def _outline(edges, start, end, wavelength_m, outline):
-    """Fill outline (4, 3) of the screen that edges (E, 2, 3) are to a ray; return whether any is beside it."""
+    """Fill outline (4, 3), m, of the screen that a building's edges (E, 2, 3) form across the ray from start to end;
+    return whether any edge projects onto the ray."""
     way, corner, crossing = end - start, np.empty(3), np.empty(3)
     length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
     most, least, highest, crossed, any_edge = -np.inf, np.inf, -np.inf, False, False
