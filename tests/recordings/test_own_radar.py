@@ -45,13 +45,18 @@ def test_what_is_missing_is_asked_for_in_one_sentence(tmp_path):
 
 
 def test_scenes_stand_at_the_distances_and_heights_of_the_record(tmp_path):
-    about = stated(tmp_path, classes=["UAV", "Pedestrian"], height_m=[3, 4])
+    about = stated(tmp_path, classes=["UAV", "Vehicle", "Pedestrian"], height_m=[3, 4])
     library = Library.of({"mine": (about, twin_of(about, 12000), [0.0, 20.0])})
-    assert list(library.scenes["mine"]) == ["UAV", "Pedestrian"]
+    assert list(library.scenes["mine"]) == ["UAV", "Vehicle", "Pedestrian"]
     scenes = [scene for scenes in library.scenes["mine"].values() for scene in scenes]
     assert all(scene["height_m"] == [3, 4] and scene["beam"]["width_deg"] == 60 for scene in scenes)
     assert all(scene["receiver"]["snr_db"] == [0.0, 20.0] for scene in scenes)
     (walk,) = (scene for scene in scenes if scene["course"] == "to_and_fro")
+    assert all(scene["distance_m"] == [2, 10] for scene in scenes if scene["course"] == "hover")
+    # Vehicles pass within a third of the farthest distance and come from that distance.
+    passing = [scene for scene in scenes if scene["course"] == "pass"]
+    assert passing and all(scene["lateral_m"] == [2, 10 / 3] for scene in passing)
+    assert all(scene["ahead_m"] == [-2.5, 10] for scene in passing)
     assert walk["near_m"][0] == 2 and walk["far_m"][1] == 10 and walk["far_m"][0] - walk["near_m"][1] >= 2.49
 
 
