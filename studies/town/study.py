@@ -28,11 +28,11 @@ SUBTYPE, PLACE_M = "DJI Mini 2", (122.0, 190.0, 12.0)
 """The drone of the picture and where it flies: in a street, below the roofs."""
 
 
-def blocks(masts: np.ndarray) -> dict:
-    """Return a town as GeoJSON: square blocks on a grid of streets, 8 to 22 m high."""
+def blocks(masts: np.ndarray, across_m: np.ndarray, along_m: np.ndarray) -> dict:
+    """Return a town as GeoJSON: square blocks around the places of a grid of streets (m), 8 to 22 m high."""
     rng, features = np.random.default_rng(63), []
-    for x in np.arange(-20.0, 530.0, STREET_M):
-        for y in np.arange(-20.0, 480.0, STREET_M):
+    for x in across_m:
+        for y in along_m:
             height = int(rng.integers(8, 23))
             if np.hypot(*(masts - [x, y]).T).min() < KEPT_CLEAR_M:
                 continue
@@ -131,6 +131,13 @@ def draw(config: dict, out: Path) -> None:
         figure.savefig(temporary, dpi=110)
 
 
+def write_blocks(path: Path, across_m: np.ndarray, along_m: np.ndarray) -> None:
+    """Write the town of blocks around the stations of the default configuration as GeoJSON."""
+    masts = np.array([station["position_m"][:2] for station in overlaid([])["network"]["stations"].values()])
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(blocks(masts, across_m, along_m), separators=(",", ":")) + "\n")
+
+
 def main() -> None:
     """Write the town, or the picture."""
     line = argparse.ArgumentParser(description=__doc__)
@@ -138,10 +145,7 @@ def main() -> None:
     line.add_argument("--figure", type=Path, help="picture to write")
     options = line.parse_args()
     if options.town:
-        config = overlaid([])
-        masts = np.array([station["position_m"][:2] for station in config["network"]["stations"].values()])
-        with replacing(options.town) as temporary:
-            temporary.write_text(json.dumps(blocks(masts), separators=(",", ":")) + "\n")
+        write_blocks(options.town, np.arange(-20.0, 530.0, STREET_M), np.arange(-20.0, 480.0, STREET_M))
     if options.figure:
         draw(overlaid([HERE / "config.yaml"]), options.figure)
 
