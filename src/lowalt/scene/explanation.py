@@ -301,16 +301,23 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
             lines.append(f"{head}not tried: {change.refused}")
             continue
         shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
-        signal = f"{change.signal:.1%}" if change.signal < 10 else f"{change.signal:.0f}-fold"
-        cells = f"{signal:>8} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
+        cells = f"{_signal_text(change):>8} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
         lines.append(f"{head}{cells}  {change.also}{f'its {change.part} left out' * bool(change.part)}".rstrip())
     lines.append(
         "named: without it; added: with it and its defaults. Shares of the signal's rms, of symbols, of pixels; "
+        "dB: how much the effect weakens (-) or strengthens (+) a signal that changes more than tenfold; "
         "<: a time that the measurement cannot tell from zero."
     )
     if sources:
         lines += [f"{change.effect}: {module_of(change.effect).SOURCE}" for change in changes if not change.part]
     return lines
+
+
+def _signal_text(change: Change) -> str:
+    """The change of the signal as a share of it, or in dB where an effect hides or drowns nearly all of it."""
+    if change.signal < 10:
+        return f"{change.signal:.1%}"
+    return f"{20 * math.log10(change.signal) * (-1 if change.named else 1):+.0f} dB"
 
 
 def cost_text(ms: float, spread_ms: float) -> str:

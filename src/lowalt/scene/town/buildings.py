@@ -1,6 +1,5 @@
 """Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene; in metres, z up."""
 
-from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -9,9 +8,10 @@ import numpy as np
 
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
+from lowalt.scene.town.building_surfaces import Surfaces, joined, mesh_parts
 from lowalt.scene.town.facets import Town, corner_numbers, sizes, town
-from lowalt.scene.town.materials import MATERIALS, named
-from lowalt.targets.mesh_files import SUFFIXES, metres, pieces
+from lowalt.scene.town.materials import MATERIALS
+from lowalt.targets.mesh_files import SUFFIXES
 
 MOST_TRIANGLES = 500_000
 FLOOR_M = 0.05
@@ -22,45 +22,12 @@ TALLEST_M, SMALLEST_M, LARGEST_M = (2.0, 900.0), 3.0, 20_000.0
 """Heights of the tallest building, and least and largest extents of a town, outside of which the unit is wrong."""
 
 
-class Surfaces(NamedTuple):
-    """Triangles as a reader finds them: corners (F, 3, 3) m; material (F,), numbers of `names`, "" where the file names
-    none; left_out: what the reader left out, in words, with how many."""
-
-    corners: np.ndarray
-    material: np.ndarray
-    names: tuple[str, ...]
-    left_out: dict[str, int]
-
-
 class Buildings(NamedTuple):
     """A town that was read: its paths' `town`, its triangles' corners (F, 3, 3) m, and what was merged or dropped."""
 
     town: Town
     corners: np.ndarray
     facts: dict
-
-
-def joined(parts: Iterable[tuple[np.ndarray, str]], left_out: dict[str, int]) -> Surfaces:
-    """Return the surfaces of parts, each the corners (F, 3, 3) and the name of their material."""
-    parts = list(parts)
-    names = tuple(dict.fromkeys(name for _, name in parts))
-    material = np.repeat([names.index(name) for _, name in parts], [len(corners) for corners, _ in parts])
-    corners = np.concatenate([np.zeros((0, 3, 3)), *(corners for corners, _ in parts)])
-    return Surfaces(corners, material.astype(np.int64), names, left_out)
-
-
-def mesh_parts(path: Path, unit: str, up: str) -> list[tuple[np.ndarray, str]]:
-    """Return the corners (F, 3, 3) m, z up, and the material's name of each piece of a mesh file.
-
-    Raises: InputError as the readers of `targets.mesh_files`.
-    """
-    result = []
-    for piece in pieces(path):
-        corners = np.asarray(piece.vertices, float)[piece.faces] * metres(unit)
-        if up == "y":
-            corners = np.stack([corners[..., 0], -corners[..., 2], corners[..., 1]], axis=-1)
-        result.append((corners, next(filter(None, map(named, piece.names)), "")))
-    return result
 
 
 def _surfaces(path: Path, settings: dict) -> Surfaces:

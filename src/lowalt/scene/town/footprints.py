@@ -11,7 +11,7 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
-from lowalt.scene.town.buildings import Surfaces, joined
+from lowalt.scene.town.building_surfaces import Surfaces, joined
 from lowalt.scene.town.materials import named
 
 try:

@@ -165,6 +165,70 @@ def trace_ray(facets, route, station, point, work, clip):
 
 
 @INNER
+def _passes(facets, k, source, ends):
+    """Whether the places of reflection at facet k of all rays from a source to a box lie on one side of the facet.
+
+    ends: (8, 5, 3) m; column 0 holds the box's corners, in binary order of the axes. A projection keeps convex sets
+    convex, so the corners of the part of the box on the source's side bound them.
+    """
+    here = _height(facets, k, source)
+    sign, across, up = 1.0 if here > 0.0 else -1.0, facets.across[k], facets.up[k]
+    here *= sign
+    a, b = 0.0, 0.0
+    for i in range(3):
+        off = source[i] - facets.centre[k, i]
+        a, b = a + across[i] * off, b + up[i] * off
+    for c in range(8):
+        # Columns 1 and 2: height over the plane, and the foot in it.
+        end, x, y = ends[c, 0], 0.0, 0.0
+        for i in range(3):
+            off = end[i] - facets.centre[k, i]
+            x, y = x + across[i] * off, y + up[i] * off
+        ends[c, 1, 0], ends[c, 2, 0], ends[c, 2, 1] = sign * _height(facets, k, end), x, y
+    least_a, most_a, least_b, most_b = np.inf, -np.inf, np.inf, -np.inf
+    for c in range(8):
+        there = ends[c, 1, 0]
+        if there <= 0.0:
+            continue
+        for j in range(4):
+            # The last one is the corner itself, the others are places where edges from it end in the plane.
+            other = c ^ (1 << j) if j < 3 else c
+            share, beyond = here / (here + there), ends[other, 1, 0]
+            x, y = ends[c, 2, 0], ends[c, 2, 1]
+            if j < 3:
+                if beyond > 0.0:
+                    continue
+                part, share = there / (there - beyond), 1.0
+                x, y = x + part * (ends[other, 2, 0] - x), y + part * (ends[other, 2, 1] - y)
+            x, y = a + share * (x - a), b + share * (y - b)
+            least_a, most_a, least_b, most_b = min(least_a, x), max(most_a, x), min(least_b, y), max(most_b, y)
+    half, some = facets.half[k], here > 0.0 and most_a > -np.inf
+    return not (some and least_a <= half[0] and most_a >= -half[0] and least_b <= half[1] and most_b >= -half[1])
+
+
+@INNER
+def misses(facets, route, station, low, high, ends, work):
+    """Whether no ray from a station by the facets of a route ends in the box between two corners (3,) m; it may also
+    say no where none does.
+
+    ends: work space (8, 5, 3), work: (8, 3).
+    """
+    source = work[0]
+    for i in range(3):
+        source[i] = station[i]
+    for k in range(len(route)):
+        for c in range(8):
+            for i in range(3):
+                ends[c, 0, i] = high[i] if (c >> i) & 1 else low[i]
+            for later in range(len(route) - 1, k, -1):
+                mirror(facets, route[later], ends[c, 0], ends[c, 0])
+        if _passes(facets, route[k], source, ends):
+            return True
+        mirror(facets, route[k], source, source)
+    return False
+
+
+@INNER
 def _bounced(normal, epsilon, way, field):
     """Reflect a wave's way (3,) and its complex field (3,) at a plane: Fresnel's coefficients of a lossy half space.
 

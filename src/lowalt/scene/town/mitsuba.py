@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from lowalt.files.errors import InputError
-from lowalt.scene.town.buildings import Surfaces, joined, mesh_parts
+from lowalt.scene.town.building_surfaces import Surfaces, joined, mesh_parts
 from lowalt.scene.town.materials import named
 from lowalt.targets.mesh_collada import parsed
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from lowalt.machine.jit import INNER, PLAIN, kernel
 from lowalt.scene.rays_loops import can_meet
-from lowalt.scene.town.image_loops import trace_ray
+from lowalt.scene.town.image_loops import misses, trace_ray
 
 ALLOCATING = kernel(inner=True)
 """For functions that only kernels call and that make arrays."""
@@ -33,12 +33,23 @@ def crosses(t, start, end):
 
 
 @INNER
+def _meets(bundle, box):
+    """Whether a bundle of rays may meet a box (6,) between the rays' starts and ends, see `rays_loops.can_meet`."""
+    for i in range(3):
+        low, high = bundle[i] - bundle[6 + i], bundle[i] + bundle[6 + i]
+        low, high = low + min(0.0, bundle[3 + i] - bundle[9 + i]), high + max(0.0, bundle[3 + i] + bundle[9 + i])
+        if box[i] > high or box[3 + i] < low:
+            return False
+    return can_meet(bundle, box)
+
+
+@INNER
 def _can_cross(bundle, t, box):
     """Whether a bundle of rays may cross the box around a triangle (9,); box: work space (6,)."""
     for i in range(3):
         box[i] = t[i] + min(0.0, min(t[3 + i], t[6 + i])) - 1e-9
         box[3 + i] = t[i] + max(0.0, max(t[3 + i], t[6 + i])) + 1e-9
-    return can_meet(bundle, box)
+    return _meets(bundle, box)
 
 
 @INNER
@@ -51,7 +62,7 @@ def between(occluders, bundle, found, most):
     leaves, node = len(boxes) // 2, 1
     size = len(occluders.triangles) // leaves
     while True:
-        if can_meet(bundle, boxes[node]):
+        if _meets(bundle, boxes[node]):
             if node < leaves:
                 node *= 2
                 continue
@@ -133,23 +144,6 @@ def _copy(ray, corners):
     for k in range(5):
         for i in range(3):
             corners[k, i] = ray[k, i]
-
-
-@INNER
-def _misses(facets, route, corners):
-    """Whether all rays of a block, given by its corners (8, 5, 3), pass a facet of the route on one side."""
-    for k in range(len(route)):
-        facet = route[k]
-        for axis in range(2):
-            way, least, most = (facets.up if axis else facets.across)[facet], np.inf, -np.inf
-            for c in range(8):
-                off = 0.0
-                for i in range(3):
-                    off += way[i] * (corners[c, k + 1, i] - facets.centre[facet, i])
-                least, most = min(least, off), max(most, off)
-            if least > facets.half[facet, axis] or most < -facets.half[facet, axis]:
-                return True
-    return False
 
 
 @INNER
@@ -280,9 +274,44 @@ def _trace_rays(scene, places, work, depth, known, present, first_only):
 
 
 @INNER
+def _cut(facets, k, low, high):
+    """Cut a box (3,) to (3,) to that around facet k; return whether they meet."""
+    for i in range(3):
+        reach = abs(facets.across[k, i]) * facets.half[k, 0] + abs(facets.up[k, i]) * facets.half[k, 1] + 1e-6
+        low[i], high[i] = max(low[i], facets.centre[k, i] - reach), min(high[i], facets.centre[k, i] + reach)
+    return low[0] <= high[0] and low[1] <= high[1] and low[2] <= high[2]
+
+
+@INNER
+def _leg_bundled(facets, route, leg, corners, bundle):
+    """Fill bundle (54,) with the rays of one leg of a block between corners (8, 5, 3), as far as they meet the facets.
+
+    Near the plane of a facet the corners' rays meet it far outside of its rim. Returns whether any ray is left.
+    """
+    span, low, high = bundle[18:30], bundle[30:33], bundle[33:36]
+    _no_span(span)
+    for i in range(3):
+        low[i], high[i] = np.inf, -np.inf
+    for k in range(8):
+        _widen(corners[k, leg], corners[k, leg + 1], span)
+        for i in range(3):
+            low[i], high[i] = min(low[i], corners[k, leg + 1, i]), max(high[i], corners[k, leg + 1, i])
+    for end in range(2):
+        at = leg - 1 + end
+        if at < 0 or at == len(route) or facets.first[route[at]] == facets.first[route[at] + 1]:
+            continue
+        if not _cut(facets, route[at], low if end else span[:3], high if end else span[3:6]):
+            return False
+    for i in range(3):
+        span[6 + i], span[9 + i] = max(span[6 + i], low[i] - span[3 + i]), min(span[9 + i], high[i] - span[i])
+    _span(span, bundle)
+    return True
+
+
+@INNER
 def _shadow_lists(scene, work, depth, parent):
     """Fill the lists at a depth with the triangles that can be in the way of a block; return their number, -1 where one
-    convex surface is in the way of all rays.
+    convex surface is in the way of all rays, or where no ray meets all facets.
 
     parent: the depth of lists that hold them all, -1 for none.
     """
@@ -298,7 +327,8 @@ def _shadow_lists(scene, work, depth, parent):
         leg = (k + hints[3]) % legs
         counts[depth, leg] = 0
         if parent < 0 or counts[parent, leg] > 0:
-            bundled(corners[:, leg], corners[:, leg + 1], 8, bundle)
+            if not _leg_bundled(facets, route, leg, corners, bundle):
+                return -1
             older = held[max(parent, 0), leg, : counts[parent, leg] if parent >= 0 else 0]
             counts[depth, leg] = _gather_leg(occluders, route, leg, bundle, older, held[depth, leg])
         total += counts[depth, leg]
@@ -320,11 +350,13 @@ def _bounds(scene, boxes, begin, end, work):
     facets, _, route, station = scene
     _, _, _, _, corners, ray, _, box = work
     low, high, middle = box[0], box[1], box[2]
-    most, least, whole = 0, 9, True
     for i in range(3):
         low[i], high[i] = np.inf, -np.inf
         for c in range(begin, end):
             low[i], high[i] = min(low[i], boxes[c, 0, i]), max(high[i], boxes[c, 1, i])
+    if misses(facets, route, station, low, high, corners, ray):
+        return 0
+    most, least, whole = 0, 9, True
     for k in range(8):
         for i in range(3):
             middle[i] = high[i] if (k >> i) & 1 else low[i]
@@ -332,7 +364,7 @@ def _bounds(scene, boxes, begin, end, work):
         # Rays that only end on the wrong side of a facet still bound those between them.
         most, least, whole = max(most, fault), min(least, fault), whole and (fault == 0 or fault > 4)
         _copy(ray, corners[k])
-    if (most == least and most > 0) or (whole and _misses(facets, route, corners)):
+    if most == least and most > 0:
         return 0
     return 1 if whole else 2
 
