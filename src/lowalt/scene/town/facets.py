@@ -22,7 +22,8 @@ class Facets(NamedTuple):
     normal (K, 3) and offset (K,) m: a facet's plane is normal . x = offset; centre (K, 3) m, across and up (K, 3), half
     (K, 2) m: a rectangle in the plane that holds the facet, infinite for the ground; first (K + 1,): a facet's
     triangles are rows first[k] to first[k + 1] of triangles (F, 9) m, a corner and two edges; the ground has none;
-    convex: (K,) bool, whether the triangles fill a convex polygon.
+    convex: (K,) bool, whether the triangles fill a convex polygon; outward: (K,), 1 or -1 where the normal points out
+    of or into a closed convex building, within which there are no rays, and 0 for other facets.
     """
 
     normal: np.ndarray
@@ -34,6 +35,7 @@ class Facets(NamedTuple):
     first: np.ndarray
     triangles: np.ndarray
     convex: np.ndarray
+    outward: np.ndarray
 
 
 class Occluders(NamedTuple):
@@ -119,6 +121,29 @@ def _convex(along: np.ndarray, area: np.ndarray, first: np.ndarray) -> np.ndarra
     return result
 
 
+def _outward(
+    corners: np.ndarray, numbers: np.ndarray, building: np.ndarray, label: np.ndarray, planes: np.ndarray
+) -> np.ndarray:
+    """Which way the facets' planes (K, 4), normals and offsets, are turned, (K,): see `Facets`.
+
+    corners (F, 3, 3) m, numbers (F, 3), building and label (F,): of the triangles.
+    """
+    edges, owner = _edges(numbers)
+    _, which = np.unique(edges, axis=0, return_inverse=True)
+    high = np.empty(int(numbers.max()) + 1)
+    high[numbers.reshape(-1)] = corners[..., 2].reshape(-1)
+    # Each edge of a closed surface has two triangles, but for those on the ground.
+    lone = (np.bincount(which)[which] != 2) & (high[edges].max(axis=1) > FLAT_M)
+    result, order = np.zeros(len(planes)), np.argsort(building, kind="stable")
+    starts = np.searchsorted(building[order], np.arange(int(building.max()) + 2))
+    for number in np.setdiff1d(building, building[owner[lone]]):
+        mine = order[starts[number] : starts[number + 1]]
+        which = np.unique(label[mine])
+        over = planes[which, :3] @ corners[mine].reshape(-1, 3).T - planes[which, 3:]
+        result[which] = (over.max(axis=1) <= FLAT_M).astype(float) - (over.min(axis=1) >= -FLAT_M)
+    return result
+
+
 def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], ground: str) -> Town:
     """Return the town of triangles (F, 3, 3) m with materials (F,), on ground of another material.
 
@@ -144,16 +169,17 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
     middle = 0.5 * (low + high)
     centre = offset[:, None] * normal + middle[:, :1] * across + middle[:, 1:] * up
     triangles = np.concatenate([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
+    edges, owner, building = _ridges(corners, numbers, label)
+    outward = _outward(corners, numbers, building, label, np.column_stack([normal, offset]))
     facets = Facets(
         np.vstack([normal, [0.0, 0.0, 1.0]]), np.append(offset, 0.0), np.vstack([centre, np.zeros(3)]),
         np.vstack([across, [1.0, 0.0, 0.0]]), np.vstack([up, [0.0, 1.0, 0.0]]),
         np.vstack([0.5 * (high - low) + FLAT_M, [np.inf, np.inf]]), np.append(first, first[-1]), triangles,
-        np.append(_convex(along, area, first), False),
+        np.append(_convex(along, area, first), False), np.append(outward, 1.0),
     )  # fmt: skip
     tree, facet = rays.tree(corners, False), {row.tobytes(): k for row, k in zip(triangles, label, strict=True)}
     of_tree = np.array([facet[row.tobytes()] for row in np.ascontiguousarray(tree.triangles)])
     names = tuple(dict.fromkeys((*materials, ground)))
-    edges, owner, building = _ridges(corners, numbers, label)
     return Town(
         facets, Occluders(tree.boxes, tree.triangles, of_tree), np.append(material[first[:-1]], names.index(ground)),
         names, building, edges, owner, {},

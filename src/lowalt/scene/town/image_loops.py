@@ -35,9 +35,10 @@ def mirrored(facets, k, point):
 def _reaches(facets, k, source, target, radius):
     """Whether facet k may reflect a ray from a source to any point within `radius` (m) of a target."""
     here, there = _height(facets, k, source), _height(facets, k, target)
+    inside = facets.outward[k] * here < 0.0
     if here < 0.0:
         here, there = -here, -there
-    if here == 0.0 or there <= -radius:
+    if inside or here == 0.0 or there <= -radius:
         return False
     least = here + there - radius
     if facets.first[k] == facets.first[k + 1] or least <= 0.0:
@@ -73,11 +74,14 @@ def ordered_pairs(facets, firsts, source, radii):
     second must be reached by way of the first.
     """
     size, count = 1024, 0
-    found = np.empty((size, 2), np.int64)
+    found, image = np.empty((size, 2), np.int64), np.empty(3)
     for a in range(len(radii)):
         if not firsts[a]:
             continue
+        mirror(facets, a, source, image)
         for b in range(len(radii)):
+            if facets.outward[b] * _height(facets, b, image) < 0.0:
+                continue
             if a == b or not _reaches(facets, a, source, facets.centre[b], radii[b]):
                 continue
             if count == size:
@@ -85,27 +89,6 @@ def ordered_pairs(facets, firsts, source, radii):
                 larger = np.empty((size, 2), np.int64)
                 larger[:count] = found
                 found = larger
-            found[count, 0], found[count, 1] = a, b
-            count += 1
-    return found[:count].copy()
-
-
-@PLAIN
-def double(facets, pairs, source, target, radius):
-    """Return those of the pairs (P, 2) that may reflect a ray from a source to within `radius` of a target."""
-    found = np.empty((len(pairs), 2), np.int64)
-    images = np.empty((len(facets.offset), 3))
-    first, count, last = np.empty(3), 0, -1
-    for b in range(len(images)):
-        mirror(facets, b, target, images[b])
-    for p in range(len(pairs)):
-        a, b = pairs[p, 0], pairs[p, 1]
-        if not _reaches(facets, a, source, images[b], radius):
-            continue
-        if a != last:
-            mirror(facets, a, source, first)
-            last = a
-        if _reaches(facets, b, first, target, radius):
             found[count, 0], found[count, 1] = a, b
             count += 1
     return found[:count].copy()
@@ -202,7 +185,7 @@ def _passes(facets, k, source, ends):
                 x, y = x + part * (ends[other, 2, 0] - x), y + part * (ends[other, 2, 1] - y)
             x, y = a + share * (x - a), b + share * (y - b)
             least_a, most_a, least_b, most_b = min(least_a, x), max(most_a, x), min(least_b, y), max(most_b, y)
-    half, some = facets.half[k], here > 0.0 and most_a > -np.inf
+    half, some = facets.half[k], here > 0.0 and facets.outward[k] * sign >= 0.0 and most_a > -np.inf
     return not (some and least_a <= half[0] and most_a >= -half[0] and least_b <= half[1] and most_b >= -half[1])
 
 
@@ -226,6 +209,33 @@ def misses(facets, route, station, low, high, ends, work):
             return True
         mirror(facets, route[k], source, source)
     return False
+
+
+@PLAIN
+def double(facets, pairs, source, low, high):
+    """Return those of the pairs (P, 2) that may reflect a ray from a source to the box between two corners (3,) m."""
+    target, radius, ends, work = 0.5 * (low + high), 0.0, np.empty((8, 5, 3)), np.empty((8, 3))
+    for i in range(3):
+        radius += (0.5 * (high[i] - low[i])) ** 2
+    radius = math.sqrt(radius)
+    found = np.empty((len(pairs), 2), np.int64)
+    images = np.empty((len(facets.offset), 3))
+    first, count, last = np.empty(3), 0, -1
+    for b in range(len(images)):
+        mirror(facets, b, target, images[b])
+    for p in range(len(pairs)):
+        a, b = pairs[p, 0], pairs[p, 1]
+        if not _reaches(facets, a, source, images[b], radius):
+            continue
+        if a != last:
+            mirror(facets, a, source, first)
+            last = a
+        if not _reaches(facets, b, first, target, radius):
+            continue
+        if not misses(facets, pairs[p], source, low, high, ends, work):
+            found[count, 0], found[count, 1] = a, b
+            count += 1
+    return found[:count].copy()
 
 
 @INNER

@@ -97,7 +97,7 @@ def candidates(town: Town, station_m: np.ndarray, places: np.ndarray, order: int
     if order >= 1:
         found.append(_unhidden(town, image_loops.single(town.facets, station_m, middle, radius)[:, None], low, high))
     if order >= 2:
-        double = image_loops.double(town.facets, _pairs(town, station_m), station_m, middle, radius)
+        double = image_loops.double(town.facets, _pairs(town, station_m), station_m, low, high)
         found.append(_unhidden(town, double, low, high))
     return found
 
