@@ -50,6 +50,14 @@ def test_a_cost_below_its_spread_is_said_to_be_below_it(ms, spread_ms, text):
     assert line.split() == ["adc", "named", "10.0%", "20.0%", text]
 
 
+@pytest.mark.parametrize(
+    "named, signal, text", [(True, 0.5, "50.0%"), (True, 1000.0, "-60 dB"), (False, 20.0, "+26 dB")]
+)
+def test_an_effect_that_hides_or_drowns_a_target_says_so_in_db(named, signal, text):
+    line = explanation.effects_table([explanation.Change("town", "channel", named, signal, 0.2)], False)[1]
+    assert line.split()[2 : 2 + len(text.split())] == text.split()
+
+
 def test_parts_of_an_effect_are_no_effects_of_a_suggested_scene():
     whole = explanation.Change("town", "channel", True, 0.5)
     part = whole._replace(part="second order", signal=0.1)

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import fresnel
 
 from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import SPEED_OF_LIGHT
@@ -159,6 +160,15 @@ def test_a_knife_edge_loses_what_p526_says():
     np.testing.assert_allclose(loss_db, near, atol=0.25)
     assert math.isclose(loss_db[1], 20 * math.log10(2), rel_tol=1e-12)
     np.testing.assert_allclose(knife_edge.field(nu) + knife_edge.field(-nu), 1.0, atol=1e-12)
+
+
+def test_the_field_behind_an_edge_is_fresnels_integral():
+    nu = np.concatenate([np.linspace(-60, 60, 5001), [0.0, 1e-9, -1e-9, 1e3, -1e4, 3e5]])
+    sine, cosine = fresnel(nu)
+    expected = 0.5 * (1.0 + 1.0j) * ((0.5 - cosine) - 1.0j * (0.5 - sine))
+    np.testing.assert_allclose(knife_edge.field(nu), expected, atol=1e-14)
+    # Far in the shadow the series of the complementary error function says more than a difference of integrals.
+    np.testing.assert_allclose(abs(knife_edge.field([1e5])) * math.pi * math.sqrt(2) * 1e5, 1.0, rtol=1e-9)
 
 
 def test_a_wide_block_is_one_knife_edge_and_a_pole_nearly_none():

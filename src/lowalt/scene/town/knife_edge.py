@@ -11,9 +11,11 @@ edge (Deygout's construction). The field changes smoothly across the border of t
 import math
 
 import numpy as np
-from scipy.special import fresnel
+from numpy.polynomial import Chebyshev, Polynomial
+from scipy.special import erfcx
 
 from lowalt.machine.jit import INNER, PLAIN
+from lowalt.scene.response_loops import phasor
 from lowalt.scene.town import shadow_loops
 from lowalt.scene.town.facets import Town
 
@@ -23,14 +25,76 @@ SURE = 0.1
 """Where all edges of a screen have a nu beyond this, its outline and what rays say must agree."""
 
 
+PIECES, DEGREE = 64, 7
+"""Number and degree of the polynomials that stand for Fresnel's integral."""
+
+
+def _pieces() -> np.ndarray:
+    """Real and imaginary parts (PIECES, 2, DEGREE + 1) of polynomials of (1 + nu) erfcx(nu (1 + j) sqrt(pi) / 2) / 2.
+
+    Each holds for one piece of (nu - 1) / (nu + 1), which makes the function smooth for all nu from 0 on.
+    """
+    result = np.empty((PIECES, 2, DEGREE + 1))
+    for k in range(PIECES):
+        low = -1.0 + 2.0 * k / PIECES
+
+        def smooth(x: np.ndarray, low: float = low) -> np.ndarray:
+            s = low + (x + 1.0) / PIECES
+            nu = (1.0 + s) / (1.0 - s)
+            return 0.5 * (1.0 + nu) * erfcx(nu * (0.5 + 0.5j) * np.sqrt(np.pi))
+
+        for part, of in enumerate((np.real, np.imag)):
+            found = Chebyshev.interpolate(lambda x, of=of: of(smooth(x)), DEGREE)
+            terms = found.convert(kind=Polynomial).coef
+            result[k, part] = np.pad(terms, (0, DEGREE + 1 - len(terms)))
+    return result
+
+
+_PIECES = _pieces()
+
+
+@INNER
+def _edge(nu):
+    """The field behind a knife edge over that in free space, as in `field`: its real and imaginary part."""
+    size = abs(nu)
+    at = PIECES * size / (size + 1.0)
+    piece = min(int(at), PIECES - 1)
+    x, real, imag = 2.0 * (at - piece) - 1.0, _PIECES[piece, 0], _PIECES[piece, 1]
+    a, b = real[DEGREE], imag[DEGREE]
+    for k in range(DEGREE - 1, -1, -1):
+        a, b = a * x + real[k], b * x + imag[k]
+    c, s = phasor(-0.25 * size * size)
+    a, b = (a * c - b * s) / (1.0 + size), (a * s + b * c) / (1.0 + size)
+    return (1.0 - a, -b) if nu < 0.0 else (a, b)
+
+
+@PLAIN
+def _fields(nu, result):
+    """Fill result (R,) complex with the fields behind edges of parameters nu (R,)."""
+    for r in range(len(nu)):
+        a, b = _edge(nu[r])
+        result[r] = complex(a, b)
+
+
 def field(nu: np.ndarray) -> np.ndarray:
     """Return the field behind a knife edge over that in free space, complex, for parameters nu of any shape.
 
     (1 + j) / 2 times the integral of exp(-j pi t^2 / 2) from nu on, for waves exp(-j k r); -20 lg of its magnitude is
     J(nu). Source: ITU-R P.526-15, equations 7, 28 and 30.
     """
-    sine, cosine = fresnel(nu)
-    return 0.5 * (1.0 + 1.0j) * ((0.5 - cosine) - 1.0j * (0.5 - sine))
+    flat = np.ravel(np.asarray(nu, float))
+    result = np.empty(len(flat), np.complex128)
+    _fields(flat, result)
+    return result.reshape(np.shape(nu))
+
+
+@PLAIN
+def _past(nu, result):
+    """Fill result (R,) complex with the fields behind screens whose edges have parameters nu (3, R); see above."""
+    for r in range(len(result)):
+        top, left, right = _edge(nu[0, r]), _edge(nu[1, r]), _edge(nu[2, r])
+        a, b, c, d = 1.0 - left[0] - right[0], -left[1] - right[1], 1.0 - top[0], -top[1]
+        result[r] = complex(1.0 - (a * c - b * d), -(a * d + b * c))
 
 
 FAR_M = 1e5
@@ -161,12 +225,11 @@ def behind(
         return None
     nu = np.empty((3, len(rays)))
     _edges_nu(outline, start, rays, wavelength_m, nu)
-    nu = nu.reshape(3, *ends.shape[:-1])
-    least = nu.min(axis=0)
+    least, result = nu.min(axis=0), np.empty(len(rays), np.complex128)
     if least.max() <= CLEAR:
         return None
-    top, left, right = field(nu)
-    return outline, 1.0 - (1.0 - left - right) * (1.0 - top), least
+    _past(nu, result)
+    return outline, result.reshape(ends.shape[:-1]), least.reshape(ends.shape[:-1])
 
 
 def _block(
