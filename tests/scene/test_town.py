@@ -54,6 +54,14 @@ def test_direct_rays_are_blocked_as_by_every_triangle():
     assert 0.2 < lit.mean() < 0.9
 
 
+def edge_field(nu, edge=0):
+    """The field behind a screen of whose edges (top, left, right) all but one are too far off for any wave to pass."""
+    rows, result = np.full((3, len(nu)), 1e15), np.empty(len(nu), np.complex128)
+    rows[edge] = nu
+    knife_edge.fields(rows, result)
+    return result
+
+
 def reference_paths(scene, mast, place, order):
     """Every path of 1 to `order` facets to one place: images of the mast, each leg against every triangle."""
     facets = scene.facets
@@ -154,21 +162,20 @@ def test_one_wall_and_the_ground_are_the_simpler_effects(tmp_path):
 
 def test_a_knife_edge_loses_what_p526_says():
     nu = np.array([-0.78, 0.0, 1.0, 2.4])
-    loss_db = -20 * np.log10(abs(knife_edge.field(nu)))
+    loss_db = -20 * np.log10(abs(edge_field(nu)))
     # P.526-15, equation 31, an approximation to within 0.2 dB, and exactly 6.02 dB at grazing.
     near = 6.9 + 20 * np.log10(np.sqrt((nu - 0.1) ** 2 + 1) + nu - 0.1)
     np.testing.assert_allclose(loss_db, near, atol=0.25)
     assert math.isclose(loss_db[1], 20 * math.log10(2), rel_tol=1e-12)
-    np.testing.assert_allclose(knife_edge.field(nu) + knife_edge.field(-nu), 1.0, atol=1e-12)
+    np.testing.assert_allclose(edge_field(nu) + edge_field(-nu), 1.0, atol=1e-12)
 
 
-def test_the_field_behind_an_edge_is_fresnels_integral():
+@pytest.mark.parametrize("edge", range(3))
+def test_the_field_behind_an_edge_is_fresnels_integral(edge):
     nu = np.concatenate([np.linspace(-60, 60, 5001), [0.0, 1e-9, -1e-9, 1e3, -1e4, 3e5]])
     sine, cosine = fresnel(nu)
     expected = 0.5 * (1.0 + 1.0j) * ((0.5 - cosine) - 1.0j * (0.5 - sine))
-    np.testing.assert_allclose(knife_edge.field(nu), expected, atol=1e-14)
-    # Far in the shadow the series of the complementary error function says more than a difference of integrals.
-    np.testing.assert_allclose(abs(knife_edge.field([1e5])) * math.pi * math.sqrt(2) * 1e5, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(edge_field(nu, edge), expected, atol=5e-15)
 
 
 def test_a_wide_block_is_one_knife_edge_and_a_pole_nearly_none():
@@ -182,7 +189,7 @@ def test_a_wide_block_is_one_knife_edge_and_a_pole_nearly_none():
         * math.sqrt(2 / (WAVELENGTH_M * length * share * (1 - share)))
         for share in (59.0 / 120.0, 61.0 / 120.0)
     )  # fmt: skip
-    np.testing.assert_allclose(field, knife_edge.field(expected), atol=5e-4)
+    np.testing.assert_allclose(field[0], edge_field([expected]), atol=5e-4)
     pole = built([(0.0, 3.0, 0.02, 0.02, 400.0)])
     lit, field = image_paths.direct(pole, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
     assert not lit.any()
@@ -211,8 +218,8 @@ def test_an_upright_edge_diffracts_on_both_sides_of_its_shadow_and_by_a_wall_tha
     nu = behind_m * np.sqrt(2 / (WAVELENGTH_M * length * share * (1 - share)))
     assert 0 < (lit[:, 0] & (nu > -0.78)).sum() < lit.sum()
     near = (nu > -0.78) & (nu < 3.0)
-    np.testing.assert_allclose(field[near, 0], knife_edge.field(nu[near]), atol=0.01)
-    np.testing.assert_allclose(abs(field[nu > 3.0, 0]), abs(knife_edge.field(nu[nu > 3.0])), rtol=0.02)
+    np.testing.assert_allclose(field[near, 0], edge_field(nu[near]), atol=0.01)
+    np.testing.assert_allclose(abs(field[nu > 3.0, 0]), abs(edge_field(nu[nu > 3.0])), rtol=0.02)
 
 
 def test_the_ply_the_geojson_and_the_mitsuba_version_of_a_town_have_equal_facades(tmp_path):

@@ -55,18 +55,6 @@ def _reaches(facets, k, source, target, radius):
 
 
 @PLAIN
-def single(facets, source, target, radius):
-    """Return the numbers of the facets that may reflect a ray from a source (3,) to within `radius` of a target."""
-    found = np.empty(len(facets.offset), np.int64)
-    count = 0
-    for k in range(len(found)):
-        if _reaches(facets, k, source, target, radius):
-            found[count] = k
-            count += 1
-    return found[:count]
-
-
-@PLAIN
 def ordered_pairs(facets, firsts, source, radii):
     """Return the pairs (P, 2) of facets, first and second, by which a ray from a source may go on at all.
 
@@ -212,28 +200,31 @@ def misses(facets, route, station, low, high, ends, work):
 
 
 @PLAIN
-def double(facets, pairs, source, low, high):
-    """Return those of the pairs (P, 2) that may reflect a ray from a source to the box between two corners (3,) m."""
-    target, radius, ends, work = 0.5 * (low + high), 0.0, np.empty((8, 5, 3)), np.empty((8, 3))
+def fitting(facets, routes, station, low, high):
+    """Return those of the routes (P, 1 or 2) by which rays from a station may end in the box between two corners (3,).
+
+    Spheres around the box sort out most of them, before `misses` holds the box itself to the facets.
+    """
+    target, radius, found = 0.5 * (low + high), 0.0, np.empty_like(routes)
+    images, ends, work = np.empty((len(facets.offset), 3)), np.empty((8, 5, 3)), np.empty((8, 3))
+    source, count, latest = station.copy(), 0, -1
     for i in range(3):
         radius += (0.5 * (high[i] - low[i])) ** 2
     radius = math.sqrt(radius)
-    found = np.empty((len(pairs), 2), np.int64)
-    images = np.empty((len(facets.offset), 3))
-    first, count, last = np.empty(3), 0, -1
-    for b in range(len(images)):
-        mirror(facets, b, target, images[b])
-    for p in range(len(pairs)):
-        a, b = pairs[p, 0], pairs[p, 1]
-        if not _reaches(facets, a, source, images[b], radius):
-            continue
-        if a != last:
-            mirror(facets, a, source, first)
-            last = a
-        if not _reaches(facets, b, first, target, radius):
-            continue
-        if not misses(facets, pairs[p], source, low, high, ends, work):
-            found[count, 0], found[count, 1] = a, b
+    for k in range(len(images)):
+        mirror(facets, k, target, images[k])
+    for p in range(len(routes)):
+        first, last = routes[p, 0], routes[p, -1]
+        if routes.shape[1] == 2:
+            if not _reaches(facets, first, station, images[last], radius):
+                continue
+            if first != latest:
+                mirror(facets, first, station, source)
+                latest = first
+        if _reaches(facets, last, source, target, radius) and not misses(
+            facets, routes[p], station, low, high, ends, work
+        ):
+            found[count] = routes[p]
             count += 1
     return found[:count].copy()
 

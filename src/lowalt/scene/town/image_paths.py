@@ -92,14 +92,9 @@ def candidates(town: Town, station_m: np.ndarray, places: np.ndarray, order: int
     """Return the routes of each of 1 to `order` facets, (P, order) int64, that may lead from a station (3,) m to places
     (N, L, 3) m."""
     low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    found = []
-    if order >= 1:
-        found.append(_unhidden(town, image_loops.single(town.facets, station_m, middle, radius)[:, None], low, high))
-    if order >= 2:
-        double = image_loops.double(town.facets, _pairs(town, station_m), station_m, low, high)
-        found.append(_unhidden(town, double, low, high))
-    return found
+    every = [np.arange(len(town.facets.offset))[:, None]][:order] + [_pairs(town, station_m) for _ in range(1, order)]
+    fitting = [image_loops.fitting(town.facets, routes, station_m, low, high) for routes in every]
+    return [_unhidden(town, routes, low, high) for routes in fitting]
 
 
 def seen(town: Town, station_m: np.ndarray, rays: TracedRays, facets: np.ndarray) -> np.ndarray:

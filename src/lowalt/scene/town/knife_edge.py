@@ -11,7 +11,6 @@ edge (Deygout's construction). The field changes smoothly across the border of t
 import math
 
 import numpy as np
-from numpy.polynomial import Chebyshev, Polynomial
 from scipy.special import erfcx
 
 from lowalt.machine.jit import INNER, PLAIN
@@ -32,22 +31,14 @@ PIECES, DEGREE = 64, 7
 def _pieces() -> np.ndarray:
     """Real and imaginary parts (PIECES, 2, DEGREE + 1) of polynomials of (1 + nu) erfcx(nu (1 + j) sqrt(pi) / 2) / 2.
 
-    Each holds for one piece of (nu - 1) / (nu + 1), which makes the function smooth for all nu from 0 on.
+    Each interpolates at Chebyshev points of one piece of nu / (nu + 1), in which the function is smooth.
     """
-    result = np.empty((PIECES, 2, DEGREE + 1))
-    for k in range(PIECES):
-        low = -1.0 + 2.0 * k / PIECES
-
-        def smooth(x: np.ndarray, low: float = low) -> np.ndarray:
-            s = low + (x + 1.0) / PIECES
-            nu = (1.0 + s) / (1.0 - s)
-            return 0.5 * (1.0 + nu) * erfcx(nu * (0.5 + 0.5j) * np.sqrt(np.pi))
-
-        for part, of in enumerate((np.real, np.imag)):
-            found = Chebyshev.interpolate(lambda x, of=of: of(smooth(x)), DEGREE)
-            terms = found.convert(kind=Polynomial).coef
-            result[k, part] = np.pad(terms, (0, DEGREE + 1 - len(terms)))
-    return result
+    nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    shares = (np.arange(PIECES)[:, None] + 0.5 * (nodes + 1.0)) / PIECES
+    nu = shares / (1.0 - shares)
+    values = 0.5 * (1.0 + nu) * erfcx(nu * (0.5 + 0.5j) * np.sqrt(np.pi))
+    terms = np.linalg.solve(np.vander(nodes, increasing=True), values.T).T
+    return np.ascontiguousarray(np.stack([terms.real, terms.imag], axis=1))
 
 
 _PIECES = _pieces()
@@ -55,7 +46,11 @@ _PIECES = _pieces()
 
 @INNER
 def _edge(nu):
-    """The field behind a knife edge over that in free space, as in `field`: its real and imaginary part."""
+    """The field behind a knife edge over that in free space, for its parameter nu: its real and imaginary part.
+
+    (1 + j) / 2 times the integral of exp(-j pi t^2 / 2) from nu on, for waves exp(-j k r); -20 lg of its magnitude is
+    J(nu). Source: ITU-R P.526-15, equations 7, 28 and 30; complementary error function: DLMF 7.7.
+    """
     size = abs(nu)
     at = PIECES * size / (size + 1.0)
     piece = min(int(at), PIECES - 1)
@@ -69,28 +64,11 @@ def _edge(nu):
 
 
 @PLAIN
-def _fields(nu, result):
-    """Fill result (R,) complex with the fields behind edges of parameters nu (R,)."""
-    for r in range(len(nu)):
-        a, b = _edge(nu[r])
-        result[r] = complex(a, b)
+def fields(nu, result):
+    """Fill result (R,) complex with the fields behind screens over those in free space.
 
-
-def field(nu: np.ndarray) -> np.ndarray:
-    """Return the field behind a knife edge over that in free space, complex, for parameters nu of any shape.
-
-    (1 + j) / 2 times the integral of exp(-j pi t^2 / 2) from nu on, for waves exp(-j k r); -20 lg of its magnitude is
-    J(nu). Source: ITU-R P.526-15, equations 7, 28 and 30.
+    nu (3, R): parameters of their top, left and right edges, see the head of this file.
     """
-    flat = np.ravel(np.asarray(nu, float))
-    result = np.empty(len(flat), np.complex128)
-    _fields(flat, result)
-    return result.reshape(np.shape(nu))
-
-
-@PLAIN
-def _past(nu, result):
-    """Fill result (R,) complex with the fields behind screens whose edges have parameters nu (3, R); see above."""
     for r in range(len(result)):
         top, left, right = _edge(nu[0, r]), _edge(nu[1, r]), _edge(nu[2, r])
         a, b, c, d = 1.0 - left[0] - right[0], -left[1] - right[1], 1.0 - top[0], -top[1]
@@ -228,7 +206,7 @@ def behind(
     least, result = nu.min(axis=0), np.empty(len(rays), np.complex128)
     if least.max() <= CLEAR:
         return None
-    _past(nu, result)
+    fields(nu, result)
     return outline, result.reshape(ends.shape[:-1]), least.reshape(ends.shape[:-1])
 
 

@@ -53,8 +53,8 @@ def _can_cross(bundle, t, box):
 
 
 @INNER
-def between(occluders, bundle, found, most):
-    """Fill found with the triangles that a bundle of rays may cross, up to `most`; return their number, -1 for more.
+def between(occluders, bundle, found):
+    """Fill found (F,) with the triangles that a bundle of rays may cross; return their number.
 
     bundle: the first twelve as in `rays_loops.can_meet`, the others are work space.
     """
@@ -68,8 +68,6 @@ def between(occluders, bundle, found, most):
                 continue
             for row in range((node - leaves) * size, (node - leaves + 1) * size):
                 if _can_cross(bundle, occluders.triangles[row], box):
-                    if count == most:
-                        return -1
                     found[count] = row
                     count += 1
         # The next node that is not inside this one.
@@ -122,7 +120,7 @@ def near(occluders, starts, ends, room, found):
     bundled(starts, ends, len(starts), bundle)
     for i in range(3):
         bundle[6 + i] += room
-    return between(occluders, bundle, found, len(found))
+    return between(occluders, bundle, found)
 
 
 @PLAIN
@@ -131,19 +129,11 @@ def blocked(occluders, starts, ends):
     result, found, bundle = np.zeros(len(starts), np.bool_), np.empty(len(occluders.triangles), np.int64), np.empty(30)
     for p in range(len(starts)):
         bundled(starts[p : p + 1], ends[p : p + 1], 1, bundle)
-        for f in range(between(occluders, bundle, found, len(found))):
+        for f in range(between(occluders, bundle, found)):
             if crosses(occluders.triangles[found[f]], starts[p], ends[p]):
                 result[p] = True
                 break
     return result
-
-
-@INNER
-def _copy(ray, corners):
-    """Copy the corners (5, 3) of a traced ray."""
-    for k in range(5):
-        for i in range(3):
-            corners[k, i] = ray[k, i]
 
 
 @INNER
@@ -154,15 +144,13 @@ def _own(occluders, row, route, leg):
 
 
 @INNER
-def _shadowed(occluders, work, held, counts, hints):
+def _shadowed(occluders, work, held, counts):
     """Whether a triangle of the lists held (legs, most) blocks a leg of a traced ray; the last to do so comes first."""
-    legs, last = len(counts), hints[-1]
-    for k in range(legs):
-        leg = (k + last) % legs
+    for leg in range(len(counts)):
         for f in range(counts[leg]):
             row = held[leg, f]
             if crosses(occluders.triangles[row], work[leg], work[leg + 1]):
-                held[leg, f], held[leg, 0], hints[-1] = held[leg, 0], row, leg
+                held[leg, f], held[leg, 0] = held[leg, 0], row
                 return True
     return False
 
@@ -175,13 +163,9 @@ def _gather_leg(occluders, route, leg, bundle, older, found):
     """
     kept, box = 0, bundle[12:18]
     if len(older) == 0:
-        for f in range(between(occluders, bundle, found, len(found))):
-            if not _own(occluders, found[f], route, leg):
-                found[kept] = found[f]
-                kept += 1
-        return kept
+        older = found[: between(occluders, bundle, found)]
     for f in range(len(older)):
-        if _can_cross(bundle, occluders.triangles[older[f]], box):
+        if not _own(occluders, older[f], route, leg) and _can_cross(bundle, occluders.triangles[older[f]], box):
             found[kept] = older[f]
             kept += 1
     return kept
@@ -201,7 +185,7 @@ def _stops(facets, occluders, row, start, end):
 
 @INNER
 def _dark(facets, occluders, starts, ends, rows):
-    """The first of some triangles that alone, or by its convex facet, blocks all rays of a block; -1 for none.
+    """Whether one of some triangles alone, or by its convex facet, blocks all rays of a block.
 
     starts, ends: (C, 3), of the rays to the corners of a box: a convex surface's shadow is convex.
     """
@@ -210,8 +194,8 @@ def _dark(facets, occluders, starts, ends, rows):
         for k in range(len(starts)):
             every = every and _stops(facets, occluders, row, starts[k], ends[k])
         if every:
-            return row
-    return -1
+            return True
+    return False
 
 
 @PLAIN
@@ -229,11 +213,11 @@ def hidden(facets, occluders, which, corners):
                 rays[k, 0, i] = corners[k % 8, i]
                 rays[k, 1, i] = facets.centre[facet, i] + a * facets.across[facet, i] + b_ * facets.up[facet, i]
         bundled(rays[:, 0], rays[:, 1], 32, bundle)
-        for f in range(between(occluders, bundle, held, len(held))):
+        for f in range(between(occluders, bundle, held)):
             if occluders.facet[held[f]] != facet:
                 held[kept] = held[f]
                 kept += 1
-        result[b] = _dark(facets, occluders, rays[:, 0], rays[:, 1], held[:kept]) >= 0
+        result[b] = _dark(facets, occluders, rays[:, 0], rays[:, 1], held[:kept])
     return result
 
 
@@ -244,8 +228,8 @@ def _trace_rays(scene, places, work, depth, known, present, first_only):
     known: whether work holds, at this depth, lists of the triangles that can be in the way.
     """
     facets, occluders, route, station = scene
-    held, counts, hints, _, _, ray, bundle, _ = work
-    legs, met, any_ray, spans, total = len(route) + 1, False, False, bundle[18:], 0
+    held, counts, _, _, ray, bundle, _ = work
+    legs, met, any_ray, spans = len(route) + 1, False, False, bundle[18:]
     for leg in range(legs):
         _no_span(spans[12 * leg : 12 * leg + 12])
     for n in range(len(places)):
@@ -258,14 +242,11 @@ def _trace_rays(scene, places, work, depth, known, present, first_only):
     lists, lengths = held[depth + 1], counts[depth + 1, :legs]
     for leg in range(legs):
         _span(spans[12 * leg : 12 * leg + 12], bundle)
-        lengths[leg] = 0
-        if not known or counts[depth, leg] > 0:
-            older = held[depth, leg, : counts[depth, leg] if known else 0]
-            lengths[leg] = _gather_leg(occluders, route, leg, bundle, older, lists[leg])
-        total += lengths[leg]
+        older = held[depth, leg, : counts[depth, leg] if known else 0]
+        lengths[leg] = 0 if known and len(older) == 0 else _gather_leg(occluders, route, leg, bundle, older, lists[leg])
     for n in range(len(places)):
-        if trace_ray(facets, route, station, places[n, 0], ray, True) == 0 and (
-            total == 0 or not _shadowed(occluders, ray, lists, lengths, hints)
+        if trace_ray(facets, route, station, places[n, 0], ray, True) == 0 and not _shadowed(
+            occluders, ray, lists, lengths
         ):
             present[n, 0] = met = True
             if first_only:
@@ -289,13 +270,9 @@ def _leg_bundled(facets, route, leg, corners, bundle):
     Near the plane of a facet the corners' rays meet it far outside of its rim. Returns whether any ray is left.
     """
     span, low, high = bundle[18:30], bundle[30:33], bundle[33:36]
-    _no_span(span)
+    bundled(corners[:, leg], corners[:, leg + 1], 8, bundle)
     for i in range(3):
-        low[i], high[i] = np.inf, -np.inf
-    for k in range(8):
-        _widen(corners[k, leg], corners[k, leg + 1], span)
-        for i in range(3):
-            low[i], high[i] = min(low[i], corners[k, leg + 1, i]), max(high[i], corners[k, leg + 1, i])
+        low[i], high[i] = corners[:, leg + 1, i].min(), corners[:, leg + 1, i].max()
     for end in range(2):
         at = leg - 1 + end
         if at < 0 or at == len(route) or facets.first[route[at]] == facets.first[route[at] + 1]:
@@ -315,16 +292,9 @@ def _shadow_lists(scene, work, depth, parent):
 
     parent: the depth of lists that hold them all, -1 for none.
     """
-    (facets, occluders, route, _), (held, counts, hints, _, corners, _, bundle, _) = scene, work
-    legs, total = len(route) + 1, 0
-    for leg in range(legs):
-        row = hints[leg]
-        if row < 0 or _own(occluders, row, route, leg):
-            continue
-        if _dark(facets, occluders, corners[:, leg], corners[:, leg + 1], hints[leg : leg + 1]) >= 0:
-            return -1
-    for k in range(legs):
-        leg = (k + hints[3]) % legs
+    (facets, occluders, route, _), (held, counts, _, corners, _, bundle, _) = scene, work
+    total = 0
+    for leg in range(len(route) + 1):
         counts[depth, leg] = 0
         if parent < 0 or counts[parent, leg] > 0:
             if not _leg_bundled(facets, route, leg, corners, bundle):
@@ -333,9 +303,7 @@ def _shadow_lists(scene, work, depth, parent):
             counts[depth, leg] = _gather_leg(occluders, route, leg, bundle, older, held[depth, leg])
         total += counts[depth, leg]
         rows = held[depth, leg, : counts[depth, leg]]
-        row = _dark(facets, occluders, corners[:, leg], corners[:, leg + 1], rows)
-        if row >= 0:
-            hints[leg], hints[3] = row, leg
+        if _dark(facets, occluders, corners[:, leg], corners[:, leg + 1], rows):
             return -1
     return total
 
@@ -348,7 +316,7 @@ def _bounds(scene, boxes, begin, end, work):
     them, and 2 where they do not.
     """
     facets, _, route, station = scene
-    _, _, _, _, corners, ray, _, box = work
+    _, _, _, corners, ray, _, box = work
     low, high, middle = box[0], box[1], box[2]
     for i in range(3):
         low[i], high[i] = np.inf, -np.inf
@@ -363,7 +331,7 @@ def _bounds(scene, boxes, begin, end, work):
         fault = trace_ray(facets, route, station, middle, ray, False)
         # Rays that only end on the wrong side of a facet still bound those between them.
         most, least, whole = max(most, fault), min(least, fault), whole and (fault == 0 or fault > 4)
-        _copy(ray, corners[k])
+        corners[k] = ray[:5]
     if most == least and most > 0:
         return 0
     return 1 if whole else 2
@@ -374,10 +342,10 @@ def _trace_blocks(scene, places, boxes, block, work, present, first_only):
     """Set present (R, 1) to True where a ray reaches a place, see `trace`; return whether any does.
 
     scene: facets, occluders, route and station; work: lists held (D, 3, F) and their lengths counts (D, 3) by depth,
-    hints (4,): the last triangle that blocked each leg, and the last leg that was; stack (64, 4), all int64; corners
-    (8, 5, 3), ray (8, 3), bundle (54,), box (3, 3); first_only: stop at the first place.
+    stack (64, 4), all int64; corners (8, 5, 3), ray (8, 3), bundle (54,), box (3, 3); first_only: stop at the first
+    place.
     """
-    stack, top, met = work[3], 1, False
+    stack, top, met = work[2], 1, False
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, len(boxes), 0, -1
     while top > 0 and not (met and first_only):
         top -= 1
@@ -405,7 +373,7 @@ def _work(count, blocks):
     while blocks > 0:
         depths, blocks = depths + 1, blocks // 2
     return (
-        np.empty((depths, 3, count), np.int64), np.zeros((depths, 3), np.int64), np.array([-1, -1, -1, 0]),
+        np.empty((depths, 3, count), np.int64), np.zeros((depths, 3), np.int64),
         np.empty((64, 4), np.int64), np.empty((8, 5, 3)), np.empty((8, 3)), np.empty(54), np.empty((3, 3)),
     )  # fmt: skip
 
