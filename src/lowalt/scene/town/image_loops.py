@@ -9,6 +9,9 @@ import numpy as np
 
 from lowalt.machine.jit import INNER, PLAIN
 
+ROOM = 1e-9
+"""Share of a ray next to its ends in which no triangle blocks it."""
+
 
 @INNER
 def _height(facets, k, point):
@@ -98,6 +101,22 @@ def _inside(facets, k, point):
         if u >= 0.0 and v >= 0.0 and u + v <= whole:
             return True
     return False
+
+
+@INNER
+def crosses(t, start, end):
+    """Whether a triangle (9,) lies between two points (3,): Moeller & Trumbore 1997."""
+    u, v, w = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    o0, o1, o2 = start[0] - t[0], start[1] - t[1], start[2] - t[2]
+    h0, h1, h2 = v * t[8] - w * t[7], w * t[6] - u * t[8], u * t[7] - v * t[6]
+    q0, q1, q2 = o1 * t[5] - o2 * t[4], o2 * t[3] - o0 * t[5], o0 * t[4] - o1 * t[3]
+    turned = t[3] * h0 + t[4] * h1 + t[5] * h2
+    sign = 1.0 if turned > 0.0 else -1.0
+    whole = sign * turned
+    first, second = sign * (o0 * h0 + o1 * h1 + o2 * h2), sign * (u * q0 + v * q1 + w * q2)
+    way = sign * (t[6] * q0 + t[7] * q1 + t[8] * q2)
+    met = first >= 0.0 and second >= 0.0 and first + second <= whole
+    return met and way > ROOM * whole and way < (1.0 - ROOM) * whole
 
 
 @INNER

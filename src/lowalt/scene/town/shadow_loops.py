@@ -8,28 +8,10 @@ import numpy as np
 
 from lowalt.machine.jit import INNER, PLAIN, kernel
 from lowalt.scene.rays_loops import can_meet
-from lowalt.scene.town.image_loops import misses, trace_ray
+from lowalt.scene.town.image_loops import crosses, misses, trace_ray
 
 ALLOCATING = kernel(inner=True)
 """For functions that only kernels call and that make arrays."""
-ROOM = 1e-9
-"""Share of a ray next to its ends in which no triangle blocks it."""
-
-
-@INNER
-def crosses(t, start, end):
-    """Whether a triangle (9,) lies between two points (3,): Moeller & Trumbore 1997."""
-    u, v, w = end[0] - start[0], end[1] - start[1], end[2] - start[2]
-    o0, o1, o2 = start[0] - t[0], start[1] - t[1], start[2] - t[2]
-    h0, h1, h2 = v * t[8] - w * t[7], w * t[6] - u * t[8], u * t[7] - v * t[6]
-    q0, q1, q2 = o1 * t[5] - o2 * t[4], o2 * t[3] - o0 * t[5], o0 * t[4] - o1 * t[3]
-    turned = t[3] * h0 + t[4] * h1 + t[5] * h2
-    sign = 1.0 if turned > 0.0 else -1.0
-    whole = sign * turned
-    first, second = sign * (o0 * h0 + o1 * h1 + o2 * h2), sign * (u * q0 + v * q1 + w * q2)
-    way = sign * (t[6] * q0 + t[7] * q1 + t[8] * q2)
-    met = first >= 0.0 and second >= 0.0 and first + second <= whole
-    return met and way > ROOM * whole and way < (1.0 - ROOM) * whole
 
 
 @INNER
@@ -272,7 +254,9 @@ def _leg_bundled(facets, route, leg, corners, bundle):
     span, low, high = bundle[18:30], bundle[30:33], bundle[33:36]
     bundled(corners[:, leg], corners[:, leg + 1], 8, bundle)
     for i in range(3):
-        low[i], high[i] = corners[:, leg + 1, i].min(), corners[:, leg + 1, i].max()
+        low[i], high[i] = np.inf, -np.inf
+        for k in range(8):
+            low[i], high[i] = min(low[i], corners[k, leg + 1, i]), max(high[i], corners[k, leg + 1, i])
     for end in range(2):
         at = leg - 1 + end
         if at < 0 or at == len(route) or facets.first[route[at]] == facets.first[route[at] + 1]:
@@ -331,7 +315,9 @@ def _bounds(scene, boxes, begin, end, work):
         fault = trace_ray(facets, route, station, middle, ray, False)
         # Rays that only end on the wrong side of a facet still bound those between them.
         most, least, whole = max(most, fault), min(least, fault), whole and (fault == 0 or fault > 4)
-        corners[k] = ray[:5]
+        for row in range(5):
+            for i in range(3):
+                corners[k, row, i] = ray[row, i]
     if most == least and most > 0:
         return 0
     return 1 if whole else 2
