@@ -9,6 +9,8 @@ import csv
 import os
 import sys
 from collections import defaultdict
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,13 +29,15 @@ SLAB_M = 1000.0
 """Thickness of the ray tracer's walls, which here are half spaces; its default of 0.1 m changes reflections."""
 DELAY_S, ANGLE_DEG = 1e-9, 0.1
 """Paths match if they differ by less."""
-SAME_S, SAME_DEG = 1e-11, 0.01
-"""Paths of one side that differ by less are one path at surfaces that coincide: repeats."""
+SAME_S, SAME_DEG = 1e-11, 0.05
+"""Paths of one side that differ by less are one path that is listed twice: repeats."""
+SEED, OTHER_SEEDS = 42, (1, 2)
+"""Random seeds of the ray tracer, and of the runs that look for the paths that it lacks."""
 HEIGHTS_M = {"drone": (30.0, 150.0), "car": (1.5, 1.5)}
 COLUMNS = (
     "town", "target", "reflections", "positions", "lowalt", "sionna", "lowalt_repeats", "sionna_repeats", "matched",
-    "delay_ns_max", "angle_deg_max", "gain_db_median", "gain_db_p95", "gain_db_max", "within_1_db", "only_lowalt_power",
-    "only_sionna_power",
+    "only_lowalt", "found_again", "only_sionna", "delay_ns_max", "angle_deg_max", "gain_db_median", "gain_db_p95",
+    "gain_db_max", "within_1_db", "only_lowalt_power", "only_sionna_power",
 )  # fmt: skip
 
 
@@ -91,7 +95,7 @@ def ray_tracer(llvm: str | None):
     return sionna.rt
 
 
-def of_sionna(rt, scene, mast: np.ndarray, places: np.ndarray, samples: int) -> list[list[tuple]]:
+def of_sionna(rt, scene, mast: np.ndarray, places: np.ndarray, samples: int, seed: int = SEED) -> list[list[tuple]]:
     """Return the same of the ray tracer for each of some places (K, 3) m."""
     for name in [*scene.transmitters, *scene.receivers]:
         scene.remove(name)
@@ -100,7 +104,7 @@ def of_sionna(rt, scene, mast: np.ndarray, places: np.ndarray, samples: int) -> 
         scene.add(rt.Receiver(f"place{k:03d}", place.tolist()))
     paths = rt.PathSolver()(
         scene, max_depth=2, samples_per_src=samples, los=True, specular_reflection=True, diffuse_reflection=False,
-        refraction=False, diffraction=False, synthetic_array=True,
+        refraction=False, diffraction=False, synthetic_array=True, seed=seed,
     )  # fmt: skip
     gains, delays = paths.cir(normalize_delays=False, out_type="numpy")
     gains, delays = abs(gains[:, 0, 0, 0, :, 0]), np.reshape(delays, (len(places), -1))
@@ -141,6 +145,24 @@ def matched(mine: list[tuple], theirs: list[tuple]) -> tuple[list[tuple], list[t
     return pairs, [path for path in mine if id(path) not in held], left
 
 
+def found_again(
+    tracer: Callable[[np.ndarray, int], list[list[tuple]]], alone: list[tuple[np.ndarray, tuple]]
+) -> list[tuple]:
+    """Return those of our paths, each with its place (3,) m, that the ray tracer finds with OTHER_SEEDS.
+
+    tracer: returns its paths to some places (K, 3) m with a seed.
+    """
+    found, left = [], alone
+    for seed in OTHER_SEEDS:
+        if left:
+            others = tracer(np.array([place for place, _ in left]), seed)
+            there = [bool(matched([path], [other for other in listed if other[0] == path[0]])[0])
+                     for (_, path), listed in zip(left, others, strict=True)]  # fmt: skip
+            found += [path for (_, path), is_there in zip(left, there, strict=True) if is_there]
+            left = [each for each, is_there in zip(left, there, strict=True) if not is_there]
+    return found
+
+
 def main(arguments: list[str]) -> None:
     """Match the paths in the towns that are named, and write the table."""
     line = argparse.ArgumentParser(description=__doc__)
@@ -172,20 +194,25 @@ def main(arguments: list[str]) -> None:
         rng = np.random.default_rng(63)
         for target, heights in HEIGHTS_M.items():
             places = drawn(rng, inside, heights, options.positions, town)
-            found: dict[int, list[list]] = defaultdict(lambda: [[], [], [], [], [], [], []])
+            found: dict[int, list[list]] = defaultdict(lambda: [[] for _ in range(8)])
             for station in network.stations:
                 ground = middle + scale * (np.array(station.position_m[:2]) - corners.mean(axis=0))
                 above = roof_m(town.occluders, ground)
                 mast = np.array([*ground, max(station.position_m[2], above + 3.0)])
-                theirs = of_sionna(rt, scene, mast, places, options.samples)
+                alone: list[tuple[np.ndarray, tuple]] = []
+                tracer = partial(of_sionna, rt, scene, mast, options.samples)
+                theirs = tracer(places)
                 for place, other in zip(places, theirs, strict=True):
                     mine = of_lowalt(town, epsilon, mast, place)
                     for count in range(3):
                         sides = [once([path for path in side if path[0] == count]) for side in (mine, other)]
                         both, repeats = zip(*sides, strict=True)
                         news = (*both, *matched(*both), *([number] for number in repeats))
-                        for held, new in zip(found[count], news, strict=True):
+                        for held, new in zip(found[count], news, strict=False):
                             held += new
+                        alone += [(place, path) for path in news[3]]
+                for path in found_again(tracer, alone):
+                    found[path[0]][7].append(path)
             for count, sides in sorted(found.items()):
                 rows.append((name, target, count, len(places) * len(network.stations), *compared(*sides)))
                 print(dict(zip(COLUMNS, rows[-1], strict=True)), file=sys.stderr, flush=True)
@@ -195,9 +222,10 @@ def main(arguments: list[str]) -> None:
 
 
 def compared(
-    ours: list, others: list, pairs: list, alone: list, missed: list, repeats: list, others_repeats: list
+    ours: list, others: list, pairs: list, alone: list, missed: list, repeats: list, others_repeats: list, again: list
 ) -> tuple:
-    """Return the columns of a line that say how well the paths agree; repeats: numbers of them, left out before."""
+    """Return the columns of a line that say how well the paths agree; repeats: numbers of them, left out before;
+    again: those of `alone` that the ray tracer finds with another seed."""
     delays = [1e9 * abs(a[1] - b[1]) for a, b in pairs]
     angles = [apart_deg(*pair) for pair in pairs]
     gains = [abs(20 * np.log10(a[3] / b[3])) for a, b in pairs]
@@ -208,7 +236,8 @@ def compared(
         numbers = [f"{np.max(delays):.4f}", f"{np.max(angles):.4f}"]
         numbers += [f"{np.percentile(gains, share):.3f}" for share in (50, 95, 100)]
         numbers.append(f"{np.mean(np.array(gains) < 1.0):.4f}")
-    return len(ours), len(others), sum(repeats), sum(others_repeats), len(pairs), *numbers, *shares
+    counts = len(ours), len(others), sum(repeats), sum(others_repeats), len(pairs), len(alone), len(again), len(missed)
+    return *counts, *numbers, *shares
 
 
 if __name__ == "__main__":
