@@ -10,6 +10,7 @@ import sys
 from importlib import import_module
 
 from lowalt.commands.command_table import COMMANDS
+from lowalt.config.command import refusal, warn_in_one_line
 from lowalt.files.errors import InputError
 
 
@@ -36,11 +37,10 @@ def main(arguments: list[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else arguments
     line = command_line(next((word for word in words if not word.startswith("-")), ""))
     options = line.parse_args(words)
+    warn_in_one_line()
     try:
         answer = options.act(options)
-    except (InputError, OSError) as error:
-        from lowalt.config.command import refusal
-
+    except (InputError, OSError, ImportError) as error:
         print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
