@@ -92,6 +92,9 @@ def test_the_example_of_a_network_is_a_backbone_and_its_overlay_names_it():
 
 def test_score_prints_intervals_and_every_baseline(small, capsys):
     test = benchmark.load("unseen", "test")
+    with pytest.raises(InputError, match=rf"row {test.key[0]}: p_uav is -2.5, expected a number from 0 to 1"):
+        benchmark.write("mine.csv", test, np.full((len(test), 4), -2.5))
+    assert not Path("mine.csv").exists(), "logits are refused before a file is written"
     benchmark.write("mine.csv", test, np.eye(4)[test.labels])
     assert main(["benchmark", "score", "mine.csv", "mine.csv", "--track", "unseen"]) == 0
     text = capsys.readouterr().out
