@@ -5,6 +5,7 @@ their own (python -m lowalt.STAGE).
 """
 
 import argparse
+import os
 import signal
 import sys
 from importlib import import_module
@@ -40,18 +41,23 @@ def main(arguments: list[str] | None = None) -> int:
     warn_in_one_line()
     try:
         answer = options.act(options)
+        text = answer.text
+        if options.json:
+            from lowalt.commands.command_line import as_json
+
+            text = as_json(answer.facts)
+        if text:
+            print(text, flush=True)
+    except BrokenPipeError:
+        # The reader, such as `head`, has closed its end; Python would try again when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
     except (InputError, OSError, ImportError) as error:
         print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted: the same command goes on from here", file=sys.stderr)
         return 128 + signal.SIGINT
-    if options.json:
-        from lowalt.commands.command_line import as_json
-
-        print(as_json(answer.facts))
-    elif answer.text:
-        print(answer.text)
     return answer.status
 
 

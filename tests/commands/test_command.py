@@ -2,7 +2,9 @@
 
 import errno
 import json
+import os
 import runpy
+import subprocess
 import sys
 
 import pytest
@@ -78,6 +80,14 @@ def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs
     )
     with pytest.raises(ModuleNotFoundError, match="nowhere"):
         refusal(ModuleNotFoundError("nowhere", name="nowhere"))
+
+
+def test_a_reader_that_has_enough_ends_a_command_without_a_traceback():
+    reading, writing = os.pipe()
+    os.close(reading)
+    ended = subprocess.run([sys.executable, "-m", "lowalt", "completion"], stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (141, b"")
 
 
 def test_a_failed_write_leaves_nothing_and_keeps_what_was(tmp_path):
