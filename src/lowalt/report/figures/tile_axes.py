@@ -21,10 +21,8 @@ class Axes(NamedTuple):
 
 
 def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
-    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom.
-
-    A column stands at the middle of its window, so that spectra with windows of different lengths can be compared.
-    """
+    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom,
+    and a column stands at the middle of its window."""
     settings, network, kind = renderer.spectra[name], renderer.network, spectrum(name)
     if isinstance(kind, OfCells):
         return Axes(*kind.axes(settings, network, station))
