@@ -56,7 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("interrupted: the same command goes on from here", file=sys.stderr)
+        print("interrupted: the same command continues a run, and starts anything else again", file=sys.stderr)
         return 128 + signal.SIGINT
     return answer.status
 
