@@ -190,8 +190,8 @@ def intervals(
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
 
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from the scene's ranges.
-    As with recordings, a window counts where its target stands above the noise (`presence.present`); one that hovers is
-    heard at any SNR that its receiver has.
+    As with recordings, a window counts if its target stands above the noise (`presence.present`); a hovering target
+    counts at any SNR.
     """
     seconds = twin.symbols * twin.symbol_interval_s
     result, names = np.empty((count, receivers, twin.symbols), np.complex128), []
@@ -205,13 +205,13 @@ def intervals(
 
 
 SCENES = "config/measured/scenes.yaml"
-"""What stands in front of any radar, and its receiver, where the record of a radar says nothing else."""
+"""The usual scenes and receiver, for whatever the record of a radar does not state."""
 ROOM_M = 2.5
 """Least distance between the ends of a walk."""
 
 
 def _placed(scene: dict, said: dict) -> dict:
-    """A scene of the usual ones, with the distances, heights and beam of a record's block `twin`."""
+    """A usual scene with the distances, heights and beam of a record's block `twin`."""
     near, far = said["distance_m"]
     scene = {**scene, "height_m": said["height_m"]}
     scene["beam"] = {"width_deg": said["beam_deg"], "floor_db": -20.0}
