@@ -126,7 +126,7 @@ def tables(found: Evaluated, looks: int, seed: int) -> tuple[list[list], list[li
 
 
 def picture(path: Path, shares: list[list], curves: dict[str, dict[float, np.ndarray]]) -> None:
-    """Draw accuracy over looks, a panel a protocol and SNR, and the share of tracks whose answer is settled."""
+    """Draw accuracy over looks, one panel per protocol and SNR, and the share of tracks whose answer is settled."""
     snrs = list(next(iter(curves.values())))
     figure, panels = plt.subplots(len(curves), len(snrs) + 1, figsize=(13, 3.1 * len(curves)), layout="constrained")
     for line, (protocol, settled_after) in zip(panels, curves.items(), strict=True):

@@ -277,5 +277,5 @@ def test_what_is_slower_than_the_slowest_target_is_gone_and_all_else_keeps_its_l
 
 
 def test_a_recording_slower_than_the_symbols_is_refused():
-    with pytest.raises(InputError, match=r"has less than one a symbol"):
+    with pytest.raises(InputError, match=r"has less than one per symbol"):
         symbol_rate(np.zeros(10, complex), 500.0, 1e-3, "bare")

@@ -33,7 +33,7 @@ MOST = 1 << 22
 
 class Reading(NamedTuple):
     """One way to read numbers: their type ("" where the file says it), their order ("" for one real channel), and the
-    bits a byte that the samples take under it."""
+    bits per byte that the samples take under it."""
 
     dtype: str
     layout: str

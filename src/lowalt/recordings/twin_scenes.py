@@ -1,7 +1,7 @@
 """Scenes of a twin: targets in front of the radar and their courses, drawn from the ranges of a configuration.
 
 A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene (`scene` in brought.schema.yaml):
-    subtypes       names of targets, one drawn a sample
+    subtypes       names of targets, one drawn per sample
     course         hover | pass | to_and_fro, and the course's own keys:
                    hover: distance_m, height_m, sway_m, sway_hz, rock_deg
                    pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol)
@@ -11,7 +11,7 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
     texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
     beam           width_deg and floor_db of the antenna, which looks along +y (optional: all directions)
-    foils          patterns of foil, one drawn a sample (optional)
+    foils          patterns of foil, one drawn per sample (optional)
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
     second         share of samples with a second target of the same scene, and its level_db (optional)

@@ -34,7 +34,7 @@ def at_symbol_rate(record: Record, twin: Twin, baseband: Baseband | None = None)
     baseband: the recording's samples where they have been read already. Where the radar has one real channel, the first
     of a recording's two is taken.
     Raises: InputError as `read`, naming the file: for a real recording where the radar has two channels, and for one
-    slower than a sample a symbol.
+    slower than one sample per symbol.
     """
     values, rate_hz = baseband or read(record)
     if record.channel == "real" and twin.channel == "complex":
