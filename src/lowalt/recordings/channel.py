@@ -32,7 +32,7 @@ EDGE = 0.9
 """Pass band of the anti-aliasing filter over half the symbol rate. In the last tenth the kernel falls off."""
 ONE_SIDED_EDGE = 0.94
 """Pass band of one-sided sampling over the symbol rate. The filter falls off between here and the symbol rate itself,
-from which on a tone would fold onto a slow target."""
+beyond which a tone would fold onto a slow target."""
 STOP_DB = 80.0
 """Attenuation of one-sided sampling from the symbol rate on."""
 FALL_CELLS = 6
@@ -156,7 +156,7 @@ def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording"
     """Return the coherent processing intervals (intervals, symbols) of a signal, each without its mean.
 
     No two share a symbol. The mean is the echo of everything that does not move, which is orders of magnitude above the
-    target's. slow: frequency, cycles per symbol, from which on a line keeps its level. More than 5 / symbols below it
+    target's. slow: frequency, cycles per symbol, above which a line keeps its level. More than 5 / symbols below it
     what is slower is gone as well, by 50 dB or more.
     Raises: InputError naming the recording where it is shorter than one interval.
     """

@@ -13,9 +13,9 @@ from scipy.signal import lfilter
 BLOCK, BLOCKS = 512, 16
 """Samples that one predictor is fitted to, and the largest number of such blocks, spread over the recording."""
 ORDER = 32
-"""Numbers that a prediction looks back: under every reading as many."""
+"""Number of earlier numbers that a prediction uses, the same under every reading."""
 REPEATS = 0.3
-"""Correlation of the innovations' power from which on a stream repeats chirp by chirp."""
+"""Least correlation of the innovations' power with which a stream counts as chirps."""
 SHORTEST_CHIRP = 16
 
 

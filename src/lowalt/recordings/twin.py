@@ -151,7 +151,7 @@ def twin_of(record: Record, rate_hz: float) -> Twin:
     simulated_hz = said.get("simulated_hz", 1 / interval_s if sampling == "bare" else min(rate_hz, 2 / interval_s))
     if not 1 - 1e-9 <= simulated_hz * interval_s <= MOST_SAMPLES / symbols:
         raise InputError(f"{record.file}: {symbols} values of {interval_s:.4g} s, simulated at {simulated_hz:.6g} Hz, "
-                         f"expected at least one sample per value and at most {MOST_SAMPLES} samples per window")  # fmt: skip
+                         f"expected at least one sample per value, at most {MOST_SAMPLES} per window")  # fmt: skip
     slowest_mps, detect_db = said.get("slowest_mps", SLOWEST_MPS), said.get("detect_db", DETECT_DB)
     return Twin(record.carrier_hz, record.channel, simulated_hz, interval_s, symbols, sampling, slowest_mps, detect_db)
 

@@ -24,7 +24,7 @@ from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 
 CLIPPED_SHARE = 1e-3
-"""Share of a window's samples in clipped peaks from which on it is left out."""
+"""A window with this share of its samples in clipped peaks, or more, is left out."""
 SPLIT = {"by": "motion", "train": 1, "val": 0, "test": 1}
 
 
