@@ -60,9 +60,9 @@ def agreed_rate(
 def _cut(values: np.ndarray) -> np.ndarray:
     """Which samples of one channel lie in cut tops: runs of equal samples at the largest or the smallest value.
 
-    The rounded top of a smooth wave is flat too, but a rounded parabola stays at its highest level at most five times as
-    long as at the next level on either side, one step below; samples in between may miss a level. A cut wave leaves its
-    top as steeply as it reached it, so it falls by more steps or stays far longer than one step lasts.
+    The rounded top of a smooth wave is flat too, but a rounded parabola stays at its highest level at most five times
+    as long as at the next level on either side, one step below; samples in between may miss a level. A cut wave leaves
+    its top as steeply as it reached it, so it falls by more steps or stays far longer than one step lasts.
     """
     starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
     levels, lengths = values[starts], np.diff(starts, append=len(values))
