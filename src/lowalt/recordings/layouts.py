@@ -21,8 +21,7 @@ TYPES = ("int16", "uint8", "int8", "float32", "int16_be", "uint16", "float64", "
          "int32_be")  # fmt: skip
 """Types that bytes without a header are tried as, the usual ones first."""
 HALVES = 0.01
-"""Bits per number by which I and Q in two halves must fit better: few receivers write them so, and many have one real
-channel."""
+"""Bits per number by which I and Q in two halves must fit better: few receivers write so, many have a real channel."""
 LATER = 0.002
 """Bits per number by which a reading must fit better than a more usual one."""
 CONTRADICTED = 0.06

@@ -1,7 +1,7 @@
 """The compiled loops of `image_paths`: whether a ray by some facets passes all buildings.
 
-Rays that end near each other are traced in blocks. A block that no ray can reach is dropped. Where no triangle can be
-in the way, rays are traced by the facets alone. Any other block is halved until single rays decide.
+Rays that end near each other are traced in blocks. A block that no ray can reach is dropped, and one with a triangle
+that may be in the way is halved until single rays decide.
 """
 
 import numpy as np
