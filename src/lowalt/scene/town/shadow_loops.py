@@ -209,7 +209,7 @@ def _stops(facets, occluders, row, start, end):
 def _dark(facets, occluders, starts, ends, rows):
     """The first of the triangles `rows` that, alone or with its convex facet, blocks all rays of a block; -1 for none.
 
-    starts, ends: (C, 3), of the rays to a box's corners. They decide for all between: a convex shape's shadow is convex.
+    starts, ends: (C, 3), of the rays to a box's corners; they decide for all between: convex shapes' shadows are convex.
     """
     for row in rows:
         every = True
