@@ -137,7 +137,7 @@ def _copy(ray, corners):
 
 @INNER
 def _misses(facets, route, corners):
-    """Whether all rays of a block, given by its corners (8, 5, 3), miss a facet of the route on the same side of it."""
+    """Whether all rays of a block, given by its corners (8, 5, 3), pass a facet of the route on one side."""
     for k in range(len(route)):
         facet = route[k]
         for axis in range(2):
@@ -209,7 +209,7 @@ def _stops(facets, occluders, row, start, end):
 def _dark(facets, occluders, starts, ends, rows):
     """The first of the triangles `rows` that, alone or with its convex facet, blocks all rays of a block; -1 for none.
 
-    starts, ends: (C, 3), of the rays to a box's corners; they decide for all between: convex shapes' shadows are convex.
+    starts, ends: (C, 3), of the rays to a box's corners; these decide, since the shadow of a convex shape is convex.
     """
     for row in rows:
         every = True
