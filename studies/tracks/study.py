@@ -97,7 +97,7 @@ def right_after(logs: np.ndarray, label: np.ndarray, count: int, method: str, he
 
 
 def settled(right: np.ndarray) -> np.ndarray:
-    """Return after how many looks a running answer (tracks, looks) is right to the end, inf where it is not at last."""
+    """Return the looks after which a running answer (tracks, looks) stays right, inf where the last one is wrong."""
     wrong = right.shape[1] - np.argmax(~right[:, ::-1], axis=1)
     return np.where(right.all(1), 1.0, np.where(right[:, -1], wrong + 1.0, np.inf))
 
