@@ -16,7 +16,7 @@ from lowalt.__main__ import main
 from lowalt.benchmark import baseline_table, confirm, definition, frozen_bytes
 from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
 
 ROOT = Path(__file__).parents[2]
 ZOO = ROOT / "results/zoo/default-unseen.safetensors"
@@ -143,10 +143,12 @@ def test_make_tells_the_last_bits_of_a_part_with_effects_from_another_signal(sma
     np.save(path, whole)
 
 
-def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch):
+def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch, recwarn):
     monkeypatch.setattr(confirm, "USUAL", 2)
     track = TRACKS["unseen"]
+    recwarn.clear()
     first = confirm.confirm(ZOO, track)
+    assert not [one for one in recwarn if issubclass(one.category, InputWarning)]
     assert first == confirm.confirm(ZOO, track)
     assert first.samples == 4 * 4 * 2 and first.percent.value > 60
     assert first.seed == definition.root_seed(ZOO.read_bytes() + b"lowalt-40 v1")
