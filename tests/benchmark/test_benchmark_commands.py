@@ -16,7 +16,7 @@ from lowalt.__main__ import main
 from lowalt.benchmark import baseline_table, confirm, definition, frozen_bytes
 from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
 
 ROOT = Path(__file__).parents[2]
 ZOO = ROOT / "results/zoo/default-unseen.safetensors"
@@ -92,6 +92,9 @@ def test_the_example_of_a_network_is_a_backbone_and_its_overlay_names_it():
 
 def test_score_prints_intervals_and_every_baseline(small, capsys):
     test = benchmark.load("unseen", "test")
+    with pytest.raises(InputError, match=rf"row {test.key[0]}: p_uav is -2.5, expected a number from 0 to 1"):
+        benchmark.write("mine.csv", test, np.full((len(test), 4), -2.5))
+    assert not Path("mine.csv").exists(), "logits are refused before a file is written"
     benchmark.write("mine.csv", test, np.eye(4)[test.labels])
     assert main(["benchmark", "score", "mine.csv", "mine.csv", "--track", "unseen"]) == 0
     text = capsys.readouterr().out
@@ -118,10 +121,34 @@ def test_make_compares_with_the_kept_checksums(small, monkeypatch, capsys, tmp_p
     table.write_text(whole)
 
 
-def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch):
+def test_make_tells_the_last_bits_of_a_part_with_effects_from_another_signal(small, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(workflow, "ended", lambda options: {"status": 0})
+    monkeypatch.setattr(frozen_bytes, "REFERENCE", str(tmp_path))
+    monkeypatch.setattr(frozen_bytes, "PARTS", ("main",))
+    monkeypatch.setattr(frozen_bytes, "config_of", lambda part: {"effects": {"clutter": {}}})
+    frozen_bytes.write("results", tmp_path)
+    path = next(Path("results/lowalt-40-v1/noisy").glob("*.npy"))
+    whole = np.load(path)
+    upward = np.nextafter(whole.real, np.inf) + 1j * whole.imag
+    np.save(path, upward.astype(whole.dtype))
+    assert (np.load(path) != whole).all() and main(["benchmark", "make"]) == 0
+    assert ", but for last bits of 1 " in capsys.readouterr().out
+    for change in (np.roll(whole, 1, axis=-1), whole * 1.0001, whole[..., ::-1]):
+        np.save(path, change.astype(whole.dtype))
+        assert main(["benchmark", "make"]) == 1 and f"main/noisy/{path.name} differs" in capsys.readouterr().out
+    one = whole.copy()
+    one.flat[abs(one).argmax()] *= 1.001
+    np.save(path, one)
+    assert main(["benchmark", "make"]) == 1
+    np.save(path, whole)
+
+
+def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch, recwarn):
     monkeypatch.setattr(confirm, "USUAL", 2)
     track = TRACKS["unseen"]
+    recwarn.clear()
     first = confirm.confirm(ZOO, track)
+    assert not [one for one in recwarn if issubclass(one.category, InputWarning)]
     assert first == confirm.confirm(ZOO, track)
     assert first.samples == 4 * 4 * 2 and first.percent.value > 60
     assert first.seed == definition.root_seed(ZOO.read_bytes() + b"lowalt-40 v1")
