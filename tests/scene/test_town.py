@@ -121,6 +121,22 @@ def test_reflected_paths_are_those_of_every_pair_of_facets():
     assert max(counts) >= 4
 
 
+def test_a_wall_that_closes_no_building_reflects_on_both_sides():
+    """Only the walls of closed convex buildings have an inner side, which no ray reaches."""
+    closed = block(0.0, 40.0, 80.0, 2.0, 30.0)
+    # A wall along x, whose winding says nothing, and the same without a roof.
+    for corners, sides in ((closed[2:4], 2), (closed[2:4, ::-1], 2), (closed[:8], 2), (closed, 1)):
+        city = made(corners, np.zeros(len(corners), int), ("concrete",), "medium_dry_ground")
+        assert (city.facets.outward[:-1] == 0.0).all() == (sides == 2)
+    sheet = made(block(0.0, 40.0, 2.0, 80.0, 30.0)[2:4], np.zeros(2, int), ("concrete",), "medium_dry_ground")
+    epsilon = image_paths.epsilons(sheet, HZ, "test")
+    for side in (-1.0, 1.0):
+        mast, place = np.array([side * 30.0, 30.0, 20.0]), np.array([[[side * 40.0, 50.0, 10.0]]])
+        routes = image_paths.reflected(sheet, epsilon, mast, place, image_paths.rays_to(place, 0.0), 1)
+        assert {route.facets for route in routes} == reference_paths(sheet, mast, place[0, 0], 1)
+        assert (0,) in {route.facets for route in routes}
+
+
 def test_paths_of_many_points_are_those_of_each():
     rng, city = np.random.default_rng(3), built(BOXES)
     epsilon = image_paths.epsilons(city, HZ, "test")
