@@ -95,7 +95,7 @@ def ray_tracer(llvm: str | None):
     return sionna.rt
 
 
-def of_sionna(rt, scene, mast: np.ndarray, places: np.ndarray, samples: int, seed: int = SEED) -> list[list[tuple]]:
+def of_sionna(rt, scene, mast: np.ndarray, samples: int, places: np.ndarray, seed: int = SEED) -> list[list[tuple]]:
     """Return the same of the ray tracer for each of some places (K, 3) m."""
     for name in [*scene.transmitters, *scene.receivers]:
         scene.remove(name)
