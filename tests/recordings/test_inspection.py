@@ -83,6 +83,25 @@ def test_hum_a_constant_part_and_an_image_are_pointed_out(tmp_path):
     assert "image at the opposite Doppler, 5 dB below" in notes
 
 
+def test_noise_has_no_image_and_a_moving_target_heard_with_unequal_channels_has_one(tmp_path):
+    def image(values):
+        np.save(tmp_path / "a.npy", values)
+        return "image at the opposite Doppler" in " ".join(inspect_recording(tmp_path / "a.npy", CARRIER, RATE).notes)
+
+    times = np.arange(20000) / RATE
+    moving = np.exp(2j * np.pi * np.cumsum(200 + 150 * np.sin(2 * np.pi * 0.7 * times)) / RATE)
+    for seed in range(8):
+        pair = np.random.default_rng(seed).standard_normal((2, 20000))
+        white = pair[0] + 1j * pair[1]
+        spectrum = np.fft.fft(white) / np.maximum(np.abs(np.fft.fftfreq(20000, 1 / RATE)), 5)
+        rounded = np.rint(127.5 + 20 * pair[0]) + 1j * np.rint(127.5 + 20 * pair[1])
+        for noise in (white, np.fft.ifft(spectrum), rounded, white[:1000], white * (1 + 5 * (times % 1 < 0.1))):
+            assert not image(noise), seed
+        assert not image(moving + 0.5 * white)
+        heard = moving + 0.3 * white
+        assert image(heard.real + 0.5j * heard.imag)
+
+
 WRONG = {
     "planar called interleaved": ("int16 iiqq", {"dtype": "int16", "layout": "iqiq"}, "layout 'iiqq'|one real channel"),
     "interleaved called planar": ("int16 iqiq", {"dtype": "int16", "layout": "iiqq"}, "layout 'iqiq'"),

@@ -17,6 +17,10 @@ ORDER = 32
 REPEATS = 0.3
 """Correlation of the innovations' power from which on a stream repeats chirp by chirp."""
 SHORTEST_CHIRP = 16
+STRETCHES = 16
+"""Stretches over which the phase of a line and of its image is compared."""
+APART_CELLS = 4
+"""Least Doppler of a line, in cells of a stretch, at which a Hann window separates it from its image."""
 
 
 def _blocks(values: np.ndarray) -> np.ndarray:
@@ -122,3 +126,24 @@ def receivers_of(values: np.ndarray, samples: int) -> int:
         one, other = chirps[:-receivers], chirps[receivers:]
         alike.append(abs(np.vdot(one, other)) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-300))
     return 1 + int(np.flatnonzero(np.array(alike) > 0.95 * max(alike))[0]) if alike else 1
+
+
+def image_of(values: np.ndarray, cycles: float) -> tuple[float, float]:
+    """Return how strong the image of a line of a complex signal (samples,) is at the opposite Doppler.
+
+    cycles: the line's Doppler in cycles a sample. The first number is the power of the image over that of the line, the
+    second their squared coherence over `STRETCHES` stretches: near 1 for an image, which is the conjugate of the line,
+    and on average 1 / `STRETCHES` for noise of any spectrum, whose sides do not follow from one another. (0.0, 0.0)
+    where the line is too slow to tell both apart.
+    Source: spectral circularity coefficient, Schreier and Scharf 2010, chapter 9.
+    """
+    length = len(values) // STRETCHES
+    place = round(cycles * length)
+    if abs(place) < APART_CELLS or length // 2 - abs(place) < APART_CELLS:
+        return 0.0, 0.0
+    stretches = (values[: length * STRETCHES] - values.mean()).reshape(STRETCHES, length)
+    spectra = np.fft.fft(stretches * np.hanning(length), axis=1)
+    line, image = spectra[:, place], spectra[:, -place]
+    powers = [float(np.vdot(side, side).real) for side in (line, image)]
+    together = abs(np.sum(line * image)) ** 2
+    return powers[1] / max(powers[0], 1e-300), float(together / max(powers[0] * powers[1], 1e-300))
