@@ -22,6 +22,10 @@ STRETCHES = 16
 APART_CELLS = 4
 """Least Doppler of a line, in cells of a stretch, at which a Hann window separates it from its image."""
 
+SKEW, FAR = 0.9, 1e3
+"""Median over mean of powers at most, and ratio of their nine tenths, median and tenth at most: numbers of another type
+that are read as floating ones span far more."""
+
 
 def _blocks(values: np.ndarray) -> np.ndarray:
     """Stretches (blocks, samples) of a channel, evenly spread, each without its mean."""
@@ -64,7 +68,7 @@ def code_bits(channels: list[np.ndarray], step_log2: float) -> float:
     for values in channels:
         parts = 2 if np.iscomplexobj(values) else 1
         with np.errstate(all="ignore"):
-            stretches = _blocks(values) * 2.0**-step_log2
+            stretches = _blocks(values) * np.exp2(-step_log2)
             largest = np.abs(stretches).max()
         if not largest < 1e100:
             return np.inf
@@ -147,3 +151,12 @@ def image_of(values: np.ndarray, cycles: float) -> tuple[float, float]:
     powers = [float(np.vdot(side, side).real) for side in (line, image)]
     together = abs(np.sum(line * image)) ** 2
     return powers[1] / max(powers[0], 1e-300), float(together / max(powers[0] * powers[1], 1e-300))
+
+
+def are_powers(values: np.ndarray) -> bool:
+    """Return whether real numbers (n,) are powers or magnitudes: none is negative, and few large ones outweigh many
+    small ones. Samples of a receiver lie to both sides of their mean, also where they are unsigned."""
+    if np.iscomplexobj(values) or values.min() < 0:
+        return False
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    return bool(middle < SKEW * values.mean() and low > 0 and high < FAR * middle and middle < FAR * low)

@@ -14,7 +14,7 @@ from lowalt.files.errors import InputError
 from lowalt.recordings import faults
 from lowalt.recordings.chirps import slow_time
 from lowalt.recordings.column_names import rises_evenly, role
-from lowalt.recordings.evidence import chirp_length, code_bits, image_of, receivers_of, step_bits
+from lowalt.recordings.evidence import are_powers, chirp_length, code_bits, image_of, receivers_of, step_bits
 from lowalt.recordings.files import channel_of, table_of, times_of
 from lowalt.recordings.formats import RAW, READERS, Table
 from lowalt.recordings.layouts import raw_readings, readings
@@ -255,6 +255,11 @@ def inspect_recording(
     if not found:
         raise InputError(f"{path}: nothing in it reads as a signal, expected samples of one or two channels")
     notes = _notes(path, found[0], rate_hz, carrier_hz)
+    powers = next((one for one in found if are_powers(one.values) and "float" in one.keys.get("dtype", "float")), None)
+    if powers is not None:
+        kind = f"read as {powers.keys['dtype']} " if "dtype" in powers.keys else ""
+        notes.insert(0, f"{kind}no number is negative and most are far below their mean, as powers or magnitudes of "
+                     "spectra are: a recording needs the samples themselves")  # fmt: skip
     return FileInspection(path, carrier_hz, rate_hz, said, found[:SHOWN], notes)
 
 
