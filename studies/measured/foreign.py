@@ -1,10 +1,10 @@
 """What networks say of what they did not learn: noise, a waving hand, and cars in front of other radars.
 
-    python studies/measured/not_learned.py --inputs FOLDER --out FOLDER [--models MODEL ...]
+    python studies/measured/foreign.py --inputs FOLDER --out FOLDER [--models MODEL ...]
 
 Some inputs are simulated at each network's own carrier, rate and channel: white noise, and a hand that waves in front
-of a body that stands still (`hand`). The others are public recordings (`not_learned.yaml`). The table
-measured-not-learned.csv has one row a network and input: of the windows, how many hold nothing, are clipped, have a
+of a body that stands still (`hand`). The others are public recordings (`foreign.yaml`). The table
+measured-foreign.csv has one row a network and input: of the windows, how many hold nothing, are clipped, have a
 line beyond the network's speeds, or are named as which class. A recording at another carrier is refused: its windows
 are 0.
 """
@@ -27,7 +27,7 @@ from lowalt.recordings.answers import Answers, answers
 from lowalt.recordings.record import Record, record
 from lowalt.recordings.twin import Twin, radars
 
-RECORDS = Path(__file__).with_name("not_learned.yaml")
+RECORDS = Path(__file__).with_name("foreign.yaml")
 COLUMNS = ("network", "input", "windows", "nothing", "clipped", "beyond", *CATEGORIES)
 SECONDS, SEED = 12.0, 20260701
 HAND_M, HAND_HZ, DISTANCE_M = 0.15, 1.2, 0.8
@@ -63,7 +63,7 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
     }
     about = {"carrier_hz": twin.carrier_hz, "rate_hz": twin.rate_hz, "channel": twin.channel}
     for name, made in simulated.items():
-        values = made(stream(SEED, "not-learned", name, int(twin.carrier_hz)))
+        values = made(stream(SEED, "foreign", name, int(twin.carrier_hz)))
         np.save(folder / "samples.npy", values if twin.channel == "complex" else values.real)
         yield name, record({"file": "samples.npy", **about}, folder, name)
     for block in load_yaml(RECORDS, "records")["records"]:
@@ -83,7 +83,7 @@ def row(network: str, name: str, said: Answers | None) -> list:
 
 def main(arguments: list[str]) -> None:
     """Ask every network about every input and write the table."""
-    line = argparse.ArgumentParser(prog="not_learned.py", description=main.__doc__)
+    line = argparse.ArgumentParser(prog="foreign.py", description=main.__doc__)
     line.add_argument("--inputs", required=True, type=Path, help="folder of the recordings")
     line.add_argument("--out", required=True, type=Path, help="folder to write")
     line.add_argument("--models", nargs="+", default=list(radars()), help="files of networks, or names of the zoo")
@@ -97,7 +97,7 @@ def main(arguments: list[str]) -> None:
                 said = answers(trained, settings, about, name) if twin.near(about.carrier_hz) else None
                 rows.append(row(trained.path.stem, name, said))
                 print(*rows[-1], sep=", ", flush=True)
-    write_csv(options.out / "measured-not-learned.csv", COLUMNS, rows)
+    write_csv(options.out / "measured-foreign.csv", COLUMNS, rows)
 
 
 if __name__ == "__main__":
