@@ -153,10 +153,14 @@ def _train(options: argparse.Namespace) -> Answer:
     record = read_record(shipped(options.record))
     facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition))
     each = ", ".join(f"{label} {percent:.0f}" for label, percent in facts["percent_by_class"].items())
+    then = f"lowalt predict {options.out.with_suffix('')} {options.record}"
+    if record.file.suffix == ".yaml":
+        # The record of a radar without any recording.
+        then = f"lowalt recording inspect FILE --carrier {record.carrier_hz:g}"
     lines = [
         f"{facts['file']}: {facts['percent']:.1f} % of {facts['windows']} simulated windows right ({each}), which no "
         f"training saw; its mean probability is {facts['mean_probability_percent']:.1f} %",
         "Real recordings differ from their simulation: design/measured.md says by how much for three radars.",
-        f"next     lowalt predict {options.out.with_suffix('')} {options.record}",
+        f"next     {then}",
     ]
     return Answer(facts, "\n".join(lines))
