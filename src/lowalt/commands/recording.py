@@ -135,7 +135,7 @@ def _inspect(options: argparse.Namespace) -> Answer:
                       "line_mps": inspection.speed_mps(one)} for one in inspection.readings],
         "notes": inspection.notes, "picture": picture, "file": out if text else None, "text": text, "next": then,
     }  # fmt: skip
-    rows = [f"{number}  {_line(inspection, one):<30}  {_described(one)}" + (" (the file says so)" if one.said else "")
+    rows = [f"{number}  {_line(inspection, one):<32}  {_described(one)}" + (" (the file says so)" if one.said else "")
             for number, one in enumerate(inspection.readings, 1)]  # fmt: skip
     lines = [f"{inspection.path}: readings, the best first, each with its strongest line", *rows,
              *(f"note: {note}" for note in inspection.notes), f"picture  {picture}"]  # fmt: skip
