@@ -1,4 +1,4 @@
-"""Reading shards: samples a second at training sizes, damage found, resume exact, on a run's own samples.
+"""Reading shards: samples per second at training sizes, damage found, resume exact, on a run's own samples.
 
     python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 

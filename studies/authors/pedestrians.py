@@ -45,7 +45,7 @@ SLOWER = 4
 """Times by which the videos are slower than the recordings, if each of their 30 frames a second is one of CMU's 120."""
 LONGEST_SHANK_PIXELS = 72
 STRAY_PIXELS = 5.0
-"""Pixels from which on a dot counts less, since it may be another node's."""
+"""Distance (pixels) beyond which a dot counts less, since it may be another node's."""
 PASSES = 2
 VIEW = np.array([[138.0, -106, 0], [-37, -49, -106]])
 """About how the authors' pictures show a metre of x, y and z, in pixels."""

@@ -4,14 +4,15 @@ Each method tries the candidates of GRID on the training samples and keeps the o
 validation samples; the test folds are never read. Boosting rounds, at most ROUNDS in steps of EVERY, and the
 temperature of the softmax over scores are chosen on validation too.
 Sources: Cortes and Vapnik, Mach. Learn. 20, 1995; Rifkin and Klautau, J. Mach. Learn. Res. 5, 2004 (one against the
-rest); Friedman, Ann. Stat. 29, 2001; Chen and Guestrin, XGBoost, 2016; Breiman, Mach.
-Learn. 45, 2001 (forests); Guo et al., 2017 (temperature).
+rest); Hoerl and Kennard, Technometrics 12, 1970 (ridge); Friedman, Ann. Stat. 29, 2001; Chen and Guestrin, XGBoost,
+2016; Breiman, Mach. Learn. 45, 2001 (forests); Guo et al., 2017 (temperature).
 """
 
 from collections.abc import Callable, Iterator
 from itertools import islice
 
 import numpy as np
+from scipy.linalg import solve
 from scipy.optimize import minimize_scalar
 from scipy.special import softmax
 
@@ -23,6 +24,7 @@ GRID = {
     "forest": [{"leaf": 1}, {"leaf": 3}],
     "logistic": [{"c": c} for c in (0.1, 1.0, 10.0)],
     "xgboost": [{"depth": 4, "rate": 0.1}, {"depth": 6, "rate": 0.1}],
+    "ridge": [{"penalties": (1e2, 1e3, 1e4, 1e5)}],
 }
 """Candidates of each method; gamma is relative to one over the number of features."""
 ROUNDS, EVERY = 200, 25
@@ -88,7 +90,26 @@ def _logistic(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: i
     yield lambda asked: model.decision_function((asked - mean) / scale)
 
 
-MAKERS = {"svm": _svm, "boosting": _boosting, "forest": _forest, "logistic": _logistic, "xgboost": _xgboost}
+def _ridge(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+    """Yield the scores of least squares on standardised features for each penalty, whose products are formed once."""
+    mean, scale = features.mean(0), np.maximum(features.std(0), 1e-6)
+    features = (features - mean) / scale
+    wanted = np.eye(int(labels.max()) + 1, dtype=features.dtype)[labels]
+    share = wanted.mean(0)
+    products, answers = features.T @ features, features.T @ (wanted - share)
+    for penalty in candidate["penalties"]:
+        weights = solve(products + penalty * np.eye(len(products), dtype=products.dtype), answers, assume_a="pos")
+        yield lambda asked, weights=weights: (asked - mean) / scale @ weights + share
+
+
+MAKERS = {
+    "svm": _svm,
+    "boosting": _boosting,
+    "forest": _forest,
+    "logistic": _logistic,
+    "xgboost": _xgboost,
+    "ridge": _ridge,
+}
 
 
 def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:

@@ -1,7 +1,7 @@
 """Physical features of slow-time signals: numbers of a target that a person can read off its spectra.
 
-Every function takes signals (B, N) complex, one a row, and the symbol interval (s). Doppler frequencies are folded into
--1 / 2 T_r .. 1 / 2 T_r, as the symbols sample them; distances between them are the shorter way round.
+Every function takes signals (B, N) complex, one per row, and the symbol interval (s). Doppler frequencies are folded
+into -1 / 2 T_r .. 1 / 2 T_r, as the symbols sample them; distances between them are the shorter way round.
 Source: Chen, The Micro-Doppler Effect in Radar, 2nd ed. 2019, ch. 2 and 3 (lines of rotors and wings); Molchanov et
 al., Int. J. Microw. Wirel. Technol. 6, 2014 (features of micro-Doppler signatures for classification).
 """

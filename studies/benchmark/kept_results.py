@@ -4,9 +4,11 @@ Methods are sorted by their headline number. Going down, a method belongs to the
 unless the interval of their difference excludes zero; otherwise it opens the next group.
 """
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import kendalltau
 
 from lowalt.benchmark.baseline_table import COLUMNS, TABLE
 from lowalt.benchmark.benchmark_tracks import TRACKS, Track
@@ -30,6 +32,21 @@ def groups(track: Track, weight: np.ndarray, subtypes: np.ndarray, values: dict[
             opener, count = name, count + 1
         found[name] = count
     return found
+
+
+def alike(rows: list[dict], count: int = 5) -> list[str]:
+    """Return a line for each of the `count` pairs of tracks that rank the methods of a table's rows most alike.
+
+    Source: Kendall, Biometrika 30, 1938 (tau: 1 for equal orders, 0 for unrelated ones).
+    """
+    percent: dict[str, dict[str, float]] = {}
+    for row in rows:
+        percent.setdefault(row["track"], {})[row["method"]] = row["percent"]
+    pairs = [
+        (float(kendalltau(*([percent[track][method] for method in percent[first]] for track in (first, second)))[0]),
+         f"{first} and {second}") for first, second in combinations(percent, 2)
+    ]  # fmt: skip
+    return [f"order of the methods: {words}, tau {tau:.2f}" for tau, words in sorted(pairs, reverse=True)[:count]]
 
 
 def write_table(rows: list[dict], folder: str | Path) -> None:

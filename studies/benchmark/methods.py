@@ -4,6 +4,7 @@ majority class                  the class with the most training samples, always
 nearest centroid on moments     distance to each class's mean of the power spectrum's moments
 ... on features                 classical methods on the physical features of `features.py` (`classical.py`)
 small CNN on images             the default's network: the reference
+frozen EfficientNet-Lite0, linear   ImageNet's features of the images, and least squares (`frozen.py`)
 ... on signals                  networks on the stations' complex signals (`signal_networks.py`)
 audio-spectrogram transformer   on images (`backbones.py`)
 """
@@ -75,6 +76,15 @@ def on_features(method: str, given: Given) -> Answer:
     return lambda samples: answer(features_of(samples, given.features))
 
 
+def on_frozen(given: Given) -> Answer:
+    """Train a linear classifier on the features of a frozen backbone with ImageNet's weights."""
+    from frozen import embedded_of
+
+    told, held = (embedded_of(part, given.features) for part in (given.train, given.validation))
+    answer = classical.fit("ridge", (told, given.train.labels), (held, given.validation.labels), given.seed)
+    return lambda samples: answer(embedded_of(samples, given.features))
+
+
 def network(given: Given, scheme: Scheme, build: Callable, source: Callable[[TrackSamples], Any]) -> Answer:
     """Train a network and return its answers; source: makes the source of a training of a track's samples."""
     from lowalt.recognition import runs
@@ -125,11 +135,14 @@ METHODS: dict[str, Callable[[Given], Answer]] = {
     "CNN on signals": lambda given: on_signals("cnn", given),
     "complex-valued CNN on signals": lambda given: on_signals("complex", given),
     "XGBoost on features": lambda given: on_features("xgboost", given),
+    "frozen EfficientNet-Lite0, linear": on_frozen,
     "audio-spectrogram transformer": lambda given: on_images("studies/benchmark/backbones.py:ast_micro", given),
     "transformer on signals": lambda given: on_signals("transformer", given),
 }
 """In the order in which a study trains them."""
 TOLD = (("moments", spectral_moments), ("features", features))
 """What methods whose name ends so see of each signal; it is computed once and kept, so its time is added to theirs."""
-SEEDLESS = ("majority class", "nearest centroid on moments")
+KEPT = {"moments": "spectral_moments", "features": "features", "linear": "embedded"}
+"""The last word of such a method's name, and the function whose results are kept."""
+SEEDLESS = ("majority class", "nearest centroid on moments", "frozen EfficientNet-Lite0, linear")
 """Methods that draw nothing, so that one seed is enough."""

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import kept_results
 import numpy as np
-from methods import METHODS, SEEDLESS, TOLD, Given
+from methods import KEPT, METHODS, SEEDLESS, TOLD, Given
 from signals import cost_s, told
 
 import trainings
@@ -82,8 +82,8 @@ def place(method: str, name: str, seed: int) -> Path:
 
 def told_s(method: str, samples: TrackSamples) -> float:
     """Return the core-seconds per sample of what a method sees of its signals, where that is kept; else 0."""
-    kept = (told_of for word, told_of in TOLD if method.endswith(word))
-    return sum(cost_s(OUT / "features", told_of, samples.run.name) for told_of in kept)
+    name = KEPT.get(method.split()[-1])
+    return cost_s(OUT / "features", name, samples.run.name) if name else 0.0
 
 
 def one(job: tuple[str, str, int], data: str) -> Path:
@@ -225,10 +225,20 @@ def main(arguments: list[str]) -> None:
         for word, told_of in TOLD:
             if any(method.endswith(word) for method in given.methods):
                 trainings.side_by_side(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
+        if any(method.endswith("linear") for method in given.methods):
+            from frozen import embedded_chunk
+
+            images = sorted(
+                path for part in PARTS for path in Path(given.data, run_name(part), "views").glob("*/*.npz")
+            )
+            colours = config_of(MAIN)["images"]["colour_map"]
+            trainings.side_by_side(
+                partial(embedded_chunk, folder=OUT / "features", colours=colours), images, given.workers
+            )
         trainings.side_by_side(partial(one, data=given.data), jobs, given.workers)
     rows = with_confirmed(tables(out), out)
     kept_results.write_table(rows, out)
-    print(f"{out / baseline_table.TABLE}: {len(rows)} rows")
+    print(f"{out / baseline_table.TABLE}: {len(rows)} rows", *kept_results.alike(rows), sep="\n")
 
 
 if __name__ == "__main__":

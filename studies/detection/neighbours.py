@@ -102,7 +102,7 @@ def picture(rows: list[list], path: Path) -> None:
 def main() -> None:
     """Compute the table and the picture."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--looks", type=int, default=100, help="looks a row")
+    options.add_argument("--looks", type=int, default=100, help="looks per row")
     options.add_argument("--out", type=Path, required=True)
     given = options.parse_args()
     rows = table(given.looks)

@@ -87,7 +87,7 @@ def table(name: str, found: list[tuple]) -> list[list]:
 
 
 def picture(rows: list[list], path: Path) -> None:
-    """Draw detection over false alarms a look, a panel a class of empty air and town, a line an SNR."""
+    """Draw detection over false alarms per look, one panel per class of empty air and town, one line per SNR."""
     names = list(SCENES)[:2]
     figure, panels = plt.subplots(2, 4, figsize=(12, 5.5), sharex=True, sharey=True, layout="constrained")
     for line, name in zip(panels, names, strict=True):
@@ -106,7 +106,7 @@ def picture(rows: list[list], path: Path) -> None:
 def main() -> None:
     """Compute the table and the picture."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--models", type=int, default=20, help="looks a class")
+    options.add_argument("--models", type=int, default=20, help="looks per class")
     options.add_argument("--out", type=Path, required=True)
     given, rows = options.parse_args(), []
     for name in SCENES:

@@ -78,7 +78,7 @@ def loaded(path: Path, name: str) -> nn.Module:
 def recognition_rows(name: str, measured: Heard, networks: dict[int, nn.Module], block: dict) -> list[list]:
     """Return the rows of `RECOGNITION` of recordings with their windows, named by networks {training seed: network}.
 
-    One row a network and recording, and one of all networks together (seed "mean"), whose probabilities are averaged.
+    One row per network and recording, and one of all networks together (seed "mean"), whose probabilities are averaged.
     """
     rows, machine = [], Machine.here(block["evaluation"]["precision"])
     for recording, windows in measured:

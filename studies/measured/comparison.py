@@ -47,7 +47,7 @@ def unmended(scene: dict, mended: list[str]) -> dict:
 
 
 def summary(values: list[float], rng: np.random.Generator) -> tuple[float, float, float]:
-    """Return mean and 95 % bootstrap interval of values, one a file or a scene; NaN is left out."""
+    """Return mean and 95 % bootstrap interval of values, one per file or scene; NaN is left out."""
     known = np.array([value for value in values if np.isfinite(value)])
     if not len(known):
         return (float("nan"),) * 3

@@ -44,7 +44,7 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
     line.add_argument("--out", required=True, type=Path, help="folder to write")
     line.add_argument("--radars", type=Path, default=RADARS, help="folder of the records of radars")
     if name == "compare":
-        line.add_argument("--count", type=int, default=60, help="simulated windows a class")
+        line.add_argument("--count", type=int, default=60, help="simulated windows per class")
     if trains:
         line.add_argument("--models", required=True, type=Path, help="folder of the networks")
         line.add_argument("--recognition", type=Path, default=Path("config/measured/recognition.yaml"))

@@ -1,6 +1,6 @@
 """How often a target's strongest range cell changes within a look: `python cell_changes.py OUT.csv`.
 
-A row a subtype: its published size and its longest side (m), and the median, smallest and largest number of changes
+One row per subtype: its published size and its longest side (m), and the median, smallest and largest number of changes
 from symbol to symbol at station A over ten motion models of the row `base` of `choices.yaml`.
 """
 

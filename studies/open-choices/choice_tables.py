@@ -15,7 +15,7 @@ from lowalt.recognition.samples import Facts
 
 
 class Held:
-    """Answers to samples of held-out subtypes, a row a training seed and a column a motion model."""
+    """Answers to samples of held-out subtypes, one row per training seed and one column per motion model."""
 
     def __init__(self, facts: Facts | predictions.Predictions, correct: list[np.ndarray]) -> None:
         """facts: of the samples; correct: (samples,) bool, of each training seed."""

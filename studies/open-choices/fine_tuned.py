@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 from choice_rows import HERE, OUT, key_of, trained
 from choice_tables import NAMED, Held, percents
-from pretrained import BACKBONE, Run, samples_of, write_weights
+from imagenet_weights import BACKBONE, write_weights
+from pretrained import Run, samples_of
 
 import trainings
 from lowalt.config.command import run

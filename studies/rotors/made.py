@@ -2,7 +2,7 @@
 
     python studies/rotors/study.py made --out made-rotors.csv
 
-made-rotors.csv, one row a kind of rotor, at 20 dB and the default's symbols and stations:
+made-rotors.csv, one row per kind of rotor, at 20 dB and the default's symbols and stations:
     rotors, blades, lines      equal rotors of one rate; blades of each; lines on either side, on average
     draws, right_percent       signals tried; passing frequencies within one cycle a look of the truth
     length_told_percent, length_error_percent, length_inside_percent

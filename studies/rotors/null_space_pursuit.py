@@ -13,10 +13,10 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 SMOOTH_CYCLES = 6.4
-"""Changes of the operator slower than this many cycles a look are free; faster ones cost."""
+"""Changes of the operator slower than this many cycles per look are free; faster ones cost."""
 
 START_CYCLES = 2.0
-"""Half width of the line that the first round takes, in cycles a look. Pursuit widens it round by round: where rotors
+"""Half width of the line that the first round takes, in cycles per look. Pursuit widens it round by round: where rotors
 outshine the body and many rounds are taken, it swallows the rotors, so few are taken."""
 
 

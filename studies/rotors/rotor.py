@@ -22,11 +22,11 @@ from scipy.linalg import solveh_banded
 POINTS_A_SYMBOL = 20
 """Points of the zero-padded transform of the rest for each symbol, raised to a power of two."""
 SMOOTH_SYMBOLS = 40
-"""A look of this many symbols has smoothing weight 1; the weight grows so that a wave of 6.4 cycles a look halves."""
+"""A look of this many symbols has smoothing weight 1; the weight grows so that a wave of 6.4 cycles per look halves."""
 WEIGHTS = np.arange(1.0, 6.0) ** -0.5 / (np.arange(1.0, 6.0) ** -0.5).sum()
 """Weights of the comb's first lines; chosen on the first 14 motion models of the seen subtypes."""
 LEAST_CYCLES, STEP_CYCLES = 8.0, 0.05
-"""Smallest passing frequency that is looked for, in cycles a look, and the steps of the search; below lies the body."""
+"""Smallest passing frequency of the search, in cycles per look, and its steps; below lies the body."""
 
 
 def body_line_hz(signal: np.ndarray, interval_s: float) -> float:
@@ -98,7 +98,7 @@ def folded(hertz: float | np.ndarray, interval_s: float) -> float | np.ndarray:
 
 
 def passing(signals: np.ndarray, interval_s: float, separate: Callable = without_body) -> Passing:
-    """Return the folded blade passing frequency of signals (B, N) complex of one target, such as one a station.
+    """Return the folded blade passing frequency of signals (B, N) complex of one target, such as one per station.
 
     interval_s: T_r; separate: `without_body` or `without_pursued_body`. All rotors turn at one rate. The logarithms of
     the signals' spectra are averaged.

@@ -18,7 +18,7 @@ from rotor import Passing
 MOST_LINES = 80
 """Lines on either side of the body that are looked at."""
 APART_CYCLES = 2.5
-"""Least distance of two folded lines, in cycles a look, at which a least squares fit tells them apart."""
+"""Least distance of two folded lines, in cycles per look, at which a least squares fit tells them apart."""
 LEAST_LINES = 3
 """Least lines on either side that must be told apart."""
 EDGE_DB = 9.0

@@ -97,7 +97,7 @@ def right_after(logs: np.ndarray, label: np.ndarray, count: int, method: str, he
 
 
 def settled(right: np.ndarray) -> np.ndarray:
-    """Return after how many looks a running answer (tracks, looks) is right to the end, inf where it is not at last."""
+    """Return the looks after which a running answer (tracks, looks) stays right, inf where the last one is wrong."""
     wrong = right.shape[1] - np.argmax(~right[:, ::-1], axis=1)
     return np.where(right.all(1), 1.0, np.where(right[:, -1], wrong + 1.0, np.inf))
 
@@ -126,7 +126,7 @@ def tables(found: Evaluated, looks: int, seed: int) -> tuple[list[list], list[li
 
 
 def picture(path: Path, shares: list[list], curves: dict[str, dict[float, np.ndarray]]) -> None:
-    """Draw accuracy over looks, a panel a protocol and SNR, and the share of tracks whose answer is settled."""
+    """Draw accuracy over looks, one panel per protocol and SNR, and the share of tracks whose answer is settled."""
     snrs = list(next(iter(curves.values())))
     figure, panels = plt.subplots(len(curves), len(snrs) + 1, figsize=(13, 3.1 * len(curves)), layout="constrained")
     for line, (protocol, settled_after) in zip(panels, curves.items(), strict=True):

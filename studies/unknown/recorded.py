@@ -3,10 +3,10 @@
     python studies/unknown/recorded.py --inputs MEASURED --foreign FOLDER --out studies/unknown/results/recorded.csv
 
 MEASURED: folder of the measured sets (design/measured.md); FOLDER: the files of foreign.yaml by the paths given there.
-The table has one row a network, a kind of window and a score:
+The table has one row per network, kind of window and score:
     windows         simulated by the network's twin, or what was recorded
     known           whether the network knows its class
-    count           windows; "all windows" counts those of a recording in which nothing moves too
+    count           number of windows; "all windows" includes those in which nothing moves
     kept_percent    share of them that is kept; right_percent: kept and named rightly
 """
 

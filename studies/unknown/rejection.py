@@ -60,7 +60,7 @@ def level(known: np.ndarray, of_known: np.ndarray, kept: float = KEPT) -> float:
 def alarms(
     known: np.ndarray, unknown: np.ndarray, of_known: np.ndarray, of_unknown: np.ndarray, kept: float = KEPT
 ) -> float:
-    """Return the share of unknown windows that the threshold keeps which keeps `kept` of the known ones.
+    """Return the share of unknown windows kept by the threshold that keeps `kept` of the known ones.
 
     Arguments as in `auroc`.
     """

@@ -3,7 +3,7 @@
     python studies/unknown/study.py [--data default] [--seeds 0 1 2] [--out studies/unknown/results]
 
 Trains on the views of a finished run's data set, into results/unknown. Writes, into OUT:
-    held.csv     one row an unknown and a score: AUROC, and the share of the unknown kept where 95 % of the known are
+    held.csv     one row per unknown and score: AUROC, and the share of the unknown kept where 95 % of the known are
     curve.csv    share of the unknown kept by share of the known kept, of networks that know all four classes
     curve.png    the same
 """
@@ -157,7 +157,7 @@ def case_of(unknown: str, found: np.ndarray, asked: ViewSamples, classes: tuple[
 
 
 def rows_of(name: str, unknowns: list[str], cases: dict, seed: int) -> list[list]:
-    """Return the table's rows of one score: one an unknown, and the mean over the classes that were held out."""
+    """Return the table's rows of one score: one per unknown, and the mean over the classes that were held out."""
     extra, score = SCORES[name]
     rows, kept = [], []
     for unknown in unknowns:
@@ -196,7 +196,7 @@ def curves(cases: dict, unknowns: tuple[str, ...]) -> list[list]:
 
 
 def drawn(rows: list[list], path: Path) -> None:
-    """Write the picture of the rows of `curves`: one panel an unknown, one line a score."""
+    """Write the picture of the rows of `curves`: one panel per unknown, one line per score."""
     from matplotlib.figure import Figure
 
     unknowns = list(dict.fromkeys(row[0] for row in rows))

@@ -118,6 +118,28 @@ def test_make_compares_with_the_kept_checksums(small, monkeypatch, capsys, tmp_p
     table.write_text(whole)
 
 
+def test_make_tells_the_last_bits_of_a_part_with_effects_from_another_signal(small, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(workflow, "ended", lambda options: {"status": 0})
+    monkeypatch.setattr(frozen_bytes, "REFERENCE", str(tmp_path))
+    monkeypatch.setattr(frozen_bytes, "PARTS", ("main",))
+    monkeypatch.setattr(frozen_bytes, "config_of", lambda part: {"effects": {"clutter": {}}})
+    frozen_bytes.write("results", tmp_path)
+    path = next(Path("results/lowalt-40-v1/noisy").glob("*.npy"))
+    whole = np.load(path)
+    upward = np.nextafter(whole.real, np.inf) + 1j * whole.imag
+    np.save(path, upward.astype(whole.dtype))
+    assert (np.load(path) != whole).all() and main(["benchmark", "make"]) == 0
+    assert ", but for last bits of 1 " in capsys.readouterr().out
+    for change in (np.roll(whole, 1, axis=-1), whole * 1.0001, whole[..., ::-1]):
+        np.save(path, change.astype(whole.dtype))
+        assert main(["benchmark", "make"]) == 1 and f"main/noisy/{path.name} differs" in capsys.readouterr().out
+    one = whole.copy()
+    one.flat[abs(one).argmax()] *= 1.001
+    np.save(path, one)
+    assert main(["benchmark", "make"]) == 1
+    np.save(path, whole)
+
+
 def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch):
     monkeypatch.setattr(confirm, "USUAL", 2)
     track = TRACKS["unseen"]

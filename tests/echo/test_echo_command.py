@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from lowalt.echo import echo_signal, echo_signals
 from lowalt.echo.__main__ import main
 from lowalt.echo.echo_input import Rigid, target
 from lowalt.files.errors import InputError
-from lowalt.measure import echo_baselines
 from lowalt.motion import poses, positions, write_table
 from lowalt.targets.cloud import write
 
@@ -89,26 +87,3 @@ def test_faults_are_named_and_leave_nothing_behind(folder):
     with pytest.raises(InputError, match="Crow, model 0: no cloud"):
         main(command(folder))
     assert not list(folder.glob("*.npy"))
-
-
-def test_the_non_uniform_transform_is_asked_once_for_all_symbols_and_for_the_accuracy_of_its_row(monkeypatch):
-    asked, places = [], []
-
-    class Plan:
-        def __init__(self, *given, **settings):
-            asked.append((given, settings))
-
-        def setpts(self, angles):
-            places.append(len(angles))
-
-        def execute(self, strengths):
-            return np.ones(NETWORK["subcarriers"])
-
-    monkeypatch.setitem(sys.modules, "finufft", SimpleNamespace(Plan=Plan))
-    network = Network.from_settings(NETWORK)
-    motion = Rigid(np.tile(np.eye(3), (6, 1, 1, 1)), np.full((6, 1, 3), 90.0), np.ones((4, 3)), np.zeros(4, int))
-    for settings in ({}, {"tolerance": 1e-3}):
-        found = echo_baselines.finufft(network, network.stations[0], motion, 1.0, (90.0, 90.0, 90.0), **settings)
-        assert found.tolist() == 6 * [1]
-    assert [settings["eps"] for _, settings in asked] == [1e-9, 1e-3] and places == 12 * [4]
-    assert asked[0] == ((1, (NETWORK["subcarriers"],)), {"eps": 1e-9, "isign": 1, "nthreads": 1})

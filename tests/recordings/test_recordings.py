@@ -170,7 +170,7 @@ def test_the_record_of_a_radar_takes_numbers_in_any_writing_and_is_refused_by_ke
     for line, change, words in (("carrier_hz: 3.3e+9", "carrier_hz: .inf", "carrier_hz: value "),
                                 ("sampling: bare", "sampling: [1]", "twin.sampling: value "),
                                 ("rate_hz: 5000.1", "", r"missing key\(s\) \['file'\], expected it, or twin"),
-                                ("simulated_hz: 5000.1", "simulated_hz: 100", "expected at least a sample a value"),
+                                ("simulated_hz: 5000.1", "simulated_hz: 100", "expected at least one sample per value"),
                                 ("tip: [2.0", "tips: [2.0", r"twin.scenes.UAV.0: unknown key\(s\) \['tips'\]"),
                                 ("leak_db: [10.0", "leak_db: [1000", "twin.receiver.leak_db")):  # fmt: skip
         assert known.count(line) >= 1
@@ -277,5 +277,5 @@ def test_what_is_slower_than_the_slowest_target_is_gone_and_all_else_keeps_its_l
 
 
 def test_a_recording_slower_than_the_symbols_is_refused():
-    with pytest.raises(InputError, match=r"has less than one a symbol"):
+    with pytest.raises(InputError, match=r"has less than one per symbol"):
         symbol_rate(np.zeros(10, complex), 500.0, 1e-3, "bare")

@@ -196,18 +196,6 @@ def test_the_range_window_is_that_of_the_subcarriers_and_keeps_the_level_of_nois
     assert detector.windowed(detector.DEFAULTS, response) is response
 
 
-@pytest.mark.parametrize("cfar, window", THRESHOLDS)
-def test_only_an_ordered_threshold_shows_a_weaker_target_among_the_training_cells(cfar, window):
-    settings = detector.DEFAULTS | {"cfar": cfar, "range_window": window}
-    cells = normals(10, 400, 64)
-    cells[:, 20] += 100
-    cells[:, 30] += 25
-    power = abs(detector.windowed(settings, cells)) ** 2
-    found = detector.exceeds(settings, power).mean(axis=0)
-    assert found[20] == 1
-    assert found[30] == (cfar == "ordered_statistic")
-
-
 def test_a_track_finds_its_target_beside_a_louder_one_only_with_an_ordered_threshold():
     cells = normals(11, 200, 64)
     cells[:, 21] += 20

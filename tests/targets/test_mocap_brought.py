@@ -43,7 +43,7 @@ def test_every_second_frame_of_a_walk_is_refused_with_the_rate_to_write(files):
     right = cloud_of(files, rate_hz=None).record
     (files / "m.amc").write_text(walk(400, period=65, speed=0.4))
     with pytest.raises(
-        InputError, match=r"m\.amc: at 120 frames a second .* `rate_hz: 60`, or to insist `rate_hz: 120`"
+        InputError, match=r"m\.amc: at 120 frames per second .* `rate_hz: 60`, or to insist `rate_hz: 120`"
     ):
         cloud_of(files, rate_hz=None)
     assert cloud_of(files, rate_hz=60).record["track_speed_mps"] == pytest.approx(right["track_speed_mps"], rel=0.02)

@@ -16,7 +16,7 @@ from lowalt.recognition.schemes import Scheme
 from lowalt.tiles.signals import load_signals
 
 VIEWS = (0, 1, 2)
-"""Numbers of the images of each station among the known spectra: VRP, TRP and VT."""
+"""Indices of VRP, TRP and VT among the known spectra."""
 
 
 def _of_unit_power(signals: np.ndarray) -> np.ndarray:
@@ -29,7 +29,7 @@ class TrackSamples(Samples):
     """The samples of one part of a track, also a source for trainings of `lowalt.recognition`.
 
     `key`, `labels` (n,) and `classes`; `images` (n, stations * 3, 24, 24) uint8 index values, station by station,
-    each VRP, TRP, VT; `signals` (n, stations, 400) complex64, the mean power of each station's is one.
+    each VRP, TRP, VT; `signals` (n, stations, 400) complex64, of mean power one at each station.
     """
 
     def __init__(self, track: Track, part: str, folder: str | Path) -> None:
@@ -57,7 +57,7 @@ class TrackSamples(Samples):
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels of the samples, places among `classes`, (n,) int64."""
+        """Labels of the samples, (n,) int64 indices into `classes`."""
         return self.facts.label
 
     @cached_property
@@ -83,9 +83,9 @@ class TrackSamples(Samples):
         return self.of_chunks(lambda path: _of_unit_power(load_signals(path, network)))
 
     def of_chunks(self, values: Callable[[Path], np.ndarray]) -> np.ndarray:
-        """Return for each sample and each of the track's stations what `values` has of it, (n, stations, ...).
+        """Return what `values` computes, for the samples and the track's stations alone, (n, stations, ...).
 
-        values: from a chunk's noisy signals (.npy) to an array (models, SNRs, stations, ...).
+        values: a function from a chunk's noisy signals (.npy) to an array (models, SNRs, stations, ...).
         Raises: InputError where a sample has no signal.
         """
         wanted: dict[tuple, list[int]] = {}

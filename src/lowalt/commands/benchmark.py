@@ -21,9 +21,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `benchmark` and its own commands to a parser's commands."""
     about = commands.add_parser(name, help=COMMANDS[name].meaning, epilog=f"example: {EXAMPLE}")
     own = about.add_subparsers(metavar="COMMAND", required=True)
-    add_command(
-        own, "tracks", tracks, "the tracks: whom each serves, and how many samples it has", "lowalt benchmark tracks"
-    )
+    add_command(own, "tracks", tracks, "the tracks: whom each serves, numbers of samples", "lowalt benchmark tracks")
     line = add_command(own, "make", make, "make the data of tracks and compare them with the kept checksums",
                        "lowalt benchmark make --track unseen town")  # fmt: skip
     line.add_argument("--track", nargs="+", default=["unseen"], help="tracks whose data to make (default: unseen)")
@@ -65,9 +63,10 @@ def make(options: argparse.Namespace) -> Answer:
         ended = workflow.ended(words)
         if ended["status"]:
             return Answer({"parts": facts}, f"{run_name(part)}: the workflow failed", ended["status"])
-        facts[part] = frozen_bytes.faults(part, "results")
+        facts[part], close = frozen_bytes.compared(part, "results")
         count = sum(name.startswith(f"{part}/") for name in frozen_bytes.kept())
-        lines += facts[part][:5] or [f"results/{run_name(part)}: all {count} files are equal to the kept checksums"]
+        last = f", but for last bits of {len(close)} that this processor decides" if close else ""
+        lines += facts[part][:5] or [f"{run_name(part)}: all {count} files are equal to the kept checksums{last}"]
     return Answer({"parts": facts}, "\n".join(lines), int(any(facts.values())))
 
 

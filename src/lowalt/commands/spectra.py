@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> Answer:
         values = ", ".join(f"{key} {value}" for key, value in row["settings"].items())
         lines += [
             f"{row['name']} ({row['title']}): {row['rows']} rows, {row['windows']} windows, "
-            f"zero at index {row['zero_index']}, {row['image_ms']:.2f} ms an image | {values}",
+            f"zero at index {row['zero_index']}, {row['image_ms']:.2f} ms per image | {values}",
             f"  {row['source']}",
         ]
     text = "\n".join([*lines, f"medians of {REPEATS}; {hardware}"])

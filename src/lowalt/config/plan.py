@@ -64,7 +64,7 @@ def _refuse_tracks(config: dict) -> None:
 
 
 def cell_type(config: dict) -> str:
-    """Return the type as which the range cells of cubes are stored: "complex64" or "int16"."""
+    """Return the type in which range cells of cubes are stored: "complex64" or "int16"."""
     return config["shards"].get("cells", "complex64")
 
 

@@ -42,7 +42,7 @@ def _shaped(values: np.ndarray, size: Size):
 
 @lru_cache(maxsize=256)
 def _masks(count: int) -> list[int]:
-    """The lowest bits, as many as each place below `count` has."""
+    """For each number below `count`, a mask of as many low bits as the number has."""
     return [(1 << place.bit_length()) - 1 for place in range(count)]
 
 

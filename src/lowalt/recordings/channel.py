@@ -32,7 +32,7 @@ EDGE = 0.9
 """Pass band of the anti-aliasing filter over half the symbol rate. In the last tenth the kernel falls off."""
 ONE_SIDED_EDGE = 0.94
 """Pass band of one-sided sampling over the symbol rate. The filter falls off between here and the symbol rate itself,
-from which on a tone would fold onto a slow target."""
+beyond which a tone would fold onto a slow target."""
 STOP_DB = 80.0
 """Attenuation of one-sided sampling from the symbol rate on."""
 FALL_CELLS = 6
@@ -78,10 +78,10 @@ def _tabulated(band: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def symbol_rate(values: np.ndarray, rate_hz: float, symbol_interval_s: float, sampling: str) -> np.ndarray:
-    """Return the signal at one value a symbol interval, complex128, from the first sample on.
+    """Return the signal at one value per symbol interval, complex128, from the first sample on.
 
     values: (samples,) real or complex at `rate_hz`; sampling: one of SAMPLINGS.
-    Raises: InputError for an unknown sampling, samples slower than one a symbol, or one-sided sampling of a complex
+    Raises: InputError for an unknown sampling, samples slower than one per symbol, or one-sided sampling of a complex
     channel.
     """
     if sampling not in SAMPLINGS:
@@ -89,7 +89,7 @@ def symbol_rate(values: np.ndarray, rate_hz: float, symbol_interval_s: float, sa
     step = rate_hz * symbol_interval_s
     if step < 1 - 1e-9:
         raise InputError(
-            f"recording at {rate_hz:.6g} samples/s has less than one a symbol of {symbol_interval_s:.4g} s, "
+            f"recording at {rate_hz:.6g} samples/s has less than one per symbol of {symbol_interval_s:.4g} s, "
             f"expected at least {1 / symbol_interval_s:.6g} samples/s"
         )
     signal = analytic(values)
@@ -143,7 +143,7 @@ def _resampled(signal: np.ndarray, step: float, band: float) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _slow_sequences(symbols: int, slow: float) -> np.ndarray:
-    """Orthonormal sequences (n, symbols) that span what is slower than `slow` (cycles a symbol) less `FALL_CELLS`.
+    """Orthonormal sequences (n, symbols) that span what is slower than `slow` (cycles per symbol) less `FALL_CELLS`.
 
     Source: Slepian 1978, Bell System Technical Journal 57(5): of length N and half-band W, some 2 N W sequences hold
     all but a share of a band's energy that falls tenfold or more with each further one.
@@ -156,7 +156,7 @@ def coherent_intervals(signal: np.ndarray, symbols: int, name: str = "recording"
     """Return the coherent processing intervals (intervals, symbols) of a signal, each without its mean.
 
     No two share a symbol. The mean is the echo of everything that does not move, which is orders of magnitude above the
-    target's. slow: frequency, cycles a symbol, from which on a line keeps its level. More than 5 / symbols below it
+    target's. slow: frequency, cycles per symbol, above which a line keeps its level. More than 5 / symbols below it
     what is slower is gone as well, by 50 dB or more.
     Raises: InputError naming the recording where it is shorter than one interval.
     """

@@ -21,7 +21,7 @@ def in_chirps(values: np.ndarray, samples: int, where: str) -> np.ndarray:
 
 
 def slow_time(stream: np.ndarray, samples: int, receivers: int = 1, receiver: int = 0) -> np.ndarray:
-    """Return the signal (chirps,) complex128, one value a chirp, at the range where most power moves.
+    """Return the signal (chirps,) complex128, one value per chirp, at the range where most power moves.
 
     stream: (chirps * receivers * samples,) real or complex, one receiver's chirp after the other's. The range is the
     bin of the Hann-windowed transform over a chirp with the largest variance from chirp to chirp. A beat note whose

@@ -13,9 +13,9 @@ from scipy.signal import lfilter
 BLOCK, BLOCKS = 512, 16
 """Samples that one predictor is fitted to, and the largest number of such blocks, spread over the recording."""
 ORDER = 32
-"""Numbers that a prediction looks back: under every reading as many."""
+"""Number of earlier numbers that a prediction uses, the same under every reading."""
 REPEATS = 0.3
-"""Correlation of the innovations' power from which on a stream repeats chirp by chirp."""
+"""Least correlation of the innovations' power with which a stream counts as chirps."""
 SHORTEST_CHIRP = 16
 STRETCHES = 16
 """Stretches over which the phase of a line and of its image is compared."""
@@ -59,7 +59,7 @@ def step_bits(numbers: np.ndarray) -> float:
 
 
 def code_bits(channels: list[np.ndarray], step_log2: float) -> float:
-    """Return the bits a real number that channels (samples,), real or complex, take in steps of 2^step_log2.
+    """Return the bits per real number that channels (samples,), real or complex, take in steps of 2^step_log2.
 
     A complex channel is two real numbers with one variance and no correlation, or, where it is the only one, two real
     channels, whichever takes fewer bits. Infinite where a value is not finite or spans 1e100 steps.
@@ -83,7 +83,7 @@ def code_bits(channels: list[np.ndarray], step_log2: float) -> float:
 
 
 def _coded(stretches: np.ndarray, order: int) -> float:
-    """Bits a real number that stretches (blocks, samples) take in steps of one."""
+    """Bits per real number that stretches (blocks, samples) take in steps of one."""
     parts = 2 if np.iscomplexobj(stretches) else 1
     innovations = _fitted(stretches, order)[1]
     freedom = max(parts * (innovations.shape[1] - order - 1), 1)

@@ -21,9 +21,9 @@ ROUND_STEPS = 2.5
 ROUND_RUN = 8
 """Times that a smooth wave may stay longer at its highest level than at the next."""
 MIRRORED = 0.9
-"""Correlation of a spectrum with its mirror about a quarter of the rate from which on I and Q stand in turn."""
+"""Least correlation of a spectrum with its mirror about a quarter of the rate that shows I and Q in turn."""
 SAME_SHARE = 0.999
-"""Squared correlation of I and Q from which on they are the same signal."""
+"""Least squared correlation of I and Q that makes them the same signal."""
 SIDE_RATIO = 4.0
 """How many times stronger the wrong side of the Doppler axis must be to call the channels swapped (6 dB)."""
 
@@ -60,9 +60,9 @@ def agreed_rate(
 def _cut(values: np.ndarray) -> np.ndarray:
     """Which samples of one channel lie in cut tops: runs of equal samples at the largest or the smallest value.
 
-    The rounded top of a smooth wave is no cut one. A parabola that is rounded stays at its highest level at most five
-    times as long as at the next level on either side, one step below; samples in between may miss a level. A cut wave
-    leaves its top with the slope with which it came, so it falls by more steps or stays far longer than one step lasts.
+    The rounded top of a smooth wave is flat too, but a rounded parabola stays at its highest level at most five times
+    as long as at the next level on either side, one step below; samples in between may miss a level. A cut wave leaves
+    its top as steeply as it reached it, so it falls by more steps or stays far longer than one step lasts.
     """
     starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
     levels, lengths = values[starts], np.diff(starts, append=len(values))

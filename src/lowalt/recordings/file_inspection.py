@@ -25,7 +25,7 @@ SHOWN = 8
 """Most readings that an inspection lists."""
 SLOW_SHARE = 5e-4
 LONGEST = 1 << 20
-"""Samples from the start that spectra are made of."""
+"""Number of samples, from the start, from which spectra are computed."""
 RATE_NAMES = ("fs", "rate", "sample_rate", "samplerate", "sampling_rate", "prf")
 MAINS_HZ = (50.0, 60.0)
 HUM_DB, HARMONICS = 10.0, 10
@@ -36,8 +36,8 @@ COHERENT = 0.5
 
 
 class Candidate(NamedTuple):
-    """A reading of a file: the keys of a record that give it, its bits a byte (fewer fit better), and whether the file
-    itself says it, by its header or names."""
+    """A reading of a file: the keys of a record that give it, its code length in bits per byte (fewer fit better), and
+    whether the file's header or names state it."""
 
     keys: dict
     bits: float
@@ -57,9 +57,9 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class FileInspection:
-    """What is seen in a file: rates and carrier (Hz, None where nothing says them), readings and faults of the first.
+    """What is seen in a file: carrier and rate (Hz, None where unknown), readings, and faults of the first reading.
 
-    said: names of those of carrier_hz and rate_hz that the file itself or its reader says.
+    said: which of carrier_hz and rate_hz the file or the user states.
     """
 
     path: Path
@@ -127,7 +127,7 @@ def _of_chirps(array: np.ndarray) -> list[Candidate]:
 
 
 def _of_raw(path: Path) -> list[Candidate]:
-    """Readings of a file without a header, the chirps of a stream that repeats first."""
+    """Readings of a file without a header; `said` marks the one that its ending stands for."""
     own, result = RAW[path.suffix.lower()], []
     for one in raw_readings(str(path))[: 2 * SHOWN]:
         said = (one.dtype, one.layout) == (("float32", "iqiq") if own[:1] == ("complex64",) else own)
@@ -148,7 +148,7 @@ def _arrays(path: Path) -> tuple[list[tuple[dict, np.ndarray]], float | None]:
 
 
 def _table(path: Path, carrier_hz: float | None) -> tuple[Table, dict]:
-    """The table of a file that states its columns, and the keys that it needs: those of SigMF's first capture where its
+    """The table of a file that states its columns, and further keys of its record: `capture: 0` for a SigMF file whose
     captures do not follow on one another at one carrier."""
     record = _record(path, {"channel": "complex"}, carrier_hz, None)
     try:
@@ -162,7 +162,7 @@ def _table(path: Path, carrier_hz: float | None) -> tuple[Table, dict]:
 
 
 def _candidates(path: Path, carrier_hz: float | None) -> tuple[list[Candidate], float | None, float | None]:
-    """Readings of a file, and the rate and carrier (Hz) that it says; carrier_hz: as its reader says it."""
+    """Readings of a file, and the rate and carrier (Hz) that it states; carrier_hz: what the user states."""
     kind, rate, carrier, result = path.suffix.lower(), None, None, []
     if kind in RAW:
         return _of_raw(path), None, None
@@ -230,8 +230,8 @@ def inspect_recording(
 ) -> FileInspection:
     """Return what a recording's file shows: its readings, the best first, and the faults of the best.
 
-    carrier_hz, rate_hz: where they are known (of chirps, the number of chirps a second); what the file itself says
-    otherwise. Raises: InputError where the file is missing, of an unknown kind, or nothing in it reads as a signal.
+    carrier_hz, rate_hz: as the user knows them (the rate of chirps is their number per second); None takes what the
+    file states. Raises: InputError where the file is missing, of an unknown kind, or nothing in it reads as a signal.
     """
     path = existing(path, "recording")
     if path.suffix.lower() not in READERS:

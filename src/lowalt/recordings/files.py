@@ -16,7 +16,7 @@ from lowalt.recordings.layouts import GROUPS, TYPES, contradiction, parted, raw_
 from lowalt.recordings.record import Record
 
 FEWEST = 1024
-"""Numbers from which on a file is asked which layout fits it."""
+"""Least number of numbers in a file whose layout is checked."""
 
 
 class Baseband(NamedTuple):

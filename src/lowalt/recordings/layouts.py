@@ -21,19 +21,19 @@ TYPES = ("int16", "uint8", "int8", "float32", "int16_be", "uint16", "float64", "
          "int32_be")  # fmt: skip
 """Types that bytes without a header are tried as, the usual ones first."""
 HALVES = 0.01
-"""Bits a number by which I and Q in two halves must be better: few receivers write so, and many have a real channel."""
+"""Bits per number by which I and Q in two halves must fit better: few receivers write so, many have a real channel."""
 LATER = 0.002
-"""Bits a number by which a reading must be better than one that is more usual."""
+"""Bits per number by which a reading must fit better than a more usual one."""
 CONTRADICTED = 0.06
-"""Bits a number from which on another reading's advantage contradicts a record. True readings of simulated echoes lose
-at most 0.02 (`benchmarks/recording_layouts.py`)."""
+"""Advantage, in bits per number, with which another reading contradicts a record. True readings of simulated echoes
+lose at most 0.02 (`benchmarks/recording_layouts.py`)."""
 MOST = 1 << 22
-"""Numbers from the start of a file that the evidence is taken from."""
+"""Number of numbers, from the start of a file, that are used as evidence."""
 
 
 class Reading(NamedTuple):
     """One way to read numbers: their type ("" where the file says it), their order ("" for one real channel), and the
-    bits a byte that the samples take under it."""
+    bits per byte that the samples take under it."""
 
     dtype: str
     layout: str
@@ -98,7 +98,7 @@ def _ranked(found: list[Reading]) -> list[Reading]:
 
 
 def contradiction(found: list[Reading], dtype: str, layout: str) -> str:
-    """Return which reading of `found` fits so much better than the stated one that this is no reading of these numbers.
+    """Return the reading of `found` that fits so much better than the stated one that the stated one must be wrong.
 
     Empty where none does. One real channel and I and Q in two halves are never held against each other: a signal
     with equal sides of the Doppler axis reads alike under both.

@@ -24,10 +24,10 @@ BETWEEN_SHARE = 0.25
 AROUND = 0.25
 """Speeds to either side of a line with which it is compared, over the whole band."""
 PASSES = 10.0
-"""How many times more than a line must a target that passes stand above the recording's quiet time, while in half of
-the windows nothing does."""
+"""A target passes where a window stands this many times `detect_db` above the recording's quiet time, while half of the
+windows hold no line."""
 BEYOND_DB = 10.0
-"""How far a line beyond the speeds that windows show must stand above all others there: rotors' lines do by less."""
+"""How far a line beyond the speeds that windows show must stand above all that they show: rotors' lines do by less."""
 SLOW_CELLS = 4
 """Doppler cells about zero speed that hold slow noise and are no line beyond a window's speeds."""
 
@@ -96,7 +96,7 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
 
     Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other windows, and the line
     is at or above slowest_mps. Where they may hover it is the floor between lines. A recording of `ENOUGH` windows
-    through which a target passes is judged by its quiet time as well, so that hum is no target beside it.
+    through which a target passes is also judged by its quiet time, so that hum next to it is no target.
     noise: intervals (m, symbols) of the receiver's noise alone, hum included, where they are known: a line must stand
     above their mean at its own speed, too.
     """

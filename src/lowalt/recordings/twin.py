@@ -78,7 +78,7 @@ class Twin:
 
     @property
     def slow(self) -> float:
-        """Doppler of `slowest_mps` in cycles a symbol."""
+        """Doppler of `slowest_mps` in cycles per symbol."""
         return self.slowest_mps / (2 * self.edge_mps)
 
     @property
@@ -120,7 +120,7 @@ LEAST_SYMBOLS, MOST_SYMBOLS = 400, 1200
 """Symbols of a window: the spectra need 400; more than 1200 add time and no class."""
 SLOWEST_MPS, DETECT_DB = 0.4, 12.0
 WHOLE = 0.02
-"""How far the symbol rate may be moved for a whole number of samples a symbol."""
+"""How far the symbol rate may be moved for a whole number of samples per symbol."""
 MOST_SAMPLES = 1_000_000
 """Largest number of simulated samples of a window."""
 
@@ -151,7 +151,7 @@ def twin_of(record: Record, rate_hz: float) -> Twin:
     simulated_hz = said.get("simulated_hz", 1 / interval_s if sampling == "bare" else min(rate_hz, 2 / interval_s))
     if not 1 - 1e-9 <= simulated_hz * interval_s <= MOST_SAMPLES / symbols:
         raise InputError(f"{record.file}: {symbols} values of {interval_s:.4g} s, simulated at {simulated_hz:.6g} Hz, "
-                         f"expected at least a sample a value and at most {MOST_SAMPLES} samples a window")  # fmt: skip
+                         f"expected at least one sample per value, at most {MOST_SAMPLES} per window")  # fmt: skip
     slowest_mps, detect_db = said.get("slowest_mps", SLOWEST_MPS), said.get("detect_db", DETECT_DB)
     return Twin(record.carrier_hz, record.channel, simulated_hz, interval_s, symbols, sampling, slowest_mps, detect_db)
 

@@ -1,7 +1,7 @@
 """Scenes of a twin: targets in front of the radar and their courses, drawn from the ranges of a configuration.
 
 A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene (`scene` in brought.schema.yaml):
-    subtypes       names of targets, one drawn a sample
+    subtypes       names of targets, one drawn per sample
     course         hover | pass | to_and_fro, and the course's own keys:
                    hover: distance_m, height_m, sway_m, sway_hz, rock_deg
                    pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol)
@@ -11,7 +11,7 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
     texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
     beam           width_deg and floor_db of the antenna, which looks along +y (optional: all directions)
-    foils          patterns of foil, one drawn a sample (optional)
+    foils          patterns of foil, one drawn per sample (optional)
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
     second         share of samples with a second target of the same scene, and its level_db (optional)
@@ -190,8 +190,8 @@ def intervals(
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
 
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from the scene's ranges.
-    As with recordings, a window counts where its target stands above the noise (`presence.present`); one that hovers is
-    heard at any SNR that its receiver has.
+    As with recordings, a window counts if its target stands above the noise (`presence.present`); a hovering target
+    counts at any SNR.
     """
     seconds = twin.symbols * twin.symbol_interval_s
     result, names = np.empty((count, receivers, twin.symbols), np.complex128), []
@@ -205,13 +205,13 @@ def intervals(
 
 
 SCENES = "config/measured/scenes.yaml"
-"""What stands in front of any radar, and its receiver, where the record of a radar says nothing else."""
+"""The usual scenes and receiver, for whatever the record of a radar does not state."""
 ROOM_M = 2.5
 """Least distance between the ends of a walk."""
 
 
 def _placed(scene: dict, said: dict) -> dict:
-    """A scene of the usual ones, with the distances, heights and beam of a record's block `twin`."""
+    """A usual scene with the distances, heights and beam of a record's block `twin`."""
     near, far = said["distance_m"]
     scene = {**scene, "height_m": said["height_m"]}
     scene["beam"] = {"width_deg": said["beam_deg"], "floor_db": -20.0}

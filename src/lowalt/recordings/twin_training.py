@@ -45,7 +45,7 @@ def settings(path: str | Path = RECOGNITION) -> dict:
 def simulated(
     library: Library, name: str, block: dict, fold: str, classes: tuple[str, ...] = tuple(CATEGORIES)
 ) -> Windows:  # fmt: skip
-    """Return the windows of a twin's classes for a fold of the block's `echoes`: disjoint random streams a fold."""
+    """Return the windows of a twin's classes for a fold of the block's `echoes`: disjoint random streams per fold."""
     images, parts = Images.from_settings(block["images"]), []
     labels, names, models, snrs = [], [], [], []
     count, receivers = block["echoes"][fold], block["receivers"]

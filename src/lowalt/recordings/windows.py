@@ -24,7 +24,7 @@ from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 
 CLIPPED_SHARE = 1e-3
-"""Share of a window's samples in clipped peaks from which on it is left out."""
+"""A window with this share of its samples in clipped peaks, or more, is left out."""
 SPLIT = {"by": "motion", "train": 1, "val": 0, "test": 1}
 
 
@@ -34,7 +34,7 @@ def at_symbol_rate(record: Record, twin: Twin, baseband: Baseband | None = None)
     baseband: the recording's samples where they have been read already. Where the radar has one real channel, the first
     of a recording's two is taken.
     Raises: InputError as `read`, naming the file: for a real recording where the radar has two channels, and for one
-    slower than a sample a symbol.
+    slower than one sample per symbol.
     """
     values, rate_hz = baseband or read(record)
     if record.channel == "real" and twin.channel == "complex":

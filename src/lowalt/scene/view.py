@@ -30,7 +30,7 @@ class Sampling(NamedTuple):
 
 
 class Displacement(NamedTuple):
-    """How much later (s) and higher in frequency (Hz) an effect lets an echo appear, a number or one a symbol (N,)."""
+    """Delay (s) and frequency shift (Hz) with which an effect lets an echo appear: a number, or one per symbol (N,)."""
 
     delay_s: np.ndarray | float = 0.0
     rise_hz: np.ndarray | float = 0.0

@@ -73,7 +73,7 @@ def cube_content(
 ) -> Content:
     """Return the content of cube shards from the chunk's noisy signals and what makes their cubes.
 
-    path: of the noisy signals; cell_type: as which cells are stored, "complex64" or "int16".
+    path: of the noisy signals; cell_type: type of the stored cells, "complex64" or "int16".
     Raises: InputError naming the option or file that is missing or does not fit.
     """
     network = cubes.scene.network

@@ -54,7 +54,7 @@ class Place(NamedTuple):
 
 
 class MadeOnDemand(Mapping):
-    """What `make` makes of each target's record, by subtype: made when it is first asked for, and then kept."""
+    """The result of `make` for each target's record, by subtype, computed on first access and kept."""
 
     def __init__(self, make: Callable[..., Any], records: dict[str, dict], seed: int, inputs: Path | None) -> None:
         """make: a function of (record, inputs, seed); inputs: the user's folder of meshes and recordings, or None."""
@@ -62,7 +62,7 @@ class MadeOnDemand(Mapping):
         self._made: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
-        """What is made of one target. Raises: KeyError for another; InputError where its record or input is wrong."""
+        """The result for one target. Raises: KeyError for another; InputError where its record or input is wrong."""
         if name not in self._made:
             self._made[name] = self._make(self._records[name], *self._sources)
         return self._made[name]
@@ -124,8 +124,8 @@ class Dataset:
 
         clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
         that the configuration names and the folder `inputs` of meshes and recordings, each when it is first asked for.
-        occluders: each subtype's surfaces, where the scene hides points behind them, made where the clouds are.
-        published: every row of the table of targets by subtype, by default from the records; the classes follow.
+        occluders: each subtype's surfaces, for a scene with `occlusion`; by default made here if the clouds are.
+        published: the row of each subtype in the table of targets, which decides the classes; by default the records'.
         Raises: InputError naming the key, value or file that is wrong.
         """
         if isinstance(config, (str, Path)):
@@ -252,7 +252,7 @@ class Dataset:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels of all samples, (n,) int64, places among `classes`; nothing is made for them."""
+        """Labels of all samples, (n,) int64 indices into `classes`; no sample is simulated."""
         numbers = {name: label(self.classes, item | {"subtype": name}) for name, item in self.published.items()}
         return np.array([numbers[self.place(number).subtype] for number in range(len(self))], np.int64)
 

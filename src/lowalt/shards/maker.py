@@ -160,7 +160,7 @@ class Maker:
         """Return the data of one sample as a shard of a kind holds it, and what its record says of its cubes.
 
         kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations, symbols);
-        cell_type: as which the cells of cubes are stored, "complex64" or "int16".
+        cell_type: type of the stored cells of cubes, "complex64" or "int16".
         """
         if kind == "image":
             return self.png(signal, row, snr_db), {}

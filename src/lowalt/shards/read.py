@@ -171,7 +171,7 @@ class ShardSet:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels of all samples, (n,) int64, places among `classes`, without reading a record."""
+        """Labels of all samples, (n,) int64 indices into `classes`, without reading a record."""
         return self._column("label").astype(np.int64)
 
     @property

@@ -143,7 +143,7 @@ def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], floa
 
 def check_record(merged: dict, where: str) -> dict:
     """Return the merged record of a built-in walk or run, checked, with the defaults of `stature_m` (the published
-    height), `rate_hz` (400 frames a second) and `points` (one a node).
+    height), `rate_hz` (400 frames per second) and `points` (one per node).
 
     Raises: InputError naming `where`, the key, the value and what was expected.
     """

@@ -43,7 +43,7 @@ class Motion:
     """A recording in our axes.
 
     root_m: (F, 3) places of the root; turned: (F, 31, 3, 3) global rotations of the bones; bones_m: (31, 3) bones
-    before they are turned; rate_hz: frames a second.
+    before they are turned; rate_hz: frames per second.
     """
 
     root_m: np.ndarray
@@ -137,8 +137,8 @@ def refuse_strange_rate(track: np.ndarray, rate_hz: float, speed_mps: float, sta
     if not WALK_RATIO_S[0] <= ratio <= WALK_RATIO_S[1]:
         other = rate_hz / 2 if ratio < WALK_RATIO_S[0] else rate_hz * 2
         raise InputError(
-            f"{where}: at {rate_hz:g} frames a second it moves {speed_mps:.2f} m/s in {1 / step_s:.2g} steps a second, "
-            f"unlike a person; is it of {other:g}? Write the right rate, `rate_hz: {other:g}`, or to insist "
+            f"{where}: at {rate_hz:g} frames per second it moves {speed_mps:.2f} m/s with {1 / step_s:.2g} steps per "
+            f"second, unlike a person; is it of {other:g}? Write the right rate, `rate_hz: {other:g}`, or to insist "
             f"`rate_hz: {rate_hz:g}`"
         )
 

@@ -121,7 +121,7 @@ def span(seconds: float) -> str:
 
 
 def pace(per_second: float) -> str:
-    """Return a rate in jobs a second, a minute or an hour: the first of these units that gives at least one."""
+    """Return a rate in jobs per second, minute or hour: the first of these units that gives at least one."""
     for factor, unit in ((1, "s"), (60, "min"), (3600, "h")):
         if per_second * factor >= 1 or unit == "h":
             return f"{per_second * factor:.1f}/{unit}"

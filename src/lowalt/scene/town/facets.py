@@ -49,7 +49,7 @@ class Town(NamedTuple):
 
     material: (K,) number of each facet's material in `materials`; building: (F,) number of the building of each
     triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet, and of_building (E,), their buildings;
-    pairs: by station's place (3,) m, pairs (P, 2) of facets by which a ray from it may go on, filled as they are asked.
+    pairs: cache, by the station's place (3,) m, of the pairs (P, 2) of facets that may reflect its rays in turn.
     """
 
     facets: Facets
@@ -122,7 +122,7 @@ def _convex(along: np.ndarray, area: np.ndarray, first: np.ndarray) -> np.ndarra
 def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], ground: str) -> Town:
     """Return the town of triangles (F, 3, 3) m with materials (F,), on ground of another material.
 
-    Buildings are what shares corners.
+    Triangles that share corners are one building.
     """
     numbers = corner_numbers(corners)
     label = labels(corners, numbers, material)

@@ -67,10 +67,9 @@ def single(facets, source, target, radius):
 
 @PLAIN
 def ordered_pairs(facets, firsts, source, radii):
-    """Return the pairs (P, 2) of facets, first and second, by which a ray from a source may go on at all.
+    """Return the pairs (P, 2) of facets such that the first may reflect a ray from a source to the second.
 
-    firsts: (K,) bool, which may come first; radii: (K,) m, around the facets' centres, infinite for the ground. The
-    second must be reached by way of the first.
+    firsts: (K,) bool, which may come first; radii: (K,) m, around the facets' centres, infinite for the ground.
     """
     size, count = 1024, 0
     found = np.empty((size, 2), np.int64)

@@ -20,7 +20,7 @@ from lowalt.scene.town.facets import Town
 CLEAR = -0.78
 """Below this nu an edge leaves a wave as it is. Source: ITU-R P.526-15, section 4.1."""
 SURE = 0.1
-"""Where all edges of a screen have a nu beyond this, its outline and what rays say must agree."""
+"""Where the nu of all edges of a screen lies beyond this, its outline and the traced rays must agree."""
 
 
 def field(nu: np.ndarray) -> np.ndarray:
@@ -34,7 +34,7 @@ def field(nu: np.ndarray) -> np.ndarray:
 
 
 FAR_M = 1e5
-"""Beyond this no wave passes around an edge."""
+"""Distance of an edge around which no wave passes."""
 
 
 @INNER
@@ -119,7 +119,7 @@ def _outline(edges, start, end, wavelength_m, outline):
     way, corner, crossing = end - start, np.empty(3), np.empty(3)
     length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
     most, least, highest, crossed, any_edge = -np.inf, np.inf, -np.inf, False, False
-    # A screen that no top shows is as low as can be.
+    # Until an edge is found, the screen's top lies far below the ray.
     outline[0], outline[1] = start, start
     outline[1, 0], outline[1, 1] = start[0] - way[1], start[1] + way[0]
     outline[0, 2] = outline[1, 2] = -FAR_M
@@ -193,7 +193,7 @@ def _block(
                 factors.append(other[1])
     sides = [min(factors, key=lambda factor: float(abs(factor).mean())) for factors in (before, after)]
     result = result * sides[0] * sides[1]
-    # A dark point that no outline covers gets nothing.
+    # A blocked point behind no outline receives nothing.
     return np.where(~lit & (least < -SURE), 0.0, result)
 
 

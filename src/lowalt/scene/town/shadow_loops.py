@@ -1,7 +1,7 @@
 """The compiled loops of `image_paths`: whether a ray by some facets passes all buildings.
 
-Rays that end near each other are traced in blocks. A block that cannot be reached is dropped whole, one that nothing
-can shadow needs no further look, and others are halved until single rays decide.
+Rays that end near each other are traced in blocks. A block that no ray can reach is dropped, and one with a triangle
+that may be in the way is halved until single rays decide.
 """
 
 import numpy as np
@@ -88,7 +88,7 @@ def _widen(start, end, span):
 
 @INNER
 def _span(span, bundle):
-    """Fill bundle (18,) with the rays of a span (12,): middles and spans of starts and ways."""
+    """Fill bundle (18,) with the middles and half widths of the starts and ways of a span (12,)."""
     for i in range(3):
         bundle[i], bundle[6 + i] = 0.5 * (span[i] + span[3 + i]), 0.5 * (span[3 + i] - span[i]) + 1e-9
         bundle[3 + i], bundle[9 + i] = 0.5 * (span[6 + i] + span[9 + i]), 0.5 * (span[9 + i] - span[6 + i]) + 1e-9
@@ -161,7 +161,7 @@ def _own(occluders, row, route, leg):
 
 @INNER
 def _shadowed(occluders, work, held, counts, hints):
-    """Whether a triangle of the lists held (legs, most) blocks a leg of a traced ray; the last to do so comes first."""
+    """Whether a triangle of the lists held (legs, most) blocks a leg of a traced ray; that one is tried first next."""
     legs, last = len(counts), hints[-1]
     for k in range(legs):
         leg = (k + last) % legs
@@ -207,9 +207,9 @@ def _stops(facets, occluders, row, start, end):
 
 @INNER
 def _dark(facets, occluders, starts, ends, rows):
-    """The first of some triangles that alone, or by its convex facet, blocks all rays of a block; -1 for none.
+    """The first of the triangles `rows` that, alone or with its convex facet, blocks all rays of a block; -1 for none.
 
-    starts, ends: (C, 3), of the rays to the corners of a box: a convex surface's shadow is convex.
+    starts, ends: (C, 3), of the rays to a box's corners; these decide, since the shadow of a convex shape is convex.
     """
     for row in rows:
         every = True
@@ -222,7 +222,7 @@ def _dark(facets, occluders, starts, ends, rows):
 
 @PLAIN
 def hidden(facets, occluders, which, corners):
-    """Return which of some facets (B,) a single convex surface hides whole from all of a box, corners (8, 3) m."""
+    """Return for facets `which` (B,) whether one convex surface hides all of it from a whole box, corners (8, 3) m."""
     result, bundle = np.zeros(len(which), np.bool_), np.empty(30)
     held, rays = np.empty(len(occluders.triangles), np.int64), np.empty((32, 2, 3))
     for b in range(len(which)):
@@ -245,7 +245,7 @@ def hidden(facets, occluders, which, corners):
 
 @INNER
 def _trace_rays(scene, places, work, depth, known, present, first_only):
-    """Do as `_trace_blocks` for a block of places (n, 1, 3) by single rays.
+    """Do the work of `_trace_blocks` for one block of places (n, 1, 3), ray by ray.
 
     known: whether work holds, at this depth, lists of the triangles that can be in the way.
     """
@@ -342,7 +342,7 @@ def _trace_blocks(scene, places, boxes, block, work, present, first_only):
     """Set present (R, 1) to True where a ray reaches a place, see `trace`; return whether any does.
 
     scene: facets, occluders, route and station; work: lists held (D, 3, F) and their lengths counts (D, 3) by depth,
-    hints (4,): the last triangle that blocked each leg, and the last leg that was; stack (64, 4), all int64; corners
+    hints (4,): the triangle that last blocked each leg, and the leg blocked last; stack (64, 4), all int64; corners
     (8, 5, 3), ray (8, 3), bundle (54,), box (3, 3); first_only: stop at the first place.
     """
     stack, top, met = work[3], 1, False

