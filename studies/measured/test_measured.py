@@ -181,8 +181,15 @@ def test_a_network_names_each_recording_once_a_seed_and_by_the_mean(tmp_path):
     block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
     (tmp_path / "recognition.yaml").write_text(yaml.safe_dump(block))
     asked = ["recognise", "--inputs", tmp_path / "inputs", "--recognition", tmp_path / "recognition.yaml", "--jobs", 1]
-    for out, more in (("trained", []), ("again", ["--reuse"])):
+    only = {"vehicle_24ghz": [{"repository": "a/b", "commit": "c", "folder": "", "files": {"drive.wav": "0"}}]}
+    (tmp_path / "only.yaml").write_text(yaml.safe_dump(only))
+    for out, more in (("trained", []), ("again", ["--reuse", "--only", str(tmp_path / "only.yaml")])):
         study([*map(str, asked), "--models", str(tmp_path / "models"), "--out", str(tmp_path / out), *more])
+        # Another recording in the folder, which the list does not name.
+        content = (tmp_path / "inputs/vehicle_24ghz/drive.wav").read_bytes()
+        (tmp_path / "inputs/vehicle_24ghz/other.wav").write_bytes(content[:-2] + b"\1\0")
+        record = (tmp_path / "inputs/vehicle_24ghz/drive.yaml").read_text().replace("drive.wav", "other.wav")
+        (tmp_path / "inputs/vehicle_24ghz/other.yaml").write_text(record)
     rows = read_csv(tmp_path / "trained/measured-recognition.csv", *accuracy.RECOGNITION)
     assert [(row["radar"], row["seed"], row["file"], row["windows"]) for row in rows] == [
         ("cw_24ghz", seed, "drive.wav", "3") for seed in ("0", "1", "mean")
