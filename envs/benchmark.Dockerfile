@@ -2,7 +2,7 @@
 # Once, where there is a network:
 #   docker pull python:3.11-bookworm
 #   docker run --rm -v "$PWD:/lowalt" -w /lowalt python:3.11-bookworm \
-#     pip download --dest wheels -c envs/constraints.txt pip uv setuptools '.[workflow,cost,recognition]'
+#     pip wheel --wheel-dir wheels -c envs/constraints.txt pip uv setuptools '.[workflow,cost,recognition]'
 # Then, without one:
 #   docker build --network none -t lowalt-40 -f envs/benchmark.Dockerfile .
 #   docker run --rm --network none -v lowalt-40:/lowalt/results lowalt-40

@@ -96,7 +96,7 @@ def test_the_offline_container_asks_only_for_the_folder_of_wheels_and_makes_a_ta
         run = subprocess.run(["make", "--dry-run", target], cwd=folder, capture_output=True, text=True)
         assert run.returncode == 0, run.stderr
     text = (ROOT / "envs" / OFFLINE).read_text()
-    fetched = re.search(r"pip download --dest wheels -c envs/constraints.txt (.*) '\.\[(.*)\]'", text)
+    fetched = re.search(r"pip wheel --wheel-dir wheels -c envs/constraints.txt (.*) '\.\[(.*)\]'", text)
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert {"pip", "uv", "setuptools"} == set(fetched[1].split())
     assert {"workflow", "cost", "recognition"} <= set(fetched[2].split(",")) <= set(extras)

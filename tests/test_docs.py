@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -117,6 +118,28 @@ def test_every_extra_that_a_command_installs_exists():
         name for _, command in NAMED for some in re.findall(r"-e '\.\[(.+)\]'", command) for name in some.split(",")
     ]
     assert len(named) > 3 and not set(named) - set(extras)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_that_imports_a_package_beyond_the_set_up_says_how_to_install_it(page):
+    """Also where only the program in `examples/` imports it that a command of the page runs."""
+    text = page.read_text()
+    programs = set(re.findall(r"\.venv/bin/python (examples/\w+\.py)", text))
+    code = "\n".join([*re.findall(r"^```python.*?\n(.*?)^```$", text, re.DOTALL | re.MULTILINE),
+                      *((ROOT / name).read_text() for name in programs)])  # fmt: skip
+    modules = set(re.findall(r"^\s*(?:import|from) (\w+)", code, re.MULTILINE))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    known = [*project["dependencies"], *(need for name in ("workflow", "cost", "recognition") for need in extras[name])]
+    named = ",".join(re.findall(r"pip install[^`\n]*'\.\[([\w,]+)\]'", text))
+    known += [need for name in filter(None, named.split(",")) for need in extras[name]]
+    known += re.findall(r"pip install[^`\n]* (\w+)`", text)
+    have = {re.match(r"[\w-]+", need)[0].lower() for need in known} | {"lowalt"}
+    offers = packages_distributions()
+    sources = {module: {name.lower() for name in offers.get(module, [module])} for module in modules}
+    assert not {
+        module for module, names in sources.items() if module not in sys.stdlib_module_names and not names & have
+    }
 
 
 def test_every_target_of_make_exists():

@@ -5,11 +5,13 @@ their own (python -m lowalt.STAGE).
 """
 
 import argparse
+import os
 import signal
 import sys
 from importlib import import_module
 
 from lowalt.commands.command_table import COMMANDS
+from lowalt.config.command import refusal, warn_in_one_line
 from lowalt.files.errors import InputError
 
 
@@ -36,22 +38,26 @@ def main(arguments: list[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else arguments
     line = command_line(next((word for word in words if not word.startswith("-")), ""))
     options = line.parse_args(words)
+    warn_in_one_line()
     try:
         answer = options.act(options)
-    except (InputError, OSError) as error:
-        from lowalt.config.command import refusal
+        text = answer.text
+        if options.json:
+            from lowalt.commands.command_line import as_json
 
+            text = as_json(answer.facts)
+        if text:
+            print(text, flush=True)
+    except BrokenPipeError:
+        # The reader, such as `head`, has closed its end; Python would try again when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    except (InputError, OSError, ImportError) as error:
         print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("interrupted: the same command goes on from here", file=sys.stderr)
+        print("interrupted: the same command continues a run, and starts anything else again", file=sys.stderr)
         return 128 + signal.SIGINT
-    if options.json:
-        from lowalt.commands.command_line import as_json
-
-        print(as_json(answer.facts))
-    elif answer.text:
-        print(answer.text)
     return answer.status
 
 

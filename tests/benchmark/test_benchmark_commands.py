@@ -16,7 +16,7 @@ from lowalt.__main__ import main
 from lowalt.benchmark import baseline_table, confirm, definition, frozen_bytes
 from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
 
 ROOT = Path(__file__).parents[2]
 ZOO = ROOT / "results/zoo/default-unseen.safetensors"
@@ -92,6 +92,9 @@ def test_the_example_of_a_network_is_a_backbone_and_its_overlay_names_it():
 
 def test_score_prints_intervals_and_every_baseline(small, capsys):
     test = benchmark.load("unseen", "test")
+    with pytest.raises(InputError, match=rf"row {test.key[0]}: p_uav is -2.5, expected a number from 0 to 1"):
+        benchmark.write("mine.csv", test, np.full((len(test), 4), -2.5))
+    assert not Path("mine.csv").exists(), "logits are refused before a file is written"
     benchmark.write("mine.csv", test, np.eye(4)[test.labels])
     assert main(["benchmark", "score", "mine.csv", "mine.csv", "--track", "unseen"]) == 0
     text = capsys.readouterr().out
@@ -140,10 +143,12 @@ def test_make_tells_the_last_bits_of_a_part_with_effects_from_another_signal(sma
     np.save(path, whole)
 
 
-def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch):
+def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch, recwarn):
     monkeypatch.setattr(confirm, "USUAL", 2)
     track = TRACKS["unseen"]
+    recwarn.clear()
     first = confirm.confirm(ZOO, track)
+    assert not [one for one in recwarn if issubclass(one.category, InputWarning)]
     assert first == confirm.confirm(ZOO, track)
     assert first.samples == 4 * 4 * 2 and first.percent.value > 60
     assert first.seed == definition.root_seed(ZOO.read_bytes() + b"lowalt-40 v1")

@@ -2,11 +2,14 @@
 
 import errno
 import json
+import os
 import runpy
+import subprocess
 import sys
 
 import pytest
 
+from lowalt.__main__ import main
 from lowalt.config.command import pick, refusal, run, settings
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
@@ -63,6 +66,28 @@ def test_a_path_that_the_system_refuses_is_named_in_one_line(tmp_path, monkeypat
     )
     with pytest.raises(OSError, match="space"):
         refusal(OSError(errno.ENOSPC, "no space", "file"))
+
+
+def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs_it(tmp_path, monkeypatch, capsys):
+    sample = tmp_path / "sample.png"
+    sample.write_bytes(b"")
+    for module in [name for name in sys.modules if name.startswith("lowalt.recognition.predict")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    assert main(["predict", "default-seen", str(sample)]) == 2
+    assert capsys.readouterr().err == (
+        "error: the package torch is not installed, expected `pip install 'lowalt[recognition]'`\n"
+    )
+    with pytest.raises(ModuleNotFoundError, match="nowhere"):
+        refusal(ModuleNotFoundError("nowhere", name="nowhere"))
+
+
+def test_a_reader_that_has_enough_ends_a_command_without_a_traceback():
+    reading, writing = os.pipe()
+    os.close(reading)
+    ended = subprocess.run([sys.executable, "-m", "lowalt", "completion"], stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (141, b"")
 
 
 def test_a_failed_write_leaves_nothing_and_keeps_what_was(tmp_path):

@@ -48,7 +48,19 @@ def test_a_target_of_known_speed_stands_at_that_speed_on_the_axes(name, speed):
         place = (np.flatnonzero(rows == rows.max()).mean() + 0.5) / len(rows)
         _, bottom, top = axes.upwards
         assert top + (bottom - top) * place == pytest.approx(speed, abs=0.1)
-        assert axes.across[2] == pytest.approx((400 - (256 if name == "vrp" else 8)) * 2.5e-3)
+
+
+@pytest.mark.parametrize("name", ["vrp", "trp"])
+def test_an_echo_that_sets_in_stands_at_half_its_strength_at_that_time_on_the_axes(name):
+    render = renderer()
+    signal = np.where(np.arange(400) < 190, 0, np.exp(-2j * np.pi * 0.125 * np.arange(400))).astype(np.complex64)
+    image = split(render.tile(np.array([signal] * 3)), len(render.spectra))[list(render.spectra).index(name)]
+    line = image[image.max(axis=1).argmax()].astype(float)
+    # Squares of the images are amplitudes: the share of a window after the onset, over that of the last window.
+    last = min(1.0, 210 / render.spectra[name].window)
+    place = (np.flatnonzero((line / line.max()) ** 2 * last > 0.5)[0] + 0.5) / len(line)
+    _, left, right = axes_of(name, render.network.stations[0], render).across
+    assert left + (right - left) * place == pytest.approx(189.5 * 2.5e-3, abs=0.01)
 
 
 def test_sample_writes_the_bytes_of_the_data_set_and_a_picture(tmp_path, capsys):

@@ -92,4 +92,4 @@ def test_an_interrupted_command_ends_with_one_line_and_130(tmp_path, capsys, mon
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(workflow.subprocess, "run", interrupted)
     assert main(["run"]) == 130
-    assert capsys.readouterr().err == "interrupted: the same command goes on from here\n"
+    assert capsys.readouterr().err == "interrupted: the same command continues a run, and starts anything else again\n"

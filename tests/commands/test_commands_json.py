@@ -15,6 +15,7 @@ from lowalt.commands.command_line import as_json
 from lowalt.commands.command_table import COMMANDS
 from lowalt.config.layers import load, plain
 from lowalt.files.atomic import replacing
+from lowalt.machine.progress import Reporter
 from lowalt.report.figures import mesh_picture, target_picture
 from lowalt.scene import explanation
 from lowalt.scene.checks import check
@@ -78,7 +79,9 @@ def test_a_town_is_looked_at_and_its_scene_drafted(answer, tmp_path, monkeypatch
     assert main(["scene", "inspect", str(town), "--unit", "cubit"]) == 2
 
 
-def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_surfaces(answer, tmp_path):
+def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_surfaces(answer, tmp_path, monkeypatch):
+    steps = []
+    monkeypatch.setattr(Reporter, "__call__", lambda self, done: steps.append((done, self._unit)))
     overlay = tmp_path / "scene.yaml"
     effects = "effects: {clutter: {}, canceller: {kind: pulse}}, targets: {own: {more: config/targets/more.yaml}}"
     overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
@@ -88,6 +91,7 @@ def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_s
     assert changes["clutter"]["also"] == "and without canceller" and changes["canceller"]["also"] == ""
     assert changes["receiver_noise"]["also"] == "at no set SNR" and changes["receiver_noise"]["signal"] > 0
     assert "surfaces" in changes["occlusion"]["refused"]
+    assert steps == [(done, "effects") for done in range(1, len(changes) + 1)], "trying every effect takes a minute"
 
 
 def test_explain_answers_with_findings_and_changes(answer, capsys, tmp_path):

@@ -11,8 +11,9 @@ import lowalt
 from forks import printed
 from lowalt.echo.fast.driver import run
 from lowalt.echo.pointwise.results import matrix
+from lowalt.files.errors import InputError
 from lowalt.machine.jit import INNER, LEAN, digest
-from lowalt.machine.machine_code import _DigestCache
+from lowalt.machine.machine_code import _DigestCache, dispatcher
 
 PROGRAM = """
 import sys
@@ -215,3 +216,11 @@ def test_a_kept_kernel_calls_the_function_that_it_was_compiled_with(tmp_path):
     programs = [["import sys", use, "print(linked.caller(0.0))"] for use in uses]
     programs += [["import sys", uses[0], "print(linked.called(0.0))", uses[1], "print(linked.caller(0.0))"]]
     assert printed(["\n".join(lines) for lines in programs]) == ["2.0\n", "4.0\n", "2.0\n4.0\n"]
+
+
+def test_machine_code_that_no_folder_can_keep_is_refused_with_the_variable_that_names_one(monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
+    names: dict = {}
+    exec(compile("def twice(x):\n    return 2 * x\n", "/proc/nowhere/kernel.py", "exec"), names)
+    with pytest.raises(InputError, match=r"beside /proc/nowhere/kernel.py nor .* expected XDG_CACHE_HOME: a folder"):
+        dispatcher(names["twice"], {}, str)

@@ -10,6 +10,7 @@ from scipy.io import wavfile
 from lowalt.__main__ import main as lowalt
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
+from lowalt.machine.progress import Reporter
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.own_radar import snr_range, temperature, trained_radar
 from lowalt.recordings.record import read_record, record
@@ -60,7 +61,7 @@ def test_scenes_stand_at_the_distances_and_heights_of_the_record(tmp_path):
     assert walk["near_m"][0] == 2 and walk["far_m"][1] == 10 and walk["far_m"][0] - walk["near_m"][1] >= 2.49
 
 
-def test_a_record_says_targets_scenes_and_receiver_of_its_own(tmp_path):
+def test_a_record_says_targets_scenes_and_receiver_of_its_own(tmp_path, monkeypatch):
     line = ["target", "drone", "--rotors", "6", "--diagonal", "1.13", "--propeller", "0.53", "--blades", "2", "--rate",
             "50:60", "--speed", "18", "--subtype", "Mine", "--out", str(tmp_path / "mine.yaml")]  # fmt: skip
     assert lowalt(line) == 0
@@ -77,7 +78,10 @@ def test_a_record_says_targets_scenes_and_receiver_of_its_own(tmp_path):
     assert (mine["receiver"]["highpass_hz"], mine["receiver"]["hum_db"]) == (5, -90)
     # Values are drawn in one order, whatever the order in the record is.
     assert next(iter(mine["receiver"])) == "snr_db" and list(mine["receiver"])[-1] == "highpass_hz"
+    steps = []
+    monkeypatch.setattr(Reporter, "__call__", lambda self, done: steps.append((done, self._unit)))
     windows, names = library.simulated("mine", "UAV", 2, "test")
+    assert steps and {unit for _, unit in steps} == {"scenes"}, "the simulation of a radar takes minutes"
     assert windows.shape == (2, 1, 256) and names == ["Mine", "Mine"]
 
 

@@ -96,6 +96,15 @@ def test_a_file_that_does_not_keep_the_contract_is_refused_in_one_sentence(half,
     assert len(str(refused.value)) <= 400
 
 
+@pytest.mark.parametrize("factor", ["view.places[0, :, 0]", "view.times_s", "0.5", "view.places"])
+def test_a_factor_of_another_shape_than_the_contract_s_is_refused_in_one_sentence(half, factor):
+    Path("half.py").write_text(HALF.replace('settings["share"] * rng.random() + 0 * view.places[..., 0]', factor))
+    cloud, row = target(np.random.default_rng(1))
+    asked = scene({"half.py": {}}, network())
+    with pytest.raises(InputError, match=r"half\.py: factor of shape"):
+        SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived()
+
+
 def test_an_edited_file_is_loaded_again_and_leaves_no_byte_code_beside_it(half):
     for share in (0.5, 0.7):
         Path("half.py").write_text(HALF.replace("0.5", str(share)))

@@ -1,11 +1,13 @@
 """A town: facets, blockage, reflections and diffraction against brute force, closed forms and the simpler effects."""
 
 import itertools
+import json
 import math
 
 import numpy as np
 import pytest
 
+from lowalt.__main__ import main
 from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
@@ -268,6 +270,18 @@ def test_a_town_that_does_not_fit_is_refused(tmp_path, change, message):
     settings = town.DEFAULTS | {"buildings": str(path), "origin": ORIGIN} | change
     with pytest.raises(InputError, match=message):
         town.refuse_place(settings, NETWORK)
+
+
+def test_a_geojson_in_metres_is_refused_by_the_command_in_one_sentence(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = geojson(tmp_path / "utm.geojson", BOXES)
+    collection = json.loads(path.read_text())
+    square = [[691_000.0, 5_335_000.0], [691_020.0, 5_335_000.0], [691_020.0, 5_335_020.0], [691_000.0, 5_335_000.0]]
+    collection["features"][0]["geometry"] = {"type": "Polygon", "coordinates": [square]}
+    path.write_text(json.dumps(collection))
+    assert main(["scene", "inspect", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "utm.geojson: the place [691000, 5.335e+06] is no longitude and latitude" in said and "EPSG:4326" in said
 
 
 def test_wrong_units_and_sunk_towns_are_refused(tmp_path):

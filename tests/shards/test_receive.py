@@ -137,6 +137,27 @@ def test_speeds_that_fold_are_named_with_an_interval_at_which_none_does():
         lowalt.Dataset(overlaid([SMALL, {"network": {"carrier_hz": 28e9, "subcarriers": 1}}]))
 
 
+def test_ranges_that_fold_are_named_with_a_value_at_which_none_does():
+    overlay = {"network": {"waveform": {"kind": "fmcw", "sweep_hz": 150e6, "sweep_s": 2e-3, "samples": 128}}}
+    with pytest.warns(UserWarning) as caught:
+        echo = lowalt.receive(overlay, "Crow", 0, "A", "cells")
+    said = next(str(one.message) for one in caught if "ranges" in str(one.message))
+    # The warning points at the user's line, and holds: the crow's echo stands in a cell nearer than the crow is.
+    assert {one.filename for one in caught} == {__file__}
+    assert said.startswith("ranges beyond 127.9 m fold, targets are up to 500 m from a station")
+    assert echo.truth["range_m"][0] > 400 > 127.9 > echo.ranges_m[abs(echo.values[0]).argmax()]
+    none = int(said.split(", at ")[1].split()[0])
+    for samples, folds in ((none, False), (none - 1, True)):
+        overlay["network"]["waveform"]["samples"] = samples
+        assert bool(Network.from_settings(overlaid([overlay])["network"]).range_folding(None)) == folds
+    ofdm = overlaid([{"network": {"subcarrier_spacing_hz": 400e3}}])["network"]
+    spacing = float(Network.from_settings(ofdm).range_folding(None).split(", at ")[1].split()[0])
+    for hertz, folds in ((spacing, False), (spacing + 1, True)):
+        assert bool(Network.from_settings(ofdm | {"subcarrier_spacing_hz": hertz}).range_folding(None)) == folds
+    near = Network.from_settings(ofdm).range_folding([[200, 100], [300, 100], [250, 200]])
+    assert near == "", "a region inside 375 m of every mast"
+
+
 def test_the_command_writes_every_array_by_name(tmp_path, capsys):
     small = tmp_path / "small.yaml"
     small.write_text("network: {symbols: 64, subcarriers: 64}\n")

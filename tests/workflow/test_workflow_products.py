@@ -146,7 +146,8 @@ def test_training_reads_images_of_the_scheme_s_own_size():
 def test_a_run_on_another_s_data_reads_there(tmp_path, monkeypatch):
     overlay = {"run": "mine", "data": "default", "recognition": {"training": {"steps": 9}}}
     made = tmp_path / "results/default/config.yaml"
-    made.parent.mkdir(parents=True)
+    (made.parent / "views").mkdir(parents=True)
+    (made.parent / "SHA256SUMS").touch()
     (tmp_path / "config").symlink_to(ROOT / "config")
     monkeypatch.chdir(tmp_path)
     made.write_text(yaml.safe_dump(load_yaml("config/default.yaml")))

@@ -110,6 +110,13 @@ def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, 
     (tmp_path / "results/made").mkdir(parents=True)
     kept = tmp_path / "results/made/config.yaml"
     kept.write_text(yaml.safe_dump(own | {"run": "made", "recognition": {}, "cost": 1}))
+    with pytest.raises(
+        InputError, match=r"results/made has no SHA256SUMS and no views, expected a run made to its end"
+    ):
+        refusals.refuse_data(own | {"data": "made"})
+    (kept.parent / "SHA256SUMS").touch()
+    refusals.refuse_data(own | {"data": "made", "recognition": own["recognition"] | {"cache": False}})
+    (kept.parent / "views").mkdir()
     refusals.refuse_data(own | {"data": "made"})
     kept.write_text(yaml.safe_dump(own | {"run": "made", "seed": own["seed"] + 1, "more": 1}))
     with pytest.raises(InputError, match=r"other settings of \['more', 'seed'\]"):

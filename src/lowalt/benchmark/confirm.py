@@ -7,6 +7,7 @@ benchmark. docs/benchmark.md says how much trying many model files can gain.
 import hashlib
 from pathlib import Path
 from typing import NamedTuple
+from warnings import catch_warnings
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from lowalt.benchmark.benchmark_tracks import TRACKS, Track
 from lowalt.benchmark.definition import VERSION, config_of, root_seed
 from lowalt.benchmark.scoring import headline, tested, values_of
 from lowalt.config.layers import merge
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.recognition.dataset_samples import DatasetSamples
 from lowalt.recognition.intervals import Interval
 from lowalt.recognition.zoo_files import path_of
@@ -45,7 +46,8 @@ def dataset(track: Track, seed: int) -> Dataset:
     count = MODELS.get(track.part, USUAL) * (2 if track.whole else 1)
     every = {"train": 1, "val": 0, "test": 0}
     more = {"seed": seed, "motion": {"models": count, "models_per_chunk": count}, "split": every}
-    return Dataset(merge(config_of(track.part), more), groups=("unseen",) if track.whole else ("seen", "unseen"))
+    with catch_warnings(action="ignore", category=InputWarning):  # nobody can change the benchmark's settings
+        return Dataset(merge(config_of(track.part), more), groups=("unseen",) if track.whole else ("seen", "unseen"))
 
 
 def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:

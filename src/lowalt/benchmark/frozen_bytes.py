@@ -82,10 +82,9 @@ def sums(part: str, folder: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """
     found = []
     for path in sorted((Path(folder) / run_name(part) / "noisy").glob("*.npy")):
-        for model in np.load(path, mmap_mode="r"):
-            of_stations = model.swapaxes(0, 1).reshape(model.shape[1], -1)
-            draws = np.random.PCG64(0).random_raw(of_stations.shape[1]) % np.uint64(4)
-            turned = of_stations * np.array([1, 1j, -1, -1j])[draws]
+        for model in np.load(path, mmap_mode="r").swapaxes(1, 2):
+            draws = np.random.PCG64(0).random_raw(model[0].size) % np.uint64(4)
+            turned = model.reshape(len(model), -1) * np.array([1, 1j, -1, -1j])[draws]
             found.append((turned.sum(axis=1), np.linalg.norm(turned, axis=1)))
     return tuple(np.stack(column) for column in zip(*found, strict=True))
 

@@ -32,7 +32,7 @@ def _shares(row: dict, columns: tuple[str, ...], where: str) -> list[float]:
             values.append(math.nan)
         if not 0 <= values[-1] <= 1 + TOLERANCE:
             raise InputError(f"{where}: {name} is {shown(row[name])}, expected a number from 0 to 1")
-    if abs(sum(values) - 1) > TOLERANCE:
+    if round(abs(sum(values) - 1), 6) > TOLERANCE:
         raise InputError(f"{where}: the probabilities sum to {sum(values):.6g}, expected 1 within {TOLERANCE:g}")
     return values
 
@@ -66,11 +66,12 @@ def read(path: str | Path, track: Track) -> np.ndarray:
 def write(path: str | Path, samples: "TrackSamples", probabilities: np.ndarray) -> None:
     """Write a submission. probabilities: (n, classes), in the order of the samples and of their classes.
 
-    Raises: InputError for another shape.
+    Raises: InputError for another shape, and for a row that `read` would refuse, such as one of logits.
     """
     wanted = (len(samples), len(samples.classes))
     if np.shape(probabilities) != wanted:
         raise InputError(f"probabilities: shape {np.shape(probabilities)}, expected {wanted}")
+    columns = probability_columns(samples.classes)
     rows = zip(samples.key.tolist(), np.asarray(probabilities, float).tolist(), strict=True)
-    columns = ("key", *probability_columns(samples.classes))
-    write_csv(path, columns, ([key, *(f"{share:.6f}" for share in shares)] for key, shares in rows))
+    whole = [(key, _shares(dict(zip(columns, values, strict=True)), columns, f"row {key}")) for key, values in rows]
+    write_csv(path, ("key", *columns), ([key, *(f"{share:.6f}" for share in shares)] for key, shares in whole))

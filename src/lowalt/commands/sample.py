@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.commands.command_line import Answer, add_command
-from lowalt.config.command import warn_in_one_line
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import replacing, write_file
 from lowalt.files.errors import InputError
@@ -35,7 +34,6 @@ def run(options: argparse.Namespace) -> Answer:
 
     Raises: InputError for a wrong configuration, subtype or model.
     """
-    warn_in_one_line()
     config = overlaid(options.overlay)
     selected = config["targets"]["select"]
     if options.model < 0 or (selected and options.subtype not in selected):

@@ -10,7 +10,6 @@ import yaml
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
 from lowalt.commands.data_sheet import add_sheets
-from lowalt.config.command import warn_in_one_line
 from lowalt.drafting.inspection import Inspection, described, inspect_mesh
 from lowalt.drafting.new import SEED, Asked, draft
 from lowalt.files.atomic import slug, write_file
@@ -111,7 +110,6 @@ def _inspect(options: argparse.Namespace) -> Answer:
 
 def _new(options: argparse.Namespace) -> Answer:
     """Draft a record of a mesh file or a robot's description."""
-    warn_in_one_line()
     stem = (options.out or options.file).stem
     asked = Asked(
         options.file, options.inputs, load_table(options.table), options.subtype, options.category, options.unit,
@@ -144,7 +142,6 @@ def _new(options: argparse.Namespace) -> Answer:
 
 def _make(options: argparse.Namespace) -> Answer:
     """Make the cloud of a record and a picture of it."""
-    warn_in_one_line()
     from lowalt.targets.make import make
 
     records = read_records(options.record)

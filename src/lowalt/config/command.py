@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.files.atomic import text_of
-from lowalt.files.errors import InputError, InputWarning, shortened
+from lowalt.files.errors import InputError, InputWarning, lacking, shortened
 from lowalt.files.json_objects import json_object
 from lowalt.machine.memory import keep_freed_memory
 
@@ -89,14 +89,16 @@ REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, 
 """Operating system errors caused by a path of the user, such as a read-only folder."""
 
 
-def refusal(error: InputError | OSError) -> str:
-    """Return the message of a refusal, of bounded length: that of an InputError, or one about the path in an error of
-    the operating system.
+def refusal(error: InputError | OSError | ImportError) -> str:
+    """Return the message of a refusal, of bounded length: that of an InputError, one about the path in an error of the
+    operating system, or one about a package that is not installed.
 
     Raises: any other error unchanged.
     """
     if isinstance(error, InputError):
         return str(error)
+    if isinstance(error, ImportError):
+        return str(lacking(error))
     if error.errno not in REFUSED or error.filename is None:
         raise error
     return shortened(f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write")
@@ -104,10 +106,10 @@ def refusal(error: InputError | OSError) -> str:
 
 @contextlib.contextmanager
 def refusing() -> Iterator[None]:
-    """Turn an InputError, or an operating system error about a path, into one line and exit status 2."""
+    """Turn an InputError, an operating system error about a path, or a missing package into one line and status 2."""
     try:
         yield
-    except (InputError, OSError) as error:
+    except (InputError, OSError, ImportError) as error:
         print(f"error: {refusal(error)}", file=sys.stderr)
         raise SystemExit(2) from None
 

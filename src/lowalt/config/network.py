@@ -254,6 +254,24 @@ class Network:
             f"network.symbol_interval_s is {interval_s:g}, at {none_s:.2g} none would fold"
         )
 
+    def range_folding(self, polygon_m: Iterable | None) -> str:
+        """Return a sentence where a range of the region of targets, of corners polygon_m (K, 2) or None for the masts',
+        is beyond the unambiguous one, c / (2 df), with a value at which none is; else an empty text."""
+        masts = [station.position_m[:2] for station in self.stations if station.transmitter is None]
+        corners = np.array(masts if polygon_m is None else polygon_m, float)
+        ends = [(station.transmitter or station, station.receiver or station) for station in self.stations]
+        ways = [[np.linalg.norm(corners - end.position_m[:2], axis=1) for end in pair] for pair in ends]
+        farthest, reach = np.mean(ways, axis=1).max(), self.subcarriers * self.cell_m
+        if farthest <= reach:
+            return ""
+        of_sweep = self.waveform == "fmcw"
+        key, value = ("waveform.samples", self.subcarriers) if of_sweep else (OFDM[1], self.subcarrier_spacing_hz)
+        none = math.ceil(value * farthest / reach) if of_sweep else math.floor(value * reach / farthest)
+        return (
+            f"ranges beyond {reach:.4g} m fold, targets are up to {farthest:.4g} m from a station: network.{key} is "
+            f"{value:g}, at {none} none would fold, nor in a smaller motion.region or with stations closer together"
+        )
+
     def folded_mps(self, speed_mps: np.ndarray, station: Station) -> np.ndarray:
         """Return the speeds (m/s, any shape) at which a station sees radial speeds, above -largest to largest."""
         largest = self.largest_mps(station)

@@ -3,7 +3,6 @@
 import math
 import os
 import re
-import warnings
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -12,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.files.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
 from lowalt.targets.mesh_files import SUFFIXES, selected
@@ -131,8 +130,7 @@ class Files:
                 shown = ", ".join(str(Path(*path)) for path in fits[:3])
                 raise InputError(f"{name!r}: {len(fits)} files below the folder of inputs fit ({shown}), expected one")
             if fits:
-                warnings.warn(f"{name!r} is taken from {Path(*fits[0])}, the only file that fits", InputWarning,
-                              stacklevel=2)  # fmt: skip
+                warn(f"{name!r} is taken from {Path(*fits[0])}, the only file that fits")
                 return self.inputs.joinpath(*fits[0]).resolve()
         return None
 

@@ -1,6 +1,9 @@
 """The exceptions for bad input: their message names the file, key or value, and what was expected instead."""
 
 import difflib
+import re
+import sys
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -52,6 +55,21 @@ class SpaceError(InputError):
     """A disk or memory is too small; the message names the file or run, the required and the free space."""
 
 
+def lacking(error: ImportError) -> InputError:
+    """Return the refusal of what needs a package that is not installed, with the command that installs it.
+
+    Raises: the error unchanged where no extra of this package names that one.
+    """
+    from importlib.metadata import requires  # takes 30 ms, which no other call should pay
+
+    name = (error.name or "").partition(".")[0]
+    for requirement in requires("lowalt") or ():
+        found = re.match(r"([\w-]+).*extra == .(\w+)", requirement)
+        if found and found[1].replace("-", "_") == name and found[2] != "test":
+            return InputError(f"the package {name} is not installed, expected `pip install 'lowalt[{found[2]}]'`")
+    raise error
+
+
 @contextmanager
 def reading(path: str | Path, kind: str) -> Iterator[None]:
     """Turn any exception of a reader into an InputError that names the file, since libraries raise many types.
@@ -73,3 +91,11 @@ def in_one_line(error: Exception) -> str:
 
 class InputWarning(UserWarning):
     """Warning: the user's input looks wrong but is used unchanged; the message says what and where."""
+
+
+def warn(text: str) -> None:
+    """Warn with `InputWarning` at the line outside this package that called it."""
+    level, frame, package = 1, sys._getframe(), __name__.partition(".")[0]
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in (package, "contextlib"):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, InputWarning, stacklevel=level)

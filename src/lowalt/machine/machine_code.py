@@ -19,6 +19,8 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.targetconfig import ConfigStack
 
+from lowalt.files.errors import InputError
+
 
 def _fields(kind) -> tuple:
     """Return the names of the fields of a named tuple's type, of those inside it, and so on, in their order."""
@@ -107,8 +109,15 @@ def dispatcher(function: Callable, options: dict[str, Any], digest: Callable[[],
     """Return numba's dispatcher of a function, with the cache of this module.
 
     options: those of `njit`; digest: gives the digest of all code that the function runs, which the key needs.
+    Raises: InputError where no folder can be written that keeps machine code.
     """
     compiled = njit(**options)(function)
-    compiled._cache = _DigestCache(function)
+    try:
+        compiled._cache = _DigestCache(function)
+    except RuntimeError:
+        place = f"beside {function.__code__.co_filename} nor in this user's cache"
+        raise InputError(
+            f"machine code can be kept neither {place}, expected XDG_CACHE_HOME: a folder that this user may write"
+        ) from None
     compiled._cache.options, compiled._cache.digest = options, digest
     return compiled

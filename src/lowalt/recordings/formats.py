@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.files.atomic import text_file
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, lacking
 from lowalt.files.json_objects import read_object
 from lowalt.recordings.chirps import in_chirps
 from lowalt.recordings.layouts import number_type
@@ -174,9 +174,7 @@ def _sigmf(path: Path, record: Record) -> Table:
     try:
         import sigmf
     except ImportError as error:
-        raise InputError(
-            f"{path}: the package sigmf is not installed ({error}), expected `pip install 'lowalt[sigmf]'`"
-        ) from error
+        raise lacking(error) from error
 
     fields = read_object(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording").get("global")
     if not isinstance(fields, dict):

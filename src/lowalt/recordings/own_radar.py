@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from torch import nn
 
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import reported
 from lowalt.recognition import model_card, model_file, zoo
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import of_run
@@ -75,7 +76,8 @@ def trained_radar(record: Record, out: Path, block: dict) -> dict:
     library = Library.of({name: (record, twin, snr_range(record, twin, baseband))})
     classes = tuple(library.scenes[name])
     block = {**block, "echoes": {**block["echoes"], "test": block["echoes"]["validation"]}}
-    folds = {fold: simulated(library, name, block, fold, classes) for fold in ("train", "validation", "test")}
+    parts = reported(("train", "validation", "test"), 3, "parts")
+    folds = {fold: simulated(library, name, block, fold, classes) for fold in parts}
     with tempfile.TemporaryDirectory() as folder:
         network = train(block, {fold: folds[fold] for fold in ("train", "validation")}, name, seed, folder, classes)
         content = of_run(Path(folder) / "model.pt")

@@ -28,6 +28,7 @@ from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.files.yaml_files import load_yaml
+from lowalt.machine.progress import reported
 from lowalt.numerics.portable import rms
 from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
@@ -195,7 +196,7 @@ def intervals(
     """
     seconds = twin.symbols * twin.symbol_interval_s
     result, names = np.empty((count, receivers, twin.symbols), np.complex128), []
-    for number in range(count):
+    for number in reported(range(count), count, "scenes"):
         signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
         for again in range(receivers):
             receiver_keys = (seed, "twin-receiver", *keys, number, again)

@@ -15,6 +15,7 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo import echo_signal
+from lowalt.files.errors import InputError
 from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.machine.progress import reported
 from lowalt.numerics.portable import rms
@@ -57,7 +58,7 @@ class SceneSample:
     def weight(self, view: View, names: Collection[str] | None = None, but: Collection[str] = ()) -> np.ndarray:
         """Return the product (N, L) of the amplitude factors that effects put on the points of a view.
 
-        names: effects to include, None for all; but: effects to leave out.
+        names: effects to include, None for all; but: effects to leave out. Raises: InputError for another shape.
         """
         result = np.ones(view.places.shape[:2])
         one_way = self.all("visible_one_way")
@@ -67,6 +68,8 @@ class SceneSample:
             if (view, name) not in self._factors:
                 ends = [(end, end.station) for end in view.ends()] if name in one_way else [(view, self.view.station)]
                 factors = [visible(end, self.scene.drawn(view.row, station, name)) for end, station in ends]
+                if not set(map(np.shape, factors)) <= {result.shape, (len(result), 1)}:
+                    raise InputError(f"{name}: factor of shape {np.shape(factors[0])}, expected {result.shape}")
                 self._factors[view, name] = factors[0] if len(factors) == 1 else np.sqrt(factors[0] * factors[1])
             result *= self._factors[view, name]
         return result

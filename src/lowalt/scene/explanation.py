@@ -18,6 +18,7 @@ import yaml
 from lowalt.config.network import Network, Station, masts_m
 from lowalt.config.plan import motion_block
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import reported
 from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
@@ -200,7 +201,8 @@ def changes(
     before, result = shown(signals), []
     parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
     others = [name for name in PLACES if name not in config["effects"]]
-    for name, part in [*((name, "") for name in named), *parts, *((name, "") for name in others)]:
+    tried = [*((name, "") for name in named), *parts, *((name, "") for name in others)]
+    for name, part in reported(tried, len(tried), "effects"):
         place, inside = places.get(name) or PLACES[name], name in named
         try:
             changed, also = (_without_part(config, name, part), "") if part else _changed(config, name)

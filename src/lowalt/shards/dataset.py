@@ -7,7 +7,6 @@ Torch is not imported: `Dataset` has a length and indexed samples, as `torch.uti
 import functools
 import itertools
 import json
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +19,7 @@ from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
 from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
 from lowalt.config.splits import FOLDS, fold
-from lowalt.files.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, warn
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.drawing import region_polygon
@@ -160,8 +159,9 @@ class Dataset:
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
         chosen = [self.published[name] for group in self.groups for name in self.plan.groups[group]]
-        if folds := self.maker.network.folding(chosen):
-            warnings.warn(folds, InputWarning, stacklevel=2)
+        network = self.maker.network
+        for folds in filter(None, (network.folding(chosen), network.range_folding(self._corners))):
+            warn(folds)
 
     @functools.cached_property
     def _numbers(self) -> np.ndarray | None:

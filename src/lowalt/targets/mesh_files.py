@@ -8,7 +8,6 @@ gigabyte; sampling is that of `surfaces`, which is seeded (pymeshlab's sampling 
 import io
 import logging
 import re
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from lowalt.files.atomic import existing
-from lowalt.files.errors import InputError, InputWarning, reading
+from lowalt.files.errors import InputError, reading, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import for_trimesh, stated_metres, stated_up
 from lowalt.targets.mesh_glb import read_glb
@@ -230,7 +229,7 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
         text = f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record is followed"
-        warnings.warn(text, InputWarning, stacklevel=2)
+        warn(text)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
     # One mark per vertex: a copy of millions of corners would double the memory.

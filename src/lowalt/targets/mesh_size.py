@@ -4,13 +4,12 @@ A wrong direction, unit or hinge still gives a cloud, but the geometry of the pa
 a car, and a hub lies in the middle of its blades. Body axes: x right, y front, z up, metres.
 """
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from lowalt.files.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, warn
 from lowalt.numerics import portable
 from lowalt.targets import bird
 from lowalt.targets.mesh_files import UNITS_M, metres
@@ -129,7 +128,7 @@ def refuse_implausible(
     if category == "Bird":
         refuse_span(parts, where)
     for doubt in _doubts(of_kind, category, count):
-        warnings.warn(f"{where}: {doubt}", InputWarning, stacklevel=2)
+        warn(f"{where}: {doubt}")
 
 
 def _refuse_size(record: dict, measure: str, size_m: float, wanted_m: float, row_m: float | None = None) -> None:

@@ -5,14 +5,13 @@ module checks records and makes a cloud of the published height from the cycle. 
 z up, metres.
 """
 
-import warnings
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.config.classes import like
 from lowalt.files.atomic import sha256
-from lowalt.files.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, warn
 from lowalt.numerics import portable
 from lowalt.targets import mocap_motion
 from lowalt.targets.cloud import Cloud
@@ -111,7 +110,7 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
         text = (
             f"{where}: of {len(motion.root_m)} frames {first + start} to {first + end - 1} are used, which close best"
         )
-        warnings.warn(f"{text}; first_frame and last_frame choose others", InputWarning, stacklevel=2)
+        warn(f"{text}; first_frame and last_frame choose others")
     sums = {name: sha256(path) for name, path in zip(record_files(record), paths, strict=True)}
     facts = {
         "track_rate_hz": float(motion.rate_hz), "cycle_s": len(track) / motion.rate_hz,

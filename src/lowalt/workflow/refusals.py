@@ -132,7 +132,7 @@ def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> 
 
 
 def refuse_data(config: dict) -> None:
-    """Refuse another run's data set if it is missing or was made with settings other than this configuration's."""
+    """Refuse another run's data set if it or its images are missing, or if its settings differ from these."""
     name = config.get("data", config["run"])
     if name == config["run"]:
         return
@@ -143,6 +143,10 @@ def refuse_data(config: dict) -> None:
     differ = [key for key in sorted({*here, *other} - set(TRAINING_BLOCKS)) if here.get(key) != other.get(key)]
     if differ:
         raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")
+    needed = ("SHA256SUMS", "views") if config["recognition"]["cache"] else ("SHA256SUMS",)
+    if lacking := [part for part in needed if not (made.parent / part).exists()]:
+        raise InputError(f"data: {made.parent} has no {' and no '.join(lacking)}, expected a run made to its end; "
+                         f"make run {name!r} without --target first")  # fmt: skip
 
 
 def refuse_missing(config: dict) -> None:

@@ -72,8 +72,10 @@ class Run:
 
     @property
     def folding(self) -> str:
-        """A sentence where speeds of targets fold, else an empty text."""
-        return self.network.folding(record["published"] for record in self.records.values())
+        """A line each where speeds of targets and their ranges fold, else an empty text."""
+        speeds = self.network.folding(record["published"] for record in self.records.values())
+        ranges = self.network.range_folding(self.config["motion"]["region"]["polygon_m"])
+        return "\n".join(filter(None, (speeds, ranges)))
 
     @property
     def name(self) -> str:

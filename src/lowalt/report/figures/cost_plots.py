@@ -64,6 +64,10 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
         place = row["core_s"], level
         panel.annotate(row["name"], (row["core_s"], row["accuracy_percent"]), place, ha="right",
                        arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5})  # fmt: skip
+    for row in data:
+        if row["front"] != "yes":
+            panel.annotate(row["name"], (row["core_s"], row["accuracy_percent"]), (7, -7), textcoords="offset points",
+                           va="top", bbox={"color": "white", "alpha": 0.7, "pad": 0.5})  # fmt: skip
     panel.set(xscale="log", ylim=(math.floor(least), max(100.0, level) + 1), ylabel="accuracy, unseen subtypes (%)",
               xlabel="processor-seconds of data and training")  # fmt: skip
     for axis in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):

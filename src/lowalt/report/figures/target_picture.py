@@ -105,8 +105,8 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
             continue
         values = kind.definition(signal, windows, name, *of_station)
         values = values if kind.SIGNED else _decibel(values)
-        half = windows.window / 2
-        times = network.symbol_interval_s * np.array([half, half + windows.hop * values.shape[1]])
+        middle = (windows.window - 1) / 2
+        times = network.symbol_interval_s * np.array([middle, network.symbols - 1 - middle])
         speeds = kind.speeds(windows, network, station)
         scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
         if kind.SIGNED:
@@ -115,7 +115,8 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
         picture = panel.imshow(
             values, origin="lower", aspect="auto", extent=(*times, *speeds), interpolation="nearest", **scale
         )
-        panel.set(title=kind.TITLE, xlabel="time (s)", ylabel="speed away from the station (m/s, folded)")
+        panel.set(title=kind.TITLE, xlabel="time (s)", ylabel="radial speed (m/s)\nreceding upwards, folded")
+        panel.set_ylim(sorted(speeds))
         panel.figure.colorbar(picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05)
 
 

@@ -21,13 +21,15 @@ class Axes(NamedTuple):
 
 
 def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
-    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom."""
+    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom,
+    and a column stands at the middle of its window."""
     settings, network, kind = renderer.spectra[name], renderer.network, spectrum(name)
     if isinstance(kind, OfCells):
         return Axes(*kind.axes(settings, network, station))
     first, last = kind.speeds(settings, network, station)
-    seconds = (network.symbols - settings.window) * network.symbol_interval_s
-    return Axes(("time (s)", 0.0, seconds), ("radial speed (m/s)\nreceding upwards", first, last))
+    middle = (settings.window - 1) / 2
+    times_s = (network.symbol_interval_s * symbol for symbol in (middle, network.symbols - 1 - middle))
+    return Axes(("time (s)", *times_s), ("radial speed (m/s)\nreceding upwards", first, last))
 
 
 def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:

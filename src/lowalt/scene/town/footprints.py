@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, lacking
 from lowalt.files.json_objects import json_object
 from lowalt.scene.town.buildings import Surfaces, joined
 from lowalt.scene.town.materials import named
@@ -20,7 +20,7 @@ try:
     from shapely.geometry import Polygon, shape
     from shapely.geometry.polygon import orient
 except ImportError as error:
-    raise InputError(f"GeoJSON needs pyproj and shapely ({error}), expected the extra `town`") from None
+    raise lacking(error) from None
 
 STOREY_M = 3.0
 """Height of a storey, for buildings whose file has `building:levels` alone. Source: Simple 3D Buildings."""
@@ -89,9 +89,20 @@ def _polygons(path: Path, place: Callable[[np.ndarray], np.ndarray]) -> tuple[li
     return found, left_out
 
 
+def _degrees(path: Path, places: np.ndarray) -> np.ndarray:
+    """Return the places (K, 2) of a file. Raises: InputError where they are no longitudes and latitudes."""
+    if not (abs(places) <= (180, 90)).all():
+        shown = ", ".join(f"{value:g}" for value in places[0])
+        raise InputError(
+            f"{path}: the place [{shown}] is no longitude and latitude in degrees, expected EPSG:4326 (RFC 7946): "
+            "in QGIS export with this reference system"
+        )
+    return places
+
+
 def middle_of(path: Path) -> tuple[float, float]:
     """Return the middle (longitude, latitude) of a file's buildings. Raises: InputError where it has none."""
-    found, _ = _polygons(path, lambda degrees: degrees)
+    found, _ = _polygons(path, lambda degrees: _degrees(path, degrees))
     if not found:
         raise InputError(f"{path}: has no building, expected polygons with the key building or height")
     low_x, low_y, high_x, high_y = np.array([part.bounds for part, _ in found]).T
@@ -126,15 +137,13 @@ def read_footprints(path: Path, origin: tuple[float, float] | None, height_m: fl
 
     def place(degrees: np.ndarray) -> np.ndarray:
         """Metres (K, 2) of degrees (K, 2)."""
-        if not (abs(degrees) <= (180, 90)).all():
-            raise InputError(f"{path}: a place is no longitude and latitude in degrees, expected EPSG:4326 (RFC 7946)")
-        return np.column_stack(towards.transform(*degrees.T))
+        return np.column_stack(towards.transform(*_degrees(path, degrees).T))
 
     found, left_out = _polygons(path, place)
     heights = [_height(properties) or height_m for _, properties in found]
     if missing := sum(height is None for height in heights):
         raise InputError(f"{path}: {missing} of {len(found)} buildings have neither height nor building:levels, "
-                         "expected effects.town.height_m, the height of those")  # fmt: skip
+                         "expected their height: --height, or effects.town.height_m of a scene")  # fmt: skip
     parts = []
     for (outline, properties), height in zip(found, heights, strict=True):
         low = _metres(properties.get("min_height")) or 0.0
