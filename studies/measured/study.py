@@ -50,6 +50,7 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
         line.add_argument("--recognition", type=Path, default=Path("config/measured/recognition.yaml"))
     if name == "recognise":
         line.add_argument("--reuse", action="store_true", help="take the networks that --models holds, train none")
+        line.add_argument("--only", type=Path, help="list of files by set (.yaml): take no other recordings")
         line.add_argument("--jobs", type=int, default=os.cpu_count(), help="radars at a time")
     options = line.parse_args(arguments)
     library = Library.read(options.radars)
@@ -141,11 +142,14 @@ def recognise(arguments: list[str]) -> None:
     """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
     inputs = _inputs("recognise", recognise.__doc__, arguments, trains=True)
     from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
+    from fetch import addresses
 
     from lowalt.recordings.twin_training import settings
 
     options, block = inputs.options, settings(inputs.options.recognition)
-    shared = inputs.recordings, inputs.library, block, options.models, options.out, options.reuse
+    named = addresses(load_yaml(options.only, "list of recordings")) if options.only else None
+    taken = [one for one in inputs.recordings if named is None or f"{one.set}/{one.name}" in named]
+    shared = taken, inputs.library, block, options.models, options.out, options.reuse
     # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
     # last radar takes longest, so it starts first.
     calls = [partial(radar_rows, name, *shared) for name in reversed(inputs.library.twins)]

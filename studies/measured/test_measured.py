@@ -8,6 +8,7 @@ from pathlib import Path
 import accuracy
 import class_figures
 import fetch
+import foreign
 import numpy as np
 import pytest
 import recorded_sets
@@ -20,6 +21,7 @@ from scipy.io import wavfile
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
+from lowalt.recordings.answers import Answers
 from lowalt.recordings.twin import Twin
 from lowalt.recordings.twin_scenes import Library
 
@@ -179,8 +181,15 @@ def test_a_network_names_each_recording_once_a_seed_and_by_the_mean(tmp_path):
     block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
     (tmp_path / "recognition.yaml").write_text(yaml.safe_dump(block))
     asked = ["recognise", "--inputs", tmp_path / "inputs", "--recognition", tmp_path / "recognition.yaml", "--jobs", 1]
-    for out, more in (("trained", []), ("again", ["--reuse"])):
+    only = {"vehicle_24ghz": [{"repository": "a/b", "commit": "c", "folder": "", "files": {"drive.wav": "0"}}]}
+    (tmp_path / "only.yaml").write_text(yaml.safe_dump(only))
+    for out, more in (("trained", []), ("again", ["--reuse", "--only", str(tmp_path / "only.yaml")])):
         study([*map(str, asked), "--models", str(tmp_path / "models"), "--out", str(tmp_path / out), *more])
+        # Another recording in the folder, which the list does not name.
+        content = (tmp_path / "inputs/vehicle_24ghz/drive.wav").read_bytes()
+        (tmp_path / "inputs/vehicle_24ghz/other.wav").write_bytes(content[:-2] + b"\1\0")
+        record = (tmp_path / "inputs/vehicle_24ghz/drive.yaml").read_text().replace("drive.wav", "other.wav")
+        (tmp_path / "inputs/vehicle_24ghz/other.yaml").write_text(record)
     rows = read_csv(tmp_path / "trained/measured-recognition.csv", *accuracy.RECOGNITION)
     assert [(row["radar"], row["seed"], row["file"], row["windows"]) for row in rows] == [
         ("cw_24ghz", seed, "drive.wav", "3") for seed in ("0", "1", "mean")
@@ -364,3 +373,19 @@ def test_the_spacing_of_a_comb_is_read_off(spacing_hz):
     noise = rng.standard_normal((2, len(time)))
     signal = comb - comb.mean() + 0.1 * (noise[0] + 1j * noise[1])
     assert spectral_figures.line_spacing_hz(signal, 5000.0, 60.0, 500.0) == pytest.approx(spacing_hz, abs=3)
+
+
+def test_foreign_inputs_are_counted_and_a_hand_moves_at_its_speed(library):
+    present = np.array([True, True, False, False, False])
+    beyond = np.array([np.nan, np.nan, 31.0, np.nan, np.nan])
+    shares = np.eye(4)[[1, 3, 0, 0, 0]]
+    clipped = np.array([False, False, False, True, False])
+    said = Answers(np.arange(5.0), present, shares, clipped, beyond, 20.0, [])
+    assert foreign.row("net", "input", said) == ["net", "input", 5, 1, 1, 1, 0, 1, 0, 1]
+    twin = library.twins["cw_24ghz"]
+    values = foreign.hand(twin, 0.5, np.random.default_rng(0))
+    for part, fastest in zip(np.split(values - values.mean(), 2), (0.0, 2 * np.pi * 1.2 * 0.15), strict=True):
+        power = np.abs(np.fft.fft(part * np.hanning(len(part)))) ** 2
+        speeds = np.abs(np.fft.fftfreq(len(part), 1 / twin.rate_hz)) * 299792458 / 24e9 / 2
+        strong = speeds[(power > 1e3 * np.median(power)) & (speeds > 0.05)]
+        assert strong.max(initial=0.0) == pytest.approx(fastest, abs=0.05)

@@ -185,14 +185,16 @@ def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name
 
 @pytest.mark.parametrize("name", ["uav_3ghz", "bird_drone_10ghz", "cw_24ghz"])
 def test_the_shipped_entries_of_radars_are_those_of_the_twins_there_are(name, monkeypatch):
-    from lowalt.recordings.twin import radars
+    from lowalt.recordings.twin import radars, records
 
     monkeypatch.chdir(ROOT)
     path = zoo.ZOO / f"{name}.safetensors"
     assert path.stat().st_size < zoo.LARGEST_BYTES and model_file.read(path).measured["percent"] > 80
-    radar = zoo.opened(name)[1]["radar"]
-    assert radar == asdict(radars()[name])
+    made = zoo.opened(name)[1]
+    radar, caution = made["radar"], records()[name].twin["caution"]
+    assert radar == asdict(radars()[name]) and made["caution"] == caution
     card = path.with_suffix(".md").read_text()
+    assert f"{caution[1:]}.\n" in card and f"It classifies {made['expected']['percent']:.1f} % of" in card
     assert f"a radar of {radar['carrier_hz'] / 1e9:g} GHz" in card and f"lowalt predict {name} recording.yaml" in card
 
 

@@ -16,6 +16,7 @@ from lowalt.recordings import read, read_record
 from lowalt.recordings.evidence import chirp_length
 from lowalt.recordings.file_inspection import inspect_recording
 from lowalt.recordings.record import record
+from lowalt.report.figures import recording_picture
 
 WRITTEN = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks/recording_layouts.py"))
 LAYOUTS, CARRIER, RATE = WRITTEN["LAYOUTS"], WRITTEN["CARRIER_HZ"], WRITTEN["RATE_HZ"]
@@ -81,6 +82,54 @@ def test_hum_a_constant_part_and_an_image_are_pointed_out(tmp_path):
     np.save(tmp_path / "b.npy", values.real + 0.3j * values.imag)
     notes = " ".join(inspect_recording(tmp_path / "b.npy", CARRIER, RATE).notes)
     assert "image at the opposite Doppler, 5 dB below" in notes
+
+
+def test_noise_has_no_image_and_a_moving_target_heard_with_unequal_channels_has_one(tmp_path):
+    def image(values):
+        np.save(tmp_path / "a.npy", values)
+        return "image at the opposite Doppler" in " ".join(inspect_recording(tmp_path / "a.npy", CARRIER, RATE).notes)
+
+    times = np.arange(20000) / RATE
+    moving = np.exp(2j * np.pi * np.cumsum(200 + 150 * np.sin(2 * np.pi * 0.7 * times)) / RATE)
+    for seed in range(8):
+        pair = np.random.default_rng(seed).standard_normal((2, 20000))
+        white = pair[0] + 1j * pair[1]
+        spectrum = np.fft.fft(white) / np.maximum(np.abs(np.fft.fftfreq(20000, 1 / RATE)), 5)
+        rounded = np.rint(127.5 + 20 * pair[0]) + 1j * np.rint(127.5 + 20 * pair[1])
+        for noise in (white, np.fft.ifft(spectrum), rounded, white[:1000], white * (1 + 5 * (times % 1 < 0.1))):
+            assert not image(noise), seed
+        assert not image(moving + 0.5 * white)
+        heard = moving + 0.3 * white
+        assert image(heard.real + 0.5j * heard.imag)
+
+
+def test_powers_are_told_from_samples(tmp_path):
+    rng = np.random.default_rng(3)
+    powers = rng.exponential(1.0, (300, 128)) * np.exp(-np.arange(128) / 20)
+    powers.astype(np.float32).tofile(tmp_path / "a.bin")
+    assert "read as float32 no number is negative" in inspect_recording(tmp_path / "a.bin").notes[0]
+    np.save(tmp_path / "a.npy", powers.ravel())
+    assert inspect_recording(tmp_path / "a.npy").notes[0].startswith("no number is negative")
+    wave = np.sin(0.07 * np.arange(38400)) + 0.2 * rng.standard_normal(38400)
+    for bits in (8, 12, 14, 16):
+        # Unsigned samples of a converter over most of its range.
+        np.clip(np.rint(2 ** (bits - 1) * (1 + 0.6 * wave)), 0, 2**bits - 1).astype(np.uint16).tofile(
+            tmp_path / "b.bin"
+        )
+        assert "no number is negative" not in " ".join(inspect_recording(tmp_path / "b.bin").notes), bits
+
+
+def test_the_picture_shows_the_speeds_that_there_are_and_says_whose_sign_is_lost(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording_picture, "png", lambda figure: figure.axes[0])
+    times = np.arange(4 * 44100) / 44100
+    swing = np.cos(2 * np.pi * np.cumsum(320 + 160 * np.sin(3 * times)) / 44100)
+    wavfile.write(tmp_path / "a.wav", 44100, np.rint(9000 * swing).astype(np.int16))
+    panel = recording_picture.recording_picture(inspect_recording(tmp_path / "a.wav", 24e9), ["one"])
+    # 480 Hz is 3 m/s; the samples would show 138.
+    assert panel.get_ylim()[0] == 0 and 3 < panel.get_ylim()[1] < 5 and panel.get_ylabel().endswith("sign lost")
+    np.save(tmp_path / "b.npy", np.random.default_rng(0).standard_normal((2, 20000)).T)
+    panel = recording_picture.recording_picture(inspect_recording(tmp_path / "b.npy", 24e9, 44100), ["one"])
+    assert panel.get_ylim()[1] > 130
 
 
 WRONG = {

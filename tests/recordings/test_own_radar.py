@@ -133,7 +133,7 @@ def test_a_record_becomes_a_network_that_predicts_in_any_folder(tmp_path, capsys
     values = np.cos(4 * np.pi * 1.2 * times / 0.02848) + np.random.default_rng(0).normal(0, 0.1, 24_000)
     wavfile.write(tmp_path / "walk.wav", 12000, (8000 * values).astype(np.int16))
     about = {"file": "walk.wav", "carrier_hz": 10.525e9, "channel": "real",
-             "twin": {**SAID, "classes": ["Pedestrian", "Vehicle"]}}  # fmt: skip
+             "twin": {**SAID, "classes": ["Pedestrian", "Vehicle"], "caution": "few were tested"}}  # fmt: skip
     (tmp_path / "walk.yaml").write_text(yaml.safe_dump(about))
     monkeypatch.chdir(tmp_path)
     line = ["recording", "train", str(tmp_path / "walk.yaml"), "--out", str(tmp_path / "mine"), "--recognition",
@@ -142,4 +142,7 @@ def test_a_record_becomes_a_network_that_predicts_in_any_folder(tmp_path, capsys
     assert "of 4 simulated windows right (Pedestrian " in capsys.readouterr().out
     assert {path.name for path in tmp_path.glob("mine*")} == {"mine.safetensors", "mine.md"}
     assert lowalt(["predict", str(tmp_path / "mine"), str(tmp_path / "walk.yaml")]) == 0
-    assert re.search(r"windows hold a target: Pedestrian \d, Vehicle \d", capsys.readouterr().out)
+    said = capsys.readouterr().out
+    assert re.search(r"windows hold a target: Pedestrian \d, Vehicle \d", said) and "note: few were tested\n" in said
+    card = (tmp_path / "mine.md").read_text()
+    assert "- Few were tested.\n" in card and re.search(r"It classifies [\d.]+ % of 4 simulated windows", card)

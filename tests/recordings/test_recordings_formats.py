@@ -80,6 +80,15 @@ def test_semicolons_and_decimal_commas_are_read(tmp_path, decimal):
     assert found.rate_hz == pytest.approx(RATE, rel=1e-5)
 
 
+@pytest.mark.parametrize("between", [" ", "\t", "   "])
+@pytest.mark.parametrize("names", [True, False])
+def test_blanks_and_tabs_separate_columns_of_text(tmp_path, between, names):
+    values = wave(500)
+    lines = [["I", "Q"]] * names + [[f"{value.real:.3f}", f"{value.imag:.3f}"] for value in values]
+    (tmp_path / "a.txt").write_text("\n".join(map(between.join, lines)) + "\n")
+    np.testing.assert_allclose(read(entry(tmp_path, "a.txt")).values, values, atol=1e-3)
+
+
 def test_a_field_of_a_struct_is_named_with_a_dot(tmp_path):
     values = wave()
     savemat(tmp_path / "a.mat", {"rec": {"iq": values, "fs": RATE, "about": {"note": "x"}}})

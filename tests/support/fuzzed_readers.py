@@ -34,6 +34,7 @@ def _recording(kind: str) -> Callable[[Path], object]:
 
     more = {
         ".wav": {}, ".csv": {"columns": ["i", "q"], "rate_hz": 800.0}, ".sigmf-meta": {},
+        ".txt": {"columns": ["i", "q"], "rate_hz": 800.0},
         ".iq": {"rate_hz": 800.0, "dtype": "float32", "layout": "iqiq"},
     }.get(kind, {"rate_hz": 800.0})  # fmt: skip
     base = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", **more}
@@ -51,6 +52,7 @@ def _recordings() -> list[Reader]:
         ".mat": _bytes(lambda path: savemat(path, {"x": wave}, do_compression=True), "a.mat"),
         ".npy": _bytes(lambda path: np.save(path, wave), "a.npy"),
         ".csv": text.encode(),
+        ".txt": text.replace(",", "\t").encode(),
         ".iq": pair.astype("<f4").tobytes(),
         ".cfile": wave.astype("<c8").tobytes(),
     }

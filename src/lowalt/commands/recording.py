@@ -135,7 +135,7 @@ def _inspect(options: argparse.Namespace) -> Answer:
                       "line_mps": inspection.speed_mps(one)} for one in inspection.readings],
         "notes": inspection.notes, "picture": picture, "file": out if text else None, "text": text, "next": then,
     }  # fmt: skip
-    rows = [f"{number}  {_line(inspection, one):<28} {_described(one)}" + (" (the file says so)" if one.said else "")
+    rows = [f"{number}  {_line(inspection, one):<32}  {_described(one)}" + (" (the file says so)" if one.said else "")
             for number, one in enumerate(inspection.readings, 1)]  # fmt: skip
     lines = [f"{inspection.path}: readings, the best first, each with its strongest line", *rows,
              *(f"note: {note}" for note in inspection.notes), f"picture  {picture}"]  # fmt: skip
@@ -153,10 +153,14 @@ def _train(options: argparse.Namespace) -> Answer:
     record = read_record(shipped(options.record))
     facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition))
     each = ", ".join(f"{label} {percent:.0f}" for label, percent in facts["percent_by_class"].items())
+    then = f"lowalt predict {options.out.with_suffix('')} {options.record}"
+    if record.file.suffix == ".yaml":
+        # The record of a radar without any recording.
+        then = f"lowalt recording inspect FILE --carrier {record.carrier_hz:g}"
     lines = [
         f"{facts['file']}: {facts['percent']:.1f} % of {facts['windows']} simulated windows right ({each}), which no "
         f"training saw; its mean probability is {facts['mean_probability_percent']:.1f} %",
         "Real recordings differ from their simulation: design/measured.md says by how much for three radars.",
-        f"next     lowalt predict {options.out.with_suffix('')} {options.record}",
+        f"next     {then}",
     ]
     return Answer(facts, "\n".join(lines))

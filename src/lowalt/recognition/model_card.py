@@ -36,7 +36,7 @@ LIMITS = """\
 - One target a sample, tracked perfectly. It always answers with one of its classes, also for noise alone.
 - Accuracy on subtypes that it was not trained on is lower: compare the tables of both protocols.
 """
-RADAR_ACCURACY = "On measured recordings: `results/reference/measured-recognition.csv`.\n"
+RADAR_ACCURACY = "It classifies {percent:.1f} % of {windows} simulated windows correctly that no training saw.\n"
 RADAR_USE = """\
     lowalt predict {name} recording.yaml
 
@@ -122,7 +122,10 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
           for part, digest in sorted(content.identity.get("samples", {}).items())),
     ]  # fmt: skip
     if "radar" in content.input:
-        radar, measured, use, limits = content.input["radar"], RADAR_ACCURACY, RADAR_USE, RADAR_LIMITS
+        radar, use, caution = content.input["radar"], RADAR_USE, content.input.get("caution", "")
+        expected = content.input.get("expected")
+        measured = RADAR_ACCURACY.format(**expected) if expected else "Not stated.\n"
+        limits = RADAR_LIMITS + (f"- {caution[0].upper()}{caution[1:]}.\n" if caution else "")
         where = f"a radar of {radar['carrier_hz'] / 1e9:g} GHz with a\n{radar['channel']} channel, trained on its twin"
     else:
         where, measured, use, limits = "base stations, trained", _accuracy(accuracy), USE, LIMITS

@@ -75,11 +75,14 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     shares = probabilities(trained.model, samples, numbers, Machine.here("fp32"), 64)
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
+    caution = settings.get("caution", "")
     starts, there = numbers * twin.symbols * twin.symbol_interval_s, ~found.clipped
     empty = intervals[_empty(record, starts, twin, where, there)] if record.empty_s and not twin.slowest_mps else None
     there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
-    return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps, _notes(record, radar, there.any()))
+    return Answers(
+        starts, there, shares, found.clipped, beyond, twin.fastest_mps, _notes(record, radar, caution, there.any())
+    )
 
 
 def _empty(record: Record, starts_s: np.ndarray, twin: Twin, where: str, sound: np.ndarray) -> np.ndarray:
@@ -93,9 +96,10 @@ def _empty(record: Record, starts_s: np.ndarray, twin: Twin, where: str, sound: 
     return inside
 
 
-def _notes(record: Record, radar: Twin, found: bool) -> list[str]:
-    """For which reasons answers on a recording may be wrong; found: whether any window holds a target."""
-    notes = []
+def _notes(record: Record, radar: Twin, caution: str, found: bool) -> list[str]:
+    """For which reasons answers on a recording may be wrong; caution: what the network's file says of them; found:
+    whether any window holds a target."""
+    notes = [caution] if found and caution else []
     if abs(record.carrier_hz / radar.carrier_hz - 1) > ANOTHER:
         at, here = radar.carrier_hz / 1e9, record.carrier_hz / 1e9
         notes.append(f"this network learned a radar at {at:.4g} GHz, and the recording is at {here:.4g} GHz: expect "

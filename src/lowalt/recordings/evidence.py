@@ -17,6 +17,14 @@ ORDER = 32
 REPEATS = 0.3
 """Least correlation of the innovations' power with which a stream counts as chirps."""
 SHORTEST_CHIRP = 16
+STRETCHES = 16
+"""Stretches over which the phase of a line and of its image is compared."""
+APART_CELLS = 4
+"""Least Doppler of a line, in cells of a stretch, at which a Hann window separates it from its image."""
+
+SKEW, FAR = 0.9, 1e3
+"""Median over mean of powers at most, and ratio of their nine tenths, median and tenth at most: numbers of another type
+that are read as floating ones span far more."""
 
 
 def _blocks(values: np.ndarray) -> np.ndarray:
@@ -60,7 +68,7 @@ def code_bits(channels: list[np.ndarray], step_log2: float) -> float:
     for values in channels:
         parts = 2 if np.iscomplexobj(values) else 1
         with np.errstate(all="ignore"):
-            stretches = _blocks(values) * 2.0**-step_log2
+            stretches = _blocks(values) * np.exp2(-step_log2)
             largest = np.abs(stretches).max()
         if not largest < 1e100:
             return np.inf
@@ -122,3 +130,33 @@ def receivers_of(values: np.ndarray, samples: int) -> int:
         one, other = chirps[:-receivers], chirps[receivers:]
         alike.append(abs(np.vdot(one, other)) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-300))
     return 1 + int(np.flatnonzero(np.array(alike) > 0.95 * max(alike))[0]) if alike else 1
+
+
+def image_of(values: np.ndarray, cycles: float) -> tuple[float, float]:
+    """Return how strong the image of a line of a complex signal (samples,) is at the opposite Doppler.
+
+    cycles: the line's Doppler in cycles a sample. The first number is the power of the image over that of the line, the
+    second their squared coherence over `STRETCHES` stretches: near 1 for an image, which is the conjugate of the line,
+    and on average 1 / `STRETCHES` for noise of any spectrum, whose sides do not follow from one another. (0.0, 0.0)
+    where the line is too slow to tell both apart.
+    Source: spectral circularity coefficient, Schreier and Scharf 2010, chapter 9.
+    """
+    length = len(values) // STRETCHES
+    place = round(cycles * length)
+    if abs(place) < APART_CELLS or length // 2 - abs(place) < APART_CELLS:
+        return 0.0, 0.0
+    stretches = (values[: length * STRETCHES] - values.mean()).reshape(STRETCHES, length)
+    spectra = np.fft.fft(stretches * np.hanning(length), axis=1)
+    line, image = spectra[:, place], spectra[:, -place]
+    powers = [float(np.vdot(side, side).real) for side in (line, image)]
+    together = abs(np.sum(line * image)) ** 2
+    return powers[1] / max(powers[0], 1e-300), float(together / max(powers[0] * powers[1], 1e-300))
+
+
+def are_powers(values: np.ndarray) -> bool:
+    """Return whether real numbers (n,) are powers or magnitudes: none is negative, and few large ones outweigh many
+    small ones. Samples of a receiver lie to both sides of their mean, also where they are unsigned."""
+    if np.iscomplexobj(values) or values.min() < 0:
+        return False
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    return bool(middle < SKEW * values.mean() and low > 0 and high < FAR * middle and middle < FAR * low)

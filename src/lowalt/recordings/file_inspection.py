@@ -14,7 +14,7 @@ from lowalt.files.errors import InputError
 from lowalt.recordings import faults
 from lowalt.recordings.chirps import slow_time
 from lowalt.recordings.column_names import rises_evenly, role
-from lowalt.recordings.evidence import chirp_length, code_bits, receivers_of, step_bits
+from lowalt.recordings.evidence import are_powers, chirp_length, code_bits, image_of, receivers_of, step_bits
 from lowalt.recordings.files import channel_of, table_of, times_of
 from lowalt.recordings.formats import RAW, READERS, Table
 from lowalt.recordings.layouts import raw_readings, readings
@@ -31,6 +31,8 @@ MAINS_HZ = (50.0, 60.0)
 HUM_DB, HARMONICS = 10.0, 10
 """How far a line of the mains stands above its surroundings, and up to which harmonic it is looked for."""
 DC_DB, IMAGE_DB = 20.0, -10.0
+COHERENT = 0.5
+"""Squared coherence of a line and its image from which on they belong together."""
 
 
 class Candidate(NamedTuple):
@@ -253,6 +255,11 @@ def inspect_recording(
     if not found:
         raise InputError(f"{path}: nothing in it reads as a signal, expected samples of one or two channels")
     notes = _notes(path, found[0], rate_hz, carrier_hz)
+    powers = next((one for one in found if are_powers(one.values) and "float" in one.keys.get("dtype", "float")), None)
+    if powers is not None:
+        kind = f"read as {powers.keys['dtype']} " if "dtype" in powers.keys else ""
+        notes.insert(0, f"{kind}no number is negative and most are far below their mean, as powers or magnitudes of "
+                     "spectra are: a recording needs the samples themselves")  # fmt: skip
     return FileInspection(path, carrier_hz, rate_hz, said, found[:SHOWN], notes)
 
 
@@ -291,11 +298,10 @@ def _notes(path: Path, seen: Seen, rate_hz: float | None, carrier_hz: float | No
     if rate_hz:
         notes += _hum(power, seen.rate_hz)
     if np.iscomplexobj(values):
-        place = round(seen.line_hz * len(values) / seen.rate_hz)
-        near = np.arange(-2, 3)
-        image = _decibels(power[(near - place) % len(power)].max() / power[place])
-        if image > IMAGE_DB:
-            notes.append(f"the strongest line has an image at the opposite Doppler, {-image:.0f} dB below: a target "
+        image, coherence = image_of(values, seen.line_hz / seen.rate_hz)
+        if _decibels(image) > IMAGE_DB and coherence > COHERENT:
+            below = max(0.0, -_decibels(image))
+            notes.append(f"the strongest line has an image at the opposite Doppler, {below:.0f} dB below: a target "
                          "with equal sides, such as a rotor, or I and Q of unequal strength")  # fmt: skip
         elif "chirps" not in seen.keys and (len(seen.keys.get("columns", ())) == 2 or seen.keys.get("layout")):
             notes.append("the sign holds if I comes before Q: exchanged, every speed changes its sign; `moves` in the "

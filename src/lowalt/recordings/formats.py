@@ -89,8 +89,15 @@ def _is_number(cell: str) -> bool:
     return True
 
 
+def _is_real(cell: str) -> bool:
+    """Whether a cell is a real number."""
+    return _is_number(cell) and not cell.endswith(("j", "J"))
+
+
 def _csv(path: Path, record: Record) -> Table:
-    """Read a CSV table with commas, or with semicolons and perhaps decimal commas; cells may be complex (1+2j, 1+2i).
+    """Read a table with commas, with blanks or tabs, or with semicolons and perhaps decimal commas.
+
+    Between commas or semicolons cells may be complex (1+2j, 1+2i).
 
     Its first line names the columns unless all its cells are numbers.
     """
@@ -99,6 +106,8 @@ def _csv(path: Path, record: Record) -> Table:
     if not lines:
         raise InputError(f"{path}: no lines, expected a table of numbers")
     delimiter = ";" if ";" in lines[0] else ","
+    if delimiter not in lines[-1] and len(lines[-1].split()) > 1 and all(map(_is_real, lines[-1].split())):
+        lines = [delimiter.join(line.split()) for line in lines]
 
     def plain(line: str) -> str:
         """The line as Python writes numbers."""
@@ -189,6 +198,6 @@ def _sigmf(path: Path, record: Record) -> Table:
 
 
 READERS: dict[str, Callable[[Path, Record], Table]] = {
-    ".wav": _wav, ".mat": _mat, ".csv": _csv, ".npy": _npy, ".sigmf-meta": _sigmf, ".sigmf-data": _sigmf,
-    **dict.fromkeys(RAW, _raw),
+    ".wav": _wav, ".mat": _mat, ".csv": _csv, ".txt": _csv, ".npy": _npy, ".sigmf-meta": _sigmf,
+    ".sigmf-data": _sigmf, **dict.fromkeys(RAW, _raw),
 }  # fmt: skip

@@ -85,19 +85,20 @@ def trained_radar(record: Record, out: Path, block: dict) -> dict:
     warm = temperature(_shares(network, folds["validation"]), validation)
     last = max(key.rpartition(".")[0] for key in content.tensors if key.startswith("classifier"))
     cooled = {key: value / warm if key.rpartition(".")[0] == last else value for key, value in content.tensors.items()}
-    made_with = {"network": twin.network_settings(), "spectra": twin.spectra_settings(), "images": block["images"]}
-    content = replace(content, tensors=cooled, input={**made_with, "radar": asdict(twin)})
-    path, reduced = out.with_name(f"{name}.safetensors"), zoo.small(content)
+    path, content = out.with_name(f"{name}.safetensors"), replace(content, tensors=cooled)
+    reduced = zoo.small(content)
     exact, entry = (model_file.trained(weights, path) for weights in (content, reduced))
-    reduced = replace(reduced, measured=zoo.held_against(exact, entry, folds["validation"]))
-    model_file.write(path, reduced)
-    model_card.write(path, reduced, [])
     shares = _shares(entry.model, folds["test"])
     right = shares.argmax(1) == test
+    made_with = {"network": twin.network_settings(), "spectra": twin.spectra_settings(), "images": block["images"]}
+    told = {"radar": asdict(twin), "caution": (record.twin or {}).get("caution", "")}
+    told["expected"] = {"windows": len(right), "percent": float(100 * right.mean())}
+    reduced = replace(reduced, measured=zoo.held_against(exact, entry, folds["validation"]), input=made_with | told)
+    model_file.write(path, reduced)
+    model_card.write(path, reduced, [])
     by_class = {label: float(100 * right[test == number].mean()) for number, label in enumerate(classes)}
     return {
-        "file": path, "twin": asdict(twin), "windows": len(right), "percent": float(100 * right.mean()),
-        "percent_by_class": by_class, "temperature": warm,
+        "file": path, "twin": asdict(twin), **told["expected"], "percent_by_class": by_class, "temperature": warm,
         "mean_probability_percent": float(100 * shares.max(axis=1).mean()),
     }  # fmt: skip
 
