@@ -158,10 +158,10 @@ def test_no_tracked_file_is_large_or_names_this_machine():
 
 
 CEILINGS = {
-    "commands": (17, 1531), "config": (9, 1224), "drafting": (11, 2190), "echo": (28, 2665), "files": (12, 786),
-    "machine": (10, 554), "measure": (6, 595), "motion": (10, 1010), "noise": (4, 175), "numerics": (13, 1030),
-    "recognition": (46, 4705), "recordings": (24, 3072), "report": (33, 1903), "scene": (87, 8255),
-    "shards": (24, 3090), "spectra": (16, 930), "targets": (36, 5115), "tiles": (16, 1478), "workflow": (15, 1780),
+    "commands": (17, 1529), "config": (9, 1224), "drafting": (11, 2177), "echo": (28, 2646), "files": (12, 786),
+    "machine": (10, 554), "measure": (6, 589), "motion": (10, 999), "noise": (3, 168), "numerics": (13, 1025),
+    "recognition": (42, 4682), "recordings": (24, 3072), "report": (33, 1903), "scene": (87, 8255),
+    "shards": (24, 3081), "spectra": (15, 924), "targets": (36, 5103), "tiles": (15, 1470), "workflow": (15, 1780),
     "benchmark": (11, 900),
 }  # fmt: skip
 """Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
