@@ -136,6 +136,13 @@ def test_make_tells_the_last_bits_of_a_part_with_effects_from_another_signal(sma
     for change in (np.roll(whole, 1, axis=-1), whole * 1.0001, whole[..., ::-1]):
         np.save(path, change.astype(whole.dtype))
         assert main(["benchmark", "make"]) == 1 and f"main/noisy/{path.name} differs" in capsys.readouterr().out
+    # Signals that agree but for last bits excuse no other file.
+    np.save(path, upward.astype(whole.dtype))
+    table = next(Path("results/lowalt-40-v1/motion").glob("*.csv"))
+    text = table.read_text()
+    table.write_text(text.replace("1", "2", 1))
+    assert main(["benchmark", "make"]) == 1 and f"main/motion/{table.name} differs" in capsys.readouterr().out
+    table.write_text(text)
     one = whole.copy()
     one.flat[abs(one).argmax()] *= 1.001
     np.save(path, one)
@@ -174,6 +181,23 @@ def test_a_confirmed_row_of_the_table_is_what_the_command_finds_again(capsys):
     found = json.loads(capsys.readouterr().out)["percent"]
     # One answer of thousands may depend on the processor's arithmetic.
     assert found == pytest.approx([float(row[f"confirmed_{name}"]) for name in ("percent", "low", "high")], abs=0.1)
+
+
+def test_frozen_features_are_those_of_each_sample_s_images_station_by_station(small, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "studies")
+    monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
+    from frozen import SCALE, embedded, embedded_of
+    from imagenet_weights import BACKBONE, write_weights
+
+    from lowalt.recognition.recogniser import backbone
+
+    test = benchmark.load("unseen", "test")
+    found = embedded_of(test, tmp_path).reshape(len(test), 3, -1)
+    model = backbone(BACKBONE, str(write_weights(tmp_path / f"{BACKBONE}.pth")), SCALE * test.size).eval()
+    chosen = [5, 0, len(test) - 1]
+    np.testing.assert_allclose(found[chosen], embedded(test.images[chosen], model, "viridis"), rtol=0.02, atol=0.01)
+    assert abs(found[5] - found[0]).max() > 0.5
+    assert (embedded_of(benchmark.load("one-station", "test"), tmp_path) == found[:, 0]).all()
 
 
 def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatch):
