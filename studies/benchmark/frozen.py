@@ -14,6 +14,7 @@ import torch
 from imagenet_weights import BACKBONE, write_weights
 from torch import nn
 
+from lowalt.benchmark.definition import MAIN, config_of
 from lowalt.benchmark.part_samples import VIEWS, TrackSamples
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
@@ -47,10 +48,10 @@ def embedded(images: np.ndarray, model: nn.Module, colours: str) -> np.ndarray:
     return torch.cat(found).view(samples, stations, -1).numpy().astype(np.float16)
 
 
-def embedded_chunk(path: Path, folder: Path, colours: str) -> Path:
+def embedded_chunk(path: Path, folder: Path) -> Path:
     """Return the file of the keys (n,) and features (n, stations, F) of a file of images; made once, then kept.
 
-    path: a file of index images; folder: where features and weights are kept; colours: name of the colour map.
+    path: a file of a run's index images; folder: where features and weights are kept.
     """
     kept = folder / embedded.__name__ / path.parents[2].name / path.name
     if not kept.is_file():
@@ -59,7 +60,7 @@ def embedded_chunk(path: Path, folder: Path, colours: str) -> Path:
         begun = time.process_time()
         samples = ViewSamples([path], Scheme("all spectra", STATIONS, VIEWS).columns, {(group, fold)})
         model = backbone(BACKBONE, str(write_weights(folder / f"{BACKBONE}.pth")), SCALE * samples.size).eval()
-        found = embedded(samples.images, model, colours)
+        found = embedded(samples.images, model, config_of(MAIN)["images"]["colour_map"])
         with replacing(kept) as temporary, temporary.open("wb") as file:
             np.savez(file, key=samples.facts.key, features=found)
         seconds = (time.process_time() - begun) / len(found)
@@ -73,7 +74,7 @@ def embedded_of(samples: TrackSamples, folder: Path) -> np.ndarray:
     wanted = {key: number for number, key in enumerate(samples.key.tolist())}
     result: np.ndarray | None = None
     for path in sorted((samples.run / f"views/{samples.size}").glob("*.npz")):
-        with np.load(embedded_chunk(path, folder, samples.config["images"]["colour_map"])) as data:
+        with np.load(embedded_chunk(path, folder)) as data:
             keys, features = data["key"], data["features"]
         if result is None:
             result = np.empty((len(samples), len(samples.track.stations), features.shape[-1]), np.float32)

@@ -11,13 +11,15 @@ audio-spectrogram transformer   on images (`backbones.py`)
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import classical
 import numpy as np
 from features import features, spectral_moments
-from signals import Signals, features_of
+from frozen import embedded, embedded_chunk, embedded_of
+from signals import Signals, features_of, told
 
 from lowalt.benchmark.part_samples import TrackSamples
 from lowalt.recognition.batches import epoch_order
@@ -41,6 +43,15 @@ class Given:
     folder: Path
     features: Path
     config: dict
+
+
+class Kept(NamedTuple):
+    """What methods see, computed once for all of them: by which function, of which files of a run, and by which
+    function of a file and the folder that keeps the results."""
+
+    of: Callable
+    files: str
+    make: Callable[..., Any]
 
 
 def majority(given: Given) -> Answer:
@@ -78,8 +89,6 @@ def on_features(method: str, given: Given) -> Answer:
 
 def on_frozen(given: Given) -> Answer:
     """Train a linear classifier on the features of a frozen backbone with ImageNet's weights."""
-    from frozen import embedded_of
-
     told, held = (embedded_of(part, given.features) for part in (given.train, given.validation))
     answer = classical.fit("ridge", (told, given.train.labels), (held, given.validation.labels), given.seed)
     return lambda samples: answer(embedded_of(samples, given.features))
@@ -140,9 +149,11 @@ METHODS: dict[str, Callable[[Given], Answer]] = {
     "transformer on signals": lambda given: on_signals("transformer", given),
 }
 """In the order in which a study trains them."""
-TOLD = (("moments", spectral_moments), ("features", features))
-"""What methods whose name ends so see of each signal; it is computed once and kept, so its time is added to theirs."""
-KEPT = {"moments": "spectral_moments", "features": "features", "linear": "embedded"}
-"""The last word of such a method's name, and the function whose results are kept."""
+KEPT = {
+    "moments": Kept(spectral_moments, "noisy/*.npy", partial(told, told_of=spectral_moments)),
+    "features": Kept(features, "noisy/*.npy", partial(told, told_of=features)),
+    "linear": Kept(embedded, "views/*/*.npz", embedded_chunk),
+}
+"""By the last word of a method's name; its time is added to the method's."""
 SEEDLESS = ("majority class", "nearest centroid on moments", "frozen EfficientNet-Lite0, linear")
 """Methods that draw nothing, so that one seed is enough."""

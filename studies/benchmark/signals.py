@@ -83,9 +83,9 @@ def told(path: Path, folder: Path, told_of: Callable[[np.ndarray, float, float],
     return np.load(kept, mmap_mode="r")
 
 
-def cost_s(folder: Path, name: str, run: str) -> float:
-    """Return the mean core-seconds per sample of a run that the function `name` took, whose results are kept."""
-    paths = (folder / name / run).glob("*.json")
+def cost_s(folder: Path, told_of: Callable, run: str) -> float:
+    """Return the mean core-seconds per sample of a run that the function took, whose results are kept."""
+    paths = (folder / told_of.__name__ / run).glob("*.json")
     return float(np.mean([json.loads(path.read_text())["core_s_per_sample"] for path in paths]))
 
 

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import kept_results
 import numpy as np
-from methods import KEPT, METHODS, SEEDLESS, TOLD, Given
-from signals import cost_s, told
+from methods import KEPT, METHODS, SEEDLESS, Given
+from signals import cost_s
 
 import trainings
 from lowalt.benchmark import baseline_table, scoring
@@ -82,8 +82,8 @@ def place(method: str, name: str, seed: int) -> Path:
 
 def told_s(method: str, samples: TrackSamples) -> float:
     """Return the core-seconds per sample of what a method sees of its signals, where that is kept; else 0."""
-    name = KEPT.get(method.split()[-1])
-    return cost_s(OUT / "features", name, samples.run.name) if name else 0.0
+    kept = KEPT.get(method.split()[-1])
+    return cost_s(OUT / "features", kept.of, samples.run.name) if kept else 0.0
 
 
 def one(job: tuple[str, str, int], data: str) -> Path:
@@ -221,20 +221,10 @@ def main(arguments: list[str]) -> None:
     jobs = [(method, track, seed) for seed, method, track in product(given.seeds, given.methods, given.tracks)
             if seed == 0 or method not in SEEDLESS]  # fmt: skip
     if not given.table:
-        chunks = sorted(path for part in PARTS for path in Path(given.data, run_name(part), "noisy").glob("*.npy"))
-        for word, told_of in TOLD:
-            if any(method.endswith(word) for method in given.methods):
-                trainings.side_by_side(partial(told, folder=OUT / "features", told_of=told_of), chunks, given.workers)
-        if any(method.endswith("linear") for method in given.methods):
-            from frozen import embedded_chunk
-
-            images = sorted(
-                path for part in PARTS for path in Path(given.data, run_name(part), "views").glob("*/*.npz")
-            )
-            colours = config_of(MAIN)["images"]["colour_map"]
-            trainings.side_by_side(
-                partial(embedded_chunk, folder=OUT / "features", colours=colours), images, given.workers
-            )
+        for word in sorted({method.split()[-1] for method in given.methods} & set(KEPT)):
+            kept = KEPT[word]
+            paths = sorted(path for part in PARTS for path in Path(given.data, run_name(part)).glob(kept.files))
+            trainings.side_by_side(partial(kept.make, folder=OUT / "features"), paths, given.workers)
         trainings.side_by_side(partial(one, data=given.data), jobs, given.workers)
     rows = with_confirmed(tables(out), out)
     kept_results.write_table(rows, out)

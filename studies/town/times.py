@@ -24,7 +24,7 @@ from lowalt.scene.effects.channel.town import paths
 from lowalt.scene.observe import observe
 
 GRID_M = (np.arange(-740.0, 1170.0, 60.0), np.arange(-780.0, 1130.0, 60.0))
-"""The middles of the houses of the regular town, 1024 but for those next to a station."""
+"""Coordinates x and y of the 1024 houses of the regular grid; those next to a station are left out."""
 STREETS_M = ((130.0, 170.0), (250.0, 225.0), (310.0, 350.0))
 """Where targets begin: streets that run along y, between blocks or at a corner of them."""
 TARGETS = {

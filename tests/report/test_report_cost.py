@@ -21,7 +21,7 @@ def echo_rows(**tolerances):
 
 def test_the_sentence_says_what_tolerances_save_and_advises_exactness_where_that_is_little():
     rows = echo_rows(exact=3e-3, loose=2.5e-3, fine=2.9e-3)
-    said = "Exact costs 3.00 ms a signal of 300 points, and tolerances save at most 0.50 ms of it"
+    said = "Exact costs 3.00 ms per signal of 300 points, and tolerances save at most 0.50 ms of it"
     assert sentence(rows) == f"{said}, so use exact."
     more = [row | {"points": "9000", "seconds": str(10 * float(row["seconds"]))} for row in rows[:2]]
     assert sentence([*rows, *more]) == f"{said} (5 of 30 ms at 9000 points), so use exact."

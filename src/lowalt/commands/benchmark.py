@@ -65,8 +65,9 @@ def make(options: argparse.Namespace) -> Answer:
             return Answer({"parts": facts}, f"{run_name(part)}: the workflow failed", ended["status"])
         facts[part], close = frozen_bytes.compared(part, "results")
         count = sum(name.startswith(f"{part}/") for name in frozen_bytes.kept())
-        last = f", but for last bits of {len(close)} that this processor decides" if close else ""
-        lines += facts[part][:5] or [f"{run_name(part)}: all {count} files are equal to the kept checksums{last}"]
+        words = f"{count - len(close)} of {count} files are equal to the kept checksums"
+        words += f", and {len(close)} differ in last bits alone, which depend on the processor" if close else ""
+        lines += facts[part][:5] or [f"{run_name(part)}: {words}"]
     return Answer({"parts": facts}, "\n".join(lines), int(any(facts.values())))
 
 

@@ -154,8 +154,7 @@ def _train(options: argparse.Namespace) -> Answer:
     facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition))
     each = ", ".join(f"{label} {percent:.0f}" for label, percent in facts["percent_by_class"].items())
     then = f"lowalt predict {options.out.with_suffix('')} {options.record}"
-    if record.file.suffix == ".yaml":
-        # The record of a radar without any recording.
+    if not record.recorded:
         then = f"lowalt recording inspect FILE --carrier {record.carrier_hz:g}"
     lines = [
         f"{facts['file']}: {facts['percent']:.1f} % of {facts['windows']} simulated windows right ({each}), which no "

@@ -75,14 +75,12 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     shares = probabilities(trained.model, samples, numbers, Machine.here("fp32"), 64)
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
-    caution = settings.get("caution", "")
     starts, there = numbers * twin.symbols * twin.symbol_interval_s, ~found.clipped
     empty = intervals[_empty(record, starts, twin, where, there)] if record.empty_s and not twin.slowest_mps else None
     there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
-    return Answers(
-        starts, there, shares, found.clipped, beyond, twin.fastest_mps, _notes(record, radar, caution, there.any())
-    )
+    notes = _notes(record, radar, settings.get("caution", ""), there.any())
+    return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps, notes)
 
 
 def _empty(record: Record, starts_s: np.ndarray, twin: Twin, where: str, sound: np.ndarray) -> np.ndarray:

@@ -22,9 +22,10 @@ STRETCHES = 16
 APART_CELLS = 4
 """Least Doppler of a line, in cells of a stretch, at which a Hann window separates it from its image."""
 
-SKEW, FAR = 0.9, 1e3
-"""Median over mean of powers at most, and ratio of their nine tenths, median and tenth at most: numbers of another type
-that are read as floating ones span far more."""
+SKEW = 0.9
+"""Largest ratio of the median of powers to their mean."""
+FAR = 1e3
+"""Largest ratio of the 90th percentile of powers to the median, and of it to the 10th: misread numbers span more."""
 
 
 def _blocks(values: np.ndarray) -> np.ndarray:
@@ -135,10 +136,9 @@ def receivers_of(values: np.ndarray, samples: int) -> int:
 def image_of(values: np.ndarray, cycles: float) -> tuple[float, float]:
     """Return how strong the image of a line of a complex signal (samples,) is at the opposite Doppler.
 
-    cycles: the line's Doppler in cycles a sample. The first number is the power of the image over that of the line, the
-    second their squared coherence over `STRETCHES` stretches: near 1 for an image, which is the conjugate of the line,
-    and on average 1 / `STRETCHES` for noise of any spectrum, whose sides do not follow from one another. (0.0, 0.0)
-    where the line is too slow to tell both apart.
+    cycles: the line's Doppler in cycles per sample. Returned are the image's power over the line's, and their squared
+    coherence over `STRETCHES` stretches: near 1 for an image, the line's conjugate, and on average 1 / `STRETCHES` for
+    noise of any spectrum; (0.0, 0.0) where the line is too slow to separate both.
     Source: spectral circularity coefficient, Schreier and Scharf 2010, chapter 9.
     """
     length = len(values) // STRETCHES

@@ -32,7 +32,7 @@ HUM_DB, HARMONICS = 10.0, 10
 """How far a line of the mains stands above its surroundings, and up to which harmonic it is looked for."""
 DC_DB, IMAGE_DB = 20.0, -10.0
 COHERENT = 0.5
-"""Squared coherence of a line and its image from which on they belong together."""
+"""Least squared coherence with which a line has an image, rather than noise at the opposite Doppler."""
 
 
 class Candidate(NamedTuple):

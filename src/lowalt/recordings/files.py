@@ -142,7 +142,7 @@ def table_of(record: Record) -> Table:
     """
     path = existing(record.file, "recording")
     kind = path.suffix.lower()
-    if kind == ".yaml":
+    if not record.recorded:
         raise InputError(f"{path}: the record of a radar without any recording, expected the key `file`")
     if kind not in READERS:
         raise InputError(f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}")

@@ -108,7 +108,7 @@ def _baseband(record: Record) -> Baseband:
 
     Raises: InputError as `read`, and where neither a recording nor the record says at which SNR targets are seen.
     """
-    if record.file.suffix != ".yaml":
+    if record.recorded:
         return read(record)
     if "snr_db" not in (record.twin or {}):
         raise InputError(f"{record.file}: no recording to measure the noise in, expected `file`, or twin.snr_db, the "

@@ -13,10 +13,7 @@ from lowalt.files.yaml_files import load_yaml
 
 @dataclass(frozen=True)
 class Record:
-    """One recording: the keys of a record, `file` with its folder, None where left out.
-
-    The record of a radar without a recording has itself as its file.
-    """
+    """One recording: the keys of a record, `file` with its folder, None where left out."""
 
     file: Path
     carrier_hz: float
@@ -42,6 +39,11 @@ class Record:
     def name(self) -> str:
         """The recording's name: its file's, without the suffix."""
         return self.file.stem
+
+    @property
+    def recorded(self) -> bool:
+        """Whether the record names a recording; that of a radar without one is its own file."""
+        return self.file.suffix.lower() != ".yaml"
 
 
 def record(block: dict, folder: Path, where: str) -> Record:

@@ -58,7 +58,7 @@ class SceneSample:
     def weight(self, view: View, names: Collection[str] | None = None, but: Collection[str] = ()) -> np.ndarray:
         """Return the product (N, L) of the amplitude factors that effects put on the points of a view.
 
-        names: effects to include, None for all; but: effects to leave out. Raises: InputError for another shape.
+        names: effects to include, None for all; but: effects to leave out. Raises: InputError for a wrong shape.
         """
         result = np.ones(view.places.shape[:2])
         one_way = self.all("visible_one_way")

@@ -108,7 +108,7 @@ def echo(measured: list[dict[str, str]]) -> Plot:
         panel.plot(times, errors, color=colour, linewidth=1)
         panel.scatter(times, errors, [sizes[row["points"]] for row in line], color=colour)
         panel.annotate(name, (times[-1], errors[-1]), (8, 9), textcoords="offset points", ha="right", color=colour)
-    panel.set(xscale="log", yscale="log", xlabel="ms a signal, one core", ylabel="error / largest value of the signal")
+    panel.set(xscale="log", yscale="log", xlabel="ms per signal, 1 core", ylabel="error / largest value of the signal")
     for size in sizes.items():
         panel.scatter([], [], size[1], color="0.5", label=f"{size[0]} points")
     panel.legend(frameon=False)

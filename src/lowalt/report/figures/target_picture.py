@@ -14,6 +14,7 @@ from lowalt.motion.drawing import draw, region_polygon
 from lowalt.numerics.streams import stream
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
+from lowalt.report.figures.tile_axes import times_s
 from lowalt.spectra import Spectra, spectrum
 from lowalt.spectra.interface import OfCells
 from lowalt.targets.cloud import Cloud
@@ -105,18 +106,14 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
             continue
         values = kind.definition(signal, windows, name, *of_station)
         values = values if kind.SIGNED else _decibel(values)
-        middle = (windows.window - 1) / 2
-        times = network.symbol_interval_s * np.array([middle, network.symbols - 1 - middle])
-        speeds = kind.speeds(windows, network, station)
         scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
         if kind.SIGNED:
             top = float(abs(values).max()) or 1.0
             scale = {"vmin": -top, "vmax": top, "cmap": "RdBu_r"}
-        picture = panel.imshow(
-            values, origin="lower", aspect="auto", extent=(*times, *speeds), interpolation="nearest", **scale
-        )
+        extent = *times_s(windows, network), *kind.speeds(windows, network, station)
+        picture = panel.imshow(values, origin="lower", aspect="auto", extent=extent, interpolation="nearest", **scale)
         panel.set(title=kind.TITLE, xlabel="time (s)", ylabel="radial speed (m/s)\nreceding upwards, folded")
-        panel.set_ylim(sorted(speeds))
+        panel.set_ylim(sorted(extent[2:]))
         panel.figure.colorbar(picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05)
 
 

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.config.network import Station
+from lowalt.config.network import Network, Station
 from lowalt.report.figures.style import plt, png
 from lowalt.shards import ShardSet
-from lowalt.spectra import spectrum
+from lowalt.spectra import Fourier, Transfer, spectrum
 from lowalt.spectra.interface import OfCells
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer, split
@@ -20,16 +20,19 @@ class Axes(NamedTuple):
     upwards: tuple[str, float, float]
 
 
+def times_s(settings: Fourier | Transfer, network: Network) -> tuple[float, float]:
+    """Return the times (s) of a spectrum's first and last column, each at the middle of its window."""
+    middle = (settings.window - 1) / 2
+    return network.symbol_interval_s * middle, network.symbol_interval_s * (network.symbols - 1 - middle)
+
+
 def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
-    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom,
-    and a column stands at the middle of its window."""
+    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom."""
     settings, network, kind = renderer.spectra[name], renderer.network, spectrum(name)
     if isinstance(kind, OfCells):
         return Axes(*kind.axes(settings, network, station))
     first, last = kind.speeds(settings, network, station)
-    middle = (settings.window - 1) / 2
-    times_s = (network.symbol_interval_s * symbol for symbol in (middle, network.symbols - 1 - middle))
-    return Axes(("time (s)", *times_s), ("radial speed (m/s)\nreceding upwards", first, last))
+    return Axes(("time (s)", *times_s(settings, network)), ("radial speed (m/s)\nreceding upwards", first, last))
 
 
 def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:

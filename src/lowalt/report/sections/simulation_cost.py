@@ -22,7 +22,7 @@ def sentence(rows: list[dict[str, str]]) -> str:
         return ""
     usual, most = min(pairs, key=lambda points: abs(points - USUAL)), max(pairs)
     exact, saved = pairs[usual]
-    words = f"Exact costs {exact:.2f} ms a signal of {usual} points, and tolerances save at most {saved:.2f} ms of it"
+    words = f"Exact costs {exact:.2f} ms per signal of {usual} points, and tolerances save at most {saved:.2f} ms of it"
     of_the_largest = "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
     return f"{words}{of_the_largest}" + (", so use exact." if saved < exact / 2 else ".")
 

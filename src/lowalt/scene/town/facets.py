@@ -132,7 +132,7 @@ def _outward(
     _, which = np.unique(edges, axis=0, return_inverse=True)
     high = np.empty(int(numbers.max()) + 1)
     high[numbers.reshape(-1)] = corners[..., 2].reshape(-1)
-    # Each edge of a closed surface has two triangles, but for those on the ground.
+    # A surface is closed if each of its edges belongs to two triangles; edges on the ground need only one.
     lone = (np.bincount(which)[which] != 2) & (high[edges].max(axis=1) > FLAT_M)
     result, order = np.zeros(len(planes)), np.argsort(building, kind="stable")
     starts = np.searchsorted(building[order], np.arange(int(building.max()) + 2))

@@ -197,10 +197,9 @@ def _passes(facets, k, source, ends):
 
 @INNER
 def misses(facets, route, station, low, high, ends, work):
-    """Whether no ray from a station by the facets of a route ends in the box between two corners (3,) m; it may also
-    say no where none does.
+    """Whether surely no ray from a station by the facets of a route ends in the box between two corners (3,) m.
 
-    ends: work space (8, 5, 3), work: (8, 3).
+    False does not say that one does. ends: work space (8, 5, 3), work: (8, 3).
     """
     source = work[0]
     for i in range(3):

@@ -92,9 +92,10 @@ def candidates(town: Town, station_m: np.ndarray, places: np.ndarray, order: int
     """Return the routes of each of 1 to `order` facets, (P, order) int64, that may lead from a station (3,) m to places
     (N, L, 3) m."""
     low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    every = [np.arange(len(town.facets.offset))[:, None]][:order] + [_pairs(town, station_m) for _ in range(1, order)]
-    fitting = [image_loops.fitting(town.facets, routes, station_m, low, high) for routes in every]
-    return [_unhidden(town, routes, low, high) for routes in fitting]
+    routes = [np.arange(len(town.facets.offset))[:, None]] if order >= 1 else []
+    routes += [_pairs(town, station_m)] if order >= 2 else []
+    fitting = [image_loops.fitting(town.facets, one, station_m, low, high) for one in routes]
+    return [_unhidden(town, one, low, high) for one in fitting]
 
 
 def seen(town: Town, station_m: np.ndarray, rays: TracedRays, facets: np.ndarray) -> np.ndarray:
