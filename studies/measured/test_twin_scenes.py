@@ -9,7 +9,7 @@ from lowalt.recordings.twin import Twin
 from lowalt.recordings.twin_courses import hover, straight, to_and_fro
 from lowalt.recordings.twin_echo import beam_gain, blade_points, echo, still_row, strengthened, textured
 from lowalt.recordings.twin_receiver import Receiver, received
-from lowalt.recordings.twin_scenes import MARGIN, clouds_of, heard, samples, stretch
+from lowalt.recordings.twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch
 from lowalt.targets.records import load_records
 
 QUIET = {
@@ -194,3 +194,13 @@ def test_wander_has_its_rms_in_decibels_and_flicker_its_corner():
     low, corner, high = (density[np.arange(2000) * 2.5 // width == place].mean()
                          for width, place in ((5.0, 0), (5.0, 10), (50.0, 10)))  # fmt: skip
     assert (corner / low, high / low) == pytest.approx((0.5, 0.0106), rel=0.15)
+
+
+def test_the_craft_at_3_ghz_has_propellers_of_its_maker_s_length():
+    library = Library.read()
+    (scene, *_) = library.scenes["uav_3ghz"]["UAV"]
+    cloud = clouds_of(library.records, scene["subtypes"], 1)[scene["subtypes"][0]]
+    for blades in range(1, 5):
+        tips = cloud.points[cloud.part == blades]
+        # 4.7 inches from tip to tip.
+        assert np.linalg.norm(tips[:, None] - tips, axis=2).max() == pytest.approx(4.7 * 0.0254, abs=5e-4)

@@ -67,6 +67,7 @@ def test_a_room_that_hums_is_empty_where_the_record_says_when_it_was(tmp_path, c
         said = capsys.readouterr().out
         assert ("note: targets of this network may hover" in said) == (name == "unknown")
         assert "note: this network learned a radar at 10 GHz, and the recording is at 10.5 GHz" in said
+        assert "note: birds and drones of one radar alone tested this network" in said
     assert len(starts["unknown"]) == 25 and min(starts["known"]) == pytest.approx(4.0) and len(starts["known"]) == 15
     path.write_text(yaml.safe_dump(about | {"empty_s": [1, 1.3]}))
     assert lowalt(["predict", "bird_drone_10ghz", str(path)]) == 2
