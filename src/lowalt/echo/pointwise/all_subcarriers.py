@@ -11,7 +11,7 @@ from lowalt.echo.pointwise.reference_range import CELL
 from lowalt.echo.pointwise.results import Paths, amplitudes
 from lowalt.echo.radar import Radar
 from lowalt.machine.jit import VECTOR
-from lowalt.numerics.chebyshev_series import band_tables
+from lowalt.numerics.chebyshev_series import band_tables, over_band
 
 ERROR = 1e-15
 """Largest error of the expansion, relative to the sum of the points' amplitudes."""
@@ -54,13 +54,12 @@ def _banded(z: np.ndarray, u: np.ndarray, count: int) -> np.ndarray:
         size = min(width, count - first)
         middle = (2 * first + size - count) / count
         piece = z if size == count else z * np.exp(-1j * np.pi * middle * u)
-        to_nodes, to_band = band_tables(1, reach * size / count, size, ERROR)
-        moments = np.empty((len(z), 2, len(to_nodes)))
+        tables = band_tables(1, reach * size / count, size, ERROR)
+        moments = np.empty((len(z), 2, len(tables[0]) // 2))
         _moments(piece, u, 1 / reach, work, moments)
-        nodes = (moments[:, 0] + 1j * moments[:, 1]) @ to_nodes
-        # The matrix to the subcarriers is real, so two products of reals take half a complex one's time.
-        result[:, first : first + size].real = nodes.real @ to_band
-        result[:, first : first + size].imag = nodes.imag @ to_band
+        bands = over_band(moments.reshape(len(z), -1), tables)
+        result[:, first : first + size].real = bands[:, 0]
+        result[:, first : first + size].imag = bands[:, 1]
     return result
 
 
