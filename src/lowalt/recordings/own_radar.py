@@ -7,6 +7,7 @@ the three are the same slow signal.
 """
 
 import tempfile
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -63,6 +64,15 @@ def temperature(shares: np.ndarray, labels: np.ndarray) -> float:
     return float(np.exp(minimize_scalar(loss, bounds=(-2.0, 3.0), method="bounded").x))
 
 
+def last_layer(tensors: Iterable[str]) -> str:
+    """Return the last layer of a network's classifier, such as "classifier.3", from the names of its tensors.
+
+    Layers rank by their numbers: layer 10 comes after layer 9.
+    """
+    layers = {name.rpartition(".")[0] for name in tensors if name.startswith("classifier.")}
+    return max(layers, key=lambda layer: [int(number) for number in layer.split(".")[1:]])
+
+
 def trained_radar(record: Record, out: Path, block: dict) -> dict:
     """Train a network for the radar of a record, write OUT.safetensors, its weights in 8 bits, and its card; return
     what to expect of it.
@@ -83,7 +93,7 @@ def trained_radar(record: Record, out: Path, block: dict) -> dict:
         content = of_run(Path(folder) / "model.pt")
     validation, test = (folds[fold].facts.label for fold in ("validation", "test"))
     warm = temperature(_shares(network, folds["validation"]), validation)
-    last = max(key.rpartition(".")[0] for key in content.tensors if key.startswith("classifier"))
+    last = last_layer(content.tensors)
     cooled = {key: value / warm if key.rpartition(".")[0] == last else value for key, value in content.tensors.items()}
     path, content = out.with_name(f"{name}.safetensors"), replace(content, tensors=cooled)
     reduced = zoo.small(content)

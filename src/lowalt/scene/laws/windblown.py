@@ -37,7 +37,6 @@ def spectrum(count: int, step_s: float, slope_s: np.ndarray) -> np.ndarray:
     """
     frequency, period, slope_s = abs(fft.fftfreq(count, step_s)), 1.0 / step_s, slope_s[:, None]
     near, far = slope_s * frequency, slope_s * (period - frequency)
-    # The library's exponentials end where float64 does.
     power = portable.exp(-np.minimum(near, LARGEST)) + portable.exp(-np.minimum(far, LARGEST))
     return np.sqrt(power / power.sum(axis=1, keepdims=True))
 
