@@ -109,7 +109,7 @@ def test_a_submission_to_the_benchmark(checkout, monkeypatch):
     """On a small copy of the benchmark; its data come from the test, so that no workflow starts and no byte is kept."""
     small_benchmark.shrink(monkeypatch)
     monkeypatch.setattr(workflow, "ended", lambda options: {"status": small_benchmark.write(Path("results")) is None})
-    monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: frozen_bytes.Compared([], []))
+    monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: [])
     printed, _ = followed("benchmark", checkout, monkeypatch)
     assert "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
     test = lowalt.benchmark.load("unseen", "test")
