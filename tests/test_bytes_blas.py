@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
-CORES = ("SkylakeX", "Haswell", "Zen", "Nehalem")
+CORES = ("SkylakeX", "Haswell", "Nehalem", "Zen")
 """Processors whose kernels OpenBLAS is told to choose. All run here: kernels that need more than this processor has are
 refused by OpenBLAS itself, which then takes others."""
 
@@ -50,13 +50,15 @@ def started(folder: Path, core: str, *words: str) -> subprocess.Popen:
     return subprocess.Popen(line, cwd=ROOT, env=os.environ | more, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
 
 
-def signals(folder: Path, symbols: int, subtypes: str, *scenes: str) -> list[dict[str, np.ndarray]]:
-    """The signals of scenes by name, made with the kernels of every core of CORES; symbols: of a look, 0 for all."""
-    made = [started(folder, core, str(symbols), subtypes, *scenes) for core in CORES]
+def signals(
+    folder: Path, cores: tuple[str, ...], symbols: int, subtypes: str, *scenes: str
+) -> list[dict[str, np.ndarray]]:
+    """The signals of scenes by name, made with the kernels of each core; symbols: of a look, 0 for all."""
+    made = [started(folder, core, str(symbols), subtypes, *scenes) for core in cores]
     for process in made:
         _, said = process.communicate()
         assert process.returncode == 0, said.decode()[-2000:]
-    return [dict(np.load(folder / f"{core}.npz")) for core in CORES]
+    return [dict(np.load(folder / f"{core}.npz")) for core in cores]
 
 
 def differing(made: list[dict[str, np.ndarray]]) -> list[tuple[str, str]]:
@@ -65,15 +67,16 @@ def differing(made: list[dict[str, np.ndarray]]) -> list[tuple[str, str]]:
     assert all(abs(values).max() > 0 for values in first.values())
     return [
         (core, name)
-        for core, values in zip(CORES, made, strict=True)
+        for core, values in zip(CORES, made, strict=False)
         for name in first
         if values[name].tobytes() != first[name].tobytes()
     ]
 
 
 def test_signals_with_canceller_links_and_phase_noise_do_not_follow_the_kernels_of_a_blas(tmp_path):
-    """Two scenes that call for most of the linear algebra; looks are short, so that four processes take seconds."""
-    assert differing(signals(tmp_path, 64, "Owl", "triangle", "sensing")) == []
+    """Two scenes that call for most of the linear algebra; looks are short, and Zen, whose kernels are
+    Haswell's, is left to the slow test, so that the processes take seconds."""
+    assert differing(signals(tmp_path, CORES[:3], 64, "Owl", "triangle", "sensing")) == []
 
 
 SHIPPED = sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml") if path.stem != "paper")
@@ -81,7 +84,7 @@ SHIPPED = sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml") i
 
 @pytest.mark.slow
 def test_signals_of_every_shipped_scene_and_of_the_town_do_not_follow_the_kernels_of_a_blas(tmp_path):
-    made = signals(tmp_path, 0, "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1", "town", *SHIPPED)
+    made = signals(tmp_path, CORES, 0, "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1", "town", *SHIPPED)
     assert set(made[0]) == {"town", *SHIPPED}
     assert differing(made) == []
 

@@ -176,3 +176,12 @@ def test_a_sample_without_its_target_keeps_its_noise_and_land(noise):
     difference = whole.cells - empty.cells
     alone = np.fft.ifft(echo.direct, axis=1)
     assert abs(difference - alone).max() < 1e-9 * abs(whole.cells).max()
+
+
+def test_noise_at_an_snr_of_zero_has_a_stream_of_its_own():
+    """A level of 0 dB is a level: its draws are those neither of 3 dB nor of an effect without a level."""
+    row = {"subtype": "a", "model": 0}
+    asked = scene({"cell_noise": {"snr_db": 0.0}}, network())
+    zero = asked.stream("cell_noise", row).random()
+    assert zero != asked.at_snr(3.0).stream("cell_noise", row).random()
+    assert zero != asked.at_snr(None).stream("cell_noise", row).random()
