@@ -7,6 +7,8 @@ parameter nu, which is positive in the shadow: the wave passes over the top and 
 Of several buildings the one that blocks most counts in full, and on each side of it the next one as seen from its
 edge (Deygout's construction). A choice between buildings would make the field jump where a target moves on, so
 buildings that block nearly as much share the weight, and edges near which a ray passes begin to count gradually.
+The field still jumps where a ray enters a gateway, which an outline does not know, and at few places of long streets:
+along 134 m of street in `studies/town/blocks.geojson`, in steps of 1 cm, five times by more than 3 % of itself.
 """
 
 import math
