@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 CONFIG, SCHEMA = ROOT / "config/default.yaml", ROOT / "workflow/schemas/config.schema.yaml"
 PAGE = (ROOT / "docs/reference/json.md").read_text()
 STATION = {"method", "decisions", "rms_change", "other_cells"}
-STATIC = ("settings", "stages", "method", "otherwise", "materials", "dropped")
+STATIC = ("settings", "stages", "method", "otherwise", "materials", "dropped", "notes")
 """Keys whose own keys are names of settings, stages, fields, filters, materials or reasons that the reference does not
 list."""
 

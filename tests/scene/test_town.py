@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter1d
 from scipy.special import fresnel
 
 from lowalt.__main__ import main
@@ -62,6 +63,33 @@ def edge_field(nu, edge=0):
     rows[edge] = nu
     knife_edge.fields(rows, result)
     return result
+
+
+def edge_nu(start, edge, ends):
+    """The parameter nu of an edge that a wave passes from start to ends (..., 3) m, by how much longer its way is."""
+    direct_m = np.linalg.norm(ends - start, axis=-1)
+    detour_m = np.linalg.norm(edge - start) + np.linalg.norm(ends - edge, axis=-1) - direct_m
+    return 2.0 * np.sqrt(detour_m / WAVELENGTH_M)
+
+
+def kirchhoff_sum(start, end, half_width_m, top_m):
+    """The field behind a screen x = 0, |y| < half_width_m, z < top_m, over that in free space: a sum over its plane.
+
+    The screen fades out far below its top, where a sharp end would diffract.
+    """
+    step = 0.01
+    y = np.arange(-half_width_m + step / 2, half_width_m, step)
+    below_m = np.arange(step / 2, 60.0, step)
+    fade = np.cos(0.5 * np.pi * np.clip((below_m - 20.0) / 40.0, 0.0, 1.0)) ** 2
+    total = 0.0
+    for part, weight in zip(np.array_split(below_m, 60), np.array_split(fade, 60), strict=True):
+        places = np.stack(np.broadcast_arrays(0.0, y[:, None], top_m - part), axis=-1)
+        out_m, on_m = np.linalg.norm(places - start, axis=-1), np.linalg.norm(places - end, axis=-1)
+        total += (np.exp(-2j * np.pi * (out_m + on_m) / WAVELENGTH_M) / (out_m * on_m) * weight).sum() * step**2
+    direct_m = np.linalg.norm(end - start)
+    free = np.exp(-2j * np.pi * direct_m / WAVELENGTH_M) / direct_m
+    slant = abs(end[0] - start[0]) / direct_m
+    return 1.0 - 1j / WAVELENGTH_M * slant * total / free
 
 
 def reference_paths(scene, mast, place, order):
@@ -201,17 +229,49 @@ def test_a_wide_block_is_one_knife_edge_and_a_pole_nearly_none():
     mast = np.array([-60.0, 3.0, 30.0])
     lit, field = image_paths.direct(wide, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
     assert not lit.any()
-    length, rise = np.linalg.norm(ends[0, 0] - mast), -10.0
-    expected = max(
-        (40.0 - 30.0 - rise * share) * math.sqrt(1 - (rise / length) ** 2)
-        * math.sqrt(2 / (WAVELENGTH_M * length * share * (1 - share)))
-        for share in (59.0 / 120.0, 61.0 / 120.0)
-    )  # fmt: skip
-    np.testing.assert_allclose(field[0], edge_field([expected]), atol=5e-4)
+    expected = max(edge_nu(mast, np.array([x, 3.0, 40.0]), ends[0, 0]) for x in (-1.0, 1.0))
+    np.testing.assert_allclose(field[0], edge_field([expected]), atol=1e-3)
     pole = built([(0.0, 3.0, 0.02, 0.02, 400.0)])
     lit, field = image_paths.direct(pole, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
     assert not lit.any()
     assert 0.9 < abs(field[0, 0]) < 1.05
+
+
+@pytest.mark.parametrize(
+    ("end", "half_width_m", "top_m"),
+    [
+        ((60.0, 0.0, 20.0), 6.0, 30.0),
+        ((60.0, 3.0, 20.0), 6.0, 40.0),
+        ((30.0, 0.0, 1.5), 5.0, 25.0),
+        ((60.0, 2.0, 26.0), 8.0, 34.0),
+        ((80.0, -9.0, 20.0), 5.0, 30.0),
+    ],
+)
+def test_the_field_behind_a_finite_screen_is_kirchhoffs_sum(end, half_width_m, top_m):
+    mast, end = np.array([-60.0, 0.0, 30.0]), np.array(end)
+    expected = kirchhoff_sum(mast, end, half_width_m, top_m)
+    screen = built([(0.0, 0.0, 1e-2, 2 * half_width_m, top_m)])
+    ends = end[None, None]
+    field = image_paths.direct(screen, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)[1][0, 0]
+    assert abs(20.0 * np.log10(abs(field / expected))) < 0.2
+    assert abs(np.angle(field / expected)) < 0.05
+
+
+def test_the_field_among_buildings_never_jumps():
+    """Where other buildings block most as a target moves on, finer steps change the field by less."""
+    city, mast = built(BOXES), np.array([-60.0, 3.0, 30.0])
+    largest = []
+    for step_m in (0.02, 0.005):
+        y = np.arange(-49.0, -41.0, step_m)
+        ends = np.stack([np.full(len(y), 75.0), y, np.full(len(y), 1.5)], axis=1)[:, None]
+        rays = image_paths.rays_to(ends, 0.0)
+        field = image_paths.direct(city, mast, ends, rays, WAVELENGTH_M, True)[1][:, 0]
+        # From both sides, how far a place is off the line through its two neighbours.
+        ahead = abs(field[2:-1] - 2.0 * field[1:-2] + field[:-3])
+        behind = abs(field[1:-2] - 2.0 * field[2:-1] + field[3:])
+        level = maximum_filter1d(abs(field), round(0.4 / step_m))[1:-2]
+        largest.append((np.minimum(ahead, behind) / level).max())
+    assert largest[1] < 0.2 * largest[0]
 
 
 def test_the_field_is_smooth_across_the_border_of_the_shadow():
@@ -220,7 +280,7 @@ def test_the_field_is_smooth_across_the_border_of_the_shadow():
     lit, field = image_paths.direct(wide, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
     assert lit.any()
     assert not lit.all()
-    assert abs(np.diff(abs(field[:, 0]))).max() < 0.05
+    assert abs(np.diff(field[:, 0])).max() < 0.1
     assert abs(field[0, 0]) < 0.2
     assert field[-1, 0] == 1.0
 
@@ -230,14 +290,12 @@ def test_an_upright_edge_diffracts_on_both_sides_of_its_shadow_and_by_a_wall_tha
     y = np.linspace(-2.0, 30.0, 600)
     ends = np.stack([np.full(600, 30.0), y, np.full(600, 30.0)], axis=1)[:, None]
     lit, field = image_paths.direct(wall, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
-    length = np.hypot(230.0, y - 5.0)
-    share = (200.0 * 230.0 - 5.0 * (y - 5.0)) / length**2
-    behind_m = (5.0 + 200.0 / 230.0 * (y - 5.0)) * 230.0 / length
-    nu = behind_m * np.sqrt(2 / (WAVELENGTH_M * length * share * (1 - share)))
+    edge = np.array([0.0, 0.0, 30.0])
+    nu = edge_nu(mast, edge, ends[:, 0]) * np.sign(5.0 + 200.0 / 230.0 * (y - 5.0))
     assert 0 < (lit[:, 0] & (nu > -0.78)).sum() < lit.sum()
     near = (nu > -0.78) & (nu < 3.0)
     np.testing.assert_allclose(field[near, 0], edge_field(nu[near]), atol=0.01)
-    np.testing.assert_allclose(abs(field[nu > 3.0, 0]), abs(edge_field(nu[nu > 3.0])), rtol=0.02)
+    np.testing.assert_allclose(abs(field[nu > 3.0, 0]), abs(edge_field(nu[nu > 3.0])), atol=1e-3)
 
 
 def test_the_ply_the_geojson_and_the_mitsuba_version_of_a_town_have_equal_facades(tmp_path):

@@ -34,6 +34,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         line.add_argument("--unit", help="unit of a mesh: m (default), cm, mm, in, ft")
         line.add_argument("--up", choices=("z", "y"), help="axis of a mesh that is up (default: z)")
         line.add_argument("--height", type=float, help="height of GeoJSON buildings that state none (m)")
+        line.add_argument("--left-out", type=float, metavar="SHARE",
+                          help="largest share of GeoJSON buildings that may be left out (default: 0.1)")  # fmt: skip
         line.add_argument("--material", help="material of surfaces without one, after ITU-R P.2040 (default: concrete)")
 
 
@@ -45,14 +47,17 @@ def _settings(options: argparse.Namespace, middle: np.ndarray) -> dict:
 
     if options.unit not in (None, *UNITS_M):
         raise InputError(f"--unit: {options.unit!r}, expected one of {list(UNITS_M)}")
-    given = {"unit": options.unit, "up": options.up, "height_m": options.height, "material": options.material}
+    if options.left_out is not None and not 0.0 <= options.left_out <= 1.0:
+        raise InputError(f"--left-out: {options.left_out:g}, expected a share from 0 to 1")
+    given = {"unit": options.unit, "up": options.up, "height_m": options.height, "material": options.material,
+             "left_out": options.left_out}  # fmt: skip
     given = {"buildings": str(options.file), **{key: value for key, value in given.items() if value is not None}}
     if options.origin is not None:
         return given | {"origin": options.origin}
     if options.file.suffix.lower() in (".geojson", ".json"):
         from lowalt.scene.town.footprints import middle_of, moved
 
-        return given | {"origin": moved(middle_of(options.file), -middle)}
+        return given | {"origin": moved(middle_of(options.file, options.height), -middle)}
     facts = read(town.DEFAULTS | given).facts
     centre = (np.array(facts["low_m"]) + facts["high_m"])[:2] / 2
     return given | {"origin": np.round(centre - middle, 1).tolist()}

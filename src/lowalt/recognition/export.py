@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from lowalt.files.atomic import replacing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, install_command
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.runs import Trained
 
@@ -52,5 +52,5 @@ def export(trained: Trained, out: str | Path) -> None:
             torch.onnx.export(model, (example,), temporary, dynamic_shapes=dynamic, dynamo=True, external_data=False)
         except ImportError as error:
             raise InputError(
-                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `pip install 'lowalt[export]'`"
+                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `{install_command('export')}`"
             ) from error

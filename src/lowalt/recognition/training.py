@@ -17,7 +17,7 @@ import torch
 from torch import nn
 
 from lowalt.files.csv_tables import write_csv
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, install_command
 from lowalt.machine.progress import Reporter
 from lowalt.recognition import checkpoint, recogniser
 from lowalt.recognition.batch_norm import over_ranks
@@ -46,7 +46,7 @@ def tensorboard(folder: str | Path, first: int) -> Metrics:
     except ImportError as error:
         raise InputError(
             f"recognition.tensorboard: the package tensorboard is not installed ({error}); "
-            "expected `pip install 'lowalt[tensorboard]'`, or recognition.tensorboard: false"
+            f"expected `{install_command('tensorboard')}`, or recognition.tensorboard: false"
         ) from error
     writer = SummaryWriter(str(folder), purge_step=first)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, install_command
 
 NUMERIC = "biufc"
 """Kinds of arrays that samples can be."""
@@ -88,7 +88,7 @@ def _new(source: str) -> dict[str, np.ndarray]:
     try:
         import h5py
     except ImportError:
-        sys.exit("version 7.3 needs h5py, expected `pip install 'lowalt[matlab]'` or a file saved with -v7")
+        sys.exit(f"version 7.3 needs h5py, expected `{install_command('matlab')}` or a file saved with -v7")
     with h5py.File(source) as file:
         return dict(_below(file, "", INFLATED * Path(source).stat().st_size))
 

@@ -124,8 +124,9 @@ class SceneSample:
 
     def echo(self, view: View) -> np.ndarray:
         """Return the frequency response (N, M) on all paths of a view's target, which stands still within a symbol."""
-        # Most facades reflect nothing during a look, so their paths are left out.
-        paths = [path for path in self.paths(view) if np.any(path.coefficient) and np.any(path.outward.coefficient)]
+        # Most facades reflect nothing during a look, so their paths are left out. On a link, waves that leave on a path
+        # may return on any other, so a path counts where either end uses it.
+        paths = [path for path in self.paths(view) if np.any(path.coefficient) or np.any(path.outward.coefficient)]
         if view is self.view and not paths and not self._waves:
             return self.direct
         return response(view, paths, self.routes(view, paths), **self._waves)

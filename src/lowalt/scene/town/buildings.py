@@ -8,7 +8,7 @@ import numpy as np
 
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
-from lowalt.scene.town.building_surfaces import Surfaces, joined, mesh_parts
+from lowalt.scene.town.building_surfaces import Surfaces, joined, mesh_parts, such_as
 from lowalt.scene.town.facets import Town, corner_numbers, sizes, town
 from lowalt.scene.town.materials import MATERIALS
 from lowalt.targets.mesh_files import SUFFIXES
@@ -20,6 +20,9 @@ LOWEST_M = -1.0
 """A triangle that reaches deeper is refused: the ground is flat."""
 TALLEST_M, SMALLEST_M, LARGEST_M = (2.0, 900.0), 3.0, 20_000.0
 """Heights of the tallest building, and least and largest extents of a town, outside of which the unit is wrong."""
+
+KEYS = ("height_m", "unit", "up", "material", "ground", "left_out")
+"""Settings of the effect `town` that say how a file is read, beside its origin."""
 
 
 class Buildings(NamedTuple):
@@ -36,14 +39,15 @@ def _surfaces(path: Path, settings: dict) -> Surfaces:
     if kind in (".geojson", ".json"):
         from lowalt.scene.town.footprints import read_footprints
 
-        return read_footprints(path, origin, settings["height_m"], settings["material"])
+        return read_footprints(path, origin, settings)
     if kind == ".xml":
         from lowalt.scene.town.mitsuba import read_mitsuba
 
         found = read_mitsuba(path, settings["unit"])
     elif kind in SUFFIXES:
         # glTF states its axes: y is up.
-        found = joined(mesh_parts(path, settings["unit"], "y" if kind == ".glb" else settings["up"]), {})
+        parts, unknown = mesh_parts(path, settings["unit"], "y" if kind == ".glb" else settings["up"])
+        found = joined(parts, {}, {}, unknown)
     else:
         known = (".geojson", ".xml", *SUFFIXES)
         raise InputError(f"{path}: ends in {kind!r}, expected a file of buildings that ends in one of {known}")
@@ -110,14 +114,14 @@ def read(settings: dict) -> Buildings:
     if settings["buildings"] is None:
         raise InputError("effects.town.buildings: not set, expected the file of the buildings, such as town.geojson")
     path, origin = existing(settings["buildings"], "file of buildings"), settings["origin"]
-    key = (settings["height_m"], settings["unit"], settings["up"], settings["material"], settings["ground"])
+    key = tuple(settings[name] for name in KEYS)
     return _read(path, path.stat().st_mtime_ns, None if origin is None else tuple(origin), key)
 
 
 @lru_cache(maxsize=4)
 def _read(path: Path, changed_ns: int, origin: tuple[float, float] | None, key: tuple) -> Buildings:
     """The buildings of a file as it was at an instant."""
-    settings = dict(zip(("height_m", "unit", "up", "material", "ground"), key, strict=True)) | {"origin": origin}
+    settings = dict(zip(KEYS, key, strict=True)) | {"origin": origin}
     for name in ("material", "ground"):
         if settings[name] not in MATERIALS:
             raise InputError(f"effects.town.{name}: {settings[name]!r}, expected one of {list(MATERIALS)}")
@@ -129,10 +133,15 @@ def _read(path: Path, changed_ns: int, origin: tuple[float, float] | None, key: 
     facets, count = made.facets, len(made.facets.offset) - 1
     walls = int((abs(facets.normal[:-1, 2]) < 0.5).sum())
     used = {name: int((material == k).sum()) for k, name in enumerate(names)}
+    notes = dict(found.notes)
+    if found.unknown:
+        lacking = f"surfaces of materials that no table has{such_as(found.unknown)}"
+        notes[f"{lacking}: {settings['material']} stands for them"] = len(found.unknown)
     facts = {
         "low_m": corners.min(axis=(0, 1)).tolist(), "high_m": corners.max(axis=(0, 1)).tolist(),
         "buildings": int(made.building.max()) + 1, "triangles": len(corners), "facets": count, "walls": walls,
         "roofs": count - walls, "materials": used, "ground": settings["ground"],
         "dropped": {reason: number for reason, number in dropped.items() if number},
+        "notes": notes,
     }  # fmt: skip
     return Buildings(made, corners, facts)

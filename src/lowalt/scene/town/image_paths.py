@@ -134,4 +134,4 @@ def direct(
     lit = seen(town, station_m, rays, np.empty(0, np.int64))
     if not diffraction:
         return lit, lit.astype(np.complex128)
-    return lit, knife_edge.direct(town, station_m, places, lit, wavelength_m, 2 * STEP)
+    return lit, knife_edge.direct(town, station_m, places, lit, wavelength_m)

@@ -49,13 +49,26 @@ def _place(shape: Element) -> np.ndarray:
     return result
 
 
-def _materials(root: Element) -> dict[str, str]:
-    """The material that each `bsdf` with an identifier means, "" for none that is known."""
-    result = {}
-    for bsdf in root.findall("bsdf"):
-        kind = next((text.get("value", "") for text in bsdf.findall("string") if text.get("name") == "type"), "")
-        result[bsdf.get("id", "")] = named(kind) or named(bsdf.get("id", "")) or ""
-    return result
+def _names(bsdf: Element) -> list[str]:
+    """The names by which a `bsdf` may mean a material: its string `type`, then its identifier."""
+    kinds = [text.get("value", "") for text in bsdf.findall("string") if text.get("name") == "type"]
+    return [name for name in (*kinds, bsdf.get("id", "")) if name]
+
+
+def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
+    """The material of a shape, "" for none that is known, and the name of one that is not known, "" for none.
+
+    scene: the names of the materials of the scene by their identifiers.
+    """
+    names = []
+    for reference in shape.findall("ref"):
+        identifier = reference.get("id", "")
+        names += scene.get(identifier, [identifier])
+    for bsdf in shape.findall("bsdf"):
+        names += _names(bsdf) or [bsdf.get("type", "")]
+    material = next(filter(None, map(named, names)), "")
+    unknown = names[0] if names and not material else ""
+    return material, unknown
 
 
 def _file_of(shape: Element, path: Path) -> Path:
@@ -89,15 +102,18 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
     shapes = root.findall("shape")
     if root.tag != "scene" or len(shapes) > MOST_SHAPES:
         raise InputError(f"{path}: <{root.tag}> with {len(shapes)} shapes, expected a scene with at most {MOST_SHAPES}")
-    materials, parts, left_out = _materials(root), [], {}
+    materials = {bsdf.get("id", ""): _names(bsdf) for bsdf in root.findall("bsdf")}
+    parts, left_out, unknown = [], {}, []
     for shape in shapes:
         if shape.get("type") not in KINDS:
             label = f"shapes of type {str(shape.get('type'))[:20]}"
             left_out[label] = left_out.get(label, 0) + 1
             continue
-        references = [ref.get("id", "") for ref in shape.findall("ref")]
-        material = next((materials.get(ref) or named(ref) or "" for ref in references), "")
+        material, unknown_name = _material(shape, materials)
+        if unknown_name:
+            unknown.append(unknown_name)
         place = _place(shape)
-        for corners, _ in mesh_parts(_file_of(shape, path), unit, "z"):
+        pieces, _ = mesh_parts(_file_of(shape, path), unit, "z")
+        for corners, _ in pieces:
             parts.append((corners @ place[:3, :3].T + place[:3, 3], material))
-    return joined(parts, left_out)
+    return joined(parts, left_out, {}, unknown)

@@ -46,7 +46,7 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
 
 
 def described(path: Path, found: Buildings) -> list[str]:
-    """Return what a town is and what was left out, in lines."""
+    """Return what a town is, what was left out and what was read otherwise than stated, in lines."""
     facts, low, high = found.facts, np.array(found.facts["low_m"]), np.array(found.facts["high_m"])
     used = ", ".join(f"{name} ({count})" for name, count in facts["materials"].items())
     lines = [
@@ -56,7 +56,8 @@ def described(path: Path, found: Buildings) -> list[str]:
         f"{facts['walls']} walls and {facts['roofs']} roofs, merged from {facts['triangles']} triangles",
         f"materials (triangles): {used}; ground: {facts['ground']}",
     ]
-    return lines + [f"left out: {count} {reason}" for reason, count in facts["dropped"].items()]
+    lines += [f"left out: {count} {reason}" for reason, count in facts["dropped"].items()]
+    return lines + [f"read otherwise: {count} {reason}" for reason, count in facts["notes"].items()]
 
 
 def overlay(settings: dict, name: str, comments: list[str]) -> str:

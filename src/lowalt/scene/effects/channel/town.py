@@ -25,7 +25,7 @@ SOURCE = (
 )
 DEFAULTS = {
     "buildings": None, "origin": None, "unit": "m", "up": "z", "height_m": None, "material": "concrete",
-    "ground": "medium_dry_ground", "order": 2, "diffraction": True, "cell_m": 0.5,
+    "left_out": 0.1, "ground": "medium_dry_ground", "order": 2, "diffraction": True, "cell_m": 0.5,
 }  # fmt: skip
 PARTS = {"second order": {"order": 1}, "reflections": {"order": 0}, "diffraction": {"diffraction": False}}
 TWICE = ("ground_reflection", "walls", "line_of_sight")
