@@ -26,7 +26,6 @@ include: "workflow/rules/report.smk"
 onstart:
     print(*filter(None, (RUN.sources, RUN.folding)), sep="\n", file=sys.stderr)
     with refusing():
-        RUN.launch.before(workflow)
         space.before(workflow, RUN.plan, config)
 
 

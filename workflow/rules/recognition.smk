@@ -83,16 +83,15 @@ rule train:
     priority: RUN.images_of_job
     conda:
         "../../envs/environment.yaml"
-    threads: config["recognition"]["training"]["threads"] * RUN.launch.per_node
+    threads: config["recognition"]["training"]["threads"]
     resources:
-        **RUN.launch.training,
+        gpu=RUN.gpus,
     params:
         settings=settings.training,
-        launcher=RUN.launch.words,
         source=options.samples,
         events=["--tensorboard"] if config["recognition"]["tensorboard"] else [],
     shell:
-        "python -m {params.launcher:q} lowalt.recognition train --settings {params.settings:q} {params.source:q}"
+        "python -m lowalt.recognition train --settings {params.settings:q} {params.source:q}"
         " --frozen {input.frozen:q} --protocol {wildcards.protocol:q}"
         ' {params.events:q} --out "$(dirname {output.model:q})" 2> {log:q}'
 
@@ -119,7 +118,7 @@ rule evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     resources:
-        **RUN.launch.evaluation,
+        gpu=RUN.gpus,
     params:
         settings=settings.evaluation,
         source=options.samples,
@@ -177,7 +176,7 @@ rule transfer_evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     resources:
-        **RUN.launch.evaluation,
+        gpu=RUN.gpus,
     params:
         settings=settings.evaluation,
         source=options.samples,

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import timm
 import torch
 from torch import nn
 
@@ -26,7 +27,6 @@ from lowalt.machine.hardware import describe
 from lowalt.recognition import checkpoint, inference, predictions, recipe, recogniser
 from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recognition.light_timm import timm
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record

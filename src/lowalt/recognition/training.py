@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import timm
 import torch
 from torch import nn
 
@@ -20,10 +21,8 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import Reporter
 from lowalt.recognition import checkpoint, recogniser
-from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.batches import Augmented, Prefetch, Unchanged, batches, epoch_order
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recognition.light_timm import timm
 from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.objective import descent
 from lowalt.recognition.recipe import averaging, optimiser, random_state, schedule, set_random_state
@@ -106,7 +105,7 @@ class Trainer:
         if self.block["activation_checkpointing"]:
             recogniser.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
-        shared = over_ranks(model) if machine.ranks > 1 else model
+        shared = machine.with_shared_statistics(model)
         plain = not machine.gpu and not self.block["compile"] and machine.precision == "fp32"
         shared = as_products(shared) if plain else shared
         self.model = shared.to(machine.device, memory_format=layout)
