@@ -146,7 +146,7 @@ def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, cap
         assert main(["predict", name, str(signals)]) == 2
         told = capsys.readouterr().err
         assert told.count("\n") == 1 and "which a file may not choose; expected `--backbone FILE.py:FUNCTION`" in told
-    for out in ("a.onnx", "a.pt2", "b.safetensors"):
+    for out in ("a.onnx", "b.safetensors"):
         with pytest.raises(InputError, match="may not choose"):
             recognition(["export", "--settings", "{}", "--model", "a.pt", "--out", out])
     with pytest.raises(InputError, match="may not choose"):

@@ -175,14 +175,14 @@ def _score(arguments: list[str]) -> None:
 
 
 def _export(arguments: list[str]) -> None:
-    """Write a trained model as safetensors with a card, as a torch.export program or as ONNX. Settings: none ({})."""
+    """Write a trained model as safetensors with a card, or as ONNX. Settings: none ({})."""
     from lowalt.recognition.export import export
     from lowalt.recognition.runs import load
 
     line = parser("lowalt.recognition export", _export.__doc__)
     line.add_argument("--model", required=True, help="model.pt of a training run")
     name_backbone(line)
-    line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md), .pt2 or .onnx")
+    line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md) or .onnx")
     options = line.parse_args(arguments)
     pick(options.settings)
     export(load(options.model, options.backbone), options.out)
