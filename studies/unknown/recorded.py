@@ -166,7 +166,7 @@ def with_empty(radar: Radar, library: Library, block: dict, fold: str) -> Kept:
 
 def with_extra(radar: Radar, library: Library, block: dict, folder: Path) -> Radar:
     """Return the radar with a network of five classes that is trained here, unless that is done."""
-    path = folder / radar.name / "model.pt"
+    path = folder / radar.name / "model.safetensors"
     if not path.is_file():
         windows = {fold: with_empty(radar, library, block, fold) for fold in ("train", "validation")}
         settings = {key: block[key] for key in ("seed", "size", "network", "training", "augmentation")}

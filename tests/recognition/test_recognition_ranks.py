@@ -11,8 +11,9 @@ import timm
 import torch
 from torch import nn
 
+import model_files
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, predictions, runs
+from lowalt.recognition import predictions, runs
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
 from trainings import SCHEME, SETTINGS, sources, with_training
@@ -71,7 +72,7 @@ def training_line(folder, views, name, batch):
 def evaluation_line(folder, views, trained, name):
     """A command line that evaluates a finished training, into `folder`/`name`."""
     settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32", "mirror": False})
-    return ["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.pt"),
+    return ["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.safetensors"),
             "--out", str(folder / name)]  # fmt: skip
 
 
@@ -98,7 +99,7 @@ def test_two_ranks_train_as_one_with_both_their_samples(both):
     """Gradients are means over the ranks' equal shares, so a step is that of one rank with the whole batch."""
     weights, losses = {}, {}
     for name, ranks in (("one", 1), ("two", 2), ("half", 1)):
-        found = checkpoint.load(both / name / "model.pt")[1]["weights"]
+        found = model_files.load(both / name / "model.safetensors")[1]["weights"]
         weights[name] = torch.cat([value.flatten() for value in found.values() if value.is_floating_point()])
         with (both / name / "history.csv").open(newline="") as file:
             losses[name] = [float(row["validation_loss"]) for row in csv.DictReader(file)]
@@ -115,7 +116,7 @@ def test_a_rank_beside_the_first_writes_and_says_nothing(views, trained, tmp_pat
     settings = with_training(steps=2, validate_every=1, checkpoint_s=0)
     runs.train(sources(views), SCHEME, "seen", settings, tmp_path / "run", events=True)
     block = {"batch": 64, "threads": 1, "precision": "fp32", "mirror": False}
-    runs.evaluate(runs.load(trained / "model.pt"), sources(views)["validation"], block, tmp_path / "some.csv")
+    runs.evaluate(runs.load(trained / "model.safetensors"), sources(views)["validation"], block, tmp_path / "some.csv")
     assert not list(tmp_path.iterdir()) and not capsys.readouterr().err
 
 
@@ -133,7 +134,8 @@ def test_batch_norm_over_ranks_of_processors_is_refused_and_over_gpus_shared():
     own = timm.create_model("test_resnet", num_classes=0)
     on_processors, on_gpus = (Machine(torch.device(kind), "fp32", 0, 2) for kind in ("cpu", "cuda"))
     with pytest.raises(
-        InputError, match="2 processes on processors share no batch norm, and the backbone has [a-z0-9.]+; expected GPUs"
+        InputError,
+        match=r"share no batch norm, and the backbone has [a-z0-9.]+; expected GPUs",
     ):
         on_processors.with_shared_statistics(own)
     assert Machine(torch.device("cpu"), "fp32").with_shared_statistics(own) is own

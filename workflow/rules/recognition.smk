@@ -73,7 +73,7 @@ rule train:
         ),
         frozen=f"{DATA}/SHA256SUMS",
     output:
-        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.safetensors",
         history="results/{run}/models/{protocol}/{scheme}/{train_seed}/history.csv",
     log:
         "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
@@ -106,7 +106,7 @@ rule evaluate:
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
-        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.safetensors",
     output:
         table="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.csv",
         about="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.json",
@@ -164,7 +164,7 @@ rule transfer_evaluate:
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
-        model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+        model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.safetensors",
     output:
         table="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.csv",
         about="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.json",
