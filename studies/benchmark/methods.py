@@ -99,7 +99,7 @@ def network(given: Given, scheme: Scheme, build: Callable, source: Callable[[Tra
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
 
-    block, model = given.config["recognition"], given.folder / "model.pt"
+    block, model = given.config["recognition"], given.folder / "model.safetensors"
     if not model.is_file():
         samples = {"train": source(given.train), "validation": source(given.validation)}
         kept = {key: block[key] for key in ("network", "training", "augmentation")}

@@ -190,7 +190,7 @@ def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
 def confirmed(rows: list[dict], data: str, zoo: Path) -> list[dict]:
     """Keep the models of CONFIRMED in a zoo, and return the rows with their confirmed results."""
     for (name, method), entry in CONFIRMED.items():
-        model, config = place(method, name, 0) / "model.pt", config_of(MAIN)
+        model, config = place(method, name, 0) / "model.safetensors", config_of(MAIN)
         content = replace(model_file.of_run(model), input={block: config[block] for block in model_file.INPUT})
         keep(content, model, TrackSamples(named(name), "validation", data), entry, zoo)
         found = confirm(zoo / f"{entry}.safetensors", named(name)).percent

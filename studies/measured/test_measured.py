@@ -199,7 +199,7 @@ def test_a_network_names_each_recording_once_a_seed_and_by_the_mean(tmp_path):
     assert (tmp_path / "trained/spectra-vehicle_24ghz-drive.wav.png").is_file()
     (tmp_path / "models/cw_24ghz-0").rename(tmp_path / "models/uav_3ghz-0")
     with pytest.raises(InputError, match="trained on the twin 'cw_24ghz', expected 'uav_3ghz'"):
-        accuracy.loaded(tmp_path / "models/uav_3ghz-0/model.pt", "uav_3ghz")
+        accuracy.loaded(tmp_path / "models/uav_3ghz-0/model.safetensors", "uav_3ghz")
 
 
 def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():

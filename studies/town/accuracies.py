@@ -120,7 +120,7 @@ def evaluated(out: Path) -> dict[tuple[str, str], list[Evaluated]]:
     for trained_on, seed in product(TRAINED_ON, config["recognition"]["seeds"]):
         job, folder = trainings.Job(scheme, PROTOCOL, seed), out / trained_on
         trainings.trained(job, config, data_of(trained_on), folder, partial(source, trained_on, size=size))
-        model = runs.load(folder / f"models/{job.name}/model.pt")
+        model = runs.load(folder / f"models/{job.name}/model.safetensors")
         for scene in SCENES:
             path = folder / f"{scene}/{job.name}.csv"
             if not path.with_suffix(".json").is_file():

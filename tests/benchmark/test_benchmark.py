@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import yaml
 
+import model_files
 from lowalt.benchmark import definition, frozen_bytes
 from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN
 from lowalt.benchmark.definition import MAIN, PARTS, VERSION, config_of, truth
 from lowalt.commands.compare import leaves
 from lowalt.config.layers import SCHEMA
 from lowalt.files.shipped import as_named
-from lowalt.recognition import checkpoint, recogniser, runs, schemes
+from lowalt.recognition import recogniser, runs, schemes
 from lowalt.workflow.run import Run
 
 ROOT = Path(__file__).parents[2]
@@ -98,10 +99,12 @@ def test_a_trained_network_may_have_the_classes_of_a_track(track, tmp_path):
              "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
     weights = recogniser.Recogniser(scheme, block, 24, np.zeros((1, 256, 3), np.uint8), len(classes)).state_dict()
     about = {"scheme": vars(scheme), "protocol": "seen", "network": block, "size": 24, "seed": 0}
-    checkpoint.save(
-        tmp_path / "model.pt", "{}", {"weights": weights, "colour_map": "gray", "classes": list(classes), **about}
+    model_files.save(
+        tmp_path / "model.safetensors",
+        "{}",
+        {"weights": weights, "colour_map": "gray", "classes": list(classes), **about},
     )
-    assert runs.load(tmp_path / "model.pt").classes == classes
+    assert runs.load(tmp_path / "model.safetensors").classes == classes
 
 
 def test_each_part_has_a_seed_of_its_own_and_tests_alone():

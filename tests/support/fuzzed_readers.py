@@ -15,7 +15,7 @@ from scipy.io import savemat, wavfile
 import towns
 from craft import craft, row
 from fuzzed_folders import folders
-from fuzzed_seals import ARCHIVE, CHECKPOINT, INDEX, JSON, MATLAB, MODEL, PNG, YAML
+from fuzzed_seals import ARCHIVE, INDEX, JSON, MATLAB, MODEL, PNG, YAML
 from fuzzing import Reader
 from shown_meshes import dae, ply, prism, skinned
 
@@ -284,16 +284,10 @@ def _index(render: dict) -> bytes:
 
 def _models() -> list[Reader]:
     """Readers of trained models."""
-    import torch
-
-    from lowalt.recognition import checkpoint, model_file, zoo_files
+    from lowalt.recognition import model_file, zoo_files
 
     path = zoo_files.path_of("default-seen")
-    known = model_file.read(path)
-    state = {**known.model, "weights": {"a": torch.ones(5)}}
-    trained = _bytes(lambda p: checkpoint.save(p, json.dumps(known.identity), state), "a.pt")
     return [
-        Reader("trained model", "a.pt", trained, checkpoint.model, seal=CHECKPOINT),
         Reader("model file", "a.safetensors", path.read_bytes(), model_file.read, share=0.2, seal=MODEL),
     ]
 

@@ -53,7 +53,7 @@ def dataset(track: Track, seed: int) -> Dataset:
 def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
     """Make the test set that follows from a model file, evaluate the model on it, and return the result.
 
-    model: model.pt of a training, a .safetensors file, or the name of one in results/zoo; trusted: FILE.py:FUNCTION of
+    model: a .safetensors file, or the name of one in results/zoo; trusted: FILE.py:FUNCTION of
     a model whose backbone is the user's own code.
     Raises: InputError for a file that is no model, one that does not answer with the track's classes or sees stations
     that the track forbids, and a track that cannot be confirmed.

@@ -31,7 +31,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     line.add_argument("--track", required=True, help="the track, such as unseen")
     line = add_command(own, "confirm", confirmed, "test a model on a set whose root seed follows from its file",
                        "lowalt benchmark confirm default-unseen --track unseen")  # fmt: skip
-    line.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
+    line.add_argument("model", help="a .safetensors file, of a training or another, or the name of one in results/zoo")
     line.add_argument("--track", required=True, help="the track, such as unseen")
     name_backbone(line)
     line = add_command(own, "table", shown, "the table of baselines", "lowalt benchmark table --track unseen")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `predict` to a parser's commands."""
     line = add_command(commands, name, run)
-    line.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
+    line.add_argument("model", help="a .safetensors file, of a training or another, or the name of one in results/zoo")
     line.add_argument("input", type=Path, help="tile (.png), signals (stations, symbols) complex (.npy), or a "
                          "recording's record (.yaml)")  # fmt: skip
     name_backbone(line)

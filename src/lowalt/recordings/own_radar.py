@@ -20,6 +20,7 @@ from lowalt.machine.progress import reported
 from lowalt.recognition import model_card, model_file, zoo
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import of_run
+from lowalt.recognition.runs import of_file
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.presence import heard_powers, noise_floor
 from lowalt.recordings.record import Record
@@ -90,14 +91,14 @@ def trained_radar(record: Record, out: Path, block: dict) -> dict:
     folds = {fold: simulated(library, name, block, fold, classes) for fold in parts}
     with tempfile.TemporaryDirectory() as folder:
         network = train(block, {fold: folds[fold] for fold in ("train", "validation")}, name, seed, folder, classes)
-        content = of_run(Path(folder) / "model.pt")
+        content = of_run(Path(folder) / "model.safetensors")
     validation, test = (folds[fold].facts.label for fold in ("validation", "test"))
     warm = temperature(_shares(network, folds["validation"]), validation)
     last = last_layer(content.tensors)
     cooled = {key: value / warm if key.rpartition(".")[0] == last else value for key, value in content.tensors.items()}
     path, content = out.with_name(f"{name}.safetensors"), replace(content, tensors=cooled)
     reduced = zoo.small(content)
-    exact, entry = (model_file.trained(weights, path) for weights in (content, reduced))
+    exact, entry = (of_file(weights, path) for weights in (content, reduced))
     shares = _shares(entry.model, folds["test"])
     right = shares.argmax(1) == test
     made_with = {"network": twin.network_settings(), "spectra": twin.spectra_settings(), "images": block["images"]}

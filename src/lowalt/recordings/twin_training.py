@@ -66,7 +66,7 @@ def train(
 ) -> nn.Module:  # fmt: skip
     """Return the network trained on simulated windows {"train": ..., "validation": ...} of the twin `name`.
 
-    block: as `settings` gives it; seed: of the weights and the order; folder: where `model.pt` and `history.csv` go.
+    block: as `settings` gives it; seed: of the weights and the order; folder: of the files that training writes.
     """
     keys, colours = ("recordings", name, seed), block["images"]["colour_map"]
     seeded(block["seed"], keys, block["training"]["threads"])
