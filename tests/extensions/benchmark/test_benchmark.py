@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import yaml
 
-from lowalt.benchmark import definition, frozen_bytes
-from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN
-from lowalt.benchmark.definition import MAIN, PARTS, VERSION, config_of, truth
 from lowalt.commands.compare import leaves
 from lowalt.config.layers import SCHEMA
+from lowalt.extensions.benchmark import definition, frozen_bytes
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN
+from lowalt.extensions.benchmark.definition import MAIN, PARTS, VERSION, config_of, truth
 from lowalt.files.shipped import as_named
 from lowalt.recognition import checkpoint, recogniser, runs, schemes
 from lowalt.workflow.run import Run
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MADE_OF = ("seed", "network", "targets", "motion", "echo", "effects", "noise", "spectra", "images", "split")
 """Blocks of a configuration that decide a byte of its samples."""
 

@@ -13,12 +13,12 @@ import pytest
 import small_benchmark
 from lowalt import benchmark
 from lowalt.__main__ import main
-from lowalt.benchmark import baseline_table, confirm, definition, frozen_bytes
-from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
+from lowalt.extensions.benchmark import baseline_table, confirm, definition, frozen_bytes
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS
 from lowalt.files.errors import InputError, InputWarning
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ZOO = ROOT / "results/zoo/default-unseen.safetensors"
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from sklearn.metrics import f1_score, roc_auc_score
 
-from lowalt.benchmark import baselines, scoring
-from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN
-from lowalt.benchmark.submission import read
+from lowalt.extensions.benchmark import baselines, scoring
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN
+from lowalt.extensions.benchmark.submission import read
 from lowalt.files.errors import InputError
 from lowalt.recognition.predictions import probability_columns
 
-sys.path.append(str(Path(__file__).parents[2] / "studies/benchmark"))
+sys.path.append(str(Path(__file__).parents[3] / "studies/benchmark"))
 import kept_results
 
 UNSEEN, OPEN = TRACKS["unseen"], TRACKS["open-set"]

@@ -10,7 +10,7 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
-from lowalt.drafting.inspection import inspect_mesh
+from lowalt.extensions.drafting.inspection import inspect_mesh
 from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import Cloud, read
 from meshes import box, saved

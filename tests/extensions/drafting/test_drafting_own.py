@@ -9,15 +9,15 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
-from lowalt.drafting.guesses import guessed_axes, guessed_unit
-from lowalt.drafting.inspection import described, inspect_mesh
+from lowalt.extensions.drafting.guesses import guessed_axes, guessed_unit
+from lowalt.extensions.drafting.inspection import described, inspect_mesh
 from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import read
 from lowalt.targets.make import make
 from lowalt.targets.records import load_table, merge, read_records
 from meshes import box, quadrotor
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize(("blades", "unit", "metres"), [(False, "in", 0.0254), (True, "mm", 0.001)])

@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from lowalt.__main__ import main
-from lowalt.drafting.front import Shape, Turning, front_of
+from lowalt.extensions.drafting.front import Shape, Turning, front_of
 from lowalt.files.errors import InputError
 from lowalt.targets.cloud import read
 from made_robots import car_urdf

@@ -8,8 +8,8 @@ import trimesh
 import yaml
 
 from lowalt.__main__ import main
-from lowalt.drafting.robot_files import read_robot
-from lowalt.drafting.robots import Joint, parts_of
+from lowalt.extensions.drafting.robot_files import read_robot
+from lowalt.extensions.drafting.robots import Joint, parts_of
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets.cloud import Cloud, read
 from made_robots import HUBS, MJCF, SDF, urdf

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dataset import RENDER, motion_rows, pack
+from lowalt.extensions.formats.sigmf import main
 from lowalt.shards import ShardSet
 from lowalt.shards.index import build
 from lowalt.shards.sample_record import sample_key
-from lowalt.shards.sigmf import main
 from pictures import NETWORK
 
 PARTS = {("seen", "train"): slice(0, 5), ("seen", "val"): slice(5, 8), ("unseen", "test"): slice(0, 2)}

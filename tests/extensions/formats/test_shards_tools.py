@@ -12,11 +12,11 @@ import yaml
 from test_shards_card import CONFIG
 
 from dataset import build
+from lowalt.extensions.formats.sigmf import main as sigmf
 from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet
 from lowalt.shards.card import main as card
 from lowalt.shards.croissant import FIELDS, RESPONSIBLE
-from lowalt.shards.sigmf import main as sigmf
 
 
 @pytest.fixture(scope="module", params=["image", "signal"])

@@ -11,14 +11,13 @@ import yaml
 from scipy.io import wavfile
 
 from lowalt.__main__ import main as lowalt
+from lowalt.extensions.recordings import read, read_record, recording_picture
+from lowalt.extensions.recordings.evidence import chirp_length
+from lowalt.extensions.recordings.file_inspection import inspect_recording
+from lowalt.extensions.recordings.record import record
 from lowalt.files.errors import InputError
-from lowalt.recordings import read, read_record
-from lowalt.recordings.evidence import chirp_length
-from lowalt.recordings.file_inspection import inspect_recording
-from lowalt.recordings.record import record
-from lowalt.report.figures import recording_picture
 
-WRITTEN = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks/recording_layouts.py"))
+WRITTEN = runpy.run_path(str(Path(__file__).parents[3] / "benchmarks/recording_layouts.py"))
 LAYOUTS, CARRIER, RATE = WRITTEN["LAYOUTS"], WRITTEN["CARRIER_HZ"], WRITTEN["RATE_HZ"]
 
 

@@ -8,14 +8,14 @@ import yaml
 from scipy.io import wavfile
 
 from lowalt.__main__ import main as lowalt
+from lowalt.extensions.recordings.files import Baseband, read
+from lowalt.extensions.recordings.own_radar import snr_range, temperature, trained_radar
+from lowalt.extensions.recordings.record import read_record, record
+from lowalt.extensions.recordings.twin import twin_of
+from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.progress import Reporter
-from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.own_radar import snr_range, temperature, trained_radar
-from lowalt.recordings.record import read_record, record
-from lowalt.recordings.twin import twin_of
-from lowalt.recordings.twin_scenes import Library
 
 SAID = {"waveform": "cw", "distance_m": [2, 10], "height_m": [-1, 1], "beam_deg": 60}
 

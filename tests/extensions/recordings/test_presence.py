@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.recordings.presence import ENOUGH, beyond_mps, floor_between, noise_floor, present
-from lowalt.recordings.twin import Twin, radars
+from lowalt.extensions.recordings.presence import ENOUGH, beyond_mps, floor_between, noise_floor, present
+from lowalt.extensions.recordings.twin import Twin, radars
 
 LOOKING = Twin(24.0e9, "real", 6000.0, 1 / 3000.0, 400, "one_sided", 0.4, 15.0)
 HOVERING = ("uav_3ghz", "bird_drone_10ghz")

@@ -10,12 +10,12 @@ from scipy.io import savemat, wavfile
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.schema import BROUGHT
+from lowalt.extensions.recordings import coherent_intervals, read, read_record, symbol_rate
+from lowalt.extensions.recordings.channel import ONE_SIDED_EDGE, analytic
+from lowalt.extensions.recordings.record import Record, record
+from lowalt.extensions.recordings.twin import CHANNELS, radars
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings import coherent_intervals, read, read_record, symbol_rate
-from lowalt.recordings.channel import ONE_SIDED_EDGE, analytic
-from lowalt.recordings.record import Record, record
-from lowalt.recordings.twin import CHANNELS, radars
 
 RATE = 8000.0
 BASE = {"carrier_hz": 24.0e9, "source": "made here", "licence": "MIT"}

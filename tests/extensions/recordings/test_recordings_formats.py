@@ -9,14 +9,14 @@ import pytest
 import yaml
 from scipy.io import savemat, wavfile
 
+from lowalt.extensions.recordings import read, read_record
+from lowalt.extensions.recordings.faults import clipped
+from lowalt.extensions.recordings.record import record
 from lowalt.files.errors import InputError
-from lowalt.recordings import read, read_record
-from lowalt.recordings.faults import clipped
-from lowalt.recordings.record import record
 
 RATE = 12000.0
-FAULTS = Path(__file__).parents[2] / "shared/data/faults/recordings"
-FAULTS = FAULTS if FAULTS.is_dir() else Path(__file__).parents[3] / "shared/data/faults/recordings"
+FAULTS = Path(__file__).parents[3] / "shared/data/faults/recordings"
+FAULTS = FAULTS if FAULTS.is_dir() else Path(__file__).parents[4] / "shared/data/faults/recordings"
 
 
 def wave(count: int = 6000) -> np.ndarray:

@@ -11,12 +11,12 @@ from PIL import Image
 from scipy.io import wavfile
 
 from lowalt.__main__ import main as lowalt
+from lowalt.extensions.recordings import read_record
+from lowalt.extensions.recordings.__main__ import main
+from lowalt.extensions.recordings.twin import radars
+from lowalt.extensions.recordings.windows import spectra, write
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings import read_record
-from lowalt.recordings.__main__ import main
-from lowalt.recordings.twin import radars
-from lowalt.recordings.windows import spectra, write
 from lowalt.shards import ShardSet, faults
 
 SECONDS = 1.3

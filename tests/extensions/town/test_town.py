@@ -12,14 +12,14 @@ from lowalt.__main__ import main
 from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.extensions.town import image_paths, knife_edge, town
+from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.facets import town as made
+from lowalt.extensions.town.materials import MATERIALS, named, properties
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import received_signal
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects.channel import ground_reflection, town, walls
-from lowalt.scene.town import image_paths, knife_edge
-from lowalt.scene.town.buildings import read
-from lowalt.scene.town.facets import town as made
-from lowalt.scene.town.materials import MATERIALS, named, properties
+from lowalt.scene.effects.channel import ground_reflection, walls
 from scenes import A, network, scene, target, view_of
 from shown_meshes import ply as ply_bytes
 from towns import BOXES, ORIGIN, block, geojson, mitsuba, ply

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.benchmark.definition import REFERENCE
+from lowalt.extensions.benchmark.definition import REFERENCE
 from lowalt.files.csv_tables import number, read_csv
 from lowalt.files.shipped import shipped
 from lowalt.recognition.intervals import Interval

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.benchmark import baseline_table
-from lowalt.benchmark.benchmark_tracks import TRACKS, Track
-from lowalt.benchmark.definition import REFERENCE, VERSION
-from lowalt.benchmark.scoring import Values, difference, models_of
+from lowalt.extensions.benchmark import baseline_table
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track
+from lowalt.extensions.benchmark.definition import REFERENCE, VERSION
+from lowalt.extensions.benchmark.scoring import Values, difference, models_of
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.errors import InputError, instead
 from lowalt.files.shipped import shipped

@@ -3,14 +3,14 @@
 import argparse
 from pathlib import Path
 
-from lowalt.benchmark import baseline_table, frozen_bytes
-from lowalt.benchmark.baselines import kept
-from lowalt.benchmark.benchmark_tracks import TRACKS, Track, named
-from lowalt.benchmark.definition import MAIN, VERSION, overlays, run_name
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
 from lowalt.config.command import name_backbone
+from lowalt.extensions.benchmark import baseline_table, frozen_bytes
+from lowalt.extensions.benchmark.baselines import kept
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track, named
+from lowalt.extensions.benchmark.definition import MAIN, VERSION, overlays, run_name
 from lowalt.files.errors import InputError
 from lowalt.recognition.intervals import Interval
 
@@ -79,8 +79,8 @@ def against(name: str, lead: Interval, width: int) -> str:
 
 def score(options: argparse.Namespace) -> Answer:
     """Score a submission. Raises: InputError in one sentence for a wrong track or file."""
-    from lowalt.benchmark.scoring import scores
-    from lowalt.benchmark.submission import read
+    from lowalt.extensions.benchmark.scoring import scores
+    from lowalt.extensions.benchmark.submission import read
 
     track = named(options.track)
     facts = scores(track, [read(path, track) for path in options.predictions], kept(track))
@@ -108,8 +108,8 @@ def _report(track: Track, facts: dict) -> str:
 
 
 def confirmed(options: argparse.Namespace) -> Answer:
-    """Confirm a model. Raises: as `lowalt.benchmark.confirm.confirm`."""
-    from lowalt.benchmark.confirm import confirm
+    """Confirm a model. Raises: as `lowalt.extensions.benchmark.confirm.confirm`."""
+    from lowalt.extensions.benchmark.confirm import confirm
 
     found = confirm(options.model, named(options.track), options.backbone)
     text = (f"{VERSION} {found.track}, confirmed: {baseline_table.words(found.percent)} % of {found.samples} samples, "

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lowalt.benchmark.baseline_table import COLUMNS, tables
+from lowalt.extensions.benchmark.baseline_table import COLUMNS, tables
 from lowalt.report.reported_run import ReportedRun
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.benchmark.definition import MAIN, Truth, truth
+from lowalt.extensions.benchmark.definition import MAIN, Truth, truth
 from lowalt.files.errors import InputError, instead
 from lowalt.recognition.protocols import FOLDS
 from lowalt.recognition.samples import Facts

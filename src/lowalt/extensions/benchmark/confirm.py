@@ -11,10 +11,10 @@ from warnings import catch_warnings
 
 import numpy as np
 
-from lowalt.benchmark.benchmark_tracks import TRACKS, Track
-from lowalt.benchmark.definition import VERSION, config_of, root_seed
-from lowalt.benchmark.scoring import headline, tested, values_of
 from lowalt.config.layers import merge
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track
+from lowalt.extensions.benchmark.definition import VERSION, config_of, root_seed
+from lowalt.extensions.benchmark.scoring import headline, tested, values_of
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.recognition.dataset_samples import DatasetSamples
 from lowalt.recognition.intervals import Interval

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.benchmark.definition import PARTS, REFERENCE, config_of, run_name
+from lowalt.extensions.benchmark.definition import PARTS, REFERENCE, config_of, run_name
 from lowalt.files.atomic import replacing, sha256, text_of
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.benchmark.benchmark_tracks import Track, named
-from lowalt.benchmark.definition import MAIN, config_of, overlays, run_name
 from lowalt.config.network import Network
+from lowalt.extensions.benchmark.benchmark_tracks import Track, named
+from lowalt.extensions.benchmark.definition import MAIN, config_of, overlays, run_name
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.recognition.samples import Samples, ViewSamples, fingerprint

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.benchmark.benchmark_tracks import UNKNOWN, Track
-from lowalt.benchmark.definition import MAIN, named_seed
+from lowalt.extensions.benchmark.benchmark_tracks import UNKNOWN, Track
+from lowalt.extensions.benchmark.definition import MAIN, named_seed
 from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions
 from lowalt.recognition.intervals import Interval, model_shares, strict_difference

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lowalt.benchmark.benchmark_tracks import Track
+from lowalt.extensions.benchmark.benchmark_tracks import Track
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError, shown
 from lowalt.recognition.predictions import probability_columns
 
 if TYPE_CHECKING:
-    from lowalt.benchmark.part_samples import TrackSamples
+    from lowalt.extensions.benchmark.part_samples import TrackSamples
 
 TOLERANCE = 1e-3
 """Largest deviation from one of a row's sum."""

@@ -59,7 +59,7 @@ def add_sheets(actions: argparse._SubParsersAction) -> None:
 
 def _draft(options: argparse.Namespace) -> Answer:
     """Draft the record and write it."""
-    from lowalt.drafting.scaled import KINDS, draft_target
+    from lowalt.extensions.drafting.scaled import KINDS, draft_target
 
     kind = KINDS[options.kind]
     stated = {word: getattr(options, word) for word in {**kind.cells, **kind.figures}}

@@ -10,8 +10,8 @@ import yaml
 from scipy.spatial import cKDTree
 
 from lowalt.config.classes import AIRBORNE
-from lowalt.drafting.guesses import TURNING, Group, alike, turning_axis
-from lowalt.drafting.inspection import Inspection
+from lowalt.extensions.drafting.guesses import TURNING, Group, alike, turning_axis
+from lowalt.extensions.drafting.inspection import Inspection
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND, body_axes

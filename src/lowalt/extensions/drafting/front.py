@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lowalt.drafting.guesses import ASYMMETRIC, SYMMETRIC, off_mirror
+from lowalt.extensions.drafting.guesses import ASYMMETRIC, SYMMETRIC, off_mirror
 from lowalt.files.errors import InputError
 
 LEVEL, ALONG = 0.5, 0.9

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.drafting import guesses
-from lowalt.drafting.front import NOTHING_TELLS, Front, Shape, Turning, front_of
+from lowalt.extensions.drafting import guesses
+from lowalt.extensions.drafting.front import NOTHING_TELLS, Front, Shape, Turning, front_of
 from lowalt.files.atomic import existing
 from lowalt.targets.mesh_files import UNITS_M, Mesh, metres, pieces, read_mesh, stated_unit_m, stated_up_axis
 from lowalt.targets.mesh_polygons import Piece

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib import pyplot as plt
 
-from lowalt.drafting.inspection import Inspection
+from lowalt.extensions.drafting.inspection import Inspection
 from lowalt.report.figures.style import png
 
 DIRECTIONS = ((0, 1), (1, 2), (0, 2))

@@ -9,11 +9,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import yaml
 
-from lowalt.drafting.draft import chosen, drafted, refuse_miscount
-from lowalt.drafting.guesses import UNUSUAL, USUAL_M, guessed_unit
-from lowalt.drafting.inspection import Inspection, inspect_mesh
-from lowalt.drafting.robot_files import is_description, read_robot
-from lowalt.drafting.robots import WHICH, category_of, drafted_robot, front_of_robot, parts_of, write_parts
+from lowalt.extensions.drafting.draft import chosen, drafted, refuse_miscount
+from lowalt.extensions.drafting.guesses import UNUSUAL, USUAL_M, guessed_unit
+from lowalt.extensions.drafting.inspection import Inspection, inspect_mesh
+from lowalt.extensions.drafting.robot_files import is_description, read_robot
+from lowalt.extensions.drafting.robots import WHICH, category_of, drafted_robot, front_of_robot, parts_of, write_parts
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 from lowalt.targets.make import make

@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.drafting.robot_geometry import DEEPEST, Files, Robot, numbers, place_of, primitive, shown
-from lowalt.drafting.robot_mjcf import mjcf
+from lowalt.extensions.drafting.robot_geometry import DEEPEST, Files, Robot, numbers, place_of, primitive, shown
+from lowalt.extensions.drafting.robot_mjcf import mjcf
 from lowalt.files.errors import InputError, reading
 from lowalt.numerics import portable
 

@@ -7,8 +7,17 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.drafting.guesses import TURNING
-from lowalt.drafting.robot_geometry import DEEPEST, Files, Robot, direction, numbers, place_of, primitive, shown
+from lowalt.extensions.drafting.guesses import TURNING
+from lowalt.extensions.drafting.robot_geometry import (
+    DEEPEST,
+    Files,
+    Robot,
+    direction,
+    numbers,
+    place_of,
+    primitive,
+    shown,
+)
 from lowalt.numerics import portable
 
 

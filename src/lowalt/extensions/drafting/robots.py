@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.drafting.draft import alternating, record_text, row_lines, size_word
-from lowalt.drafting.front import LEVEL, Front, Shape, Turning, front_of
-from lowalt.drafting.guesses import TURNING
-from lowalt.drafting.robot_geometry import Joint, Robot
+from lowalt.extensions.drafting.draft import alternating, record_text, row_lines, size_word
+from lowalt.extensions.drafting.front import LEVEL, Front, Shape, Turning, front_of
+from lowalt.extensions.drafting.guesses import TURNING
+from lowalt.extensions.drafting.robot_geometry import Joint, Robot
 from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import LARGEST_TRIANGLES

@@ -9,9 +9,9 @@ import yaml
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
-from lowalt.commands.data_sheet import add_sheets
-from lowalt.drafting.inspection import Inspection, described, inspect_mesh
-from lowalt.drafting.new import SEED, Asked, draft
+from lowalt.extensions.drafting.data_sheet import add_sheets
+from lowalt.extensions.drafting.inspection import Inspection, described, inspect_mesh
+from lowalt.extensions.drafting.new import SEED, Asked, draft
 from lowalt.files.atomic import slug, write_file
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
@@ -94,7 +94,7 @@ def _write(path: Path, data: bytes) -> Path:
 
 def _inspect(options: argparse.Namespace) -> Answer:
     """Inspect a mesh and draw it."""
-    from lowalt.report.figures.mesh_picture import inspection_picture
+    from lowalt.extensions.drafting.mesh_picture import inspection_picture
 
     seen = inspect_mesh(options.file, options.category, options.unit, size_m=options.size_m)
     out = _write(options.out or Path(f"{options.file.stem}-inspect.png"), inspection_picture(seen))
@@ -119,7 +119,7 @@ def _new(options: argparse.Namespace) -> Answer:
 
     def show(seen: Inspection) -> None:
         """Draw the numbered pieces of a mesh."""
-        from lowalt.report.figures.mesh_picture import inspection_picture
+        from lowalt.extensions.drafting.mesh_picture import inspection_picture
 
         _write(asked.picture, inspection_picture(seen, numbered=True))
 

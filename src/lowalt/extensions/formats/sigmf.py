@@ -1,6 +1,6 @@
 """Signals as SigMF recordings: one per station, all samples one after the other, each with an annotation of its own.
 
-`python -m lowalt.shards.sigmf --index INDEX --out FOLDER`. The sample rate is the symbol rate: the signals are the
+`python -m lowalt.extensions.formats.sigmf --index INDEX --out FOLDER`. The sample rate is the symbol rate: the signals are the
 echoes' values symbol by symbol. Facts for which the standard has no field are in the namespace `lowalt`.
 Source: SigMF specification 1.2 (core namespace, annotations).
 """
@@ -89,7 +89,7 @@ def export(shards: ShardSet, folder: str | Path) -> list[Path]:
 
 def main(arguments: Iterable[str]) -> None:
     """Export the signals of a data set as SigMF recordings, one per station."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.shards.sigmf", description=main.__doc__)
+    line = argparse.ArgumentParser(prog="python -m lowalt.extensions.formats.sigmf", description=main.__doc__)
     line.add_argument("--index", required=True, help="index of a data set of signals")
     line.add_argument("--groups", nargs="+", default=list(GROUPS), choices=GROUPS)
     line.add_argument("--folds", nargs="+", default=list(FOLDS), choices=FOLDS)

@@ -1,22 +1,22 @@
-"""`python -m lowalt.recordings import`: one recording as windows, spectra and tiles."""
+"""`python -m lowalt.extensions.recordings import`: one recording as windows, spectra and tiles."""
 
 import argparse
 from pathlib import Path
 
 from lowalt.config.command import dispatch, run
 from lowalt.config.layers import load_yaml
+from lowalt.extensions.recordings.record import read_record
+from lowalt.extensions.recordings.twin import RADARS, radars
+from lowalt.extensions.recordings.windows import write
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
-from lowalt.recordings.record import read_record
-from lowalt.recordings.twin import RADARS, radars
-from lowalt.recordings.windows import write
 
 IMAGES = "config/default.yaml"
 
 
 def import_(arguments: list[str]) -> None:
     """Turn one recording into signals, spectra, tiles and, with a label, a shard and its index."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.recordings import", description=import_.__doc__)
+    line = argparse.ArgumentParser(prog="python -m lowalt.extensions.recordings import", description=import_.__doc__)
     line.add_argument("--radars", default=RADARS, help=f"folder of the records of radars (default: {RADARS})")
     line.add_argument("--record", required=True, type=Path, help="record of the recording (.yaml)")
     line.add_argument("--radar", required=True, help="the twin whose symbol rate the signals get")
@@ -31,7 +31,7 @@ def import_(arguments: list[str]) -> None:
 
 def main(arguments: list[str]) -> None:
     """Run one command of the stage."""
-    dispatch("lowalt.recordings", {"import": import_}, arguments)
+    dispatch("lowalt.extensions.recordings", {"import": import_}, arguments)
 
 
 if __name__ == "__main__":

@@ -4,15 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.recordings.files import read
+from lowalt.extensions.recordings.presence import beyond_mps, present
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import Twin, radars
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
+from lowalt.extensions.recordings.windows import looks
 from lowalt.files.errors import InputError
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.runs import Trained
-from lowalt.recordings.files import read
-from lowalt.recordings.presence import beyond_mps, present
-from lowalt.recordings.record import Record
-from lowalt.recordings.twin import Twin, radars
-from lowalt.recordings.window_samples import Windows, facts, rendered
-from lowalt.recordings.windows import looks
 from lowalt.tiles.image_settings import Images
 
 ANOTHER = 0.02

@@ -8,18 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings import faults
+from lowalt.extensions.recordings.chirps import slow_time
+from lowalt.extensions.recordings.column_names import rises_evenly, role
+from lowalt.extensions.recordings.evidence import are_powers, chirp_length, code_bits, image_of, receivers_of, step_bits
+from lowalt.extensions.recordings.files import channel_of, table_of, times_of
+from lowalt.extensions.recordings.formats import RAW, READERS, Table
+from lowalt.extensions.recordings.layouts import raw_readings, readings
+from lowalt.extensions.recordings.mat_files import read_mat
+from lowalt.extensions.recordings.record import Record
 from lowalt.files.array_files import UNREADABLE
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
-from lowalt.recordings import faults
-from lowalt.recordings.chirps import slow_time
-from lowalt.recordings.column_names import rises_evenly, role
-from lowalt.recordings.evidence import are_powers, chirp_length, code_bits, image_of, receivers_of, step_bits
-from lowalt.recordings.files import channel_of, table_of, times_of
-from lowalt.recordings.formats import RAW, READERS, Table
-from lowalt.recordings.layouts import raw_readings, readings
-from lowalt.recordings.mat_files import read_mat
-from lowalt.recordings.record import Record
 
 SHOWN = 8
 """Most readings that an inspection lists."""

@@ -5,15 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.recordings import faults
+from lowalt.extensions.recordings.chirps import slow_time
+from lowalt.extensions.recordings.column_names import rises_evenly, role, unit
+from lowalt.extensions.recordings.formats import RAW, READERS, Table
+from lowalt.extensions.recordings.layouts import GROUPS, TYPES, contradiction, parted, raw_readings, readings
+from lowalt.extensions.recordings.record import Record
 from lowalt.files.array_files import UNREADABLE
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
-from lowalt.recordings import faults
-from lowalt.recordings.chirps import slow_time
-from lowalt.recordings.column_names import rises_evenly, role, unit
-from lowalt.recordings.formats import RAW, READERS, Table
-from lowalt.recordings.layouts import GROUPS, TYPES, contradiction, parted, raw_readings, readings
-from lowalt.recordings.record import Record
 
 FEWEST = 1024
 """Least number of numbers in a file whose layout is checked."""

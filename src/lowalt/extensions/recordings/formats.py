@@ -1,6 +1,6 @@
 """Tables of samples out of WAV, MAT, CSV, NPY, SigMF and raw files, as they stand in the file.
 
-This module only reads. `lowalt.recordings.files` picks the channel, `lowalt.recordings.faults` judges it.
+This module only reads. `lowalt.extensions.recordings.files` picks the channel, `lowalt.extensions.recordings.faults` judges it.
 """
 
 import math
@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.recordings.chirps import in_chirps
+from lowalt.extensions.recordings.layouts import number_type
+from lowalt.extensions.recordings.mat_files import read_mat
+from lowalt.extensions.recordings.record import Record
 from lowalt.files.atomic import text_file
 from lowalt.files.errors import InputError, lacking
 from lowalt.files.json_objects import read_object
-from lowalt.recordings.chirps import in_chirps
-from lowalt.recordings.layouts import number_type
-from lowalt.recordings.mat_files import read_mat
-from lowalt.recordings.record import Record
 
 SAME_CARRIER = 1e-3
 """Largest relative difference between the carrier of the record and that of a SigMF capture."""

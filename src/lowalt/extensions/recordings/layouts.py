@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.recordings.evidence import code_bits, step_bits
 from lowalt.files.errors import InputError
-from lowalt.recordings.evidence import code_bits, step_bits
 
 GROUPS = {"iqiq": 2, "iiqq": 2, "dca2": 4, "dca4": 8}
 """Numbers in the smallest whole group of each order."""

@@ -14,19 +14,19 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from torch import nn
 
+from lowalt.extensions.recordings.files import Baseband, read
+from lowalt.extensions.recordings.presence import heard_powers, noise_floor
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import Twin, twin_of
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.twin_training import simulated, train
+from lowalt.extensions.recordings.window_samples import Windows
+from lowalt.extensions.recordings.windows import windows
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import reported
 from lowalt.recognition import model_card, model_file, zoo
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import of_run
-from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.presence import heard_powers, noise_floor
-from lowalt.recordings.record import Record
-from lowalt.recordings.twin import Twin, twin_of
-from lowalt.recordings.twin_scenes import Library
-from lowalt.recordings.twin_training import simulated, train
-from lowalt.recordings.window_samples import Windows
-from lowalt.recordings.windows import windows
 
 SPREAD_DB = 5.0
 """How far the twin's SNR reaches beyond that of the recording, to either side."""

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, median_filter
 
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.recordings.twin import Twin
+from lowalt.extensions.recordings.twin import Twin
 
 QUIET_SHARE = 0.1
 """Share of the windows in which a speed is taken to be empty."""

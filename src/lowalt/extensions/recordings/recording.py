@@ -8,10 +8,10 @@ from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command, positive
 from lowalt.commands.command_table import COMMANDS
+from lowalt.extensions.recordings.file_inspection import FileInspection, Seen, inspect_recording
 from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
-from lowalt.recordings.file_inspection import FileInspection, Seen, inspect_recording
 
 DRAFTED = "# Drafted by `lowalt recording inspect`."
 """First line of a draft; only a file that begins with it is written over."""
@@ -102,7 +102,7 @@ def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
     ]
     if missing:
         return f"lowalt recording inspect {shlex.quote(str(inspection.path))} {' '.join(missing)}"
-    from lowalt.recordings.twin import radars
+    from lowalt.extensions.recordings.twin import radars
 
     names = [name for name, twin in radars().items() if twin.near(inspection.carrier_hz)
              and (twin.channel == "real" or seen.keys["channel"] == "complex")]  # fmt: skip
@@ -113,7 +113,7 @@ def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
 
 def _inspect(options: argparse.Namespace) -> Answer:
     """Inspect a recording, draw it and draft its record."""
-    from lowalt.report.figures.recording_picture import recording_picture
+    from lowalt.extensions.recordings.recording_picture import recording_picture
 
     inspection = inspect_recording(options.file, options.carrier, options.rate)
     count = len(inspection.readings)
@@ -146,9 +146,9 @@ def _inspect(options: argparse.Namespace) -> Answer:
 
 def _train(options: argparse.Namespace) -> Answer:
     """Train a network for the radar of a record."""
-    from lowalt.recordings.own_radar import trained_radar
-    from lowalt.recordings.record import read_record
-    from lowalt.recordings.twin_training import settings
+    from lowalt.extensions.recordings.own_radar import trained_radar
+    from lowalt.extensions.recordings.record import read_record
+    from lowalt.extensions.recordings.twin_training import settings
 
     record = read_record(shipped(options.record))
     facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition))

@@ -7,7 +7,7 @@ from matplotlib import pyplot as plt
 from scipy.signal import spectrogram
 
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.recordings.file_inspection import FileInspection, Seen
+from lowalt.extensions.recordings.file_inspection import FileInspection, Seen
 from lowalt.report.figures.style import png
 
 PANELS = 3

@@ -13,10 +13,10 @@ from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import pick
 from lowalt.config.layers import load_yaml, merge
 from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.extensions.recordings.channel import EDGE, ONE_SIDED_EDGE, SAMPLINGS
+from lowalt.extensions.recordings.record import Record, record
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
-from lowalt.recordings.channel import EDGE, ONE_SIDED_EDGE, SAMPLINGS
-from lowalt.recordings.record import Record, record
 from lowalt.spectra import Fourier, Spectra, Transfer
 
 CHANNELS = ("complex", "real")

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from lowalt.echo import Rigid, echo_signals
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_courses import Course
 from lowalt.files.errors import InputError
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.table import NUMBERS, PHASES
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_courses import Course
 from lowalt.scene.effects.motion import rotor_spread
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import NODES

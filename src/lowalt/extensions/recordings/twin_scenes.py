@@ -25,19 +25,19 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.config.classes import AIRBORNE, CATEGORIES
+from lowalt.extensions.recordings.channel import coherent_intervals, symbol_rate
+from lowalt.extensions.recordings.presence import present
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import RADARS, Twin, records, twin_of
+from lowalt.extensions.recordings.twin_courses import Course, hover, straight, to_and_fro
+from lowalt.extensions.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
+from lowalt.extensions.recordings.twin_receiver import Receiver, received
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.progress import reported
 from lowalt.numerics.portable import rms
 from lowalt.numerics.streams import stream
-from lowalt.recordings.channel import coherent_intervals, symbol_rate
-from lowalt.recordings.presence import present
-from lowalt.recordings.record import Record
-from lowalt.recordings.twin import RADARS, Twin, records, twin_of
-from lowalt.recordings.twin_courses import Course, hover, straight, to_and_fro
-from lowalt.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
-from lowalt.recordings.twin_receiver import Receiver, received
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records

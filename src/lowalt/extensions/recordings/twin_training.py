@@ -11,6 +11,8 @@ from torch import nn
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.layers import load_yaml, merge
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.recognition.checkpoint import identity
@@ -19,8 +21,6 @@ from lowalt.recognition.recipe import check, seeded
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.schemes import named
 from lowalt.recognition.training import Trainer, TrainingRun
-from lowalt.recordings.twin_scenes import Library
-from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.tiles.image_settings import Images
 
 RECOGNITION = "config/measured/recognition.yaml"

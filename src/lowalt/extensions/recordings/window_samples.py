@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lowalt.extensions.recordings.twin import Twin
 from lowalt.recognition.samples import Facts, Samples
-from lowalt.recordings.twin import Twin
 from lowalt.tiles.image_settings import Images
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize

@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.recordings.channel import coherent_intervals, symbol_rate
+from lowalt.extensions.recordings.faults import clipped
+from lowalt.extensions.recordings.files import Baseband, read
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import Twin
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.motion.table import NUMBERS
-from lowalt.recordings.channel import coherent_intervals, symbol_rate
-from lowalt.recordings.faults import clipped
-from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.record import Record
-from lowalt.recordings.twin import Twin
 from lowalt.shards.index import build
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.spectra import trp, vrp, vt

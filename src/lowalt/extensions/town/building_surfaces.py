@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.scene.town.materials import named
+from lowalt.extensions.town.materials import named
 from lowalt.targets.mesh_files import metres, pieces
 
 

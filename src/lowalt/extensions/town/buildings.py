@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.town.building_surfaces import Surfaces, joined, mesh_parts
+from lowalt.extensions.town.facets import Town, corner_numbers, sizes, town
+from lowalt.extensions.town.materials import MATERIALS
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
-from lowalt.scene.town.building_surfaces import Surfaces, joined, mesh_parts
-from lowalt.scene.town.facets import Town, corner_numbers, sizes, town
-from lowalt.scene.town.materials import MATERIALS
 from lowalt.targets.mesh_files import SUFFIXES
 
 MOST_TRIANGLES = 500_000
@@ -34,11 +34,11 @@ def _surfaces(path: Path, settings: dict) -> Surfaces:
     """The surfaces of a file by its ending, moved so that the origin of the settings is (0, 0, 0)."""
     kind, origin = path.suffix.lower(), settings["origin"]
     if kind in (".geojson", ".json"):
-        from lowalt.scene.town.footprints import read_footprints
+        from lowalt.extensions.town.footprints import read_footprints
 
         return read_footprints(path, origin, settings["height_m"], settings["material"])
     if kind == ".xml":
-        from lowalt.scene.town.mitsuba import read_mitsuba
+        from lowalt.extensions.town.mitsuba import read_mitsuba
 
         found = read_mitsuba(path, settings["unit"])
     elif kind in SUFFIXES:
@@ -97,7 +97,7 @@ def files_of(buildings: str | Path) -> list[str]:
     path = existing(buildings, "file of buildings")
     if path.suffix.lower() != ".xml":
         return [str(path)]
-    from lowalt.scene.town.mitsuba import meshes_of
+    from lowalt.extensions.town.mitsuba import meshes_of
 
     return [str(path), *map(str, meshes_of(path))]
 

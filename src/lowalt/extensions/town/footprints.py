@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.extensions.town.building_surfaces import Surfaces, joined
+from lowalt.extensions.town.materials import named
 from lowalt.files.errors import InputError, lacking
 from lowalt.files.json_objects import json_object
-from lowalt.scene.town.building_surfaces import Surfaces, joined
-from lowalt.scene.town.materials import named
 
 try:
     import shapely

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.town import image_loops, knife_edge, shadow_loops
+from lowalt.extensions.town.facets import Town
+from lowalt.extensions.town.materials import properties
 from lowalt.scene.fresnel import VACUUM_F_M
-from lowalt.scene.town import image_loops, knife_edge, shadow_loops
-from lowalt.scene.town.facets import Town
-from lowalt.scene.town.materials import properties
 
 BLOCK = 64
 """Rays that are traced together at least."""

@@ -13,10 +13,10 @@ import math
 import numpy as np
 from scipy.special import erfcx
 
+from lowalt.extensions.town import shadow_loops
+from lowalt.extensions.town.facets import Town
 from lowalt.machine.jit import INNER, PLAIN
 from lowalt.scene.response_loops import phasor
-from lowalt.scene.town import shadow_loops
-from lowalt.scene.town.facets import Town
 
 CLEAR = -0.78
 """Below this nu an edge leaves a wave as it is. Source: ITU-R P.526-15, section 4.1."""

@@ -10,9 +10,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from lowalt.extensions.town.building_surfaces import Surfaces, joined, mesh_parts
+from lowalt.extensions.town.materials import named
 from lowalt.files.errors import InputError
-from lowalt.scene.town.building_surfaces import Surfaces, joined, mesh_parts
-from lowalt.scene.town.materials import named
 from lowalt.targets.mesh_collada import parsed
 
 KINDS = ("ply", "obj")

@@ -6,9 +6,9 @@ that may be in the way is halved until single rays decide.
 
 import numpy as np
 
+from lowalt.extensions.town.image_loops import crosses, misses, trace_ray
 from lowalt.machine.jit import INNER, PLAIN, kernel
 from lowalt.scene.rays_loops import can_meet
-from lowalt.scene.town.image_loops import crosses, misses, trace_ray
 
 ALLOCATING = kernel(inner=True)
 """For functions that only kernels call and that make arrays."""

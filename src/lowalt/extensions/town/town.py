@@ -11,11 +11,11 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo.radar import radar
+from lowalt.extensions.town import image_paths, shadow_loops
+from lowalt.extensions.town.buildings import read
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.response import ImagePath
-from lowalt.scene.town import image_paths, shadow_loops
-from lowalt.scene.town.buildings import read
 from lowalt.scene.view import View
 
 SOURCE = (

@@ -6,8 +6,8 @@ import numpy as np
 import yaml
 
 from lowalt.config.network import Network
+from lowalt.extensions.town.buildings import Buildings
 from lowalt.files.atomic import replacing
-from lowalt.scene.town.buildings import Buildings
 
 AROUND_M = 100.0
 """Margin around stations and region within which buildings are drawn."""

@@ -39,8 +39,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 def _settings(options: argparse.Namespace, middle: np.ndarray) -> dict:
     """The settings of the effect `town` by the options; middle: (2,) m, where the town's middle goes by default."""
-    from lowalt.scene.effects.channel import town
-    from lowalt.scene.town.buildings import read
+    from lowalt.extensions.town import town
+    from lowalt.extensions.town.buildings import read
     from lowalt.targets.mesh_files import UNITS_M
 
     if options.unit not in (None, *UNITS_M):
@@ -50,7 +50,7 @@ def _settings(options: argparse.Namespace, middle: np.ndarray) -> dict:
     if options.origin is not None:
         return given | {"origin": options.origin}
     if options.file.suffix.lower() in (".geojson", ".json"):
-        from lowalt.scene.town.footprints import middle_of, moved
+        from lowalt.extensions.town.footprints import middle_of, moved
 
         return given | {"origin": moved(middle_of(options.file), -middle)}
     facts = read(town.DEFAULTS | given).facts
@@ -62,10 +62,9 @@ def _examined(options: argparse.Namespace, picture: Path) -> tuple[dict, dict, l
     """Draw the plan; return the settings of the effect, the facts about the town, and lines that say them."""
     from lowalt.config.layers import overlaid
     from lowalt.config.network import Network, masts_m
+    from lowalt.extensions.town import town, town_plan
+    from lowalt.extensions.town.buildings import read
     from lowalt.motion.drawing import region_polygon
-    from lowalt.scene.effects.channel import town
-    from lowalt.scene.town import town_plan
-    from lowalt.scene.town.buildings import read
 
     config = overlaid(options.overlay)
     network, masts = Network.from_settings(config["network"]), np.array(masts_m(config["network"]), float)
@@ -91,8 +90,8 @@ def _inspect(options: argparse.Namespace) -> Answer:
 
 def _new(options: argparse.Namespace) -> Answer:
     """Draft an overlay. Raises: InputError naming the file and what is wrong with it, or an overlay that exists."""
+    from lowalt.extensions.town import town_plan
     from lowalt.files.atomic import slug, write_file
-    from lowalt.scene.town import town_plan
 
     if options.out.suffix not in (".yaml", ".yml") or options.out.exists():
         raise InputError(f"--out: {options.out}, expected a new file that ends in .yaml")
