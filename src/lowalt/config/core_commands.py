@@ -21,7 +21,11 @@ CORE_COMMANDS = {
         "run the workflow: the default, or with overlays",
         "lowalt run config/tiny.yaml --target data --cores 2",
     ),
-    "status": Command("lowalt.commands.workflow", "the state of a run in another terminal", "lowalt status"),
+    "status": Command(
+        "lowalt.commands.workflow",
+        "the state of a run in another terminal",
+        "lowalt status",
+    ),
     "sample": Command(
         "lowalt.commands.sample",
         "one sample: tile, signals, record, and a picture with axes",
@@ -42,7 +46,11 @@ CORE_COMMANDS = {
         "the spectra of a configuration, and the time an image of each takes",
         "lowalt spectra config/tiny.yaml",
     ),
-    "verify": Command("lowalt.commands.data", "check every byte of a data set", f"lowalt verify {_INDEX}"),
+    "verify": Command(
+        "lowalt.commands.data",
+        "check every byte of a data set",
+        f"lowalt verify {_INDEX}",
+    ),
     "remake": Command(
         "lowalt.commands.data",
         "make stored samples again from their records and compare every byte",

@@ -1,4 +1,4 @@
-"""`python -m lowalt.extensions.benchmark RESULTS`: write the checksums of the benchmark's finished runs, for a new version."""
+"""`python -m lowalt.extensions.benchmark RESULTS` writes the checksums of finished runs, for a new version."""
 
 import argparse
 

@@ -1,6 +1,7 @@
 """Tables of samples out of WAV, MAT, CSV, NPY, SigMF and raw files, as they stand in the file.
 
-This module only reads. `lowalt.extensions.recordings.files` picks the channel, `lowalt.extensions.recordings.faults` judges it.
+This module only reads. `lowalt.extensions.recordings.files` picks the channel,
+`lowalt.extensions.recordings.faults` judges it.
 """
 
 import math

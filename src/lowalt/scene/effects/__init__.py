@@ -38,7 +38,7 @@ ADDED: dict[str, AddedEffect] = offered("effects")
 
 
 def _places() -> dict[str, str]:
-    """The place of every effect: in each those LISTED, the others of its folder by name, and extensions' between them."""
+    """The place of every effect: those LISTED, then the others of its folder, and extensions' between."""
     folder, result = Path(__file__).parent, {}
     for place in PLACE_ORDER:
         files = sorted(path.stem for path in (folder / place).glob("*.py") if path.stem != "__init__")
