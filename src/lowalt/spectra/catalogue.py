@@ -29,6 +29,11 @@ TIMES = "times"
 INSTANTS = ("even", "known")
 
 
+def module_name(name: str) -> str:
+    """Return the dotted name of a spectrum's module."""
+    return ADDED.get(name, f"lowalt.spectra.kinds.{name}")
+
+
 @functools.cache
 def spectrum(name: str) -> Any:
     """Return the module of a spectrum.

@@ -1,7 +1,8 @@
 """Signals as SigMF recordings: one per station, all samples one after the other, each with an annotation of its own.
 
 `python -m lowalt.extensions.formats.sigmf --index INDEX --out FOLDER`. The sample rate is the symbol
-rate: the signals are the echoes' values symbol by symbol. Facts for which the standard has no field are in the namespace `lowalt`.
+rate: the signals are the echoes' values symbol by symbol. Facts for
+which the standard has no field are in the namespace `lowalt`.
 Source: SigMF specification 1.2 (core namespace, annotations).
 """
 
