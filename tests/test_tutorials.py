@@ -93,7 +93,7 @@ def test_every_tutorial_is_followed_here():
     pages = {path.stem for path in FOLDER.glob("*.md")}
     assert pages == {
         "first_data_set", "trajectory", "target", "effect", "backbone", "pytorch", "hugging_face", "recording",
-        "benchmark",
+        "benchmark", "extension",
     }  # fmt: skip
 
 

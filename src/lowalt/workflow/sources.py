@@ -41,8 +41,8 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 @functools.cache
-def _imports(path: Path) -> tuple[str, ...]:
-    """Modules of the package that a file imports: anywhere in the file, but in a `__main__` only at top level.
+def _imports(path: Path, package: str = PACKAGE.name) -> tuple[str, ...]:
+    """Modules of lowalt, and of the file's own `package`, that a file imports: anywhere in the file, but in a `__main__` only at top level.
 
     Imports within a function of a `__main__` belong to one subcommand; the caller names them. Those within functions of
     the package's `__init__` serve users' attribute access, which no stage uses.
@@ -55,7 +55,7 @@ def _imports(path: Path) -> tuple[str, ...]:
             modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             modules += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return tuple(name for name in modules if name.split(".")[0] == PACKAGE.name and _file(name))
+    return tuple(name for name in modules if name.split(".")[0] in (PACKAGE.name, package) and _file(name))
 
 
 @functools.cache
@@ -80,7 +80,7 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
             seen.add(name)
             parent = name.rpartition(".")[0]
             own = name.split(".")[0] == PACKAGE.name
-            todo += [*([parent] if parent and own else []), *_imports(_file(name))]
+            todo += [*([parent] if parent and own else []), *_imports(_file(name), name.split(".")[0])]
             if name == CATALOGUE:
                 todo += [module_name(spectrum) for spectrum in spectra]
     return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
