@@ -46,7 +46,8 @@ PROGRAMS = {
         "    os.wait()\n"
         "else:\n"
         "    sys.exit()\n"
-        "names = [n for n in sys.modules if n.startswith(('lowalt.scene.effects.', 'lowalt.extensions.')) and n.count('.') > 2]\n"
+        "folders = ('lowalt.scene.effects.', 'lowalt.extensions.')\n"
+        "names = [n for n in sys.modules if n.startswith(folders) and n.count('.') > 2]\n"
         "print(*(n.rpartition('.')[2] for n in names), flush=True)\n"
         "os._exit(0)"
     ),

@@ -42,7 +42,8 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 @functools.cache
 def _imports(path: Path, package: str = PACKAGE.name) -> tuple[str, ...]:
-    """Modules of lowalt, and of the file's own `package`, that a file imports: anywhere in the file, but in a `__main__` only at top level.
+    """Modules of lowalt, and of the file's own `package`, that a file imports: anywhere in the file,
+    but in a `__main__` only at top level.
 
     Imports within a function of a `__main__` belong to one subcommand; the caller names them. Those within functions of
     the package's `__init__` serve users' attribute access, which no stage uses.

@@ -18,7 +18,7 @@ def definition(
     return fourier.magnitudes(signals, settings, name) ** 2
 
 
-def fill(re: np.ndarray, im: np.ndarray, settings: Settings, tables: tuple, out: np.ndarray) -> None:
+def fill(re: np.ndarray, im: np.ndarray, settings: Settings, tables: tuple, out: np.ndarray) -> None:  # noqa: F811
     """Fill out (rows, starts) float32 with the squares of the windows that start at 0 .. starts - 1."""
     fourier.fill(re, im, settings, tables, out)
     np.square(out, out=out)
