@@ -19,7 +19,7 @@ refused by OpenBLAS itself, which then takes others."""
 PROBE = """
 import sys
 import numpy as np
-from lowalt.benchmark.definition import config_of
+from lowalt.extensions.benchmark.definition import config_of
 from lowalt.config.layers import overlaid
 from lowalt.scene.chain import SceneSample
 from lowalt.shards.dataset import Dataset

@@ -21,7 +21,7 @@ from features import features, spectral_moments
 from frozen import embedded, embedded_chunk, embedded_of
 from signals import Signals, features_of, told
 
-from lowalt.benchmark.part_samples import TrackSamples
+from lowalt.extensions.benchmark.part_samples import TrackSamples
 from lowalt.recognition.batches import epoch_order
 from lowalt.recognition.schemes import Scheme
 

@@ -16,14 +16,14 @@ from recorded_sets import HALVES, Measured
 from torch import nn
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.twin_training import simulated, train
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import model_file, runs
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recordings.twin_scenes import Library
-from lowalt.recordings.twin_training import simulated, train
-from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.tiles import join
 from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import encode

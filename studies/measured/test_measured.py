@@ -18,12 +18,12 @@ from comparison import DISTANCES, FIGURES, distance_rows
 from recorded_sets import SETS, halves, recordings, usable
 from scipy.io import wavfile
 
+from lowalt.extensions.recordings.answers import Answers
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings.answers import Answers
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import Library
 
 HERE = Path(__file__).parent
 # Several studies have a program of this name.

@@ -23,6 +23,15 @@ import torch
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings import twin_training
+from lowalt.extensions.recordings.channel import coherent_intervals
+from lowalt.extensions.recordings.files import Baseband, read
+from lowalt.extensions.recordings.presence import present
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import MARGIN, Library, samples, stretch
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
+from lowalt.extensions.recordings.windows import at_symbol_rate
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
@@ -31,15 +40,6 @@ from lowalt.recognition import runs, zoo
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.samples import Samples, fingerprint, joined
 from lowalt.recognition.schemes import TABLE, named
-from lowalt.recordings import twin_training
-from lowalt.recordings.channel import coherent_intervals
-from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.presence import present
-from lowalt.recordings.record import Record
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import MARGIN, Library, samples, stretch
-from lowalt.recordings.window_samples import Windows, facts, rendered
-from lowalt.recordings.windows import at_symbol_rate
 from lowalt.tiles.image_settings import Images
 
 FOLDER = Path("config/measured")

@@ -14,9 +14,10 @@ from lowalt.commands import workflow
 from lowalt.commands.command_line import as_json
 from lowalt.commands.command_table import COMMANDS
 from lowalt.config.layers import load, plain
+from lowalt.extensions.drafting import mesh_picture
 from lowalt.files.atomic import replacing
 from lowalt.machine.progress import Reporter
-from lowalt.report.figures import mesh_picture, target_picture
+from lowalt.report.figures import target_picture
 from lowalt.scene import explanation
 from lowalt.scene.checks import check
 from lowalt.scene.effects import PLACES

@@ -186,7 +186,7 @@ def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name
 
 @pytest.mark.parametrize("name", ["uav_3ghz", "bird_drone_10ghz", "cw_24ghz"])
 def test_the_shipped_entries_of_radars_are_those_of_the_twins_there_are(name, monkeypatch):
-    from lowalt.recordings.twin import radars, records
+    from lowalt.extensions.recordings.twin import radars, records
 
     monkeypatch.chdir(ROOT)
     path = zoo.ZOO / f"{name}.safetensors"
