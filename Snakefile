@@ -76,7 +76,11 @@ rule prepared:
 
 rule models:
     input:
-        expand("results/{run}/models/{training}/model.safetensors", run=RUN.name, training=RUN.trainings),
+        expand(
+            "results/{run}/models/{training}/model.safetensors",
+            run=RUN.name,
+            training=RUN.trainings,
+        ),
         f"results/{RUN.name}/config.yaml",
     localrule: True
 

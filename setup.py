@@ -1,4 +1,6 @@
-"""What `pyproject.toml` cannot say: a wheel carries the workflow, so that `lowalt run` works without a checkout."""
+"""What `pyproject.toml` cannot say: a wheel carries the workflow, so that `lowalt run` works
+without a checkout.
+"""
 
 import shutil
 from pathlib import Path
@@ -6,11 +8,21 @@ from pathlib import Path
 from setuptools import setup
 from setuptools.command.build_py import build_py
 
-SHIPPED = ("Snakefile", "workflow", "config", "profiles", "envs", "results/reference", "results/zoo")
+SHIPPED = (
+    "Snakefile",
+    "workflow",
+    "config",
+    "profiles",
+    "envs",
+    "results/reference",
+    "results/zoo",
+)
 
 
 class BuildWithWorkflow(build_py):
-    """Copies the workflow into the built package; an editable installation finds it in the checkout."""
+    """Copies the workflow into the built package; an editable installation finds it in the
+    checkout.
+    """
 
     def run(self) -> None:
         """Build the package, then add the workflow's files to it."""

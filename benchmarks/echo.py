@@ -1,10 +1,12 @@
 """The echo stage as the workflow runs it, files included.
 
-    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 2000] [--out echo_stage.csv]
+    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 2000] [--out
+    echo_stage.csv]
 
-Writes the stage's rate on motion models of mixed subtypes by the real command, with one and with two processes at a
-time; the shares of its time that poses, signals, kernels and correct rounding take; and how it scales with points,
-symbols, stations and cores. A process has one thread; run it on a quiet machine.
+Writes the stage's rate on motion models of mixed subtypes by the real command, with one and with
+two processes at a time; the shares of its time that poses, signals, kernels and correct rounding
+take; and how it scales with points, symbols, stations and cores. A process has one thread; run it
+on a quiet machine.
 """
 
 import argparse
@@ -38,15 +40,18 @@ from lowalt.targets.records import load_table
 PAPER = 240_000
 """Motion models of the paper, each seen by three stations."""
 CHUNK = 1000
-"""Models a job: 50 of each of a protocol's 20 subtypes, in the default's chunks and in the paper's."""
+"""Models a job: 50 of each of a protocol's 20 subtypes, in the default's chunks and in the paper's.
+"""
 
 
 def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
     """Motion table of `count` models, subtypes in turn."""
-    network, published = Network.from_settings(config["network"]), load_table("config/targets.csv")
+    network = Network.from_settings(config["network"])
+    published = load_table("config/targets.csv")
     masts = np.array([station.position_m[:2] for station in network.stations])
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
-    rows, half = [], len(clouds) // 2
+    rows = []
+    half = len(clouds) // 2
     for index in range(count):
         # As in the workflow, a chunk holds half of the subtypes.
         cloud = clouds[index // CHUNK % 2 * half + index % half]
@@ -57,12 +62,19 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
 
 
 def stage(
-    config: dict, paths: dict[str, str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path
-) -> float:  # fmt: skip
-    """Seconds that the echo command takes for all rows, `processes` at a time: a job per chunk and list of stations.
+    config: dict,
+    paths: dict[str, str],
+    rows: list[dict],
+    jobs_of: list[list[str]],
+    processes: int,
+    folder: Path,
+) -> float:
+    """Seconds that the echo command takes for all rows, `processes` at a time: a job per chunk and
+    list of stations.
 
-    paths: the cloud file of each subtype; a job gets those of its chunk. A job has one thread, as Snakemake gives it:
-    jobs side by side would otherwise fight for cores. Python may keep its bytecode, as it does unless forbidden to.
+    paths: the cloud file of each subtype; a job gets those of its chunk. A job has one thread, as
+    Snakemake gives it: jobs side by side would otherwise fight for cores. Python may keep its
+    bytecode, as it does unless forbidden to.
     """
     alone = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     alone.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -75,9 +87,25 @@ def stage(
         clouds = dict.fromkeys(paths[row["subtype"]] for row in chunk)
         for names in jobs_of:
             files = [str(folder / f"{part}-{name}.npy") for name in names]
-            jobs.append([sys.executable, "-m", "lowalt.echo", "--settings", block, "--motion", str(table), "--clouds",
-                         *clouds, "--station", *names, "--out", *files])  # fmt: skip
-    start, running = time.perf_counter(), []
+            jobs.append(
+                [
+                    sys.executable,
+                    "-m",
+                    "lowalt.echo",
+                    "--settings",
+                    block,
+                    "--motion",
+                    str(table),
+                    "--clouds",
+                    *clouds,
+                    "--station",
+                    *names,
+                    "--out",
+                    *files,
+                ]
+            )
+    start = time.perf_counter()
+    running = []
     for job in jobs:
         while len(running) == processes:
             time.sleep(0.005)
@@ -92,14 +120,23 @@ def stage(
 
 
 def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
-    """Return the seconds of poses, signals, and in these of kernels and of correct rounding, and counts of symbols.
+    """Return the seconds of poses, signals, and in these of kernels and of correct rounding, and
+    counts of symbols.
 
     All rows at all stations, without files and start-up.
     """
     network = Network.from_settings(config["network"])
     by_name = {cloud.subtype: cloud for cloud in clouds}
-    kernel, correct = driver.run, nearest.correct
-    spent = {"poses_s": 0.0, "signals_s": 0.0, "kernel_s": 0.0, "rounding_s": 0.0, "again": 0, "symbols": 0}
+    kernel = driver.run
+    correct = nearest.correct
+    spent = {
+        "poses_s": 0.0,
+        "signals_s": 0.0,
+        "kernel_s": 0.0,
+        "rounding_s": 0.0,
+        "again": 0,
+        "symbols": 0,
+    }
 
     def timed(name: str, call: Callable, *arguments):
         """Return the call's result and add its wall time to spent[name]."""
@@ -112,37 +149,59 @@ def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
     nearest.correct = functools.partial(timed, "rounding_s", correct)
     try:
         for row in rows:
-            cloud, aim = by_name[row["subtype"]], np.array([row["x_m"], row["y_m"], row["z_m"]])
-            motion = Rigid(*timed("poses_s", poses, cloud, row, network.times_s), cloud.points, cloud.part)
+            cloud = by_name[row["subtype"]]
+            aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
+            motion = Rigid(
+                *timed("poses_s", poses, cloud, row, network.times_s), cloud.points, cloud.part
+            )
             for station in network.stations:
                 found = timed(
-                    "signals_s", echo_signal, network, station, motion, cloud.rcs_m2, aim, config["echo"]["tolerance"]
+                    "signals_s",
+                    echo_signal,
+                    network,
+                    station,
+                    motion,
+                    cloud.rcs_m2,
+                    aim,
+                    config["echo"]["tolerance"],
                 )
                 spent["again"] += found.method.again[0]
                 spent["symbols"] += network.symbols
     finally:
-        driver.run, nearest.correct = kernel, correct
+        driver.run = kernel
+        nearest.correct = correct
     return spent
 
 
 def scaling(config: dict, cloud: Cloud) -> list[dict]:
     """Seconds a signal over points, symbols and tolerances, for one cloud resampled."""
-    network, published = Network.from_settings(config["network"]), load_table("config/targets.csv")
+    network = Network.from_settings(config["network"])
+    published = load_table("config/targets.csv")
     sizes = [(400, 31, None), (400, 100, None), (100, 400, None), (1600, 400, None)]
-    sizes += [(400, points, tolerance) for points in (400, 1600, 5000) for tolerance in (None, 1e-9, 1e-6, 1e-4, 1e-2)]
+    sizes += [
+        (400, points, tolerance)
+        for points in (400, 1600, 5000)
+        for tolerance in (None, 1e-9, 1e-6, 1e-4, 1e-2)
+    ]
     calls = []
     for symbols, points, tolerance in sizes:
         longer = dataclasses.replace(network, symbols=symbols)
-        given = cost.sample(cloud, published[cloud.subtype], longer, config["motion"], 1, 200.0, points)
+        given = cost.sample(
+            cloud, published[cloud.subtype], longer, config["motion"], 1, 200.0, points
+        )
         call = functools.partial(echo_signal, longer, longer.stations[0], *given, tolerance)
         call()
         calls.append((call, 7, 3))
     named = ["exact" if tolerance is None else f"{tolerance:g}" for _, _, tolerance in sizes]
     return [
-        {"what": f"one signal of {cloud.category} {cloud.subtype}, {symbols} symbols x {points} points, {name}",
-         "seconds": seconds}
-        for (symbols, points, _), name, (seconds, _) in zip(sizes, named, cost.in_turn(calls), strict=True)
-    ]  # fmt: skip
+        {
+            "what": f"one signal of {cloud.category} {cloud.subtype}, {symbols} symbols x {points} points, {name}",
+            "seconds": seconds,
+        }
+        for (symbols, points, _), name, (seconds, _) in zip(
+            sizes, named, cost.in_turn(calls), strict=True
+        )
+    ]
 
 
 def main() -> None:
@@ -153,10 +212,13 @@ def main() -> None:
     line.add_argument("--models", type=int, default=2000)
     line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo_stage.csv"))
     given = line.parse_args()
-    config, clouds = load_yaml(given.config), [read(path) for path in given.clouds]
+    config = load_yaml(given.config)
+    clouds = [read(path) for path in given.clouds]
     lacking = set(load_table("config/targets.csv")) - {cloud.subtype for cloud in clouds}
     if lacking:
-        raise SystemExit(f"--clouds: no cloud of {sorted(lacking)}, expected all subtypes (`make data`)")
+        raise SystemExit(
+            f"--clouds: no cloud of {sorted(lacking)}, expected all subtypes (`make data`)"
+        )
     rows = models(config, clouds, given.models)
     everyone = list(config["network"]["stations"])
     first = {cloud.category: cloud for cloud in reversed(clouds)}
@@ -164,20 +226,36 @@ def main() -> None:
     paths = {cloud.subtype: path for cloud, path in zip(clouds, given.clouds, strict=True)}
     with tempfile.TemporaryDirectory() as folder:
         for processes, how, jobs_of in (
-            (1, "echo.job: chunk", [everyone]), (2, "echo.job: chunk", [everyone]),
+            (1, "echo.job: chunk", [everyone]),
+            (2, "echo.job: chunk", [everyone]),
             (2, "echo.job: station", [[name] for name in everyone]),
-        ):  # fmt: skip
+        ):
             seconds = stage(config, paths, rows, jobs_of, processes, Path(folder))
-            result.append({"what": f"echo stage, {len(rows)} models x {len(everyone)} stations, {how}, "
-                           f"{processes} process(es)", "seconds": seconds, "models_per_s": len(rows) / seconds,
-                           "paper_minutes": PAPER / (len(rows) / seconds) / 60})  # fmt: skip
+            result.append(
+                {
+                    "what": f"echo stage, {len(rows)} models x {len(everyone)} stations, {how}, "
+                    f"{processes} process(es)",
+                    "seconds": seconds,
+                    "models_per_s": len(rows) / seconds,
+                    "paper_minutes": PAPER / (len(rows) / seconds) / 60,
+                }
+            )
         start = stage(config, paths, rows[:1], [everyone[:1]], 1, Path(folder))
-    result.append({"what": "a job of one model and station: start, files and first calls", "seconds": start})
+    result.append(
+        {"what": "a job of one model and station: start, files and first calls", "seconds": start}
+    )
     alone = [row["seconds"] for row in result if "1 process" in row["what"]][-1]
     spent = inside(config, clouds, rows)
-    again, symbols = spent.pop("again"), spent.pop("symbols")
-    result += [{"what": f"inside the stage, 1 process: {name[:-2]}", "seconds": value, "share": value / alone}
-               for name, value in spent.items()]  # fmt: skip
+    again = spent.pop("again")
+    symbols = spent.pop("symbols")
+    result += [
+        {
+            "what": f"inside the stage, 1 process: {name[:-2]}",
+            "seconds": value,
+            "share": value / alone,
+        }
+        for name, value in spent.items()
+    ]
     result[-1]["what"] += f", {again} of {symbols} symbols computed again"
     columns = ("what", "seconds", "models_per_s", "paper_minutes", "share", "hardware")
     write_csv(given.out, columns, [row | {"hardware": cost.hardware()} for row in result])

@@ -1,12 +1,13 @@
-"""Reading shards: samples per second at training sizes, damage found, resume exact, on a run's own samples.
+"""Reading shards: samples per second at training sizes, damage found, resume exact, on a run's own
+samples.
 
     python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 
-Packs one chunk of the run as image shards, as signal shards and as the usual RGB PNG tiles (Pillow, level 6), then
-reads each through `torch.utils.data.DataLoader` with two workers, shuffled, at 224, 64 and 24 pixels. RGB tiles are
-decoded and resized by Pillow. Then reads single samples in random order from disk, and from a local web server in a
-process of its own by byte ranges. Then harms copies of the shards 1 000 times (a byte, or a cut) and stops an epoch
-100 times.
+Packs one chunk of the run as image shards, as signal shards and as the usual RGB PNG tiles (Pillow,
+level 6), then reads each through `torch.utils.data.DataLoader` with two workers, shuffled, at 224,
+64 and 24 pixels. RGB tiles are decoded and resized by Pillow. Then reads single samples in random
+order from disk, and from a local web server in a process of its own by byte ranges. Then harms
+copies of the shards 1 000 times (a byte, or a cut) and stops an epoch 100 times.
 """
 
 import argparse
@@ -51,7 +52,8 @@ class Views(Dataset):
     """Index images of a shard set at one size."""
 
     def __init__(self, shards: ShardSet, size: int) -> None:
-        self.shards, self.size = shards, size
+        self.shards = shards
+        self.size = size
 
     def __len__(self) -> int:
         return len(self.shards)
@@ -64,7 +66,8 @@ class Colours(Dataset):
     """RGB tiles the usual way: Pillow decodes, cuts and resizes nine images."""
 
     def __init__(self, files: list[bytes], size: int) -> None:
-        self.files, self.size = files, size
+        self.files = files
+        self.size = size
 
     def __len__(self) -> int:
         return len(self.files)
@@ -73,14 +76,21 @@ class Colours(Dataset):
         with Image.open(io.BytesIO(self.files[number])) as tile:
             side = tile.width // 3
             boxes = [
-                (x, y, x + side, y + side) for y in range(0, tile.height, side) for x in range(0, tile.width, side)
+                (x, y, x + side, y + side)
+                for y in range(0, tile.height, side)
+                for x in range(0, tile.width, side)
             ]
-            views = [tile.crop(box).resize((self.size, self.size), Image.Resampling.BILINEAR) for box in boxes]
+            views = [
+                tile.crop(box).resize((self.size, self.size), Image.Resampling.BILINEAR)
+                for box in boxes
+            ]
         return torch.from_numpy(np.stack([np.asarray(view) for view in views]))
 
 
 def pack(run: Path, folder: Path, models: int) -> dict[str, Path]:
-    """Index files of image and signal shards of the first rows of every chunk; the same samples in both."""
+    """Index files of image and signal shards of the first rows of every chunk; the same samples in
+    both.
+    """
     config = yaml.safe_load((run / "config.yaml").read_text())
     network = Network.from_settings(config["network"])
     images = Images.from_settings(config["images"])
@@ -107,7 +117,9 @@ def pack(run: Path, folder: Path, models: int) -> dict[str, Path]:
 
 
 def rate(data: Dataset, workers: int, batch: int = 16) -> float:
-    """Samples a second through a shuffled loader, the best of five epochs, once every worker has begun."""
+    """Samples a second through a shuffled loader, the best of five epochs, once every worker has
+    begun.
+    """
     best = 0.0
     # Read one sample first: the workers inherit everything that it compiles or opens.
     data[0]
@@ -117,7 +129,8 @@ def rate(data: Dataset, workers: int, batch: int = 16) -> float:
         found = iter(loader)
         for _ in range(2 * workers):
             next(found)
-        start, count = time.perf_counter(), 0
+        start = time.perf_counter()
+        count = 0
         for views in found:
             count += len(views)
         best = max(best, count / (time.perf_counter() - start))
@@ -125,7 +138,9 @@ def rate(data: Dataset, workers: int, batch: int = 16) -> float:
 
 
 def processor_ms(data: Dataset, samples: int = 60) -> float:
-    """Processor time of one sample in this process (ms): the least of three passes, averaged over samples."""
+    """Processor time of one sample in this process (ms): the least of three passes, averaged over
+    samples.
+    """
     data[0]
     passes = []
     for _ in range(3):
@@ -139,8 +154,11 @@ def processor_ms(data: Dataset, samples: int = 60) -> float:
 
 
 def access_ms(index: str | Path, rng: np.random.Generator, count: int = 300) -> float:
-    """Median time until the record and data of a random sample are read and checked (ms), once its table is there."""
-    shards, times = ShardSet(index), []
+    """Median time until the record and data of a random sample are read and checked (ms), once its
+    table is there.
+    """
+    shards = ShardSet(index)
+    times = []
     if not len(shards.keys):
         raise InputError(f"{index}: no samples")
     for number in rng.integers(len(shards), size=count):
@@ -162,8 +180,12 @@ def served_ms(index: Path, rng: np.random.Generator) -> float:
             server.terminate()
 
 
-def damage(index: Path, folder: Path, count: int, rng: np.random.Generator) -> tuple[int, int, int, int]:
-    """Harm shards `count` times: faults, those that verify found, named with the sample, and that reading refused."""
+def damage(
+    index: Path, folder: Path, count: int, rng: np.random.Generator
+) -> tuple[int, int, int, int]:
+    """Harm shards `count` times: faults, those that verify found, named with the sample, and that
+    reading refused.
+    """
     shutil.copytree(index.parent, folder)
     index = folder / index.name
     entries = json.loads(index.read_text())["shards"]
@@ -171,7 +193,8 @@ def damage(index: Path, folder: Path, count: int, rng: np.random.Generator) -> t
     for _ in range(count):
         entry = entries[rng.integers(len(entries))]
         path = folder / entry["path"]
-        place, cut = int(rng.integers(entry["bytes"])), rng.random() < 0.5
+        place = int(rng.integers(entry["bytes"]))
+        cut = rng.random() < 0.5
         with path.open("r+b") as file:
             file.seek(place)
             rest = file.read() if cut else file.read(1)
@@ -181,7 +204,9 @@ def damage(index: Path, folder: Path, count: int, rng: np.random.Generator) -> t
             else:
                 file.write(bytes([rest[0] ^ int(rng.integers(1, 256))]))
         rows = map_samples(table_path(path))
-        hit = [n for n, row in enumerate(rows) if row["offset"] <= place < row["offset"] + row["size"]]
+        hit = [
+            n for n, row in enumerate(rows) if row["offset"] <= place < row["offset"] + row["size"]
+        ]
         keys = [rows["key"][n].decode() for n in hit] or ["end of the archive", "bytes, expected"]
         lines = list(shard_faults(path, entry))
         found += bool(lines)
@@ -198,7 +223,10 @@ def refuses(index: Path, entry: dict, hit: list[int]) -> bool:
     if not hit:
         return True
     shards = ShardSet(index, [entry["group"]], [entry["fold"]])
-    start = sum(e["samples"] for e in shards.shards[: [e["name"] for e in shards.shards].index(entry["name"])])
+    start = sum(
+        e["samples"]
+        for e in shards.shards[: [e["name"] for e in shards.shards].index(entry["name"])]
+    )
     try:
         shards.images(start + hit[0])
     except InputError as error:
@@ -217,8 +245,11 @@ class Keys(Dataset):
 
 
 def resumes(shards: ShardSet, count: int, rng: np.random.Generator) -> int:
-    """How many of `count` stops and resumes read the very samples, in the very order, of the uninterrupted epoch."""
-    data, facts = Keys(shards), facts_of(shards, np.arange(len(shards)), placed=False)
+    """How many of `count` stops and resumes read the very samples, in the very order, of the
+    uninterrupted epoch.
+    """
+    data = Keys(shards)
+    facts = facts_of(shards, np.arange(len(shards)), placed=False)
     parts = [batches(epoch_order(facts, 5, ("resumes",), 1, 0), 8) for _ in range(2)]
     order = list(DataLoader(data, batch_sampler=parts[0]))
     keys = [key for batch in order for key in batch]
@@ -231,9 +262,15 @@ def resumes(shards: ShardSet, count: int, rng: np.random.Generator) -> int:
 
 def main() -> None:
     """Measure and write the table."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--run", type=Path, required=True, help="a run's folder: config.yaml, motion/ and noisy/")
-    options.add_argument("--models", type=int, default=60, help="motion models of each group to pack")
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument(
+        "--run", type=Path, required=True, help="a run's folder: config.yaml, motion/ and noisy/"
+    )
+    options.add_argument(
+        "--models", type=int, default=60, help="motion models of each group to pack"
+    )
     options.add_argument("--faults", type=int, default=1000)
     options.add_argument("--out", type=Path, required=True)
     given = options.parse_args()
@@ -247,28 +284,50 @@ def main() -> None:
         colours = []
         for number in numbers:
             buffer = io.BytesIO()
-            Image.fromarray(paint(sets["image"].tile(number), sets["image"].palette)).save(buffer, "PNG")
+            Image.fromarray(paint(sets["image"].tile(number), sets["image"].palette)).save(
+                buffer, "PNG"
+            )
             colours.append(buffer.getvalue())
         for size in (224, 64, 24):
-            sources = {kind: Views(shards, size) for kind, shards in sets.items()} | {"RGB PNG": Colours(colours, size)}
+            sources = {kind: Views(shards, size) for kind, shards in sets.items()} | {
+                "RGB PNG": Colours(colours, size)
+            }
             for kind, data in sources.items():
                 rows.append(("loading", kind, size, 2, len(data), rate(data, 2), "samples/s"))
-                rows.append(("one sample", kind, size, 0, len(data), processor_ms(data), "ms of processor"))
+                rows.append(
+                    ("one sample", kind, size, 0, len(data), processor_ms(data), "ms of processor")
+                )
         rng = np.random.default_rng(0)
         for kind, index in indexes.items():
             rows.append(("random access, disk", kind, "", 0, 300, access_ms(index, rng), "ms"))
             rows.append(("random access, HTTP", kind, "", 0, 300, served_ms(index, rng), "ms"))
         for kind, index in indexes.items():
-            count, found, named, refused = damage(index, folder / f"harmed-{kind}", given.faults, rng)
-            for what, number in (("found", found), ("named", named), ("refused by the loader", refused)):
+            count, found, named, refused = damage(
+                index, folder / f"harmed-{kind}", given.faults, rng
+            )
+            for what, number in (
+                ("found", found),
+                ("named", named),
+                ("refused by the loader", refused),
+            ):
                 rows.append((f"faults {what}", kind, "", "", count, number, f"of {count}"))
         rows.append(
-            ("resumed exactly", "signal", "", "", len(sets["signal"]), resumes(sets["signal"], 100, rng), "of 100")
+            (
+                "resumed exactly",
+                "signal",
+                "",
+                "",
+                len(sets["signal"]),
+                resumes(sets["signal"], 100, rng),
+                "of 100",
+            )
         )
         for kind, shards in sets.items():
             size = sum(entry["bytes"] for entry in shards.shards) / len(shards)
             rows.append(("bytes on disk", kind, "", "", len(shards), size, "bytes/sample"))
-    table = [[f"{value:.5g}" if isinstance(value, float) else value for value in row] for row in rows]
+    table = [
+        [f"{value:.5g}" if isinstance(value, float) else value for value in row] for row in rows
+    ]
     for line in table:
         print(*line, sep="  ")
     write_csv(given.out, COLUMNS, [[*line, describe()] for line in table])

@@ -1,12 +1,13 @@
-"""Whether the echo of a single point appears where the observed truth says, in every scene and at every station.
+"""Whether the echo of a single point appears where the observed truth says, in every scene and at
+every station.
 
     python benchmarks/observed_truth.py --out results/reference/observed_truth.csv
 
-Each look has one isotropic point in uniform motion, and those effects of a scene that neither add noise nor other
-echoes. `cells` is the largest distance of a symbol's strongest range cell from the observed cell, `bins` the largest
-distance of the range-Doppler map's peak from the observed speed of the nearest symbol, in speeds of the map. Both are
-at most a half where the truth is right. `geometric_cells` and `geometric_bins` are the
-same for the geometric truth.
+Each look has one isotropic point in uniform motion, and those effects of a scene that neither add
+noise nor other echoes. `cells` is the largest distance of a symbol's strongest range cell from the
+observed cell, `bins` the largest distance of the range-Doppler map's peak from the observed speed
+of the nearest symbol, in speeds of the map. Both are at most a half where the truth is right.
+`geometric_cells` and `geometric_bins` are the same for the geometric truth.
 """
 
 import argparse
@@ -27,19 +28,40 @@ from lowalt.spectra.kinds import range_doppler
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles.cubes import Cubes
 
-COLUMNS = ("scene", "waveform", "symbols", "looks", "cells", "bins", "geometric_cells", "geometric_bins")
+COLUMNS = (
+    "scene",
+    "waveform",
+    "symbols",
+    "looks",
+    "cells",
+    "bins",
+    "geometric_cells",
+    "geometric_bins",
+)
 OTHERS = (
-    "scatter", "from_sender", "heard", "companions", "paths", "routes", "visible", "visible_one_way", "cross_sections",
-    "filtered", "choose",
-)  # fmt: skip
-"""Functions of the effects that add other echoes, change the target's amplitude, or act behind the receiver."""
+    "scatter",
+    "from_sender",
+    "heard",
+    "companions",
+    "paths",
+    "routes",
+    "visible",
+    "visible_one_way",
+    "cross_sections",
+    "filtered",
+    "choose",
+)
+"""Functions of the effects that add other echoes, change the target's amplitude, or act behind the
+receiver.
+"""
 NOISE = ("receiver_noise", "cell_noise", "phase_noise", "transmit_leakage")
 FURTHER: dict[str, tuple[str, dict]] = {
     "links, 0.017 ppm": ("links", {"effects": {"link_offset": {}}}),
     "continuous wave": ("fmcw", {"network": {"waveform": {"kind": "cw"}}, "effects": {}}),
 }
 """Scenes beyond the shipped ones: the scene that each starts from, and what replaces its blocks."""
-SYMBOLS, LOOKS = (64, 65), 6
+SYMBOLS = (64, 65)
+LOOKS = 6
 """Symbols of a look, and looks at each station."""
 
 
@@ -64,30 +86,51 @@ def block_of(root: Path, name: str) -> dict:
 def alone(effects: list[NamedEffect]) -> tuple[NamedEffect, ...]:
     """Return the effects that leave a single echo without noise."""
     return tuple(
-        effect for effect in effects
+        effect
+        for effect in effects
         if effect.name not in NOISE and not any(hasattr(effect.module, name) for name in OTHERS)
-    )  # fmt: skip
+    )
 
 
 def point() -> Cloud:
     """Return a target of a single point of 1 m2."""
     nothing = np.full((1, 3), np.nan)
     return Cloud(
-        points=np.zeros((1, 3)), part=np.zeros(1, int), kinds=("body",), names=("body",), parents=np.array([-1]),
-        hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(1),
-        record={"subtype": "Point", "category": "UAV", "source": "", "checksum": "", "published": {"size_m": 0.4}},
-    )  # fmt: skip
+        points=np.zeros((1, 3)),
+        part=np.zeros(1, int),
+        kinds=("body",),
+        names=("body",),
+        parents=np.array([-1]),
+        hinges=nothing,
+        axes=nothing,
+        normals=nothing,
+        rcs_m2=np.ones(1),
+        record={
+            "subtype": "Point",
+            "category": "UAV",
+            "source": "",
+            "checksum": "",
+            "published": {"size_m": 0.4},
+        },
+    )
 
 
 def course(network: Network, scene: str, look: int) -> dict:
-    """Return a row of the motion table: a place between the stations, a speed up to 40 m/s in any direction."""
+    """Return a row of the motion table: a place between the stations, a speed up to 40 m/s in any
+    direction.
+    """
     rng = stream(1, "observed truth", scene, look)
     masts = np.array([station.position_m for station in network.stations])
-    middle, extent = masts.mean(axis=0), float(np.ptp(masts[:, 0]))
-    place = middle + np.array([*(0.2 * extent * rng.uniform(-1, 1, 2)), 0.1 * extent * rng.random()])
+    middle = masts.mean(axis=0)
+    extent = float(np.ptp(masts[:, 0]))
+    place = middle + np.array(
+        [*(0.2 * extent * rng.uniform(-1, 1, 2)), 0.1 * extent * rng.random()]
+    )
     way = rng.standard_normal(3) * [1, 1, 0.2]
     velocity = 40 * rng.uniform(-1, 1) * way / np.linalg.norm(way)
-    numbers = dict(zip(("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"), (*place, *velocity), strict=True))
+    numbers = dict(
+        zip(("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"), (*place, *velocity), strict=True)
+    )
     level = {"yaw_rad": 0.0, "pitch_rad": 0.0, "roll_rad": 0.0}
     texts = {"subtype": "Point", "category": "UAV", "group": "seen", "model": look}
     return dict.fromkeys(NUMBERS, np.nan) | texts | level | numbers
@@ -100,12 +143,16 @@ def distance(cube: Cube, network: Network, station: Station) -> Distance:
     truth = dict(zip(TRUTH, cube.truth.T, strict=True))
     settings = range_doppler.Settings(max(count - 1 + count % 2, 3), symbols)
     power = range_doppler.definition(cube, settings)
-    seen_mps = network.bin_speeds_mps(symbols, station)[np.unravel_index(power.argmax(), power.shape)[1]]
+    seen_mps = network.bin_speeds_mps(symbols, station)[
+        np.unravel_index(power.argmax(), power.shape)[1]
+    ]
     step_mps = 2 * network.largest_mps(station) / symbols
     strongest = abs(cube.cells[there]).argmax(axis=1)
 
     def cells(where: np.ndarray) -> float:
-        """Largest distance of the strongest cells from a truth (N,); cells wrap around as ranges do."""
+        """Largest distance of the strongest cells from a truth (N,); cells wrap around as ranges
+        do.
+        """
         return float(abs((strongest - where[there] + count / 2) % count - count / 2).max())
 
     def bins(speeds_mps: np.ndarray) -> float:
@@ -113,34 +160,50 @@ def distance(cube: Cube, network: Network, station: Station) -> Distance:
         return float(abs(network.folded_mps(seen_mps - speeds_mps, station)).min() / step_mps)
 
     return Distance(
-        cells(truth["observed_cell"]), bins(truth["observed_mps"]),
-        cells(truth["range_m"] / network.cell_m % count), bins(truth["radial_mps"]),
-    )  # fmt: skip
+        cells(truth["observed_cell"]),
+        bins(truth["observed_mps"]),
+        cells(truth["range_m"] / network.cell_m % count),
+        bins(truth["radial_mps"]),
+    )
 
 
 def distances(config: dict, name: str, symbols: int, looks: int) -> list[Distance]:
     """Return the distances of several looks at every station of a scene."""
     network = Network.from_settings(config["network"] | {"symbols": symbols})
-    scene = Scene(network, config["seed"], config["echo"]["tolerance"], alone(called(config["effects"])))
+    scene = Scene(
+        network, config["seed"], config["echo"]["tolerance"], alone(called(config["effects"]))
+    )
     cubes = Cubes(scene, {"Point": point()}, kept=1)
     return [
         distance(cubes.of(course(network, name, look), np.inf, station), network, station)
-        for look in range(looks) for station in network.stations
-    ]  # fmt: skip
+        for look in range(looks)
+        for station in network.stations
+    ]
 
 
 def main() -> None:
     """Compute, print and write the table."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     options.add_argument("--looks", type=int, default=LOOKS, help="at each station")
     options.add_argument("--out", type=Path, required=True)
-    given, table = options.parse_args(), []
+    given = options.parse_args()
+    table = []
     for name in (*sorted(path.stem for path in Path("config/scenes").glob("*.yaml")), *FURTHER):
         for symbols in SYMBOLS:
             config = block_of(Path(), name)
             found = np.array(distances(config, name, symbols, given.looks))
             waveform = config["network"].get("waveform", {"kind": "ofdm"})["kind"]
-            table.append([name, waveform, symbols, len(found), *(f"{value:.3f}" for value in found.max(axis=0))])
+            table.append(
+                [
+                    name,
+                    waveform,
+                    symbols,
+                    len(found),
+                    *(f"{value:.3f}" for value in found.max(axis=0)),
+                ]
+            )
             print(*table[-1], sep=",", flush=True)
     write_csv(given.out, COLUMNS, table)
 

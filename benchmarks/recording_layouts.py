@@ -1,10 +1,12 @@
-"""How many tries `lowalt recording inspect` needs for a file of unknown layout: the place of the true reading.
+"""How many tries `lowalt recording inspect` needs for a file of unknown layout: the place of the
+true reading.
 
     python benchmarks/recording_layouts.py --out results/benchmarks/recording_layouts.csv
 
-Simulated echoes in noise (a point at one speed, a walker, a drone's body and rotors; a leak is always there) are
-written as receivers write them. A reading is right where it gives back the samples that were written, up to a factor,
-and of chirps the slow signal. Rate and carrier are told, nothing else.
+Simulated echoes in noise (a point at one speed, a walker, a drone's body and rotors; a leak is
+always there) are written as receivers write them. A reading is right where it gives back the
+samples that were written, up to a factor, and of chirps the slow signal. Rate and carrier are told,
+nothing else.
 """
 
 import argparse
@@ -20,23 +22,36 @@ from lowalt.extensions.recordings.file_inspection import inspect_recording
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 
-CARRIER_HZ, RATE_HZ, COUNT, SPEED_MPS = 3.3e9, 5000.0, 8192, 3.0
+CARRIER_HZ = 3.3e9
+RATE_HZ = 5000.0
+COUNT = 8192
+SPEED_MPS = 3.0
 WAVE_M = SPEED_OF_LIGHT / CARRIER_HZ
 SNRS_DB = (30, 10, 0)
 COLUMNS = ("layout", "echo", "snr_db", "tries")
 
 
 def echo(kind: str, snr_db: float, rng: np.random.Generator) -> np.ndarray:
-    """Return the samples (COUNT,) of an echo of unit power, "point", "walker" or "drone", in noise, with a leak."""
+    """Return the samples (COUNT,) of an echo of unit power, "point", "walker" or "drone", in noise,
+    with a leak.
+    """
     times = np.arange(COUNT) / RATE_HZ
     range_m = 20 - SPEED_MPS * times
     parts = {
         "point": [(1.0, range_m)],
-        "walker": [(1.0, range_m), *((0.4, range_m + 0.15 * np.sin(2 * np.pi * 1.8 * times + phase))
-                                     for phase in (0, 3))],
-        "drone": [(1.0, range_m), *((0.3, range_m + reach * np.cos(2 * np.pi * rate * times + rate))
-                                    for rate in (80.0, 82.0, 79.0, 85.0) for reach in (0.04, 0.07, 0.1))],
-    }  # fmt: skip
+        "walker": [
+            (1.0, range_m),
+            *((0.4, range_m + 0.15 * np.sin(2 * np.pi * 1.8 * times + phase)) for phase in (0, 3)),
+        ],
+        "drone": [
+            (1.0, range_m),
+            *(
+                (0.3, range_m + reach * np.cos(2 * np.pi * rate * times + rate))
+                for rate in (80.0, 82.0, 79.0, 85.0)
+                for reach in (0.04, 0.07, 0.1)
+            ),
+        ],
+    }
     signal = sum(size * np.exp(-4j * np.pi * distance / WAVE_M) for size, distance in parts[kind])
     signal /= np.sqrt(np.mean(np.abs(signal) ** 2))
     noise = rng.standard_normal((2, COUNT)) * np.sqrt(0.5) * 10 ** (-snr_db / 20)
@@ -71,7 +86,9 @@ def mat73(path: Path, values: np.ndarray) -> Path:
 
 
 def chirped(values: np.ndarray, samples: int = 64, beat: float = 0.11) -> np.ndarray:
-    """Chirps (512 * samples,) of a target with the slow signal `values`: a beat note of conjugate phase, clutter."""
+    """Chirps (512 * samples,) of a target with the slow signal `values`: a beat note of conjugate
+    phase, clutter.
+    """
     fast = np.exp(2j * np.pi * beat * np.arange(samples))
     still = 2 * np.exp(2j * np.pi * 0.031 * np.arange(samples))
     return (values[:512, None].conj() * fast + still).ravel()
@@ -79,7 +96,9 @@ def chirped(values: np.ndarray, samples: int = 64, beat: float = 0.11) -> np.nda
 
 def written(layout: str, values: np.ndarray, folder: Path) -> Path:
     """Write samples (n,) complex in a layout of `LAYOUTS` and return the file's path."""
-    return LAYOUTS[layout](folder, values, np.round(3000 * values.real), np.round(3000 * values.imag))
+    return LAYOUTS[layout](
+        folder, values, np.round(3000 * values.real), np.round(3000 * values.imag)
+    )
 
 
 def raw(folder: Path, name: str, numbers: np.ndarray, dtype: str) -> Path:
@@ -135,12 +154,24 @@ LAYOUTS = {
     "int16 iqiq": lambda f, v, i, q: raw(f, "a.bin", in_turn(i, q), "<i2"),
     "int16 iiqq": lambda f, v, i, q: raw(f, "a.bin", np.r_[i, q], "<i2"),
     "int16 big-endian": lambda f, v, i, q: raw(f, "a.bin", in_turn(i, q), ">i2"),
-    "int16 dca2": lambda f, v, i, q: raw(f, "a.bin", in_turn(i[::2], i[1::2], q[::2], q[1::2]), "<i2"),
-    "int16 dca4": lambda f, v, i, q: raw(f, "a.bin", in_turn(*(np.roll(i, 40 * k) for k in range(4)),
-                                                             *(np.roll(q, 40 * k) for k in range(4))), "<i2"),
-    "int16 dca2 chirps": lambda f, v, i, q: raw(f, "a.bin", dca2(np.round(3000 * chirped(v))), "<i2"),
-    "uint8 iqiq": lambda f, v, i, q: raw(f, "a.bin", np.clip(127.5 + in_turn(i, q) / 100, 0, 255), "u1"),
-    "uint8 .cu8": lambda f, v, i, q: raw(f, "a.cu8", np.clip(127.5 + in_turn(i, q) / 100, 0, 255), "u1"),
+    "int16 dca2": lambda f, v, i, q: raw(
+        f, "a.bin", in_turn(i[::2], i[1::2], q[::2], q[1::2]), "<i2"
+    ),
+    "int16 dca4": lambda f, v, i, q: raw(
+        f,
+        "a.bin",
+        in_turn(*(np.roll(i, 40 * k) for k in range(4)), *(np.roll(q, 40 * k) for k in range(4))),
+        "<i2",
+    ),
+    "int16 dca2 chirps": lambda f, v, i, q: raw(
+        f, "a.bin", dca2(np.round(3000 * chirped(v))), "<i2"
+    ),
+    "uint8 iqiq": lambda f, v, i, q: raw(
+        f, "a.bin", np.clip(127.5 + in_turn(i, q) / 100, 0, 255), "u1"
+    ),
+    "uint8 .cu8": lambda f, v, i, q: raw(
+        f, "a.cu8", np.clip(127.5 + in_turn(i, q) / 100, 0, 255), "u1"
+    ),
     "int8 iqiq": lambda f, v, i, q: raw(f, "a.iq", np.clip(in_turn(i, q) / 100, -128, 127), "i1"),
     "int8 .cs8": lambda f, v, i, q: raw(f, "a.cs8", np.clip(in_turn(i, q) / 100, -128, 127), "i1"),
     "float32 iqiq": lambda f, v, i, q: raw(f, "a.bin", in_turn(v.real, v.imag), "<f4"),
@@ -149,8 +180,10 @@ LAYOUTS = {
     "MATLAB 5": lambda f, v, i, q: mat5(f, v),
     "MATLAB 7.3": lambda f, v, i, q: mat73(f / "seven.mat", v),
     "SigMF int16": lambda f, v, i, q: sigmf(f, "a", in_turn(i, q).astype("<i2"), "ci16_le"),
-    "SigMF float32": lambda f, v, i, q: sigmf(f, "b", in_turn(v.real, v.imag).astype("<f4"), "cf32_le"),
-}  # fmt: skip
+    "SigMF float32": lambda f, v, i, q: sigmf(
+        f, "b", in_turn(v.real, v.imag).astype("<f4"), "cf32_le"
+    ),
+}
 
 
 def dca2(values: np.ndarray) -> np.ndarray:
@@ -159,7 +192,9 @@ def dca2(values: np.ndarray) -> np.ndarray:
 
 
 def tries(path: Path, values: np.ndarray) -> int:
-    """Return the place, from 1, of the first reading of a file that gives back the samples; 99 where none does."""
+    """Return the place, from 1, of the first reading of a file that gives back the samples; 99
+    where none does.
+    """
     try:
         seen = inspect_recording(path, CARRIER_HZ, RATE_HZ)
     except InputError:
@@ -178,7 +213,9 @@ def tries(path: Path, values: np.ndarray) -> int:
 
 def main() -> None:
     """Write the table and print how many files need one try, two, or more."""
-    line = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    line = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     line.add_argument("--out", type=Path, required=True, help="table to write (.csv)")
     options = line.parse_args()
     rows = []
@@ -187,11 +224,15 @@ def main() -> None:
             for kind in ("point", "walker", "drone"):
                 for snr in SNRS_DB:
                     values = echo(kind, snr, np.random.default_rng([snr, len(kind)]))
-                    rows.append([layout, kind, snr, tries(written(layout, values, Path(folder)), values)])
+                    rows.append(
+                        [layout, kind, snr, tries(written(layout, values, Path(folder)), values)]
+                    )
     write_csv(options.out, COLUMNS, rows)
     counts = [row[-1] for row in rows]
-    print(f"{len(rows)} files: {counts.count(1)} at the first try, {counts.count(2)} at the second, "
-          f"{sum(count > 2 for count in counts)} later")  # fmt: skip
+    print(
+        f"{len(rows)} files: {counts.count(1)} at the first try, {counts.count(2)} at the second, "
+        f"{sum(count > 2 for count in counts)} later"
+    )
     for row in rows:
         if row[-1] > 2:
             print(*row)

@@ -1,10 +1,13 @@
-"""How well readers of shards shuffle: labels, subtypes and motion models of their batches, against a random order.
+"""How well readers of shards shuffle: labels, subtypes and motion models of their batches, against
+a random order.
 
-    python benchmarks/shuffling.py --shards results/RUN/shards/*-train-*.tar --out results/benchmarks/shuffling.csv
+    python benchmarks/shuffling.py --shards results/RUN/shards/*-train-*.tar --out
+    results/benchmarks/shuffling.csv
 
-Reads the same shards with each reader, one worker, and cuts what it gives into batches of 64. The entropy of a batch is
-that of its shares of labels or subtypes, in bits; `motion models` is the number of distinct ones in a batch. `random
-order` is a permutation of all samples, as random access through `ShardSet` gives.
+Reads the same shards with each reader, one worker, and cuts what it gives into batches of 64. The
+entropy of a batch is that of its shares of labels or subtypes, in bits; `motion models` is the
+number of distinct ones in a batch. `random order` is a permutation of all samples, as random access
+through `ShardSet` gives.
 """
 
 import argparse
@@ -41,7 +44,9 @@ def by_hub(paths: list[str], buffer: int) -> Iterator[Facts]:
     """Samples in the order of the hub's library, with shards and a buffer of samples shuffled."""
     import datasets
 
-    data = datasets.load_dataset("webdataset", data_files={"train": paths}, split="train", streaming=True)
+    data = datasets.load_dataset(
+        "webdataset", data_files={"train": paths}, split="train", streaming=True
+    )
     yield from (facts(row["json"]) for row in data.shuffle(seed=1, buffer_size=buffer))
 
 
@@ -61,16 +66,26 @@ def bits(values: list) -> float:
 def figures(found: list[Facts]) -> tuple[float, float, float]:
     """Mean over batches: entropies of labels and subtypes, and distinct motion models."""
     batches = [found[first : first + BATCH] for first in range(0, len(found) - BATCH + 1, BATCH)]
-    each = [(bits([label for label, _, _ in batch]), bits([name for _, name, _ in batch]),
-             len({(name, model) for _, name, model in batch})) for batch in batches]  # fmt: skip
+    each = [
+        (
+            bits([label for label, _, _ in batch]),
+            bits([name for _, name, _ in batch]),
+            len({(name, model) for _, name, model in batch}),
+        )
+        for batch in batches
+    ]
     label, subtype, models = np.mean(each, axis=0).tolist()
     return label, subtype, models
 
 
 def main() -> None:
     """Read the shards with each reader and write the table."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--shards", nargs="+", required=True, help="tars of a data set, next to their tables")
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument(
+        "--shards", nargs="+", required=True, help="tars of a data set, next to their tables"
+    )
     options.add_argument("--out", type=Path, required=True)
     given = options.parse_args()
     readers = {
@@ -84,7 +99,9 @@ def main() -> None:
     rows = []
     for name, reader in readers.items():
         found = list(reader)
-        rows.append((name, len(given.shards), len(found), *(f"{value:.4g}" for value in figures(found))))
+        rows.append(
+            (name, len(given.shards), len(found), *(f"{value:.4g}" for value in figures(found)))
+        )
         print(*rows[-1], sep="  ")
     write_csv(given.out, COLUMNS, rows)
 

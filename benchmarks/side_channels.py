@@ -2,12 +2,12 @@
 
     .venv/bin/python benchmarks/side_channels.py --out results/benchmarks/side_channels.csv
 
-The data set is made here, as signals, from the default with fewer motion models and the overlays that are given. For
-each channel a random forest learns the class on four fifths of the motion models and is tested on the rest, five times.
-`p_value` is the share of 1000 assignments of classes to motion models, the true one and random ones, that are at least
-as accurate. Classes are balanced, so a channel without information may fall below chance: of what a training has more,
-its test has less.
-docs/benchmark-rules.md says what follows for a submission.
+The data set is made here, as signals, from the default with fewer motion models and the overlays
+that are given. For each channel a random forest learns the class on four fifths of the motion
+models and is tested on the rest, five times. `p_value` is the share of 1000 assignments of classes
+to motion models, the true one and random ones, that are at least as accurate. Classes are balanced,
+so a channel without information may fall below chance: of what a training has more, its test has
+less. docs/benchmark-rules.md says what follows for a submission.
 """
 
 import argparse
@@ -66,7 +66,10 @@ def tar_headers(found: Evidence) -> np.ndarray:
 
 def pngs(found: Evidence) -> list[bytes]:
     """The PNG file of each sample, as image shards hold it."""
-    return [encode(found.shards.tile(number), found.shards.palette) for number in range(len(found.shards))]
+    return [
+        encode(found.shards.tile(number), found.shards.palette)
+        for number in range(len(found.shards))
+    ]
 
 
 def png_apart_from_pixels(found: Evidence) -> np.ndarray:
@@ -82,7 +85,9 @@ def low_bits(found: Evidence) -> np.ndarray:
 
 def levels_db(found: Evidence) -> np.ndarray:
     """Mean power (dB) of the signals of each station."""
-    power = [np.mean(np.abs(found.shards.signal(n)) ** 2, axis=-1) for n in range(len(found.shards))]
+    power = [
+        np.mean(np.abs(found.shards.signal(n)) ** 2, axis=-1) for n in range(len(found.shards))
+    ]
     return 10 * np.log10(np.array(power, float))
 
 
@@ -91,7 +96,11 @@ def leaves_below(*path: str) -> Callable[[Evidence], np.ndarray]:
 
     def leaves(value: object) -> list[float]:
         """The numbers in a tree of dicts."""
-        return [n for item in value.values() for n in leaves(item)] if isinstance(value, dict) else [float(value)]
+        return (
+            [n for item in value.values() for n in leaves(item)]
+            if isinstance(value, dict)
+            else [float(value)]
+        )
 
     def channel(found: Evidence) -> np.ndarray:
         """The numbers of every record."""
@@ -109,44 +118,61 @@ def leaves_below(*path: str) -> Callable[[Evidence], np.ndarray]:
 def column(name: str) -> Callable[[Evidence], np.ndarray]:
     """A channel: one column of the shards' tables."""
     return lambda found: (
-        np.concatenate([table[name] for _, table in found.shards.tables()]).reshape(-1, 1).astype(float)
+        np.concatenate([table[name] for _, table in found.shards.tables()])
+        .reshape(-1, 1)
+        .astype(float)
     )
 
 
 CHANNELS: dict[str, tuple[Callable[[Evidence], np.ndarray], str]] = {
     "position in the shard": (place, "chance"),
     "time, owner and mode in the tar": (tar_headers, "chance"),
-    "group of subtypes": (lambda f: np.array([[r["group"] == "seen"] for r in f.records], float), "chance"),
+    "group of subtypes": (
+        lambda f: np.array([[r["group"] == "seen"] for r in f.records], float),
+        "chance",
+    ),
     "SNR": (lambda f: np.minimum(f.shards.snrs_db, 99).reshape(-1, 1), "chance"),
     "root seed in the record": (leaves_below("seed"), "chance"),
-    "SHA-256 of the sample": (lambda f: np.concatenate([table["sha256"] for _, table in f.shards.tables()]), "chance"),
+    "SHA-256 of the sample": (
+        lambda f: np.concatenate([table["sha256"] for _, table in f.shards.tables()]),
+        "chance",
+    ),
     "PNG apart from its pixels": (png_apart_from_pixels, "chance"),
     "lowest bits of the signal": (low_bits, "chance"),
-    "size of the PNG": (lambda f: np.array([[len(data)] for data in pngs(f)], float), "in the image"),
+    "size of the PNG": (
+        lambda f: np.array([[len(data)] for data in pngs(f)], float),
+        "in the image",
+    ),
     "level of the signal": (levels_db, "forbidden"),
-    "key": (lambda f: np.array([list(k.ljust(12)[:12]) for k in f.shards.keys.tolist()], float), "forbidden"),
+    "key": (
+        lambda f: np.array([list(k.ljust(12)[:12]) for k in f.shards.keys.tolist()], float),
+        "forbidden",
+    ),
     "size of the record": (column("record_size"), "forbidden"),
     "motion in the record": (leaves_below("motion"), "forbidden"),
     "range, direction and speed in the record": (leaves_below("geometry"), "forbidden"),
-}  # fmt: skip
-"""Features of each sample (n, any) by channel, and the verdict: `chance` is shown, `in the image` follows from the
-pixels alone, `forbidden` names the class and may not be used."""
+}
+"""Features of each sample (n, any) by channel, and the verdict: `chance` is shown, `in the image`
+follows from the pixels alone, `forbidden` names the class and may not be used."""
 
 
 def from_known_seed(found: Evidence, chosen: np.ndarray) -> np.ndarray:
     """Answers for the chosen noisy samples of a program that knows the root seed.
 
-    Each subtype has noise of its own. The answer is the class of the subtype whose noise correlates best with the
-    signal of the first station.
+    Each subtype has noise of its own. The answer is the class of the subtype whose noise correlates
+    best with the signal of the first station.
     """
     label_of = {record["subtype"]: record["label"] for record in found.records}
     (station, *_) = found.shards.index["render"]["network"]["stations"]
     answers = []
     for number in chosen.tolist():
-        signal, record = found.shards.signal(number)[0], found.records[number]
+        signal = found.shards.signal(number)[0]
+        record = found.records[number]
         fits = {}
         for subtype in label_of:
-            rng = stream(record["seed"], "noise", subtype, record["model"], station, record["snr_db"])
+            rng = stream(
+                record["seed"], "noise", subtype, record["model"], station, record["snr_db"]
+            )
             noise = circular(rng.bit_generator.random_raw(2 * len(signal)), 1.0)
             fits[subtype] = abs(np.vdot(noise[0] + 1j * noise[1], signal))
         answers.append(label_of[max(fits, key=fits.__getitem__)])
@@ -154,9 +180,11 @@ def from_known_seed(found: Evidence, chosen: np.ndarray) -> np.ndarray:
 
 
 def absent_from_training(labels: np.ndarray, models: np.ndarray, trains: np.ndarray) -> np.ndarray:
-    """Answers for all motion models by their numbers: the class of which the fewest with that number train.
+    """Answers for all motion models by their numbers: the class of which the fewest with that
+    number train.
 
-    Ten consecutive motion models of a subtype hold exactly eight that train, so whoever does not train is tested.
+    Ten consecutive motion models of a subtype hold exactly eight that train, so whoever does not
+    train is tested.
     """
     count = np.zeros((models.max() + 1, labels.max() + 1))
     np.add.at(count, (models[trains], labels[trains]), 1)
@@ -164,15 +192,30 @@ def absent_from_training(labels: np.ndarray, models: np.ndarray, trains: np.ndar
 
 
 def by_number(config: dict, models: int = 250) -> tuple:
-    """The row of a program that knows only the number of a motion model, and which ones train; no data is needed."""
+    """The row of a program that knows only the number of a motion model, and which ones train; no
+    data is needed.
+    """
     published = records_of(config["targets"])
     classes = classes_of({name: item["published"] for name, item in published.items()})
-    rows = [(label(classes, item["published"]), number, fold(config["split"], config["seed"], name, number))
-            for name, item in published.items() for number in range(models)]  # fmt: skip
+    rows = [
+        (
+            label(classes, item["published"]),
+            number,
+            fold(config["split"], config["seed"], name, number),
+        )
+        for name, item in published.items()
+        for number in range(models)
+    ]
     labels, numbers, folds = (np.array(column) for column in zip(*rows, strict=True))
     tested = folds == "test"
     answers = absent_from_training(labels, numbers, folds == "train")[tested]
-    return row("motion models absent from training", answers, labels[tested], np.arange(tested.sum()), "forbidden")
+    return row(
+        "motion models absent from training",
+        answers,
+        labels[tested],
+        np.arange(tested.sum()),
+        "forbidden",
+    )
 
 
 def learned(features: np.ndarray, labels: np.ndarray, groups: np.ndarray) -> np.ndarray:
@@ -181,38 +224,63 @@ def learned(features: np.ndarray, labels: np.ndarray, groups: np.ndarray) -> np.
     from sklearn.model_selection import StratifiedGroupKFold, cross_val_predict
 
     forest = RandomForestClassifier(100, min_samples_leaf=3, random_state=0)
-    # Parts of unequal classes would make the most frequent class of a training the least frequent of its test.
+    # Parts of unequal classes would make the most frequent class of a training the least frequent
+    # of its test.
     parts = StratifiedGroupKFold(5, shuffle=True, random_state=0)
     return cross_val_predict(forest, features, labels, groups=groups, cv=parts)
 
 
 def chance_of(answers: np.ndarray, labels: np.ndarray, groups: np.ndarray) -> float:
-    """Share of assignments of the labels to the groups, the true one and random ones, that are at least as accurate."""
+    """Share of assignments of the labels to the groups, the true one and random ones, that are at
+    least as accurate.
+    """
     _, first, which = np.unique(groups, return_index=True, return_inverse=True)
     rng = np.random.default_rng(0)
     drawn = [np.mean(answers == rng.permutation(labels[first])[which]) for _ in range(REPEATS)]
     return (1 + int(np.sum(np.array(drawn) >= np.mean(answers == labels)))) / (1 + REPEATS)
 
 
-def row(channel: str, answers: np.ndarray, labels: np.ndarray, groups: np.ndarray, verdict: str) -> tuple:
+def row(
+    channel: str, answers: np.ndarray, labels: np.ndarray, groups: np.ndarray, verdict: str
+) -> tuple:
     """One row of the table."""
-    right, most = np.mean(answers == labels), np.bincount(labels).max() / len(labels)
+    right = np.mean(answers == labels)
+    most = np.bincount(labels).max() / len(labels)
     p_value = chance_of(answers, labels, groups)
-    return channel, f"{100 * right:.1f}", f"{100 * most:.1f}", f"{p_value:.3f}", len(labels), verdict
+    return (
+        channel,
+        f"{100 * right:.1f}",
+        f"{100 * most:.1f}",
+        f"{p_value:.3f}",
+        len(labels),
+        verdict,
+    )
 
 
 def measured(found: Evidence) -> list[tuple]:
     """Every channel's row."""
     labels = np.array([record["label"] for record in found.records])
     groups = np.array([f"{record['subtype']} {record['model']}" for record in found.records])
-    rows = [row(name, learned(features(found), labels, groups), labels, groups, verdict)
-            for name, (features, verdict) in CHANNELS.items()]  # fmt: skip
+    rows = [
+        row(name, learned(features(found), labels, groups), labels, groups, verdict)
+        for name, (features, verdict) in CHANNELS.items()
+    ]
     noisy = np.flatnonzero([record["noise"] for record in found.records])
     answers = from_known_seed(found, noisy)
-    rows.append(row("noise of the known root seed", answers, labels[noisy], groups[noisy], "forbidden"))
+    rows.append(
+        row("noise of the known root seed", answers, labels[noisy], groups[noisy], "forbidden")
+    )
     small = np.stack([found.shards.tile(n)[::24, ::24].ravel() for n in range(len(labels))])
     tested = np.array([int(record["fold"] == "test") for record in found.records])
-    rows.append(row("whether the image is tested on", learned(small, tested, groups), tested, groups, "chance"))
+    rows.append(
+        row(
+            "whether the image is tested on",
+            learned(small, tested, groups),
+            tested,
+            groups,
+            "chance",
+        )
+    )
     return rows
 
 
@@ -225,12 +293,19 @@ def evidence(config: dict, folder: Path) -> Evidence:
 
 def main() -> None:
     """Make the data set, measure every channel and write the table."""
-    line = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    line = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     line.add_argument("--configfile", nargs="*", default=[], help="overlays on config/default.yaml")
-    line.add_argument("--models", type=int, default=20, help="motion models per subtype (default 20)")
+    line.add_argument(
+        "--models", type=int, default=20, help="motion models per subtype (default 20)"
+    )
     line.add_argument("--out", type=Path, required=True, help="table to write (.csv)")
     options = line.parse_args()
-    fewer = {"motion": {"models": options.models, "models_per_chunk": 10}, "noise": {"snr_db": [3, float("inf")]}}
+    fewer = {
+        "motion": {"models": options.models, "models_per_chunk": 10},
+        "noise": {"snr_db": [3, float("inf")]},
+    }
     config = merge(load(["config/default.yaml", *options.configfile], SCHEMA), fewer)
     with tempfile.TemporaryDirectory() as folder:
         rows = measured(evidence(config, Path(folder)))

@@ -1,4 +1,5 @@
-"""The pages of keys of the site, Markdown made of the two schemas: of the configuration, and of targets' records.
+"""The pages of keys of the site, Markdown made of the two schemas: of the configuration, and of
+targets' records.
 
 `docs/site_pages.py` makes them as the site is built.
 """
@@ -16,7 +17,12 @@ Made from `workflow/schemas/config.schema.yaml`. The values of the embedded defa
 refused before any job starts. In an overlay, null takes out what a lower layer has, such as a station, a spectrum or
 an effect, wherever the key may be left out.
 """
-LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
+LIMITS = {
+    "minimum": "at least",
+    "exclusiveMinimum": "above",
+    "maximum": "at most",
+    "exclusiveMaximum": "below",
+}
 
 RECORDS_HEAD = """\
 # Keys of target records
@@ -26,9 +32,11 @@ Made from `src/lowalt/targets/records.schema.yaml`. What a record is, and how to
 
 """
 INSIDE = {
-    "Parts of a mesh (`parts`, each by its name)": "part", "Meshes of a part (`meshes`, a list)": "mesh",
-    "Regions (`region`, `drop`)": "region", "Wing beat (`flap`)": "flap",
-}  # fmt: skip
+    "Parts of a mesh (`parts`, each by its name)": "part",
+    "Meshes of a part (`meshes`, a list)": "mesh",
+    "Regions (`region`, `drop`)": "region",
+    "Wing beat (`flap`)": "flap",
+}
 
 
 def kind(entry: dict) -> str:
@@ -48,11 +56,15 @@ def kind(entry: dict) -> str:
 
 def value(entry: dict) -> str:
     """Return the type of a key and the range of a number in words, such as `number, at least 0`."""
-    return ", ".join([kind(entry), *(f"{word} {entry[key]:g}" for key, word in LIMITS.items() if key in entry)])
+    return ", ".join(
+        [kind(entry), *(f"{word} {entry[key]:g}" for key, word in LIMITS.items() if key in entry)]
+    )
 
 
 def rows(entry: dict, prefix: str = "") -> Iterator[tuple[str, str, str]]:
-    """Yield (key, value, meaning) of every key below an entry; keys of inner blocks are joined by dots."""
+    """Yield (key, value, meaning) of every key below an entry; keys of inner blocks are joined by
+    dots.
+    """
     further = entry.get("additionalProperties")
     below = dict(entry.get("properties", {}))
     if isinstance(further, dict):
@@ -69,19 +81,23 @@ def cell(text: str) -> str:
 
 
 def configuration_page(schema: dict) -> str:
-    """Return the page of the configuration's schema: single keys first, then a section for each block.
+    """Return the page of the configuration's schema: single keys first, then a section for each
+    block.
 
     Raises: InputError where the schema has no properties.
     """
     if not schema.get("properties"):
         raise InputError("the schema has no key `properties`")
     title = "| key | value | meaning |\n|---|---|---|\n"
-    single, blocks = title, ""
+    single = title
+    blocks = ""
     for key, entry in schema["properties"].items():
         lines = list(rows(entry))
         if not lines:
             lines = [(key, value(entry), entry.get("description", ""))]
-        table = "".join(f"| `{name}` | {' | '.join(map(cell, cells))} |\n" for name, *cells in lines)
+        table = "".join(
+            f"| `{name}` | {' | '.join(map(cell, cells))} |\n" for name, *cells in lines
+        )
         if lines[0][0] == key:
             single += table
         else:
@@ -91,20 +107,27 @@ def configuration_page(schema: dict) -> str:
 
 
 def records_page(schema: dict) -> str:
-    """Return the page of the keys of records: those of every record, of each source, and of what stands inside.
+    """Return the page of the keys of records: those of every record, of each source, and of what
+    stands inside.
 
     Raises: InputError naming a key without a description.
     """
-    sections = {"Every record" if name == COMMON else f"Source `{name}`": section
-                for name, section in schema["sources"].items()}  # fmt: skip
+    sections = {
+        "Every record" if name == COMMON else f"Source `{name}`": section
+        for name, section in schema["sources"].items()
+    }
     sections |= {title: schema["$defs"][name] for title, name in INSIDE.items()}
     lines = [RECORDS_HEAD]
     for title, section in sections.items():
         lines += [f"## {title}", "", "| key | meaning |", "|---|---|"]
         for name, key in section["properties"].items():
             if "description" not in key:
-                raise InputError(f"schema of records: {name} has no description, expected one line of meaning")
-            lines.append(f"| `{name}`{' (needed)' * (name in section.get('required', []))} | {key['description']} |")
+                raise InputError(
+                    f"schema of records: {name} has no description, expected one line of meaning"
+                )
+            lines.append(
+                f"| `{name}`{' (needed)' * (name in section.get('required', []))} | {key['description']} |"
+            )
         lines.append("")
     lines += [
         "## Built-in models (`model`)",

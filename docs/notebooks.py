@@ -2,10 +2,10 @@
 
     python docs/notebooks.py --out notebooks
 
-A block of Python becomes a cell, a block of shell commands a cell that ends at the first failing one, a block with a
-title a cell that writes this file, and all other text cells of Markdown. A block with the title "entry" is text: the
-tutorial says where to insert it. The first cell goes from the folder of the notebooks to that of the checkout, where
-all commands of a tutorial are to be run.
+A block of Python becomes a cell, a block of shell commands a cell that ends at the first failing
+one, a block with a title a cell that writes this file, and all other text cells of Markdown. A
+block with the title "entry" is text: the tutorial says where to insert it. The first cell goes from
+the folder of the notebooks to that of the checkout, where all commands of a tutorial are to be run.
 """
 
 import argparse
@@ -38,7 +38,9 @@ def cell(language: str, title: str, text: str) -> nbformat.NotebookNode | None:
 
 
 def relinked(text: str) -> str:
-    """Return Markdown of a tutorial with links to files as seen from a folder at the root of the checkout."""
+    """Return Markdown of a tutorial with links to files as seen from a folder at the root of the
+    checkout.
+    """
 
     def place(found: re.Match) -> str:
         """A link's target below the root, seen from a folder next to it."""
@@ -49,14 +51,17 @@ def relinked(text: str) -> str:
 
 def notebook(page: str) -> nbformat.NotebookNode:
     """Return the notebook of a tutorial's Markdown text; equal texts give equal notebooks."""
-    cells, shown, end = [new_code_cell(START)], "", 0
+    cells = [new_code_cell(START)]
+    shown = ""
+    end = 0
     for block in FENCE.finditer(page):
         made = cell(block[1], block[2] or "", block[3])
         shown += relinked(page[end : block.start()]) + (block[0] if made is None else "")
         end = block.end()
         if made is not None:
             cells += [new_markdown_cell(shown.strip())] if shown.strip() else []
-            cells, shown = [*cells, made], ""
+            cells = [*cells, made]
+            shown = ""
     shown += relinked(page[end:])
     cells += [new_markdown_cell(shown.strip())] if shown.strip() else []
     for number, one in enumerate(cells):

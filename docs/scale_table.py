@@ -1,9 +1,10 @@
 """Time and disk that a configuration would take, scaled from the measured stages of a finished run.
 
-Data stages scale with samples: core-seconds per sample of the measured run, times the samples planned. Training scales
-with images through the backbone: milliseconds per training sample of the same backbone at the same size on one core, as
-accuracy_cost.csv has it, times all steps of all schemes. Early stopping and validation are left out. A network that
-was never timed gets no estimate. All times are those of the measured processor, not of a GPU.
+Data stages scale with samples: core-seconds per sample of the measured run, times the samples
+planned. Training scales with images through the backbone: milliseconds per training sample of the
+same backbone at the same size on one core, as accuracy_cost.csv has it, times all steps of all
+schemes. Early stopping and validation are left out. A network that was never timed gets no
+estimate. All times are those of the measured processor, not of a GPU.
 """
 
 import argparse
@@ -23,9 +24,17 @@ DATA_RULES = ("motion", "echo", "noise", "tiles", "shard", "index")
 UNUSED = {"image": set(), "signal": {"tiles"}, "recipe": {"tiles", "noise"}}
 """Data stages that a kind of shards does without."""
 COLUMNS = (
-    "configuration", "motion_models", "samples", "core_hours", "shards_gb", "noisy_gb", "measured_on",
-    "trainings", "training_core_hours", "training_measured_on",
-)  # fmt: skip
+    "configuration",
+    "motion_models",
+    "samples",
+    "core_hours",
+    "shards_gb",
+    "noisy_gb",
+    "measured_on",
+    "trainings",
+    "training_core_hours",
+    "training_measured_on",
+)
 COST_COLUMNS = ("backbone", "pixels", "network_bytes", "train_ms", "hardware")
 
 
@@ -34,30 +43,38 @@ def samples_of(config: dict) -> tuple[int, int]:
 
     Raises: InputError where its plan is refused.
     """
-    plan = Plan.of(config, {name: item["published"] for name, item in records_of(config["targets"]).items()})
+    plan = Plan.of(
+        config, {name: item["published"] for name, item in records_of(config["targets"]).items()}
+    )
     models = plan.models * sum(map(len, plan.groups.values()))
     return models, models * len(plan.snrs)
 
 
 def _images(row: dict[str, str]) -> int:
-    """Number of images of a sample that the network of a row takes in: bytes over pixels, a byte a pixel."""
+    """Number of images of a sample that the network of a row takes in: bytes over pixels, a byte a
+    pixel.
+    """
     return int(row["network_bytes"]) // int(row["pixels"]) ** 2
 
 
 def training_hours(costs: list[dict[str, str]], config: dict) -> tuple[int, float | None, str]:
-    """Return (trainings, core-hours of them all, hardware) of a configuration; None and "" if a network was not timed.
+    """Return (trainings, core-hours of them all, hardware) of a configuration; None and "" if a
+    network was not timed.
 
-    costs: rows of accuracy_cost.csv. Of each network the row of the most images per sample counts; a scheme of another
-    number of images takes time in proportion.
+    costs: rows of accuracy_cost.csv. Of each network the row of the most images per sample counts;
+    a scheme of another number of images takes time in proportion.
     """
-    block, known = config["recognition"], {}
+    block = config["recognition"]
+    known = {}
     for row in costs:
         key = row["backbone"], int(row["pixels"] or 0)
         if row["train_ms"] and (key not in known or _images(row) > _images(known[key])):
             known[key] = row
     most = max(map(_images, known.values()), default=0)
     stations = station_names(config["network"])
-    number, hours, hardware = 0, 0.0, ""
+    number = 0
+    hours = 0.0
+    hardware = ""
     for scheme in (named(block["table"], name, stations) for name in block["schemes"]):
         settings = scheme.settled(block)
         repeats = len(set(block["protocols"]) & set(scheme.protocols)) * len(block["seeds"])
@@ -74,7 +91,7 @@ def training_hours(costs: list[dict[str, str]], config: dict) -> tuple[int, floa
 
 def estimate(
     stages: list[dict[str, str]], costs: list[dict[str, str]], config: dict, name: str
-) -> dict[str, object]:  # fmt: skip
+) -> dict[str, object]:
     """Return one row of COLUMNS for `config`, scaled from rows of stages.csv and accuracy_cost.csv.
 
     Raises: InputError where a data stage was not measured.
@@ -89,13 +106,25 @@ def estimate(
     core_hours = sum(seconds[rule] for rule in made) / measured * samples / 3600
     signal = 8 * config["network"]["symbols"] * len(config["network"]["stations"])
     levels = len(config["noise"]["snr_db"])
-    by_kind = {"image": float(stages[0]["sample_bytes"]), "signal": signal, "recipe": signal / levels}
+    by_kind = {
+        "image": float(stages[0]["sample_bytes"]),
+        "signal": signal,
+        "recipe": signal / levels,
+    }
     disk = by_kind[config["shards"]["kind"]]
     trainings, hours, hardware = training_hours(costs, config)
     row = (
-        name, models, samples, round(core_hours, 2), round(disk * samples / 1e9, 1), round(signal * samples / 1e9, 1),
-        stages[0]["hardware"], trainings, "" if hours is None else round(hours, 1), hardware,
-    )  # fmt: skip
+        name,
+        models,
+        samples,
+        round(core_hours, 2),
+        round(disk * samples / 1e9, 1),
+        round(signal * samples / 1e9, 1),
+        stages[0]["hardware"],
+        trainings,
+        "" if hours is None else round(hours, 1),
+        hardware,
+    )
     return dict(zip(COLUMNS, row, strict=True))
 
 
@@ -105,8 +134,12 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--stages", required=True, help="stages.csv of a finished run")
     line.add_argument("--costs", required=True, help="table of lowalt.measure.accuracy_cost (.csv)")
     line.add_argument("--schema", required=True, help="schema of the configuration (.yaml)")
-    line.add_argument("--base", required=True, help="configuration on which the overlays lie (.yaml)")
-    line.add_argument("--overlays", nargs="+", required=True, help="configurations to estimate (.yaml)")
+    line.add_argument(
+        "--base", required=True, help="configuration on which the overlays lie (.yaml)"
+    )
+    line.add_argument(
+        "--overlays", nargs="+", required=True, help="configurations to estimate (.yaml)"
+    )
     line.add_argument("--out", required=True, help="table to write (.csv)")
     options = line.parse_args(arguments)
     stages = read_csv(options.stages, "rule", "wall_s", "samples", "sample_bytes", "hardware")

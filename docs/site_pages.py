@@ -1,9 +1,11 @@
-"""A hook of mkdocs: documents that lie elsewhere in the repository appear in the site, and links between all work.
+"""A hook of mkdocs: documents that lie elsewhere in the repository appear in the site, and links
+between all work.
 
-A file of docs/ has its path below docs/ in the site; every other file keeps its path in the repository. Markdown files
-of the navigation become pages. Any other file that a page links to is added to the site as it is. So the links that
-work in the repository work in the site, and every text stands once. Pages of keys are made of the schemas as the site
-is built: links to a schema lead to its page.
+A file of docs/ has its path below docs/ in the site; every other file keeps its path in the
+repository. Markdown files of the navigation become pages. Any other file that a page links to is
+added to the site as it is. So the links that work in the repository work in the site, and every
+text stands once. Pages of keys are made of the schemas as the site is built: links to a schema lead
+to its page.
 """
 
 import posixpath
@@ -17,7 +19,8 @@ from lowalt.files.yaml_files import load_yaml
 
 ROOT = Path(__file__).parents[1]
 DOCS = "docs/"
-CONFIGURATION, RECORDS = "workflow/schemas/config.schema.yaml", "src/lowalt/targets/records.schema.yaml"
+CONFIGURATION = "workflow/schemas/config.schema.yaml"
+RECORDS = "src/lowalt/targets/records.schema.yaml"
 KEYS = {CONFIGURATION: "reference/configuration.md", RECORDS: "reference/records.md"}
 """Schemas in the repository, and the pages of the site that are made of them."""
 LINK = re.compile(r"\]\(([^)#\s:]+)((?:#[^)\s]*)?)\)")
@@ -35,15 +38,19 @@ def in_site(path: str) -> str:
 
 
 def relinked(text: str, path: str) -> str:
-    """Return the text of a page, its links turned from paths in the repository to paths in the site.
+    """Return the text of a page, its links turned from paths in the repository to paths in the
+    site.
 
-    path: the page's path in the repository. A folder's link leads to its README.md. Links to files that are not there
-    stay as they are, so that mkdocs warns about them.
+    path: the page's path in the repository. A folder's link leads to its README.md. Links to files
+    that are not there stay as they are, so that mkdocs warns about them.
     """
-    here, place = posixpath.dirname(path), posixpath.dirname(in_site(path))
+    here = posixpath.dirname(path)
+    place = posixpath.dirname(in_site(path))
 
     def turned(match: re.Match) -> str:
-        """The link of a match as it must read in the site; unchanged where it names no file of the repository."""
+        """The link of a match as it must read in the site; unchanged where it names no file of the
+        repository.
+        """
         target = posixpath.normpath(posixpath.join(here, match[1]))
         if (ROOT / target).is_dir():
             target = f"{target}/README.md"
@@ -56,7 +63,10 @@ def relinked(text: str, path: str) -> str:
 
 def linked(text: str, path: str) -> set[str]:
     """Return the paths in the repository of the files that a page links to."""
-    joined = {posixpath.normpath(posixpath.join(posixpath.dirname(path), match[1])) for match in LINK.finditer(text)}
+    joined = {
+        posixpath.normpath(posixpath.join(posixpath.dirname(path), match[1]))
+        for match in LINK.finditer(text)
+    }
     folders = {f"{name}/README.md" for name in joined if (ROOT / name).is_dir()}
     return {name for name in joined | folders if (ROOT / name).is_file()}
 
@@ -76,7 +86,11 @@ def on_files(files, config):
     named = [in_repository(uri) for uri in pages(config.nav) if uri not in KEYS.values()]
     wanted = set(named)
     for name in named:
-        wanted |= {path for path in linked((ROOT / name).read_text(), name) if path in named or path[-3:] != ".md"}
+        wanted |= {
+            path
+            for path in linked((ROOT / name).read_text(), name)
+            if path in named or path[-3:] != ".md"
+        }
     for path in sorted(wanted):
         if files.get_file_from_path(in_site(path)) is None:
             files.append(File.generated(config, in_site(path), abs_src_path=str(ROOT / path)))

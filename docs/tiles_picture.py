@@ -1,4 +1,5 @@
-"""The README's picture: one clean tile of each category out of a finished run, two by two at half size.
+"""The README's picture: one clean tile of each category out of a finished run, two by two at half
+size.
 
 python docs/tiles_picture.py INDEX OUT
 """
@@ -38,7 +39,9 @@ def main(arguments: list[str]) -> None:
     """Write the picture."""
     index, out = arguments
     with replacing(out) as temporary:
-        cover([data for _, data in example_tiles(ShardSet(index, folds=["test"]))]).save(temporary, optimize=True)
+        cover([data for _, data in example_tiles(ShardSet(index, folds=["test"]))]).save(
+            temporary, optimize=True
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""A submission of features with any estimator of scikit-learn: python examples/benchmark_features.py [TRACK]."""
+"""A submission of features with any estimator of scikit-learn: python
+examples/benchmark_features.py [TRACK].
+"""
 
 import sys
 
@@ -9,7 +11,9 @@ from lowalt import benchmark
 
 
 def features(signals: np.ndarray) -> np.ndarray:
-    """Shares of the power in 16 Doppler bands of each station, (n, stations * 16), the strongest line in the middle."""
+    """Shares of the power in 16 Doppler bands of each station, (n, stations * 16), the strongest
+    line in the middle.
+    """
     power = np.abs(np.fft.fft(signals)) ** 2
     rows = np.arange(power.shape[-1]) + power.argmax(-1)[..., None] - power.shape[-1] // 2
     centred = np.take_along_axis(power, rows % power.shape[-1], -1)
@@ -18,6 +22,9 @@ def features(signals: np.ndarray) -> np.ndarray:
 
 
 track = sys.argv[1] if len(sys.argv) > 1 else "unseen"
-train, test = benchmark.load(track, "train"), benchmark.load(track, "test")
-model = HistGradientBoostingClassifier(max_iter=50, random_state=0).fit(features(train.signals), train.labels)
+train = benchmark.load(track, "train")
+test = benchmark.load(track, "test")
+model = HistGradientBoostingClassifier(max_iter=50, random_state=0).fit(
+    features(train.signals), train.labels
+)
 benchmark.write("predictions.csv", test, model.predict_proba(features(test.signals)))

@@ -1,7 +1,8 @@
 """A network of your own for the benchmark: the function that examples/benchmark_network.yaml names.
 
-.venv/bin/lowalt run config/lowalt-40-v1.yaml examples/benchmark_network.yaml trains it, and its prediction file
-results/my-network/predictions/unseen/abc-vrp-trp-vt/0.csv is a submission as it stands.
+.venv/bin/lowalt run config/lowalt-40-v1.yaml examples/benchmark_network.yaml trains it, and its
+prediction file results/my-network/predictions/unseen/abc-vrp-trp-vt/0.csv is a submission as it
+stands.
 """
 
 from torch import nn

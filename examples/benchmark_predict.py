@@ -1,4 +1,6 @@
-"""A submission from any function of signals and images: python examples/benchmark_predict.py [TRACK]."""
+"""A submission from any function of signals and images: python examples/benchmark_predict.py
+[TRACK].
+"""
 
 import sys
 
@@ -12,7 +14,8 @@ means = [train.images[train.labels == label].mean(0) for label in range(len(trai
 
 
 def predict(signals: np.ndarray, images: np.ndarray) -> np.ndarray:
-    """Probabilities (n, classes) of signals (n, stations, 400) complex and images (n, stations * 3, 24, 24) uint8.
+    """Probabilities (n, classes) of signals (n, stations, 400) complex and images (n, stations * 3,
+    24, 24) uint8.
 
     Here they fall off with the distance of an image to the mean image of each class.
     """

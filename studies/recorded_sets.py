@@ -1,14 +1,17 @@
-"""Sets of measured recordings: which files belong to them, which half each is in, and their windows with a target.
+"""Sets of measured recordings: which files belong to them, which half each is in, and their windows
+with a target.
 
-A file of sets holds records whose `file` is a pattern inside the set's folder. A file of the split lists the files of
-both halves by name; a file that is in neither list is a test file. A record next to a file (any .yaml in the set's
-folder) takes precedence over the set's pattern, so a file of any name, rate and channel can be added.
+A file of sets holds records whose `file` is a pattern inside the set's folder. A file of the split
+lists the files of both halves by name; a file that is in neither list is a test file. A record next
+to a file (any .yaml in the set's folder) takes precedence over the set's pattern, so a file of any
+name, rate and channel can be added.
 
-Four keys stand only in records of sets: `radar`, the record in `config/measured/radars` of the radar that they are
-of; `rates_hz`, the possible rates of the set's files, of which each file's sample
-times select one; `carrier_ghz_in_name`, a regular expression whose group is the carrier (GHz) in the file's name,
-where `carrier_hz` serves files without one; and `device`, the radar that recorded them where another set has it too.
-Another folder becomes a set by its file `set.yaml`: `like`, a set of the same radar, and `files`, its records.
+Four keys stand only in records of sets: `radar`, the record in `config/measured/radars` of the
+radar that they are of; `rates_hz`, the possible rates of the set's files, of which each file's
+sample times select one; `carrier_ghz_in_name`, a regular expression whose group is the carrier
+(GHz) in the file's name, where `carrier_hz` serves files without one; and `device`, the radar that
+recorded them where another set has it too. Another folder becomes a set by its file `set.yaml`:
+`like`, a set of the same radar, and `files`, its records.
 """
 
 import re
@@ -40,11 +43,11 @@ SETS, SPLIT = (Path(__file__).parent / f"measured/{name}.yaml" for name in ("set
 
 
 class Measured(NamedTuple):
-    """One recording of a set: `half` is "tuning" or "test", `like` the known set of the same radar, `radar` the name
-    of that radar's record.
+    """One recording of a set: `half` is "tuning" or "test", `like` the known set of the same radar,
+    `radar` the name of that radar's record.
 
-    rates_hz: possible rates (Hz), of which the file has one; none where its record alone says it. of: the radar that
-    recorded it, where another set has it too.
+    rates_hz: possible rates (Hz), of which the file has one; none where its record alone says it.
+    of: the radar that recorded it, where another set has it too.
     """
 
     set: str
@@ -71,13 +74,16 @@ class Measured(NamedTuple):
         Raises: InputError where no radar of the library has this set.
         """
         if self.radar not in library.twins:
-            raise InputError(f"set {self.set!r}: no radar {self.radar!r}, expected one of {sorted(library.twins)}")
+            raise InputError(
+                f"set {self.set!r}: no radar {self.radar!r}, expected one of {sorted(library.twins)}"
+            )
         return library.twins[self.radar].at_carrier(self.record.carrier_hz)
 
     def read(self) -> Baseband:
         """Return the recording's samples, at the one of its possible rates that the file has.
 
-        Raises: InputError as `lowalt.extensions.recordings.read`, and where the file has none of the rates.
+        Raises: InputError as `lowalt.extensions.recordings.read`, and where the file has none of
+        the rates.
         """
         baseband = read(self.record)
         if not self.rates_hz:
@@ -90,7 +96,8 @@ class Measured(NamedTuple):
         return baseband._replace(rate_hz=nearest)
 
     def windows(self, twin: Twin) -> np.ndarray:
-        """Return the recording's windows that hold a target, (n, symbols) complex128 at the twin's symbol rate.
+        """Return the recording's windows that hold a target, (n, symbols) complex128 at the twin's
+        symbol rate.
 
         Raises: InputError as `read`, and where the recording is shorter than one window.
         """
@@ -134,7 +141,9 @@ def _of_pattern(block: dict, path: Path, where: str) -> _File:
 
 
 def _files(folder: Path, patterns: list[dict], where: str) -> dict[str, _File]:
-    """The files of a set's folder by name; files that no record describes are named on standard error."""
+    """The files of a set's folder by name; files that no record describes are named on standard
+    error.
+    """
     files: dict[str, _File] = {}
     for number, block in enumerate(patterns):
         for path in sorted(folder.glob("*")):
@@ -156,15 +165,25 @@ def _files(folder: Path, patterns: list[dict], where: str) -> dict[str, _File]:
 
 
 def _blocks(inputs: Path, sets: str | Path) -> dict[str, tuple[str, list[dict]]]:
-    """Set -> (known set of the same radar, records): the known sets and the folders that have a file of their own."""
+    """Set -> (known set of the same radar, records): the known sets and the folders that have a
+    file of their own.
+    """
     known = load_yaml(sets, "measured sets", "sets to their records")
     blocks = {name: (name, patterns) for name, patterns in known.items()}
-    for folder in sorted(path for path in inputs.glob("*") if path.is_dir() and path.name not in known):
+    for folder in sorted(
+        path for path in inputs.glob("*") if path.is_dir() and path.name not in known
+    ):
         if not (folder / SET_FILE).is_file():
-            print(f"{folder}: left out, no set of that name and no {SET_FILE} in it", file=sys.stderr)
+            print(
+                f"{folder}: left out, no set of that name and no {SET_FILE} in it", file=sys.stderr
+            )
             continue
         block = load_yaml(folder / SET_FILE, "set of recordings", "like and files")
-        if set(block) != {"like", "files"} or block["like"] not in known or not isinstance(block["files"], list):
+        if (
+            set(block) != {"like", "files"}
+            or block["like"] not in known
+            or not isinstance(block["files"], list)
+        ):
             raise InputError(
                 f"{folder / SET_FILE}: expected files, a list of records, and like, one of {sorted(known)}"
             )
@@ -172,32 +191,44 @@ def _blocks(inputs: Path, sets: str | Path) -> dict[str, tuple[str, list[dict]]]
     return blocks
 
 
-def recordings(inputs: str | Path, sets: str | Path = SETS, split: str | Path = SPLIT) -> list[Measured]:
-    """Return the recordings there are below the folder `inputs`, one folder a set, in the order of sets and names.
+def recordings(
+    inputs: str | Path, sets: str | Path = SETS, split: str | Path = SPLIT
+) -> list[Measured]:
+    """Return the recordings there are below the folder `inputs`, one folder a set, in the order of
+    sets and names.
 
-    A set whose folder is missing is left out. Raises: InputError where no recording is there, a record is wrong, or a
-    file fits two patterns of its set.
+    A set whose folder is missing is left out. Raises: InputError where no recording is there, a
+    record is wrong, or a file fits two patterns of its set.
     """
-    blocks, half_of, result = _blocks(Path(inputs), sets), halves(split), []
-    radars = {name: patterns[0]["radar"] for name, (like, patterns) in blocks.items() if like == name}
+    blocks = _blocks(Path(inputs), sets)
+    half_of = halves(split)
+    result = []
+    radars = {
+        name: patterns[0]["radar"] for name, (like, patterns) in blocks.items() if like == name
+    }
     for name, (like, patterns) in blocks.items():
         where = f"{sets}: {name}" if like == name else str(Path(inputs) / name / SET_FILE)
         tuning = half_of.get(name, {}).get("tuning", ())
         for file, found in sorted(_files(Path(inputs) / name, patterns, where).items()):
             half = "tuning" if file in tuning else "test"
-            result.append(Measured(name, half, found.record, like, radars[like], found.rates_hz, found.device))
+            result.append(
+                Measured(name, half, found.record, like, radars[like], found.rates_hz, found.device)
+            )
     if not result:
         raise InputError(f"{inputs}: no recordings of {sorted(blocks)}, expected a folder a set")
     return result
 
 
 def usable(measured: list[Measured], library: Library) -> list[Measured]:
-    """Return the recordings that can be read and cut into windows; the others are named on standard error.
+    """Return the recordings that can be read and cut into windows; the others are named on standard
+    error.
 
-    A recording counts once, whatever its file's name: of files with equal bytes the first is taken, tuning before test.
+    A recording counts once, whatever its file's name: of files with equal bytes the first is taken,
+    tuning before test.
     Raises: InputError where none can be used.
     """
-    good, known = [], {}
+    good = []
+    known = {}
     for recording in sorted(measured, key=lambda one: HALVES.index(one.half)):
         try:
             digest = sha256(recording.record.file)

@@ -1,4 +1,6 @@
-"""Trainings of a study: finished ones are kept, several run side by side, and their tables are those of a run."""
+"""Trainings of a study: finished ones are kept, several run side by side, and their tables are
+those of a run.
+"""
 
 import os
 from collections.abc import Callable, Iterable
@@ -35,21 +37,38 @@ class Job(NamedTuple):
 
 def config_of(*overlays: str | Path) -> dict:
     """Return the default configuration with overlays laid on it."""
-    return load([ROOT / "config/default.yaml", *overlays], ROOT / "workflow/schemas/config.schema.yaml")
+    return load(
+        [ROOT / "config/default.yaml", *overlays], ROOT / "workflow/schemas/config.schema.yaml"
+    )
 
 
 def settings_of(config: dict, data: Path, scheme: Scheme, seed: int) -> dict:
-    """Return what `runs.train` asks of a configuration; data: folder of the run whose data set is trained on."""
-    kept = {key: config["recognition"][key] for key in ("size", "network", "training", "augmentation")}
+    """Return what `runs.train` asks of a configuration; data: folder of the run whose data set is
+    trained on.
+    """
+    kept = {
+        key: config["recognition"][key] for key in ("size", "network", "training", "augmentation")
+    }
     classes = ShardSet(data / "shards/index.json", check=False).classes
     return scheme.settled(
-        {**kept, "seed": seed, "colour_map": config["images"]["colour_map"], "classes": list(classes)}
+        {
+            **kept,
+            "seed": seed,
+            "colour_map": config["images"]["colour_map"],
+            "classes": list(classes),
+        }
     )
 
 
 def images_of(data: Path, scheme: Scheme, pairs: set, size: int) -> ViewSamples:
-    """Return the images of a run's (group, fold) pairs as a scheme sees them, from its caches of views."""
-    paths = [path for path in (data / f"views/{size}").glob("*.npz") if tuple(path.stem.split("-")[:2]) in pairs]
+    """Return the images of a run's (group, fold) pairs as a scheme sees them, from its caches of
+    views.
+    """
+    paths = [
+        path
+        for path in (data / f"views/{size}").glob("*.npz")
+        if tuple(path.stem.split("-")[:2]) in pairs
+    ]
     return ViewSamples(paths, scheme.columns, pairs)
 
 
@@ -63,22 +82,28 @@ def trained(
 ) -> Path:
     """Train and evaluate one job, unless that is done, and return its prediction file.
 
-    data: folder of the run whose data set it is; out: folder of the study's results; source: gives the samples of
-    (group, fold) pairs to a part, "train", "validation" or "asked"; build: makes the network.
+    data: folder of the run whose data set it is; out: folder of the study's results; source: gives
+    the samples of (group, fold) pairs to a part, "train", "validation" or "asked"; build: makes the
+    network.
     """
-    path, folder = out / f"predictions/{job.name}.csv", out / f"models/{job.name}"
+    path = out / f"predictions/{job.name}.csv"
+    folder = out / f"models/{job.name}"
     if not path.with_suffix(".json").is_file():
         samples = {part: source(job.scheme, folds(job.protocol, part), part) for part in PARTS}
         settings = settings_of(config, data, job.scheme, job.seed)
         runs.train(samples, job.scheme, job.protocol, settings, folder, build=build)
         pairs = evaluated_folds(job.protocol)
         model = runs.load(folder / "model.safetensors", build=build)
-        runs.evaluate(model, source(job.scheme, pairs, "asked"), config["recognition"]["evaluation"], path)
+        runs.evaluate(
+            model, source(job.scheme, pairs, "asked"), config["recognition"]["evaluation"], path
+        )
     return path
 
 
 def side_by_side(call: Callable, jobs: Iterable, workers: int | None = None) -> list:
-    """Return what a call gives for each job, in processes of their own; workers: how many, all cores by default."""
+    """Return what a call gives for each job, in processes of their own; workers: how many, all
+    cores by default.
+    """
     with ProcessPoolExecutor(workers or os.cpu_count(), get_context("spawn")) as pool:
         return list(pool.map(call, jobs))
 

@@ -8,25 +8,45 @@ import pytest
 from meshes import write_bird, write_quad
 from skips import Skips
 
-# Files that take long, the longest first. Two processes share the files of tests, one file at a time: a long file that
-# begins last would keep one of them alone at the end.
+# Files that take long, the longest first. Two processes share the files of tests, one file at a
+# time: a long file that begins last would keep one of them alone at the end.
 LONG = (
-    "test_workflow", "test_workflow_reruns", "test_recognition_resume", "test_recognition_training",
-    "test_wheel", "test_contributing", "test_recognition_ranks", "test_echo", "test_bytes",
-    "test_house", "test_dataset", "test_workflow_locks", "test_classes",
-    "test_recognition_sharing", "test_recognition_memory",
-    "test_report_plots", "test_attacks", "test_recordings_unseen",
-    "test_skips", "test_workflow_board", "test_targets_more",
-)  # fmt: skip
+    "test_workflow",
+    "test_workflow_reruns",
+    "test_recognition_resume",
+    "test_recognition_training",
+    "test_wheel",
+    "test_contributing",
+    "test_recognition_ranks",
+    "test_echo",
+    "test_bytes",
+    "test_house",
+    "test_dataset",
+    "test_workflow_locks",
+    "test_classes",
+    "test_recognition_sharing",
+    "test_recognition_memory",
+    "test_report_plots",
+    "test_attacks",
+    "test_recordings_unseen",
+    "test_skips",
+    "test_workflow_board",
+    "test_targets_more",
+)
 
 
-# Imports make millions of objects that stay: looking through them for garbage took a tenth of the tests' time.
+# Imports make millions of objects that stay: looking through them for garbage took a tenth of the
+# tests' time.
 gc.disable()
 
 
 def pytest_addoption(parser):
     """An option of this suite."""
-    parser.addoption("--strict-skips", action="store_true", help="fail where a test is skipped for an unlisted reason")
+    parser.addoption(
+        "--strict-skips",
+        action="store_true",
+        help="fail where a test is skipped for an unlisted reason",
+    )
 
 
 def pytest_configure(config):
@@ -51,7 +71,8 @@ def pytest_collection_finish():
 def mlcroissant(monkeypatch, tmp_path):
     """Croissant's reference implementation, unpacking into a folder of the test's own.
 
-    It keeps unpacked archives by their relative names, so it would take one data set's shards for another's.
+    It keeps unpacked archives by their relative names, so it would take one data set's shards for
+    another's.
     """
     library = pytest.importorskip("mlcroissant")
     from mlcroissant._src.operation_graph.operations import extract

@@ -1,4 +1,6 @@
-"""Inputs that attack: damaged files of every kind, and some that would run code, fill the memory or leave a folder."""
+"""Inputs that attack: damaged files of every kind, and some that would run code, fill the memory or
+leave a folder.
+"""
 
 import io
 import itertools
@@ -43,11 +45,15 @@ def test_the_fuzzer_sees_an_exception_and_changes_what_it_is_given(tmp_path):
     reader.read = lambda path: path.read_bytes() == reader.data or careless(path)
     found = fuzzing.attack(reader, 20, 1, tmp_path)
     assert found["faults"] == 20 and "UnicodeDecodeError" in found["first_fault"]
-    changed = {fuzzing.mutated(b"0123456789" * 9, np.random.default_rng(seed)) for seed in range(50)}
+    changed = {
+        fuzzing.mutated(b"0123456789" * 9, np.random.default_rng(seed)) for seed in range(50)
+    }
     assert len(changed) > 45 and b"0123456789" * 9 not in changed
 
 
-@pytest.mark.parametrize("name", [name for name, reader in READERS.items() if reader.seal in (ARCHIVE, PNG)])
+@pytest.mark.parametrize(
+    "name", [name for name, reader in READERS.items() if reader.seal in (ARCHIVE, PNG)]
+)
 def test_sealed_damage_is_in_one_part_under_checksums_that_are_right(name):
     reader = READERS[name]
     good = reader.seal.opened(reader.data)
@@ -64,7 +70,8 @@ def yaml_of(folder, text):
 
 NAMES = b"abcdefghij"
 BILLIONS = b"a: &a [1]\n" + b"".join(
-    b"%c: &%c [%s]\n" % (later, later, b",".join([b"*%c" % former] * 9)) for former, later in itertools.pairwise(NAMES)
+    b"%c: &%c [%s]\n" % (later, later, b",".join([b"*%c" % former] * 9))
+    for former, later in itertools.pairwise(NAMES)
 )
 """Ten lines, each nine times the one before."""
 
@@ -83,10 +90,22 @@ BILLIONS = b"a: &a [1]\n" + b"".join(
         (b"\xff\xfea: 1", "in UTF-8 text"),
         (b"? [1]\n: 2", "not YAML"),
     ],
-    ids=["code", "billions", "endless", "deep", "a million deep", "month 99", "5000 digits", "twice", "encoding",
-         "list as key"],
-)  # fmt: skip
-def test_yaml_that_runs_code_grows_or_is_not_what_it_seems_is_refused(text, expected, tmp_path, monkeypatch):
+    ids=[
+        "code",
+        "billions",
+        "endless",
+        "deep",
+        "a million deep",
+        "month 99",
+        "5000 digits",
+        "twice",
+        "encoding",
+        "list as key",
+    ],
+)
+def test_yaml_that_runs_code_grows_or_is_not_what_it_seems_is_refused(
+    text, expected, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=expected) as found:
         load_yaml(yaml_of(tmp_path, text))
@@ -136,7 +155,12 @@ def test_an_array_whose_header_promises_ten_gigabytes_is_refused(tmp_path):
 
 def png(width, height, pixels):
     header = struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)
-    parts = ((b"IHDR", header), (b"PLTE", bytes(768)), (b"IDAT", zlib.compress(pixels)), (b"IEND", b""))
+    parts = (
+        (b"IHDR", header),
+        (b"PLTE", bytes(768)),
+        (b"IDAT", zlib.compress(pixels)),
+        (b"IEND", b""),
+    )
     return SIGNATURE + b"".join(_chunk(*part) for part in parts)
 
 
@@ -155,19 +179,32 @@ def test_a_palette_of_too_many_colours_is_refused_and_a_short_one_is_read():
 
 
 def index_of(folder, **changes):
-    entry = {"name": "a", "path": "a.tar", "group": "seen", "fold": "train", "samples": 1, "bytes": 1}
+    entry = {
+        "name": "a",
+        "path": "a.tar",
+        "group": "seen",
+        "fold": "train",
+        "samples": 1,
+        "bytes": 1,
+    }
     entry |= {"table_sha256": "0" * 64, **changes}
-    render = {name: load_yaml("config/default.yaml")[name] for name in ("network", "spectra", "images")}
+    render = {
+        name: load_yaml("config/default.yaml")[name] for name in ("network", "spectra", "images")
+    }
     content = {"format": index.FORMAT, "kind": "image", "shards": [entry], "render": render}
     content["sha256"] = index._checksum(content)
     (folder / "index.json").write_text(json.dumps(content))
     return folder / "index.json"
 
 
-def test_an_index_whose_shards_lie_elsewhere_or_are_no_shards_is_refused_though_its_checksum_is_right(tmp_path):
+def test_an_index_whose_shards_lie_elsewhere_or_are_no_shards_is_refused_though_its_checksum_is_right(
+    tmp_path,
+):
     assert index.load(index_of(tmp_path))["shards"][0]["path"] == "a.tar"
     for path in ("../a.tar", "/etc/passwd", "b/../../a.tar"):
-        with pytest.raises(InputError, match=r"index.json: shard '.*' lies outside the index's folder"):
+        with pytest.raises(
+            InputError, match=r"index.json: shard '.*' lies outside the index's folder"
+        ):
             index.load(index_of(tmp_path, path=path))
     with pytest.raises(InputError, match=r"shards\.0\.samples: value '1', expected type integer"):
         index.load(index_of(tmp_path, samples="1"))

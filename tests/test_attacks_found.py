@@ -1,4 +1,6 @@
-"""Damaged files on which a reader once ended with a traceback or without the file's name: each is refused by name."""
+"""Damaged files on which a reader once ended with a traceback or without the file's name: each is
+refused by name.
+"""
 
 import struct
 import zipfile
@@ -46,7 +48,9 @@ def test_a_number_of_a_motion_model_beyond_floating_point_is_refused(tmp_path):
     path = tmp_path / "motion.csv"
     cells = ["9" * 400 if name == "model" else "1" for name in COLUMNS]
     path.write_text(f"{','.join(COLUMNS)}\n{','.join(cells)}\n")
-    with pytest.raises(InputError, match=r"line 2, column model: '9+ \.\.\. 9+', expected a number"):
+    with pytest.raises(
+        InputError, match=r"line 2, column model: '9+ \.\.\. 9+', expected a number"
+    ):
         read_table(path)
 
 
@@ -58,7 +62,9 @@ def test_a_name_that_no_file_can_have_is_that_of_no_file(tmp_path):
 def test_a_frozen_file_whose_name_has_a_null_byte_is_refused(tmp_path):
     path = tmp_path / "SHA256SUMS"
     path.write_text(f"{'0' * 64}  clouds/a\0.npz\n")
-    with pytest.raises(InputError, match=r"SHA256SUMS line 1: 'clouds/a\\x00\.npz', expected a file below"):
+    with pytest.raises(
+        InputError, match=r"SHA256SUMS line 1: 'clouds/a\\x00\.npz', expected a file below"
+    ):
         freeze.verify(path)
 
 
@@ -73,7 +79,8 @@ def test_offsets_that_do_not_part_the_tiles_are_refused(offsets, tmp_path):
 
 
 def test_a_checkpoint_whose_pickle_ends_early_is_refused(tmp_path):
-    whole, path = tmp_path / "whole.pt", tmp_path / "cut.pt"
+    whole = tmp_path / "whole.pt"
+    path = tmp_path / "cut.pt"
     checkpoint.save(whole, "{}", {"weights": {"a": torch.ones(5)}})
     with zipfile.ZipFile(whole) as old, zipfile.ZipFile(path, "w") as new:
         for name in old.namelist():
@@ -82,11 +89,15 @@ def test_a_checkpoint_whose_pickle_ends_early_is_refused(tmp_path):
         checkpoint.load(path)
 
 
-@pytest.mark.parametrize("chunk", [b"", b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 800, 1600, 2, 16)])
+@pytest.mark.parametrize(
+    "chunk", [b"", b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 800, 1600, 2, 16)]
+)
 def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
     path = tmp_path / "a.wav"
     path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
-    with pytest.raises(InputError, match=r"a\.wav: a \.wav file without a format or without samples"):
+    with pytest.raises(
+        InputError, match=r"a\.wav: a \.wav file without a format or without samples"
+    ):
         read(Record(file=path, carrier_hz=24e9, channel="real"))
 
 
@@ -98,14 +109,26 @@ def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
         ("a.png", encoded(33, 100), "tile: 33 x 100 pixels, expected rows of 3 square images"),
         ("a.png", encoded(3, 2), "tile: 3 x 2 pixels, expected rows of 3 square images"),
         ("a.png", b"", "no PNG signature"),
-        ("a.npy", np.zeros((3, 400)), r"float64 \(3, 400\), expected complex \(stations, symbols\)"),
-        ("a.npy", np.zeros(400, complex), r"complex128 \(400,\), expected complex \(stations, symbols\)"),
-        ("a.npy", np.zeros((2, 400), complex), r"signals have shape \(2, 400\), expected \(3, 400\)"),
+        (
+            "a.npy",
+            np.zeros((3, 400)),
+            r"float64 \(3, 400\), expected complex \(stations, symbols\)",
+        ),
+        (
+            "a.npy",
+            np.zeros(400, complex),
+            r"complex128 \(400,\), expected complex \(stations, symbols\)",
+        ),
+        (
+            "a.npy",
+            np.zeros((2, 400), complex),
+            r"signals have shape \(2, 400\), expected \(3, 400\)",
+        ),
         ("a.npy", np.full((3, 400), np.nan, complex), "NaN or infinite"),
         ("a.npy", b"x", "not a whole signals file"),
         ("a.wav", b"x", r"expected signals \(.npy\) or a tile \(.png\)"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_sample_is_refused_by_its_file(name, content, expected, tmp_path):
     path = tmp_path / name
     if isinstance(content, bytes):
@@ -121,15 +144,25 @@ def test_what_is_no_sample_is_refused_by_its_file(name, content, expected, tmp_p
     ("name", "content", "expected"),
     [
         ("points", b"no array at all", "the magic string is not correct"),
-        ("record", np.array([4294967295], "u4").view("U1"), "its text has the code 4294967295, which is no character"),
-        ("points", np.full((20, 3), 1e300), "points has a coordinate that is no number within 1000 m"),
+        (
+            "record",
+            np.array([4294967295], "u4").view("U1"),
+            "its text has the code 4294967295, which is no character",
+        ),
+        (
+            "points",
+            np.full((20, 3), 1e300),
+            "points has a coordinate that is no number within 1000 m",
+        ),
         ("points", np.full((20, 3), "a"), "points has values of type <U1, expected numbers"),
         ("part", np.zeros(20), "part has values of type float64, expected numbers"),
         ("rcs_m2", np.full(20, 1e300), "rcs_m2 has a value that is no number from 0 to 1e[+]09 m2"),
     ],
     ids=["bytes", "no character", "far", "text", "parts by halves", "huge"],
-)  # fmt: skip
-def test_a_cloud_of_what_are_no_numbers_or_none_that_a_target_has_is_refused(name, content, expected, tmp_path):
+)
+def test_a_cloud_of_what_are_no_numbers_or_none_that_a_target_has_is_refused(
+    name, content, expected, tmp_path
+):
     path = tmp_path / "a.npz"
     write_cloud(path, craft())
     parts = ARCHIVE.opened(path.read_bytes())

@@ -1,4 +1,6 @@
-"""The table of a whole `make`: processes fall into parts, times add up, and every process notes its own."""
+"""The table of a whole `make`: processes fall into parts, times add up, and every process notes its
+own.
+"""
 
 import json
 import os
@@ -33,29 +35,48 @@ def test_a_command_line_belongs_to_a_stage_to_snakemake_or_to_neither(words, nam
 def test_times_of_stages_add_up_and_what_is_left_of_the_processor_time_is_set_up_s():
     def ended(words, begin, end, cpu):
         imports = {"torch": 0.5, "yaml": 0.125}
-        return {"words": words.split(), "begin": begin, "end": end, "cpu": cpu, "start": 0.25, "imports": imports}
+        return {
+            "words": words.split(),
+            "begin": begin,
+            "end": end,
+            "cpu": cpu,
+            "start": 0.25,
+            "imports": imports,
+        }
 
     notes = [
-        ended("python -m lowalt.echo", 10, 16, 5), ended("python -m lowalt.echo", 12, 14, 1),
-        ended("python -m lowalt.tiles", 16, 18, 2), ended("python .venv/bin/snakemake", 9, 19, 1.5),
+        ended("python -m lowalt.echo", 10, 16, 5),
+        ended("python -m lowalt.echo", 12, 14, 1),
+        ended("python -m lowalt.tiles", 16, 18, 2),
+        ended("python .venv/bin/snakemake", 9, 19, 1.5),
         ended("python -m venv .venv", 0, 3, 3),
-    ]  # fmt: skip
+    ]
     rows = {row["part"]: row for row in table(notes, 2, 20.0, 14.0, {"set-up": 8.0})}
     assert (rows["echo"]["processes"], rows["echo"]["wall_s"], rows["echo"]["cpu_s"]) == (2, 8, 6)
     # Two processes start for 0.25 s and import for 0.625 s each.
     spent = {name: rows["echo"][name] for name in CAUSES if rows["echo"][name]}
     assert spent == {"start_s": 0.5, "torch_s": 1.0, "others_s": 0.25, "work_s": 4.25}
     assert rows["echo"]["percent"] == 80 and rows["Snakemake"]["percent"] == 100
-    assert rows["make"] == {"part": "make", "processes": 5, "wall_s": 20.0, "cpu_s": 14.0, "percent": 25.0}
+    assert rows["make"] == {
+        "part": "make",
+        "processes": 5,
+        "wall_s": 20.0,
+        "cpu_s": 14.0,
+        "percent": 25.0,
+    }
     assert rows["set-up"]["wall_s"] == 8.0 and rows["set-up"]["cpu_s"] == 14.0 - 9.5
 
 
 def test_a_process_notes_its_words_and_its_processor_time_by_cause(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(NOTES)
-    busy = "import time; begin = time.process_time()\nwhile time.process_time() < begin + {}: pass\n"
+    busy = (
+        "import time; begin = time.process_time()\nwhile time.process_time() < begin + {}: pass\n"
+    )
     for name, seconds, more in (("outer", 0.1, "import inner\n"), ("inner", 0.2, "")):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "__init__.py").write_text(busy.format(seconds) + more + "from . import part\n")
+        (tmp_path / name / "__init__.py").write_text(
+            busy.format(seconds) + more + "from . import part\n"
+        )
         (tmp_path / name / "part.py").write_text("")
     program = "import outer\n" + busy.format(0.3)
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "LOWALT_NOTES": str(tmp_path)}

@@ -1,4 +1,6 @@
-"""Settings that a file brings, each damaged in many ways and signed again: refused in one line, or the same result."""
+"""Settings that a file brings, each damaged in many ways and signed again: refused in one line, or
+the same result.
+"""
 
 import copy
 import json
@@ -29,8 +31,24 @@ from small_configuration import configuration
 from trainings import SCHEME, SETTINGS, write_views
 
 DAMAGE = (
-    None, True, -1, 0, 0.5, 10**30, 20_000, math.nan, "", "x\ny", "../x", [], {}, [[]], [-1], {"x": 1}, ["a", "a"],
-)  # fmt: skip
+    None,
+    True,
+    -1,
+    0,
+    0.5,
+    10**30,
+    20_000,
+    math.nan,
+    "",
+    "x\ny",
+    "../x",
+    [],
+    {},
+    [[]],
+    [-1],
+    {"x": 1},
+    ["a", "a"],
+)
 RUNS = "def run(size):\n    open('made', 'w').close()\n"
 
 
@@ -44,14 +62,22 @@ def signals(tmp_path, monkeypatch):
 
 def leaves(value, path=()):
     """Paths of all values in nested mappings and lists, inner ones too."""
-    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    inner = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     for key, entry in inner:
         yield (*path, key)
         yield from leaves(entry, (*path, key))
 
 
 def damaged(block):
-    """Copies of a block, each with one value damaged, dropped or joined by an unknown key; each value in two ways."""
+    """Copies of a block, each with one value damaged, dropped or joined by an unknown key; each
+    value in two ways.
+    """
     for turn, path in enumerate(leaves(block)):
         for new in (*DAMAGE, "drop", "add")[turn % 10 :: 10]:
             found = copy.deepcopy(block)
@@ -77,10 +103,13 @@ def line_of(call, *given):
 
 
 @pytest.mark.parametrize("part", ["model", "input"])
-def test_a_model_file_with_a_damaged_setting_is_refused_in_one_line_or_answers_the_same(part, signals, tmp_path):
+def test_a_model_file_with_a_damaged_setting_is_refused_in_one_line_or_answers_the_same(
+    part, signals, tmp_path
+):
     from lowalt.recognition.predict_sample import predict
 
-    content, path = model_file.read(zoo.ZOO / "default-seen.safetensors"), tmp_path / "a.safetensors"
+    content = model_file.read(zoo.ZOO / "default-seen.safetensors")
+    path = tmp_path / "a.safetensors"
 
     def asked():
         """The answer of the file."""
@@ -88,7 +117,8 @@ def test_a_model_file_with_a_damaged_setting_is_refused_in_one_line_or_answers_t
         return list(predict(model, signals, settings).values()) if settings else "refused"
 
     model_file.write(path, content)
-    good, counted = asked(), {"refused": 0, "same": 0}
+    good = asked()
+    counted = {"refused": 0, "same": 0}
     for where, new, block in damaged(getattr(content, part)):
         model_file.write(path, replace(content, **{part: block}))
         found = line_of(asked)
@@ -101,7 +131,11 @@ def test_a_model_file_with_a_damaged_setting_is_refused_in_one_line_or_answers_t
 
 
 def test_an_index_with_a_damaged_setting_is_refused_in_one_line_or_makes_samples(tmp_path):
-    write_run(Dataset(configuration(effects={"receiver_noise": {}, "adc": {"bits": 8}})), tmp_path, "signal")
+    write_run(
+        Dataset(configuration(effects={"receiver_noise": {}, "adc": {"bits": 8}})),
+        tmp_path,
+        "signal",
+    )
     path = tmp_path / "shards/index.json"
     whole = json.loads(path.read_text())
     key = ShardSet(path).keys[0].decode()
@@ -132,7 +166,10 @@ def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, cap
     for name in ("a.safetensors", "b.safetensors"):
         assert main(["predict", name, str(signals)]) == 2
         told = capsys.readouterr().err
-        assert told.count("\n") == 1 and "which a file may not choose; expected `--backbone FILE.py:FUNCTION`" in told
+        assert (
+            told.count("\n") == 1
+            and "which a file may not choose; expected `--backbone FILE.py:FUNCTION`" in told
+        )
     for out in ("a.onnx", "b.safetensors"):
         with pytest.raises(InputError, match="may not choose"):
             recognition(["export", "--settings", "{}", "--model", "a.safetensors", "--out", out])
@@ -146,14 +183,20 @@ def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, cap
 
 @pytest.mark.parametrize(
     ("part", "key", "value"),
-    [("network", "heads", 1), ("size", None, 64), ("colour_map", None, "viridis"), ("scheme", "fusion", "mean")],
+    [
+        ("network", "heads", 1),
+        ("size", None, 64),
+        ("colour_map", None, "viridis"),
+        ("scheme", "fusion", "mean"),
+    ],
 )
 def test_a_model_that_contradicts_its_identity_is_refused(part, key, value, trained, tmp_path):
     identity, state = model_files.load(trained / "model.safetensors")
     state[part] = {**state[part], key: value} if key else value
     model_files.save(tmp_path / "a.safetensors", identity, state)
     with pytest.raises(
-        InputError, match=rf"a\.safetensors: {part}{'.' + key if key else ''} is .*, with which it was trained"
+        InputError,
+        match=rf"a\.safetensors: {part}{'.' + key if key else ''} is .*, with which it was trained",
     ):
         runs.load(tmp_path / "a.safetensors")
 
@@ -168,13 +211,22 @@ def test_a_run_names_no_code_and_its_caller_may(tmp_path, monkeypatch):
     (tmp_path / "run/shards").mkdir(parents=True)
     (tmp_path / "run/config.yaml").write_text(yaml.safe_dump(config))
     (tmp_path / "run/shards/index.json").write_text("{}")
-    monkeypatch.setattr(train_evaluate, "ShardSet", lambda index: SimpleNamespace(classes=("UAV", "Bird")))
-    with pytest.raises(InputError, match=r"^run: its backbone 'code\.py:run' is code, which a file may not choose"):
+    monkeypatch.setattr(
+        train_evaluate, "ShardSet", lambda index: SimpleNamespace(classes=("UAV", "Bird"))
+    )
+    with pytest.raises(
+        InputError, match=r"^run: its backbone 'code\.py:run' is code, which a file may not choose"
+    ):
         lowalt.train("run", "A:VT", "seen")
     del config["recognition"]
     (tmp_path / "run/config.yaml").write_text(yaml.safe_dump(config))
-    for call in (lambda: lowalt.train("run"), lambda: lowalt.evaluate(runs.Trained(*[None] * 7), "run")):
-        with pytest.raises(InputError, match=r"run/config\.yaml: .*missing key\(s\) \['recognition'\]"):
+    for call in (
+        lambda: lowalt.train("run"),
+        lambda: lowalt.evaluate(runs.Trained(*[None] * 7), "run"),
+    ):
+        with pytest.raises(
+            InputError, match=r"run/config\.yaml: .*missing key\(s\) \['recognition'\]"
+        ):
             call()
     assert not (tmp_path / "made").exists()
 
@@ -187,11 +239,18 @@ def test_a_model_on_code_of_its_user_answers_where_he_names_it(tmp_path, monkeyp
     block = {**SETTINGS["network"], "backbone": "mine.py:small", "heads": 5}
     fresh = runs.built(SCHEME, block, 32, "gray", 4)
     state = {name: SETTINGS[name] for name in ("size", "seed", "colour_map", "classes")}
-    state |= {"scheme": SCHEME.record, "protocol": "seen", "network": block, "weights": fresh.state_dict()}
+    state |= {
+        "scheme": SCHEME.record,
+        "protocol": "seen",
+        "network": block,
+        "weights": fresh.state_dict(),
+    }
     model_files.save("a.safetensors", "{}", state)
     image = torch.randint(0, 255, (2, 4, 32, 32), dtype=torch.uint8)
     with torch.inference_mode():
-        assert torch.allclose(runs.load("a.safetensors", "mine.py:small").model(image), fresh.eval()(image), atol=1e-5)
+        assert torch.allclose(
+            runs.load("a.safetensors", "mine.py:small").model(image), fresh.eval()(image), atol=1e-5
+        )
 
 
 def test_a_network_larger_than_its_weights_takes_limited_memory(trained, tmp_path):
@@ -203,7 +262,8 @@ def test_a_network_larger_than_its_weights_takes_limited_memory(trained, tmp_pat
         model_files.save(tmp_path / "a.safetensors", "{}", state)
         with pytest.raises(InputError, match=r"do not fit its network|not a trained model"):
             runs.load(tmp_path / "a.safetensors")
-    # The limit is one of new address space; what earlier tests left mapped and empty may fill besides.
+    # The limit is one of new address space; what earlier tests left mapped and empty may fill
+    # besides.
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2 * 1_900_000
 
 
@@ -211,7 +271,11 @@ def test_facts_of_other_shapes_offsets_in_words_and_null_bytes_are_refused_in_on
     views, tiles, text = (tmp_path / name for name in ("views.npz", "tiles.npz", "a.yaml"))
     with np.load(write_views(views, 5)) as data:
         good = dict(data)
-    for name, value in (("range_m", np.array(1.0)), ("label", good["label"].astype(str)), ("fold", np.array("train"))):
+    for name, value in (
+        ("range_m", np.array(1.0)),
+        ("label", good["label"].astype(str)),
+        ("fold", np.array("train")),
+    ):
         np.savez(views, **{**good, name: value})
         assert line_of(samples.ViewSamples, [views], [0], {("seen", "train")}) == "refused"
     np.savez(tiles, data=np.zeros(6, np.uint8), offsets=np.array(["0", "6"]))

@@ -1,4 +1,6 @@
-"""The same bytes on every processor: a chunk and a small data set in short, the whole tiny one in full."""
+"""The same bytes on every processor: a chunk and a small data set in short, the whole tiny one in
+full.
+"""
 
 import json
 import re
@@ -15,7 +17,10 @@ from lowalt.shards.dataset import Dataset
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "results/reference/tiny.sha256"
-NAMES = [pytest.param(name, marks=pytest.mark.skipif(not able(name), reason=f"no {name} here")) for name in EMULATED]
+NAMES = [
+    pytest.param(name, marks=pytest.mark.skipif(not able(name), reason=f"no {name} here"))
+    for name in EMULATED
+]
 
 SMALL = """
 targets: {select: [DJI Mini 2, Owl, Audi A6L 2019, Running Pedestrian 1]}
@@ -26,30 +31,47 @@ shards: {kind: signal}
 
 
 def test_signals_of_a_small_data_set_are_those_of_another_processor(tmp_path):
-    """Clouds, motion tables, shards, their tables and the index, on the processor that can do least."""
+    """Clouds, motion tables, shards, their tables and the index, on the processor that can do
+    least.
+    """
     (tmp_path / "small.yaml").write_text(SMALL)
     config = "--config", "config/default.yaml", "config/tiny.yaml", str(tmp_path / "small.yaml")
     build.main([*config, "--out", str(tmp_path / "here")])
     run("x86-64-v2", "-m", "lowalt.shards.build", *config, "--out", str(tmp_path / "there"))
     expected = manifest.text(tmp_path / "here")
-    assert expected.count("\n") == 4 + 2 + 2 * 2 + 1 and manifest.text(tmp_path / "there") == expected
+    assert (
+        expected.count("\n") == 4 + 2 + 2 * 2 + 1 and manifest.text(tmp_path / "there") == expected
+    )
 
 
 def test_echoes_noise_and_shards_with_tiles_of_a_chunk_have_their_stored_checksums(tmp_path):
-    """One chunk of the tiny data set; the stored values hold on every processor. A shard has the tiles as PNG files."""
-    dataset = Dataset(load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml"))
-    chunk, stored = "seen-00000", manifest.read(REFERENCE)
+    """One chunk of the tiny data set; the stored values hold on every processor. A shard has the
+    tiles as PNG files.
+    """
+    dataset = Dataset(
+        load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
+    )
+    chunk = "seen-00000"
+    stored = manifest.read(REFERENCE)
     build.write_chunk(dataset, tmp_path, chunk, "image")
-    rows, levels, maker = build.rows_of(dataset, chunk), dataset.plan.chunk(chunk).snrs, dataset.maker
-    made = {f"noisy/{chunk}.npy": np.array([[maker.signal(row, snr) for snr in levels] for row in rows])}
+    rows = build.rows_of(dataset, chunk)
+    levels = dataset.plan.chunk(chunk).snrs
+    maker = dataset.maker
+    made = {
+        f"noisy/{chunk}.npy": np.array([[maker.signal(row, snr) for snr in levels] for row in rows])
+    }
     for place, station in enumerate(maker.network.stations):
-        made[f"echo/{chunk}/{station.name}.npy"] = np.array([maker.received(row)[0][place] for row in rows])
+        made[f"echo/{chunk}/{station.name}.npy"] = np.array(
+            [maker.received(row)[0][place] for row in rows]
+        )
     for name, values in made.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         np.save(tmp_path / name, values)
     lines = [line.partition("  ") for line in manifest.text(tmp_path).splitlines()]
     found = {name: digest for digest, _, name in lines}
-    assert set(found) == {name for name in stored if re.match(r"(motion|echo|noisy|shards)/seen-", name)}
+    assert set(found) == {
+        name for name in stored if re.match(r"(motion|echo|noisy|shards)/seen-", name)
+    }
     for name, digest in found.items():
         assert digest == stored[name], name
 
@@ -68,7 +90,16 @@ def test_emulation_leaves_instructions_out():
 @pytest.mark.parametrize("name", ["native", *NAMES])
 def test_the_tiny_data_set_has_the_bytes_of_its_manifest(name, threads, tmp_path):
     config = ("config/default.yaml", "config/tiny.yaml")
-    run(name, "-m", "lowalt.shards.build", "--config", *config, "--out", str(tmp_path / "run"), threads=threads)
+    run(
+        name,
+        "-m",
+        "lowalt.shards.build",
+        "--config",
+        *config,
+        "--out",
+        str(tmp_path / "run"),
+        threads=threads,
+    )
     # Echoes and noisy signals stay in memory here; the shards follow from them.
     assert manifest.faults(REFERENCE, tmp_path / "run", ("echo", "noise", "tiles")) == []
 
@@ -76,11 +107,16 @@ def test_the_tiny_data_set_has_the_bytes_of_its_manifest(name, threads, tmp_path
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_samples_of_the_benchmark_have_their_kept_checksums_on_another_processor(name, tmp_path):
-    """One sample of each subtype and some of every other part; natively `tests/benchmark` makes them again."""
+    """One sample of each subtype and some of every other part; natively `tests/benchmark` makes
+    them again.
+    """
     run(name, "-m", "lowalt.extensions.benchmark", "results", "--samples", "--out", str(tmp_path))
-    made, kept = ((folder / frozen_bytes.SAMPLES).read_text().splitlines()
-                  for folder in (tmp_path, ROOT / frozen_bytes.REFERENCE))  # fmt: skip
+    made, kept = (
+        (folder / frozen_bytes.SAMPLES).read_text().splitlines()
+        for folder in (tmp_path, ROOT / frozen_bytes.REFERENCE)
+    )
     assert len(made) == len(kept) == 64
-    # The town has effects, whose last bits follow the processor: `test_bytes_effects.py` says how far apart they are.
+    # The town has effects, whose last bits follow the processor: `test_bytes_effects.py` says how
+    # far apart they are.
     exact = [line for line in kept if "  town/" not in line]
     assert len(exact) == 56 and set(exact) <= set(made)

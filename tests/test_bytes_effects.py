@@ -6,7 +6,10 @@ import pytest
 from emulation import EMULATED, able, run
 from lowalt.scene.effects import PLACES
 
-NAMES = [pytest.param(name, marks=pytest.mark.skipif(not able(name), reason=f"no {name} here")) for name in EMULATED]
+NAMES = [
+    pytest.param(name, marks=pytest.mark.skipif(not able(name), reason=f"no {name} here"))
+    for name in EMULATED
+]
 CLOSE = 2e-7
 """Largest difference, relative to the largest value: three units in the last place of float32."""
 
@@ -35,7 +38,9 @@ np.savez(sys.argv[1], **found)
 
 @pytest.fixture(scope="module")
 def signals(tmp_path_factory):
-    """Signals of every effect by name, native and without AVX: (2 targets, 3 stations, symbols) complex64 each."""
+    """Signals of every effect by name, native and without AVX: (2 targets, 3 stations, symbols)
+    complex64 each.
+    """
     folder = tmp_path_factory.mktemp("effects")
     for name in ("native", "x86-64-v2"):
         run(name, "-c", PROBE, str(folder / f"{name}.npz"))
@@ -93,10 +98,14 @@ np.savez(sys.argv[1], images=np.stack(images), signals=np.stack(signals))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("other", NAMES)
-def test_samples_of_the_benchmark_s_town_differ_in_the_last_bit_of_few_values_and_in_no_pixel(other, tmp_path):
+def test_samples_of_the_benchmark_s_town_differ_in_the_last_bit_of_few_values_and_in_no_pixel(
+    other, tmp_path
+):
     for name in ("native", other):
         run(name, "-c", TOWN, str(tmp_path / f"{name}.npz"))
     here, there = (np.load(tmp_path / f"{name}.npz") for name in ("native", other))
     apart = abs(here["signals"] - there["signals"])
-    assert (apart <= 2 * np.finfo(np.float32).eps * abs(here["signals"])).all() and (apart > 0).mean() < 0.01
+    assert (apart <= 2 * np.finfo(np.float32).eps * abs(here["signals"])).all() and (
+        apart > 0
+    ).mean() < 0.01
     assert (here["images"] == there["images"]).all() and here["images"].std() > 0

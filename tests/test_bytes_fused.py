@@ -1,8 +1,10 @@
-"""No compiled kernel of a stage whose bytes are promised lets a compiler fuse or reorder, on ARM as on x86-64.
+"""No compiled kernel of a stage whose bytes are promised lets a compiler fuse or reorder, on ARM as
+on x86-64.
 
-A fused multiply-add rounds once where a product and a sum round twice. LLVM fuses only what the code it gets allows: by
-flags on an operation or by the intrinsic `fmuladd`. ARM processors always have the instruction, so the machine code
-that the same compiler makes for one is looked at too, without running it.
+A fused multiply-add rounds once where a product and a sum round twice. LLVM fuses only what the
+code it gets allows: by flags on an operation or by the intrinsic `fmuladd`. ARM processors always
+have the instruction, so the machine code that the same compiler makes for one is looked at too,
+without running it.
 """
 
 import importlib
@@ -18,40 +20,67 @@ llvm = pytest.importorskip("llvmlite.binding")
 
 # The stages whose stored values are not rounded afterwards from a bound, as the echo's are.
 MODULES = (
-    "numerics.exact.arithmetic", "numerics.exact.sines", "echo.rounding.nearest", "echo.rounding.sums",
-    "motion.pose_kernels", "numerics.normals", "spectra.sliding", "tiles.huffman",
-    "tiles.huffman_code", "tiles.pixels", "tiles.png", "tiles.resample",
-)  # fmt: skip
+    "numerics.exact.arithmetic",
+    "numerics.exact.sines",
+    "echo.rounding.nearest",
+    "echo.rounding.sums",
+    "motion.pose_kernels",
+    "numerics.normals",
+    "spectra.sliding",
+    "tiles.huffman",
+    "tiles.huffman_code",
+    "tiles.pixels",
+    "tiles.png",
+    "tiles.resample",
+)
 LOOSE = re.compile(
-    r"\bf(?:add|sub|mul|div|neg) (?:(?:nnan|ninf|nsz|arcp|afn) )*(?:fast|contract|reassoc)\b|@llvm\.fmuladd"
+    r"\bf(?:add|sub|mul|div|neg) (?:(?:nnan|ninf|nsz|arcp|afn) "
+    r")*(?:fast|contract|reassoc)\b|@llvm\.fmuladd"
 )
 LIBRARY = re.compile(r"call .*@(?:llvm\.|numba_)?(?:sin|cos|tan|exp|log|pow|hypot|atan)\w*[.(]")
 FUSED = re.compile(r"\b(?:fn?madd|fn?msub|fmla|fmls)\b")
-LINE, TABLE = "float32[::1]", "float32[:, ::1]"
+LINE = "float32[::1]"
+TABLE = "float32[:, ::1]"
 SIGNATURES = {
     ("motion.pose_kernels", "_product"): "float64[:, ::1], float64[:, ::1], float64[:, ::1]",
     ("motion.pose_kernels", "_sines"): "float64[::1], float64[::1], float64[::1]",
     ("numerics.normals", "fill"): "uint64[::1], float64, float64[:, ::1], float64[:, ::1]",
-    ("spectra.sliding", "fourier_magnitudes"): f"{LINE}, {LINE}, int64, int64, {LINE}, {LINE}, {TABLE}",
+    (
+        "spectra.sliding",
+        "fourier_magnitudes",
+    ): f"{LINE}, {LINE}, int64, int64, {LINE}, {LINE}, {TABLE}",
     ("spectra.sliding", "transfer"): f"{LINE}, {LINE}, int64, {TABLE}, {TABLE}, {LINE}, {TABLE}",
-    ("tiles.pixels", "index_image"): f"{TABLE}, boolean, int32, int32, int32[::1], int32[::1], uint8[:, ::1]",
+    (
+        "tiles.pixels",
+        "index_image",
+    ): f"{TABLE}, boolean, int32, int32, int32[::1], int32[::1], uint8[:, ::1]",
     ("tiles.resample", "along_rows"): f"{TABLE}, uint64[:, ::1], {TABLE}, {TABLE}",
     ("tiles.resample", "across_rows"): f"{TABLE}, int64[:, ::1], {TABLE}, {TABLE}",
 }
 """Kernels with much floating-point work, and the types that their stages give them."""
-FREE = (("motion.pose_kernels", "_product"), ("tiles.resample", "along_rows"), ("tiles.resample", "across_rows"))
-"""Those of them that hold no memory of their own: their code has nothing in it that only x86-64 knows."""
+FREE = (
+    ("motion.pose_kernels", "_product"),
+    ("tiles.resample", "along_rows"),
+    ("tiles.resample", "across_rows"),
+)
+"""Those of them that hold no memory of their own: their code has nothing in it that only x86-64
+knows.
+"""
 
 
 def kernels(name: str) -> dict[str, Kernel]:
     """The compiled functions that a module of the package defines."""
     module = importlib.import_module(f"lowalt.{name}")
     found = {key: value for key, value in vars(module).items() if isinstance(value, Kernel)}
-    return {key: value for key, value in found.items() if value.function.__module__ == module.__name__}
+    return {
+        key: value for key, value in found.items() if value.function.__module__ == module.__name__
+    }
 
 
 def code(function, signature: str, **options) -> str:
-    """The code that LLVM gets and has improved, compiled anew: kept machine code cannot be inspected."""
+    """The code that LLVM gets and has improved, compiled anew: kept machine code cannot be
+    inspected.
+    """
     fresh = njit(**options)(function)
     fresh.compile(f"void({signature})")
     return next(iter(fresh.inspect_llvm().values()))
@@ -59,7 +88,9 @@ def code(function, signature: str, **options) -> str:
 
 def options_of(kernel: Kernel) -> dict:
     """The settings of a kernel that decide about its arithmetic."""
-    return {key: kernel.options[key] for key in ("fastmath", "error_model") if key in kernel.options}
+    return {
+        key: kernel.options[key] for key in ("fastmath", "error_model") if key in kernel.options
+    }
 
 
 def for_arm(text: str) -> str:
@@ -98,7 +129,9 @@ def sum_of_products(x, y, out):
 def test_loose_code_would_be_seen():
     """Without this the patterns above might fit nothing."""
     signature = f"{LINE}, {LINE}, {LINE}"
-    assert not LOOSE.search(code(sum_of_products, signature)) and LIBRARY.search(code(sum_of_products, signature))
+    assert not LOOSE.search(code(sum_of_products, signature)) and LIBRARY.search(
+        code(sum_of_products, signature)
+    )
     for flags in ({"contract"}, {"reassoc", "nsz"}, True):
         assert LOOSE.search(code(sum_of_products, signature, fastmath=flags))
 

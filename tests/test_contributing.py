@@ -152,9 +152,13 @@ def lines(tmp_path_factory):
     (folder / "scene.yaml").write_text("run: leaky\neffects: {dc_offset: {share: 0.25}}\n")
     (folder / "src/lowalt/spectra/kinds/power.py").write_text(SPECTRUM)
     enter(folder, "      vrp: &fourier\n", SPECTRUM_ENTRY)
-    (folder / "more.yaml").write_text("run: more\nspectra: {power: {window: 16, hop: 2}, trp: null}\n")
+    (folder / "more.yaml").write_text(
+        "run: more\nspectra: {power: {window: 16, hop: 2}, trp: null}\n"
+    )
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
-    run = subprocess.run([sys.executable, "-c", TRIAL], cwd=folder, env=environment, capture_output=True, text=True)
+    run = subprocess.run(
+        [sys.executable, "-c", TRIAL], cwd=folder, env=environment, capture_output=True, text=True
+    )
     assert run.returncode == 0, run.stderr
     return run.stdout.splitlines()
 
@@ -183,7 +187,11 @@ def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented
 
 
 # The page of fates names what is gone, that of words has a test of its own.
-DESIGN = sorted(f"design/{path.name}" for path in (ROOT / "design").glob("*.md") if path.stem not in ("fates", "words"))
+DESIGN = sorted(
+    f"design/{path.name}"
+    for path in (ROOT / "design").glob("*.md")
+    if path.stem not in ("fates", "words")
+)
 
 
 @pytest.mark.parametrize("name", ["CONTRIBUTING.md", "README.md", *DESIGN])
@@ -192,8 +200,12 @@ def test_every_path_and_module_that_a_document_names_exists(name):
     files = r"[\w.-]+/[\w./-]*\w\.(?:py|yaml|csv|md|html|png|smk)"
     paths = set(re.findall(rf"`({files})`", text))
     # Names in capitals stand for any name, and results are there only after a run.
-    paths = {path for path in paths if not re.search(r"(^|/)[A-Z]+[/.]|^results/(?!reference)", path)}
-    modules = {found.rstrip(".") for found in re.findall(r"`(?:python -m )?(lowalt\.[a-z_.]+)", text)}
+    paths = {
+        path for path in paths if not re.search(r"(^|/)[A-Z]+[/.]|^results/(?!reference)", path)
+    }
+    modules = {
+        found.rstrip(".") for found in re.findall(r"`(?:python -m )?(lowalt\.[a-z_.]+)", text)
+    }
     # Short paths are those of the package, or of one of its rooms.
     places = (ROOT, ROOT / "src/lowalt", *(ROOT / "src/lowalt").iterdir())
     missing = [path for path in paths if not any((place / path).exists() for place in places)]
@@ -211,9 +223,16 @@ def test_every_name_in_the_list_of_words_stands_in_the_code():
     source = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py"))
     known = set(re.findall(r"[A-Za-z_]\w+", source + (ROOT / "config/default.yaml").read_text()))
     known |= {path.stem for path in (ROOT / "src").rglob("*")} | {"config", "src"}
-    rows = [line for line in (ROOT / "design/words.md").read_text().splitlines() if line.startswith("| ")]
+    rows = [
+        line
+        for line in (ROOT / "design/words.md").read_text().splitlines()
+        if line.startswith("| ")
+    ]
     named = {
-        word for row in rows for code in re.findall(r"`([^`]+)`", row) for word in re.findall(r"[A-Za-z_]\w+", code)
+        word
+        for row in rows
+        for code in re.findall(r"`([^`]+)`", row)
+        for word in re.findall(r"[A-Za-z_]\w+", code)
     }
     assert len(rows) > 40 and len(named) > 40
     assert not named - known - {"py", "RUN"}
@@ -223,17 +242,37 @@ def test_each_of_the_twenty_questions_is_answered_by_a_file_that_holds_its_word(
     text = (ROOT / "CONTRIBUTING.md").read_text().partition("## Twenty questions")[2]
     rows = re.findall(r"^\| (.+\?) \| `([^`]+)`[^|]* \| `([^`]+)` \|$", text, re.MULTILINE)
     assert len(rows) == len({question for question, _, _ in rows}) == 20
-    found = {file: next((base / file for base in (ROOT, ROOT / "src/lowalt") if (base / file).is_file()), None)
-             for _, file, _ in rows}  # fmt: skip
-    wrong = [row for row in rows if not found[row[1]] or not re.search(rf"\b{row[2]}\b", found[row[1]].read_text())]
+    found = {
+        file: next(
+            (base / file for base in (ROOT, ROOT / "src/lowalt") if (base / file).is_file()), None
+        )
+        for _, file, _ in rows
+    }
+    wrong = [
+        row
+        for row in rows
+        if not found[row[1]] or not re.search(rf"\b{row[2]}\b", found[row[1]].read_text())
+    ]
     assert not wrong
 
 
 def test_names_in_brackets_after_a_path_stand_in_that_file():
-    text = (ROOT / "CONTRIBUTING.md").read_text().partition("## Where does it live?")[2].partition("\n## ")[0]
-    named = [(path, word) for path, words in re.findall(r"`([\w./-]+\.py)` \(((?:`\w+`(?:, )?)+)", text)
-             for word in re.findall(r"`(\w+)`", words)]  # fmt: skip
+    text = (
+        (ROOT / "CONTRIBUTING.md")
+        .read_text()
+        .partition("## Where does it live?")[2]
+        .partition("\n## ")[0]
+    )
+    named = [
+        (path, word)
+        for path, words in re.findall(r"`([\w./-]+\.py)` \(((?:`\w+`(?:, )?)+)", text)
+        for word in re.findall(r"`(\w+)`", words)
+    ]
     assert len(named) >= 3
     rooms = ROOT / "src/lowalt"
-    wrong = [pair for pair in named if not re.search(rf"\b(def|class) {pair[1]}\b", (rooms / pair[0]).read_text())]
+    wrong = [
+        pair
+        for pair in named
+        if not re.search(rf"\b(def|class) {pair[1]}\b", (rooms / pair[0]).read_text())
+    ]
     assert not wrong

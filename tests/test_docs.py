@@ -1,4 +1,6 @@
-"""The documents keep their word: functions, files, keys and commands that they name exist, and the site links them."""
+"""The documents keep their word: functions, files, keys and commands that they name exist, and the
+site links them.
+"""
 
 import argparse
 import importlib
@@ -22,7 +24,12 @@ from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md")])
-OTHERS = [ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", *(ROOT / "design").glob("*.md"), *ROOT.glob("*/README.md")]
+OTHERS = [
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "SECURITY.md",
+    *(ROOT / "design").glob("*.md"),
+    *ROOT.glob("*/README.md"),
+]
 PHYSICS = (ROOT / "docs/physics.md").read_text()
 SORTS = (
     r"\.venv/bin/(?:lowalt|python|snakemake|pip)\b[^`\n]+",
@@ -35,10 +42,17 @@ COMMAND = re.compile("|".join([*SORTS, r"^python -m lowalt\.[^`\n]*"]), re.MULTI
 
 def commands(page: Path) -> list[str]:
     """Commands of a page: in code spans, and lines of shell blocks."""
-    return [line.partition("  #")[0].strip() for line in COMMAND.findall(page.read_text().replace("\\\n", " "))]
+    return [
+        line.partition("  #")[0].strip()
+        for line in COMMAND.findall(page.read_text().replace("\\\n", " "))
+    ]
 
 
-NAMED = [(page.relative_to(ROOT).as_posix(), command) for page in [*PAGES, *OTHERS] for command in commands(page)]
+NAMED = [
+    (page.relative_to(ROOT).as_posix(), command)
+    for page in [*PAGES, *OTHERS]
+    for command in commands(page)
+]
 
 
 class Parsed(Exception):
@@ -59,11 +73,19 @@ def only_parsed(monkeypatch):
 
 def test_there_are_commands_of_every_sort():
     words = {command.split()[0] for _, command in NAMED} - {"python"}
-    assert words == {".venv/bin/lowalt", ".venv/bin/python", ".venv/bin/snakemake", ".venv/bin/pip", "make"}
+    assert words == {
+        ".venv/bin/lowalt",
+        ".venv/bin/python",
+        ".venv/bin/snakemake",
+        ".venv/bin/pip",
+        "make",
+    }
     assert len(NAMED) > 60
 
 
-@pytest.mark.parametrize("page, command", [pair for pair in NAMED if pair[1].startswith(".venv/bin/lowalt")])
+@pytest.mark.parametrize(
+    "page, command", [pair for pair in NAMED if pair[1].startswith(".venv/bin/lowalt")]
+)
 def test_every_command_of_lowalt_is_understood(page, command, only_parsed):
     # FILE, NAME and the like stand for any value; KEY and N are such words too.
     with pytest.raises((Parsed, SystemExit)) as ended:
@@ -81,26 +103,40 @@ def test_every_module_and_its_options_exist(page, command):
     source = path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__main__.py"
     assert source.is_file(), f"{page}: {command}"
     # A command may take its options from functions of its room, or of the rooms that know no stage.
-    ground = [file for room in ("files", "config") for file in (ROOT / "src/lowalt" / room).glob("*.py")]
+    ground = [
+        file for room in ("files", "config") for file in (ROOT / "src/lowalt" / room).glob("*.py")
+    ]
     rooms = (source, *source.parent.glob("*.py"), *ground)
     known = "\n".join(file.read_text() for file in rooms)
-    missing = [word for word in words if word.startswith("--") and word != "--help" and f'"{word}"' not in known]
+    missing = [
+        word
+        for word in words
+        if word.startswith("--") and word != "--help" and f'"{word}"' not in known
+    ]
     assert not missing, f"{page}: {command}"
 
 
 def test_snakemake_understands_every_command_and_has_its_rules():
     from snakemake.cli import get_argument_parser
 
-    read, wanted = get_argument_parser(), set()
-    for words in (shlex.split(command)[1:] for _, command in NAMED if command.startswith(".venv/bin/snakemake")):
+    read = get_argument_parser()
+    wanted = set()
+    for words in (
+        shlex.split(command)[1:]
+        for _, command in NAMED
+        if command.startswith(".venv/bin/snakemake")
+    ):
         asked = read.parse_args(words)
         wanted |= {name for name in [*asked.targets, *(asked.forcerun or ())] if "/" not in name}
-    rules = "".join(path.read_text() for path in [ROOT / "Snakefile", *(ROOT / "workflow/rules").glob("*.smk")])
+    rules = "".join(
+        path.read_text() for path in [ROOT / "Snakefile", *(ROOT / "workflow/rules").glob("*.smk")]
+    )
     assert len(wanted) >= 4 and not wanted - set(re.findall(r"^ *rule (\w+):", rules, re.MULTILINE))
 
 
 @pytest.mark.parametrize(
-    "page, command", [pair for pair in NAMED if re.match(r"\.venv/bin/python (?!-m lowalt|-m pip_audit)", pair[1])]
+    "page, command",
+    [pair for pair in NAMED if re.match(r"\.venv/bin/python (?!-m lowalt|-m pip_audit)", pair[1])],
 )
 def test_every_program_and_its_options_exist(page, command):
     words = shlex.split(command)[1:]
@@ -113,23 +149,42 @@ def test_every_program_and_its_options_exist(page, command):
 
 
 def test_every_extra_that_a_command_installs_exists():
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
     named = [
-        name for _, command in NAMED for some in re.findall(r"-e '\.\[(.+)\]'", command) for name in some.split(",")
+        name
+        for _, command in NAMED
+        for some in re.findall(r"-e '\.\[(.+)\]'", command)
+        for name in some.split(",")
     ]
     assert len(named) > 3 and not set(named) - set(extras)
 
 
 def test_a_missing_package_is_asked_for_by_its_own_name():
     """No index holds this package, so a stranger could publish one of its name."""
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
     for extra, packages in extras.items():
-        start, said = "pip install ", install_command(extra)
+        start = "pip install "
+        said = install_command(extra)
         assert said.startswith(start)
         # The metadata writes the bounds of versions in an order of its own.
-        asked = {frozenset(re.findall(r"[\w.-]+(?:\[\w+\])?", package)) for package in shlex.split(said)[2:]}
-        assert asked == {frozenset(re.findall(r"[\w.-]+(?:\[\w+\])?", package)) for package in packages}
-    texts = [*ROOT.glob("src/**/*.py"), *ROOT.glob("src/**/*.jinja"), *ROOT.glob("workflow/**/*"), *PAGES, *OTHERS]
+        asked = {
+            frozenset(re.findall(r"[\w.-]+(?:\[\w+\])?", package))
+            for package in shlex.split(said)[2:]
+        }
+        assert asked == {
+            frozenset(re.findall(r"[\w.-]+(?:\[\w+\])?", package)) for package in packages
+        }
+    texts = [
+        *ROOT.glob("src/**/*.py"),
+        *ROOT.glob("src/**/*.jinja"),
+        *ROOT.glob("workflow/**/*"),
+        *PAGES,
+        *OTHERS,
+    ]
     from_index = []
     for path in texts:
         for line in path.read_text().splitlines() if path.is_file() else ():
@@ -143,20 +198,31 @@ def test_a_page_that_imports_a_package_beyond_the_set_up_says_how_to_install_it(
     """Also where only the program in `examples/` imports it that a command of the page runs."""
     text = page.read_text()
     programs = set(re.findall(r"\.venv/bin/python (examples/\w+\.py)", text))
-    code = "\n".join([*re.findall(r"^```python.*?\n(.*?)^```$", text, re.DOTALL | re.MULTILINE),
-                      *((ROOT / name).read_text() for name in programs)])  # fmt: skip
+    code = "\n".join(
+        [
+            *re.findall(r"^```python.*?\n(.*?)^```$", text, re.DOTALL | re.MULTILINE),
+            *((ROOT / name).read_text() for name in programs),
+        ]
+    )
     modules = set(re.findall(r"^\s*(?:import|from) (\w+)", code, re.MULTILINE))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    known = [*project["dependencies"], *(need for name in ("workflow", "cost", "recognition") for need in extras[name])]
+    known = [
+        *project["dependencies"],
+        *(need for name in ("workflow", "cost", "recognition") for need in extras[name]),
+    ]
     named = ",".join(re.findall(r"pip install[^`\n]*'\.\[([\w,]+)\]'", text))
     known += [need for name in filter(None, named.split(",")) for need in extras[name]]
     known += re.findall(r"pip install[^`\n]* (\w+)`", text)
     have = {re.match(r"[\w-]+", need)[0].lower() for need in known} | {"lowalt"}
     offers = packages_distributions()
-    sources = {module: {name.lower() for name in offers.get(module, [module])} for module in modules}
+    sources = {
+        module: {name.lower() for name in offers.get(module, [module])} for module in modules
+    }
     assert not {
-        module for module, names in sources.items() if module not in sys.stdlib_module_names and not names & have
+        module
+        for module, names in sources.items()
+        if module not in sys.stdlib_module_names and not names & have
     }
 
 
@@ -166,7 +232,10 @@ def test_every_target_of_make_exists():
     wanted = {words[1] for words in asked if words[1] != "-C"}
     assert len(wanted) > 8 and not wanted - targets
     for folder, target in (words[2:4] for words in asked if words[1] == "-C"):
-        assert re.search(rf"^{target}:", (ROOT / folder / "Makefile").read_text(), re.MULTILINE), (folder, target)
+        assert re.search(rf"^{target}:", (ROOT / folder / "Makefile").read_text(), re.MULTILINE), (
+            folder,
+            target,
+        )
 
 
 def test_every_target_that_make_help_lists_stands_in_a_document():
@@ -181,7 +250,9 @@ def test_every_link_and_every_file_of_a_command_exists(page):
     plain = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     links = [link for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", plain) if link]
     missing = [link for link in links if not ((ROOT / page).parent / link).exists()]
-    files = re.findall(r"(?<![\w./])(?:config|workflow|design|src|envs|benchmarks|profiles)/[\w./-]+\.\w+", plain)
+    files = re.findall(
+        r"(?<![\w./])(?:config|workflow|design|src|envs|benchmarks|profiles)/[\w./-]+\.\w+", plain
+    )
     made = re.findall(r'title="([^"]+)"', text)
     missing += [name for name in files if name not in made and not (ROOT / name).exists()]
     assert not missing
@@ -210,12 +281,18 @@ def test_every_effect_and_every_equation_stands_on_the_page_of_physics():
 
 def test_every_overlay_that_a_document_shows_is_a_configuration_s(tmp_path):
     text = "".join(page.read_text() for page in PAGES)
-    shown = {overlay for some in re.findall(r"overlay with ((?:`[^`]+`(?:, | and )?)+)", text)
-             for overlay in re.findall(r"`([a-z]+: \{[^`]+)`", some)}  # fmt: skip
+    shown = {
+        overlay
+        for some in re.findall(r"overlay with ((?:`[^`]+`(?:, | and )?)+)", text)
+        for overlay in re.findall(r"`([a-z]+: \{[^`]+)`", some)
+    }
     assert len(shown) > 12
     for overlay in sorted(shown):
         (tmp_path / "mine.yaml").write_text(f"run: mine\n{overlay}\n")
-        load([ROOT / "config/default.yaml", tmp_path / "mine.yaml"], ROOT / "workflow/schemas/config.schema.yaml")
+        load(
+            [ROOT / "config/default.yaml", tmp_path / "mine.yaml"],
+            ROOT / "workflow/schemas/config.schema.yaml",
+        )
 
 
 def test_every_effect_stands_on_the_page_of_scenes():
@@ -225,8 +302,14 @@ def test_every_effect_stands_on_the_page_of_scenes():
 
 def test_the_page_of_keys_says_type_range_and_meaning_of_inner_keys():
     inner = {"type": ["number", "null"], "minimum": 2, "description": "a | b"}
-    block = {"type": "object", "description": "things", "additionalProperties": {"properties": {"far_m": inner}}}
-    text = configuration_page({"properties": {"seed": {"type": "integer", "description": "root"}, "sites": block}})
+    block = {
+        "type": "object",
+        "description": "things",
+        "additionalProperties": {"properties": {"far_m": inner}},
+    }
+    text = configuration_page(
+        {"properties": {"seed": {"type": "integer", "description": "root"}, "sites": block}}
+    )
     assert "| `seed` | integer | root |\n" in text
     assert "## sites\n\nThings.\n" in text
     assert "| `NAME.far_m` | number or null, at least 2 | a \\| b |\n" in text
@@ -238,10 +321,17 @@ def test_links_lead_to_the_same_files_in_the_site_as_in_the_repository(monkeypat
     pytest.importorskip("mkdocs")
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     site = importlib.import_module("site_pages")
-    found = site.relinked("[a](../design/echo.md#what) [b](tutorials/target.md) ![c](../design/pictures/tiles.png)",
-                          "docs/tasks.md")  # fmt: skip
-    assert found == "[a](design/echo.md#what) [b](tutorials/target.md) ![c](design/pictures/tiles.png)"
-    assert site.relinked("[a](docs/index.md) [b](config)", "CONTRIBUTING.md") == "[a](index.md) [b](config/README.md)"
+    found = site.relinked(
+        "[a](../design/echo.md#what) [b](tutorials/target.md) ![c](../design/pictures/tiles.png)",
+        "docs/tasks.md",
+    )
+    assert (
+        found == "[a](design/echo.md#what) [b](tutorials/target.md) ![c](design/pictures/tiles.png)"
+    )
+    assert (
+        site.relinked("[a](docs/index.md) [b](config)", "CONTRIBUTING.md")
+        == "[a](index.md) [b](config/README.md)"
+    )
     assert site.relinked("[a](../README.md)", "docs/none.md") == "[a](README.md)"
     assert site.relinked("[a](nowhere.md)", "docs/index.md") == "[a](nowhere.md)"
     assert site.relinked(f"[a](../{site.RECORDS})", "docs/index.md") == "[a](reference/records.md)"
@@ -250,16 +340,31 @@ def test_links_lead_to_the_same_files_in_the_site_as_in_the_repository(monkeypat
 def test_the_site_builds_without_a_warning_and_with_every_link(tmp_path):
     pytest.importorskip("mkdocs")
     pytest.importorskip("mkdocstrings")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+    command = [
+        sys.executable,
+        "-m",
+        "mkdocs",
+        "build",
+        "--strict",
+        "--site-dir",
+        str(tmp_path / "site"),
+    ]
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment)
     assert run.returncode == 0, run.stderr
     page = (tmp_path / "site/reference/library.html").read_text()
     assert "An endless sequence of samples" in page
     assert (tmp_path / "site/design/pictures/tiles.png").is_file()
-    assert "<code>models_per_chunk</code>" in (tmp_path / "site/reference/configuration.html").read_text()
+    assert (
+        "<code>models_per_chunk</code>"
+        in (tmp_path / "site/reference/configuration.html").read_text()
+    )
     elsewhere = re.compile(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?:https?:)?//')
-    asking = [path.name for path in (tmp_path / "site").rglob("*.html") if elsewhere.search(path.read_text())]
+    asking = [
+        path.name
+        for path in (tmp_path / "site").rglob("*.html")
+        if elsewhere.search(path.read_text())
+    ]
     assert not asking
 
 
@@ -268,11 +373,17 @@ def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():
 
     def pages(entry):
         below = entry.values() if isinstance(entry, dict) else entry
-        return [entry] if isinstance(entry, str) else [name for value in below for name in pages(value)]
+        return (
+            [entry]
+            if isinstance(entry, str)
+            else [name for value in below for name in pages(value)]
+        )
 
     # Pages of keys are made as the site is built.
     every_name = set(pages(nav)) - {"reference/configuration.md", "reference/records.md"}
     named = {f"docs/{name}" if (ROOT / "docs" / name).is_file() else name for name in every_name}
     assert not [name for name in named if not (ROOT / name).is_file()]
-    every = {page.relative_to(ROOT).as_posix() for page in [*PAGES, *ROOT.glob("design/*.md")]} - {"README.md"}
+    every = {page.relative_to(ROOT).as_posix() for page in [*PAGES, *ROOT.glob("design/*.md")]} - {
+        "README.md"
+    }
     assert every <= named

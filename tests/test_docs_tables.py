@@ -1,4 +1,6 @@
-"""Documents: tables are written between their marks from the CSVs, and a document without marks is refused."""
+"""Documents: tables are written between their marks from the CSVs, and a document without marks is
+refused.
+"""
 
 import pytest
 from filled_tables import fill, main
@@ -32,7 +34,11 @@ def test_tables_stand_between_their_marks_and_can_be_written_again(tmp_path):
 
 
 def test_a_document_without_its_marks_is_refused():
-    for text in ("", "<!-- end of cost -->\n<!-- cost -->\n", "<!-- cost -->\n<!-- cost -->\n<!-- end of cost -->"):
+    for text in (
+        "",
+        "<!-- end of cost -->\n<!-- cost -->\n",
+        "<!-- cost -->\n<!-- cost -->\n<!-- end of cost -->",
+    ):
         with pytest.raises(InputError, match="each once"):
             fill(text, "cost", "")
     with pytest.raises(InputError, match="expected DOCUMENT"):

@@ -1,4 +1,6 @@
-"""The README's picture: the clean tile of each class out of a data set, and four of them on one page."""
+"""The README's picture: the clean tile of each class out of a data set, and four of them on one
+page.
+"""
 
 import io
 
@@ -19,8 +21,13 @@ def test_the_tile_of_a_class_is_that_of_its_first_motion_model_without_noise(tmp
     records = [shards.record(number) for number in range(len(shards))]
     clean = np.flatnonzero(np.isinf(shards.snrs_db))
     assert 0 < len(clean) < len(shards)
-    for (words, png), name in zip(found, ("UAV: DJI Mavic 3", "Bird: Crow", "Vehicle: Model Y"), strict=True):
-        number = min((i for i in clean if name.endswith(records[i]["subtype"])), key=lambda i: records[i]["model"])
+    for (words, png), name in zip(
+        found, ("UAV: DJI Mavic 3", "Bird: Crow", "Vehicle: Model Y"), strict=True
+    ):
+        number = min(
+            (i for i in clean if name.endswith(records[i]["subtype"])),
+            key=lambda i: records[i]["model"],
+        )
         assert words == f"{name}, motion model {records[number]['model']}, no noise"
         shown = Image.open(io.BytesIO(png))
         assert (np.asarray(shown) == shards.tile(int(number))).all()
@@ -33,7 +40,9 @@ def test_the_page_has_four_tiles_at_half_size_and_a_gap_between_them():
     for colour in colours:
         tiles.append(io.BytesIO())
         Image.new("RGB", (40, 40), colour).save(tiles[-1], "PNG")
-    page = np.asarray(tiles_picture.cover([one.getvalue() for one in tiles]).convert("RGB")).astype(int)
+    page = np.asarray(tiles_picture.cover([one.getvalue() for one in tiles]).convert("RGB")).astype(
+        int
+    )
     assert page.shape == (52, 52, 3)
     for place, colour in zip(((0, 0), (0, 32), (32, 0), (32, 32)), colours, strict=True):
         assert abs(page[place[0] : place[0] + 20, place[1] : place[1] + 20] - colour).max() <= 4

@@ -1,4 +1,6 @@
-"""The layout of the package: imports go one way, entry points stay light, and no stray file is in the repository."""
+"""The layout of the package: imports go one way, entry points stay light, and no stray file is in
+the repository.
+"""
 
 import ast
 import functools
@@ -34,7 +36,10 @@ def test_a_stage_imports_only_what_stands_before_it(stage):
 LIGHT = [stage for stage in STAGES if stage not in ("spectra", "recognition")]
 SCENES = [{}, *({name: {}} for name in PLACES)]
 PROGRAMS = {
-    **{stage: f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)" for stage in LIGHT},
+    **{
+        stage: f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)"
+        for stage in LIGHT
+    },
     "plain": "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in sys.modules)",
     "scenes": (
         "import os, sys, lowalt.echo.__main__, lowalt.scene.__main__, lowalt.noise.__main__\n"
@@ -65,7 +70,10 @@ def test_who_only_wants_data_never_imports_torch(said):
 
 
 def test_what_no_scene_names_is_not_imported(said):
-    found = [{other for other in line.split() if other in PLACES} for line in said["scenes"].split("\n")[:-1]]
+    found = [
+        {other for other in line.split() if other in PLACES}
+        for line in said["scenes"].split("\n")[:-1]
+    ]
     assert found == [set(scene) for scene in SCENES]
 
 
@@ -74,7 +82,9 @@ def test_a_run_without_effects_imports_nothing_of_them(said):
 
 
 def test_the_plan_of_the_package_names_every_room():
-    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"extensions"} == set(ROOMS)
+    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"extensions"} == set(
+        ROOMS
+    )
 
 
 def test_the_picture_of_the_house_has_a_mark_for_every_import_between_rooms():
@@ -87,12 +97,16 @@ def test_the_picture_of_the_house_has_a_mark_for_every_import_between_rooms():
     centres = np.array(ndimage.center_of_mass(dots > 0, dots, range(1, count + 1)))
     # The first room imports none, and none imports the last.
     places = (centres - centres.min(axis=0)) / np.ptp(centres, axis=0) * (len(ROOMS) - 2)
-    found = [(ROOMS[row + 1], ROOMS[column]) for row, column in np.rint(places).astype(int).tolist()]
+    found = [
+        (ROOMS[row + 1], ROOMS[column]) for row, column in np.rint(places).astype(int).tolist()
+    ]
     assert sorted(found) == sorted(pairs)
 
 
 class File:
-    """What the tests below ask of a Python file: its docstring, its classes, and its functions with their lines."""
+    """What the tests below ask of a Python file: its docstring, its classes, and its functions with
+    their lines.
+    """
 
     def __init__(self, path: Path) -> None:
         """Read the file."""
@@ -100,8 +114,11 @@ class File:
         self.docstring = ast.get_docstring(tree)
         self.classes = [node.name for node in tree.body if isinstance(node, ast.ClassDef)]
         # Those inside classes and other functions as well.
-        self.functions = [(node.name, node.end_lineno - node.lineno, ast.get_docstring(node))
-                          for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]  # fmt: skip
+        self.functions = [
+            (node.name, node.end_lineno - node.lineno, ast.get_docstring(node))
+            for node in ast.walk(tree)
+            if isinstance(node, ast.FunctionDef)
+        ]
 
 
 # Reading all files takes a second.
@@ -130,8 +147,12 @@ def test_every_function_says_what_it_does():
 def test_functions_have_at_most_80_lines_and_files_600():
     files = python_files("src", "benchmarks", "tests", "docs", "examples")
     lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in files}
-    long = [f"{path.name}: {name}" for path in files for name, more_lines, _ in file(path).functions
-            if more_lines >= 80]  # fmt: skip
+    long = [
+        f"{path.name}: {name}"
+        for path in files
+        for name, more_lines, _ in file(path).functions
+        if more_lines >= 80
+    ]
     assert not long
     assert not {str(path): count for path, count in lines.items() if count > 600}
 
@@ -142,7 +163,9 @@ def test_no_name_of_a_class_stands_for_two_things():
 
 
 def test_no_base_name_of_a_module_stands_for_two_modules():
-    names = Counter(path.name for path in python_files("src/lowalt") if not path.name.startswith("__"))
+    names = Counter(
+        path.name for path in python_files("src/lowalt") if not path.name.startswith("__")
+    )
     assert not {name for name, count in names.items() if count > 1}
 
 
@@ -155,14 +178,21 @@ def test_no_tracked_file_is_large_or_names_this_machine():
     assert files
     assert not [path for path in files if path.stat().st_size > 1_000_000]
     home = "/" + "work/"
-    named = [path for path in files if path.suffix != ".png" and home in path.read_text(errors="replace")]
+    named = [
+        path for path in files if path.suffix != ".png" and home in path.read_text(errors="replace")
+    ]
     assert not named
 
 
 SKIPPED = {
-    tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENCODING,
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENCODING,
     tokenize.ENDMARKER,
-}  # fmt: skip
+}
 
 
 def tokens(text: str) -> int:
@@ -170,7 +200,9 @@ def tokens(text: str) -> int:
     documented = {
         line
         for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        if isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
         for line in range(node.lineno, node.end_lineno + 1)
     }
     found = tokenize.generate_tokens(io.StringIO(text).readline)
@@ -201,19 +233,27 @@ TOKENS = {
     "extensions/recordings": 26839,
     "extensions/town": 20073,
 }
-"""Tokens of each room and extension. A commit that needs more than SLACK above it raises its figure and says why."""
+"""Tokens of each room and extension. A commit that needs more than SLACK above it raises its figure
+and says why.
+"""
 SLACK = 1.05
 
 
 def sizes() -> dict[str, int]:
     """Tokens of each room of the core and of each extension."""
-    return {room: sum(tokens(path.read_text()) for path in modules(room)) for room in (*ROOMS, *EXTENSIONS)}
+    return {
+        room: sum(tokens(path.read_text()) for path in modules(room))
+        for room in (*ROOMS, *EXTENSIONS)
+    }
 
 
 def test_tokens_count_neither_documentation_nor_line_ends():
     packed = "a, b = f(x), 2\n"
     assert tokens(packed) == 10
-    assert tokens('"""What it\nholds."""\n\n# Why.\na, b = (\n    f(x),\n    2\n)\n') == tokens(packed) + 2
+    assert (
+        tokens('"""What it\nholds."""\n\n# Why.\na, b = (\n    f(x),\n    2\n)\n')
+        == tokens(packed) + 2
+    )
 
 
 def test_no_room_and_no_extension_grows_by_more_than_the_slack():

@@ -1,4 +1,6 @@
-"""Kept tables: each names its command, and a row of each that needs no training is remade, chosen by the date."""
+"""Kept tables: each names its command, and a row of each that needs no training is remade, chosen
+by the date.
+"""
 
 import csv
 import datetime
@@ -30,7 +32,11 @@ def tracked():
     if found.returncode:
         pytest.skip("not a git checkout")
     folders = "results/", "studies/", "benchmarks/"
-    names = {name for name in found.stdout.split("\0") if name.endswith(".csv") and name.startswith(folders)}
+    names = {
+        name
+        for name in found.stdout.split("\0")
+        if name.endswith(".csv") and name.startswith(folders)
+    }
     return names - {"results/tables.csv"}
 
 
@@ -49,14 +55,19 @@ def test_every_command_of_a_kept_table_is_there():
         for part in row["command"].split(" && "):
             if part.startswith("make -C "):
                 folder = part.split()[2]
-                targets = set(re.findall(r"^(\w+):", (ROOT / folder / "Makefile").read_text(), re.MULTILINE))
+                targets = set(
+                    re.findall(r"^(\w+):", (ROOT / folder / "Makefile").read_text(), re.MULTILINE)
+                )
                 asked = [word for word in part.split()[3:] if "=" not in word]
             else:
-                targets, asked = root_targets, [word for word in part.split()[1:2] if part.startswith("make ")]
+                targets = root_targets
+                asked = [word for word in part.split()[1:2] if part.startswith("make ")]
                 asked = [word for word in asked if word not in ("on", "study")]
             assert set(asked) <= targets, part
         for study in re.findall(r"NAME=([\w-]+)", row["command"]):
-            assert (ROOT / f"studies/{study}/Makefile").is_file() or row["command"].endswith("--label NAME"), row
+            assert (ROOT / f"studies/{study}/Makefile").is_file() or row["command"].endswith(
+                "--label NAME"
+            ), row
         for path in re.findall(r"\S+\.(?:py|yaml)\b", row["command"]):
             assert (ROOT / path).is_file(), row
 
@@ -85,37 +96,55 @@ def truth(kept):
 def scale(kept, tmp_path):
     module = program("docs/scale_table.py")
     overlay = f"config/{kept['configuration']}.yaml"
-    module.main([
-        "--stages", "results/reference/default-stages.csv", "--costs", "results/reference/default-accuracy_cost.csv",
-        "--schema", "workflow/schemas/config.schema.yaml", "--base", "config/default.yaml", "--overlays", overlay,
-        "--out", str(tmp_path / "scale.csv"),
-    ])  # fmt: skip
+    module.main(
+        [
+            "--stages",
+            "results/reference/default-stages.csv",
+            "--costs",
+            "results/reference/default-accuracy_cost.csv",
+            "--schema",
+            "workflow/schemas/config.schema.yaml",
+            "--base",
+            "config/default.yaml",
+            "--overlays",
+            overlay,
+            "--out",
+            str(tmp_path / "scale.csv"),
+        ]
+    )
     return read(tmp_path / "scale.csv")[0]
 
 
 def fuzzed(kept, tmp_path):
-    (reader,) = [each for each in import_module("fuzzed_readers").readers() if each.name == kept["reader"]]
+    (reader,) = [
+        each for each in import_module("fuzzed_readers").readers() if each.name == kept["reader"]
+    ]
     found = import_module("fuzzing").attack(reader, int(kept["inputs"]), 1, tmp_path)
     return {key: found[key] for key in ("reader", "inputs", "accepted", "refused", "faults")}
 
 
 def coverage(kept):
     module = program("benchmarks/interval_coverage.py")
-    rng, case = import_module("lowalt.numerics.streams").stream(1, "coverage", kept["case"]), module.CASES[kept["case"]]
+    rng = import_module("lowalt.numerics.streams").stream(1, "coverage", kept["case"])
+    case = module.CASES[kept["case"]]
     # The plain intervals, of a stream of their own, take as long again.
     return {"held_percent": f"{100 * module.held(case, int(kept['trials']), 400, rng, False):.1f}"}
 
 
 def fault(kept, tmp_path):
     module = program("benchmarks/planted_faults.py")
-    (planted,) = [row for row in read("benchmarks/planted_faults.csv") if row["fault"] == kept["fault"]]
+    (planted,) = [
+        row for row in read("benchmarks/planted_faults.csv") if row["fault"] == kept["fault"]
+    ]
     by = module.planted(module.copy_of_tree(ROOT, tmp_path / "tree"), planted)
     return {"fault": planted["fault"], "caught": "yes" if by else "no"}
 
 
 def rounding(kept):
     module = program("benchmarks/rounding.py")
-    dataset = module.Dataset(module.load(["config/default.yaml"], "workflow/schemas/config.schema.yaml"))
+    dataset = module.Dataset(
+        module.load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
+    )
     points = None if kept["points"] == "as they are" else int(kept["points"])
     found = module.measured(dataset, 5, points, 1)
     return {key: found[key] for key in ("points", "signals", "symbols", "again", "left_open")}
@@ -151,28 +180,37 @@ def precision(kept):
 
 def gain(kept):
     module = program("benchmarks/sampling_gain.py")
-    tone_hz, names = float(kept["tone_hz"]), [name for name in kept if name.startswith("gain_") and kept[name]]
+    tone_hz = float(kept["tone_hz"])
+    names = [name for name in kept if name.startswith("gain_") and kept[name]]
     rates_hz = (float(name.split("_")[1]) for name in names)
-    found = (module.gain(kept["sampling"], kept["channel"], rate_hz, tone_hz) for rate_hz in rates_hz)
+    found = (
+        module.gain(kept["sampling"], kept["channel"], rate_hz, tone_hz) for rate_hz in rates_hz
+    )
     return dict(zip(names, (f"{value:z.2f}" for value in found), strict=True))
 
 
 def layout(kept, tmp_path):
-    module, snr_db = program("benchmarks/recording_layouts.py"), int(kept["snr_db"])
+    module = program("benchmarks/recording_layouts.py")
+    snr_db = int(kept["snr_db"])
     values = module.echo(kept["echo"], snr_db, np.random.default_rng([snr_db, len(kept["echo"])]))
     return {"tries": module.tries(module.written(kept["layout"], values, tmp_path), values)}
 
 
 REMADE = {
-    "results/reference/scene_cells.csv": cells, "results/reference/scale.csv": scale,
+    "results/reference/scene_cells.csv": cells,
+    "results/reference/scale.csv": scale,
     "results/reference/observed_truth.csv": truth,
-    "results/benchmarks/fuzz.csv": fuzzed, "results/benchmarks/interval_coverage.csv": coverage,
-    "results/benchmarks/planted_faults.csv": fault, "results/benchmarks/rounding.csv": rounding,
-    "results/benchmarks/scene_levels.csv": scene_level, "results/benchmarks/target_levels.csv": target_level,
+    "results/benchmarks/fuzz.csv": fuzzed,
+    "results/benchmarks/interval_coverage.csv": coverage,
+    "results/benchmarks/planted_faults.csv": fault,
+    "results/benchmarks/rounding.csv": rounding,
+    "results/benchmarks/scene_levels.csv": scene_level,
+    "results/benchmarks/target_levels.csv": target_level,
     "results/benchmarks/training_memory.csv": memory,
     "results/benchmarks/recording_layouts.csv": layout,
-    "results/benchmarks/sampling_gain.csv": gain, "results/benchmarks/signal_precision.csv": precision,
-}  # fmt: skip
+    "results/benchmarks/sampling_gain.csv": gain,
+    "results/benchmarks/signal_precision.csv": precision,
+}
 
 
 def test_every_table_that_is_remade_by_date_has_its_way():

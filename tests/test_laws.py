@@ -1,4 +1,6 @@
-"""Laws that hold for all inputs, tried on random ones: how results follow a change of the input, stage by stage."""
+"""Laws that hold for all inputs, tried on random ones: how results follow a change of the input,
+stage by stage.
+"""
 
 import math
 import tempfile
@@ -18,7 +20,8 @@ from lowalt.recognition.intervals import bootstrap, model_shares
 from lowalt.spectra import trp, vrp, vt
 from made_predictions import run_files
 
-CARRIER, INTERVAL = 4.9e9, 1 / 3200
+CARRIER = 4.9e9
+INTERVAL = 1 / 3200
 SEEDS = st.integers(0, 2**32 - 1)
 FEW = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
@@ -35,17 +38,22 @@ def complex_noise(seed, *shape):
     snrs=st.lists(st.floats(-30, 40), min_size=1, max_size=3, unique=True),
     levels=st.lists(st.floats(1e-9, 1e3), min_size=1, max_size=3),
 )
-def test_noise_has_the_power_of_its_snr_at_every_station_whatever_the_levels_of_the_others(seed, snrs, levels):
-    symbols, stations = 4000, list("DEFG")[: len(levels)]
+def test_noise_has_the_power_of_its_snr_at_every_station_whatever_the_levels_of_the_others(
+    seed, snrs, levels
+):
+    symbols = 4000
+    stations = list("DEFG")[: len(levels)]
     echo = np.array(levels)[:, None, None] * np.exp(1j * np.arange(symbols))
     rows = [{"subtype": "Crow", "model": 3}]
     found = noisy_signals(echo, rows, stations, snrs, seed)[0]
     for level, snr_db in enumerate(snrs):
         for place, amplitude in enumerate(levels):
             power = np.mean(np.abs(found[level, place] - echo[place, 0]) ** 2)
-            # The mean of 4000 exponential powers errs by 1.6 %; complex64 rounds 1e-14 of the signal's power.
+            # The mean of 4000 exponential powers errs by 1.6 %; complex64 rounds 1e-14 of the
+            # signal's power.
             assert power == pytest.approx(amplitude**2 * 10 ** (-snr_db / 10), rel=0.12)
-    # A station's noise is its own: with the others left out, or in another order, it is the same to the bit.
+    # A station's noise is its own: with the others left out, or in another order, it is the same to
+    # the bit.
     alone = noisy_signals(echo[:1], rows, stations[:1], snrs, seed)[0]
     assert (alone[:, 0] == found[:, 0]).all()
     turned = noisy_signals(echo[::-1], rows, stations[::-1], snrs[::-1], seed)[0]
@@ -57,7 +65,8 @@ def test_noise_has_the_power_of_its_snr_at_every_station_whatever_the_levels_of_
 def test_a_later_start_moves_every_spectrum_and_changes_no_value(seed, delay):
     signal = complex_noise(seed, 400)
     for image in (vrp, trp, lambda cut: vt(cut, CARRIER, INTERVAL)):
-        whole, late = image(signal), image(signal[delay:])
+        whole = image(signal)
+        late = image(signal[delay:])
         expected = whole[:, delay : delay + late.shape[1]]
         np.testing.assert_allclose(late, expected, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
 
@@ -77,10 +86,13 @@ def test_a_factor_scales_magnitudes_by_its_size_and_velocities_by_its_square(see
 @FEW
 @given(seed=SEEDS, image=st.sampled_from([vrp, trp]))
 def test_time_reversed_shows_windows_backwards_with_frequencies_of_the_other_sign(seed, image):
-    """|FFT(x reversed)|(f) = |FFT(x)|(-f); row n/2 is frequency zero and row 0 is its own mirror image."""
+    """|FFT(x reversed)|(f) = |FFT(x)|(-f); row n/2 is frequency zero and row 0 is its own mirror
+    image.
+    """
     signal = complex_noise(seed, 333)
     # There is one window fewer than fit, so that of the last symbols is added by a symbol more.
-    forward, back = image(np.append(signal, 0)), image(np.append(signal[::-1], 0))
+    forward = image(np.append(signal, 0))
+    back = image(np.append(signal[::-1], 0))
     mirrored = np.roll(forward[::-1], 1, axis=0)[:, ::-1]
     np.testing.assert_allclose(back, mirrored, rtol=1e-8, atol=1e-10 * forward.max())
     # Conjugation mirrors frequencies and leaves time.
@@ -90,15 +102,27 @@ def test_time_reversed_shows_windows_backwards_with_frequencies_of_the_other_sig
 
 @FEW
 @given(
-    seed=st.integers(0, 10**9), models=st.integers(1, 200), more=st.integers(1, 100),
-    shares=st.tuples(st.integers(1, 9), st.integers(0, 4), st.integers(0, 4)), by=st.sampled_from(["motion", "sample"]),
-)  # fmt: skip
-def test_models_that_are_added_move_no_fold_and_full_blocks_have_their_shares(seed, models, more, shares, by):
-    split, snrs = {"by": by, **dict(zip(FOLDS, shares, strict=True))}, (3.0, 8.0)
-    before = {(model, snr): fold(split, seed, "Crow", model, snr) for model in range(models) for snr in snrs}
+    seed=st.integers(0, 10**9),
+    models=st.integers(1, 200),
+    more=st.integers(1, 100),
+    shares=st.tuples(st.integers(1, 9), st.integers(0, 4), st.integers(0, 4)),
+    by=st.sampled_from(["motion", "sample"]),
+)
+def test_models_that_are_added_move_no_fold_and_full_blocks_have_their_shares(
+    seed, models, more, shares, by
+):
+    split = {"by": by, **dict(zip(FOLDS, shares, strict=True))}
+    snrs = (3.0, 8.0)
+    before = {
+        (model, snr): fold(split, seed, "Crow", model, snr)
+        for model in range(models)
+        for snr in snrs
+    }
     # Asked again from the last model to the first, among models and another subtype that are new.
     after = {
-        (model, snr): (fold(split, seed, "Owl", model, snr), fold(split, seed, "Crow", model, snr))[1]
+        (model, snr): (fold(split, seed, "Owl", model, snr), fold(split, seed, "Crow", model, snr))[
+            1
+        ]
         for model in reversed(range(models + more))
         for snr in reversed(snrs)
     }
@@ -116,8 +140,16 @@ def test_tables_do_not_depend_on_the_order_of_predictions_or_of_runs(seed):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         cases = [("A:VT", 0), ("A:VT", 1), ("ABC:VRP+TRP+VT", 0)]
-        paths = [run_files(folder, "seen", scheme, 0.8, seed, models=20)[0] for scheme, seed in cases]
-        tables.write([Evaluated(path) for path in paths], ["A:VT", "ABC:VRP+TRP+VT"], {}, folder / "before", 1)
+        paths = [
+            run_files(folder, "seen", scheme, 0.8, seed, models=20)[0] for scheme, seed in cases
+        ]
+        tables.write(
+            [Evaluated(path) for path in paths],
+            ["A:VT", "ABC:VRP+TRP+VT"],
+            {},
+            folder / "before",
+            1,
+        )
         for path in paths:
             head, *lines = path.read_text().splitlines()
             path.write_text("\n".join([head, *rng.permutation(lines)]) + "\n")
@@ -126,7 +158,9 @@ def test_tables_do_not_depend_on_the_order_of_predictions_or_of_runs(seed):
         written = sorted(path.name for path in (folder / "before").iterdir())
         assert "accuracy.csv" in written and len(written) > 6
         for table in written:
-            assert (folder / "after" / table).read_bytes() == (folder / "before" / table).read_bytes(), table
+            assert (folder / "after" / table).read_bytes() == (
+                folder / "before" / table
+            ).read_bytes(), table
 
 
 @settings(max_examples=6, deadline=None)
@@ -137,7 +171,9 @@ def test_an_interval_is_as_wide_as_scipy_s_bootstrap_of_motion_models(seed, mode
     values = np.repeat(rng.random(models), snrs) > rng.random(models * snrs)
     ours = bootstrap(motion, values.astype(float), np.random.default_rng(seed))
     _, _, (shares,) = model_shares(motion, [values])
-    theirs = stats.bootstrap((shares,), np.mean, n_resamples=4000, method="percentile", rng=seed).confidence_interval
+    theirs = stats.bootstrap(
+        (shares,), np.mean, n_resamples=4000, method="percentile", rng=seed
+    ).confidence_interval
     assert ours.value == pytest.approx(shares.mean())
     # Ends of 4000 draws err by a few percent of the width.
     width = theirs.high - theirs.low
@@ -145,7 +181,11 @@ def test_an_interval_is_as_wide_as_scipy_s_bootstrap_of_motion_models(seed, mode
 
 
 @settings(max_examples=5, deadline=None)
-@given(seed=st.integers(0, 1000), order=st.permutations(range(3)), fusion=st.sampled_from(["attention", "mean"]))
+@given(
+    seed=st.integers(0, 1000),
+    order=st.permutations(range(3)),
+    fusion=st.sampled_from(["attention", "mean"]),
+)
 def test_the_network_answers_the_same_for_stations_in_another_order(seed, order, fusion):
     torch = pytest.importorskip("torch")
     from test_recognition import images, small_recogniser
@@ -157,7 +197,9 @@ def test_the_network_answers_the_same_for_stations_in_another_order(seed, order,
         torch.testing.assert_close(model(turned), model(index), atol=2e-5, rtol=1e-4)
         # Spectra are no such set: their embedding tells one from the other.
         swapped = index.unflatten(1, (3, 2)).flip(2).flatten(1, 2)
-        assert fusion == "mean" or not torch.allclose(model(swapped), model(index), atol=2e-5, rtol=1e-4)
+        assert fusion == "mean" or not torch.allclose(
+            model(swapped), model(index), atol=2e-5, rtol=1e-4
+        )
 
 
 _MODELS: dict = {}

@@ -1,4 +1,6 @@
-"""Notebooks of the tutorials: every block of a page is a cell, links lead to files, and the cells run in a kernel."""
+"""Notebooks of the tutorials: every block of a page is a cell, links lead to files, and the cells
+run in a kernel.
+"""
 
 import importlib
 import re
@@ -26,7 +28,16 @@ def book(made, page):
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
     """A folder with links to the contents of a checkout and to the environment of this Python."""
-    for name in ("Snakefile", "config", "design", "envs", "examples", "profiles", "src", "workflow"):
+    for name in (
+        "Snakefile",
+        "config",
+        "design",
+        "envs",
+        "examples",
+        "profiles",
+        "src",
+        "workflow",
+    ):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / ".venv").symlink_to(sys.prefix)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
@@ -40,7 +51,9 @@ def run(notebook, folder):
     client = pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     (folder / "notebooks").mkdir()
-    client.NotebookClient(notebook, timeout=240, resources={"metadata": {"path": str(folder / "notebooks")}}).execute()
+    client.NotebookClient(
+        notebook, timeout=240, resources={"metadata": {"path": str(folder / "notebooks")}}
+    ).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     return "".join(output.get("text", "") for output in outputs)
 
@@ -50,12 +63,23 @@ def test_a_notebook_holds_every_block_and_all_text_of_its_page(made, page):
     text = (FOLDER / f"{page}.md").read_text()
     found = book(made, page)
     made.nbformat.validate(found)
-    blocks = [(kind, title, code) for kind, title, code in FENCE.findall(text) if title or kind in ("python", "sh")]
+    blocks = [
+        (kind, title, code)
+        for kind, title, code in FENCE.findall(text)
+        if title or kind in ("python", "sh")
+    ]
     cells = [cell.source for cell in found.cells if cell.cell_type == "code"]
     wanted = [code.rstrip() for _, title, code in blocks if title != "entry"]
-    assert cells[0] == made.START and [re.sub(r"^%%.*\n", "", source) for source in cells[1:]] == wanted
+    assert (
+        cells[0] == made.START
+        and [re.sub(r"^%%.*\n", "", source) for source in cells[1:]] == wanted
+    )
     # Every sentence between blocks stands in a cell of text.
-    prose = re.sub(r"\]\([^)]*\)|\s", "", "".join(one.source for one in found.cells if one.cell_type == "markdown"))
+    prose = re.sub(
+        r"\]\([^)]*\)|\s",
+        "",
+        "".join(one.source for one in found.cells if one.cell_type == "markdown"),
+    )
     parts = [re.sub(r"\]\([^)]*\)|\s", "", part) for part in FENCE.sub("```", text).split("```")]
     assert len(parts) > 1 and all(part in prose for part in parts)
     assert found == book(made, page)
@@ -63,7 +87,9 @@ def test_a_notebook_holds_every_block_and_all_text_of_its_page(made, page):
 
 @pytest.mark.parametrize("page", PAGES)
 def test_links_of_a_notebook_lead_to_files_of_the_repository(made, page):
-    prose = "\n".join(cell.source for cell in book(made, page).cells if cell.cell_type == "markdown")
+    prose = "\n".join(
+        cell.source for cell in book(made, page).cells if cell.cell_type == "markdown"
+    )
     links = re.findall(r"\]\(([^)#\s:]+)", re.sub(r"```.*?```", "", prose, flags=re.DOTALL))
     assert not [link for link in links if not (ROOT / "notebooks" / link).resolve().exists()]
 
@@ -71,9 +97,7 @@ def test_links_of_a_notebook_lead_to_files_of_the_repository(made, page):
 def test_cells_run_in_order_in_the_checkout_and_a_failing_line_is_not_passed_over(made, checkout):
     """`test_tutorials` runs the blocks of all pages in the quick suite."""
     errors = pytest.importorskip("nbclient").exceptions
-    text = (
-        "```python\nprint(open('Snakefile').read(8), end='')\n```\n```sh\nfalse\ntrue\n```\n```python\nprint(1)\n```\n"
-    )
+    text = "```python\nprint(open('Snakefile').read(8), end='')\n```\n```sh\nfalse\ntrue\n```\n```python\nprint(1)\n```\n"
     short = made.notebook(text)
     with pytest.raises(errors.CellExecutionError):
         run(short, checkout)

@@ -29,19 +29,33 @@ def spinning(kind: str, category: str, radius_m: float, blades: int, **record) -
     """A strong body point and `blades` points on a circle about z (a rotor) or about -x (a wheel)."""
     axis = np.array([0.0, 0.0, 1.0]) if kind == "rotor" else np.array([-1.0, 0.0, 0.0])
     angle = 2 * math.pi * np.arange(blades) / blades
-    ring = {"rotor": [np.cos(angle), np.sin(angle), 0 * angle], "wheel": [0 * angle, np.cos(angle), np.sin(angle)]}[
-        kind
-    ]
+    ring = {
+        "rotor": [np.cos(angle), np.sin(angle), 0 * angle],
+        "wheel": [0 * angle, np.cos(angle), np.sin(angle)],
+    }[kind]
     return Cloud(
         points=np.vstack([np.zeros(3), radius_m * np.stack(ring, axis=1)]),
-        part=np.array([0] + [1] * blades), kinds=("body", kind), names=("body", kind), parents=np.array([-1, -1]),
-        hinges=np.array([NOTHING, np.zeros(3)]), axes=np.array([NOTHING, axis]),
-        normals=np.full((blades + 1, 3), np.nan), rcs_m2=np.ones(blades + 1),
-        record={"subtype": "test", "category": category, "source": "test", "checksum": "", **record},
-    )  # fmt: skip
+        part=np.array([0] + [1] * blades),
+        kinds=("body", kind),
+        names=("body", kind),
+        parents=np.array([-1, -1]),
+        hinges=np.array([NOTHING, np.zeros(3)]),
+        axes=np.array([NOTHING, axis]),
+        normals=np.full((blades + 1, 3), np.nan),
+        rcs_m2=np.ones(blades + 1),
+        record={
+            "subtype": "test",
+            "category": category,
+            "source": "test",
+            "checksum": "",
+            **record,
+        },
+    )
 
 
-def signal(cloud: Cloud, network: Network = NETWORK, station: str = "A", **values: float) -> np.ndarray:
+def signal(
+    cloud: Cloud, network: Network = NETWORK, station: str = "A", **values: float
+) -> np.ndarray:
     """The clean signal of a cloud; motion values not given are zero, phases too."""
     row = {"subtype": "test", "model": 0, **dict.fromkeys(NUMBERS, 0.0), "playback": 1.0, **values}
     motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
@@ -63,26 +77,45 @@ def fold(frequency_hz: float, rate_hz: float = 400.0) -> float:
     return (frequency_hz + rate_hz / 2) % rate_hz - rate_hz / 2
 
 
-@pytest.mark.parametrize(("rate_hz", "seen_hz"), [(40, 80), (60, 120), (160, -80), (256, 112), (660, 120)])
+@pytest.mark.parametrize(
+    ("rate_hz", "seen_hz"), [(40, 80), (60, 120), (160, -80), (256, 112), (660, 120)]
+)
 def test_a_two_blade_rotor_shows_twice_its_rate_folded(rate_hz, seen_hz):
     assert fold(2 * rate_hz) == seen_hz
-    # 4 mm keeps the modulation index under one, so the first pair of lines is the strongest after the body's.
-    found = signal(spinning("rotor", "UAV", 0.004, 2), x_m=200.0, y_m=120.0, z_m=60.0, rate_hz=float(rate_hz))
+    # 4 mm keeps the modulation index under one, so the first pair of lines is the strongest after
+    # the body's.
+    found = signal(
+        spinning("rotor", "UAV", 0.004, 2), x_m=200.0, y_m=120.0, z_m=60.0, rate_hz=float(rate_hz)
+    )
     spectrum = vrp(found[None])[0].mean(axis=1)
     axis = (np.arange(256) - 128) * 400 / 256
     lines = axis[np.argsort(np.where(np.abs(axis) < 5, 0, spectrum))[-2:]]
-    np.testing.assert_allclose(sorted(lines), sorted([seen_hz, -seen_hz]), atol=400 / 256 / 2 + 1e-9)
+    np.testing.assert_allclose(
+        sorted(lines), sorted([seen_hz, -seen_hz]), atol=400 / 256 / 2 + 1e-9
+    )
 
 
 def test_a_wing_beat_is_the_period_of_the_spectrum():
     flap = {"mean_deg": 15, "amplitude_deg": 40, "fold_amplitude_deg": 30, "fold_lag_deg": 90}
     wing = np.linspace(0.05, 0.4, 8)[:, None] * [1.0, 0, 0]
     cloud = Cloud(
-        points=np.vstack([np.zeros(3), wing]), part=np.array([0] + [1] * 8), kinds=("body", "wing"),
-        names=("body", "wing"), parents=np.array([-1, -1]), hinges=np.array([NOTHING, np.zeros(3)]),
-        axes=np.array([NOTHING, [0, -1.0, 0]]), normals=np.full((9, 3), np.nan), rcs_m2=np.ones(9),
-        record={"subtype": "test", "category": "Bird", "source": "test", "checksum": "", "flap": flap},
-    )  # fmt: skip
+        points=np.vstack([np.zeros(3), wing]),
+        part=np.array([0] + [1] * 8),
+        kinds=("body", "wing"),
+        names=("body", "wing"),
+        parents=np.array([-1, -1]),
+        hinges=np.array([NOTHING, np.zeros(3)]),
+        axes=np.array([NOTHING, [0, -1.0, 0]]),
+        normals=np.full((9, 3), np.nan),
+        rcs_m2=np.ones(9),
+        record={
+            "subtype": "test",
+            "category": "Bird",
+            "source": "test",
+            "checksum": "",
+            "flap": flap,
+        },
+    )
     beat_hz = 5.0
     found = trp(signal(cloud, x_m=150.0, y_m=90.0, z_m=40.0, rate_hz=beat_hz)[None])[0]
     columns = found - found.mean(axis=1, keepdims=True)
@@ -97,12 +130,15 @@ def test_a_wing_beat_is_the_period_of_the_spectrum():
 
 
 def test_a_wheel_turns_at_the_rate_its_diameter_sets():
-    speed, diameter = 5.0, 0.5588
+    speed = 5.0
+    diameter = 0.5588
     rate_hz = speed / (math.pi * diameter)
     # One subcarrier has one range cell: no cell crossing disturbs the phase over ten seconds.
     network = replace(NETWORK, subcarriers=1, symbols=4000, transmit=(1, 1), receive=(1, 1))
     motion = {"x_m": 250.0, "y_m": 100.0, "z_m": 0.3, "vy_mps": speed, "rate_hz": rate_hz}
-    found = signal(spinning("wheel", "Vehicle", 0.004, 1, wheel_diameter_m=diameter), network, **motion)
+    found = signal(
+        spinning("wheel", "Vehicle", 0.004, 1, wheel_diameter_m=diameter), network, **motion
+    )
     path = np.array([250.0, 100.0, 0.3]) + network.times_s[:, None] * [0, speed, 0]
     range_m = np.linalg.norm(path - network.station("A").position_m, axis=1)
     still = found * np.exp(4j * np.pi * network.carrier_hz * range_m / SPEED_OF_LIGHT)
@@ -133,19 +169,32 @@ def doppler_hz(cloud: Cloud, row: dict, point: int, symbols: int) -> float:
     front = np.array([-math.sin(row["yaw_rad"]), math.cos(row["yaw_rad"]), 0.0])
     place = np.array([row["x_m"], row["y_m"], row["z_m"]]) + 300.0 * front
     station = replace(NETWORK.station("A"), position_m=tuple(place))
-    network = replace(NETWORK, subcarriers=1, symbols=symbols, symbol_interval_s=1e-4, transmit=(1, 1), receive=(1, 1))
+    network = replace(
+        NETWORK,
+        subcarriers=1,
+        symbols=symbols,
+        symbol_interval_s=1e-4,
+        transmit=(1, 1),
+        receive=(1, 1),
+    )
     motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
     own = (np.arange(len(cloud.points)) == point).astype(float)
-    found = echo_signal(replace(network, stations=(station,)), station, motion, own, place - 300.0 * front).signal
+    found = echo_signal(
+        replace(network, stations=(station,)), station, motion, own, place - 300.0 * front
+    ).signal
     return float(np.angle(found[1:] * found[:-1].conj()).mean() / (2 * math.pi * 1e-4))
 
 
 @pytest.mark.parametrize("name", ["Audi A6L 2019", "Walking Pedestrian 1"])
-def test_a_ground_target_that_faces_the_station_approaches_and_the_top_of_its_wheels_is_faster(name):
+def test_a_ground_target_that_faces_the_station_approaches_and_the_top_of_its_wheels_is_faster(
+    name,
+):
     cloud = make(RECORDS[name], None, 1)
     corners = region_polygon(np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0]]), None)
     settings = load_yaml("config/default.yaml")["motion"]
-    row = draw(stream(1, name), cloud, RECORDS[name]["published"], np.full((1, 2), -1e4), corners, settings)
+    row = draw(
+        stream(1, name), cloud, RECORDS[name]["published"], np.full((1, 2), -1e4), corners, settings
+    )
     row["model"] = 0
     speed = math.hypot(row["vx_mps"], row["vy_mps"])
     one_mps = 2 * NETWORK.station("A").frequency_hz / SPEED_OF_LIGHT
@@ -154,7 +203,9 @@ def test_a_ground_target_that_faces_the_station_approaches_and_the_top_of_its_wh
     for wheel in cloud.parts_of("wheel"):
         mine = np.flatnonzero(cloud.part == wheel)
         height = positions(cloud, row, np.zeros(1))[0, mine, 2] / cloud.record["wheel_diameter_m"]
-        top, bottom = (doppler_hz(cloud, row, mine[at], 3) for at in (height.argmax(), height.argmin()))
+        top, bottom = (
+            doppler_hz(cloud, row, mine[at], 3) for at in (height.argmax(), height.argmin())
+        )
         assert top == pytest.approx(2 * speed * one_mps * height.max(), rel=0.05)
         assert bottom < 0.5 * speed * one_mps < speed * one_mps < top
 
@@ -163,15 +214,24 @@ def test_a_walkers_foot_on_the_ground_stays_there():
     cloud = make(RECORDS["Walking Pedestrian 1"], None, 1)
     speed = cloud.record["track_speed_mps"]
     times = np.arange(400) * 2.5e-3
-    row = {"subtype": "test", "model": 0, **dict.fromkeys(NUMBERS, 0.0), "playback": 1.0, "vy_mps": speed}
+    row = {
+        "subtype": "test",
+        "model": 0,
+        **dict.fromkeys(NUMBERS, 0.0),
+        "playback": 1.0,
+        "vy_mps": speed,
+    }
     feet = positions(cloud, row, times)[:, FEET]
     lowest = feet[:-1, :, 2].argmin(axis=1)
-    along = np.take_along_axis(np.diff(feet[..., 1], axis=0), lowest[:, None], axis=1)[:, 0] / 2.5e-3
+    along = (
+        np.take_along_axis(np.diff(feet[..., 1], axis=0), lowest[:, None], axis=1)[:, 0] / 2.5e-3
+    )
     assert abs(np.median(along)) < 0.3 * speed
 
 
 def test_doppler_of_200_hz_sits_on_the_fold():
-    # One subcarrier: at 6 m/s a range cell is crossed within the window, which would split the line.
+    # One subcarrier: at 6 m/s a range cell is crossed within the window, which would split the
+    # line.
     network = replace(NETWORK, subcarriers=1)
     station = network.station("A")
     speed = 200.0 * SPEED_OF_LIGHT / (2 * station.frequency_hz)

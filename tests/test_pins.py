@@ -1,5 +1,6 @@
-"""The pins: whatever the package names has one, the environment for conda has what jobs need at these versions, and
-continuous integration runs the oldest and the newest versions that the package promises."""
+"""The pins: whatever the package names has one, the environment for conda has what jobs need at
+these versions, and continuous integration runs the oldest and the newest versions that the package
+promises."""
 
 import re
 import tomllib
@@ -16,12 +17,16 @@ OF_JOBS = ("workflow", "recognition", "methods", "cost", "tensorboard", "town")
 
 
 def plain(requirement: str) -> str:
-    """The name of a requirement as an index writes it: small letters, hyphens, no extras and no version."""
+    """The name of a requirement as an index writes it: small letters, hyphens, no extras and no
+    version.
+    """
     return re.sub(r"[-_.]+", "-", re.match(r"[\w.-]+", requirement)[0]).lower()
 
 
 def pins(lines: list[str]) -> dict[str, str]:
-    """Version by name of lines NAME==VERSION; a name that stands twice, or a line of another form, is an error."""
+    """Version by name of lines NAME==VERSION; a name that stands twice, or a line of another form,
+    is an error.
+    """
     found: dict[str, str] = {}
     for line in lines:
         name, version = re.fullmatch(r"([\w.-]+)==([\w.+!]+)", line).groups()
@@ -45,7 +50,11 @@ def test_every_package_that_pyproject_names_has_a_pin(constraints):
 def test_the_environment_for_conda_holds_what_jobs_need_at_the_pinned_versions(constraints):
     listed = yaml.safe_load((ROOT / "envs/environment.yaml").read_text())["dependencies"]
     packages = pins(listed[-1]["pip"])
-    needed = {plain(item) for items in (PROJECT["dependencies"], *(EXTRAS[name] for name in OF_JOBS)) for item in items}
+    needed = {
+        plain(item)
+        for items in (PROJECT["dependencies"], *(EXTRAS[name] for name in OF_JOBS))
+        for item in items
+    }
     assert packages == {name: constraints[name] for name in needed}
     oldest = PROJECT["requires-python"].removeprefix(">=")
     assert f"python={oldest}" in listed
@@ -53,17 +62,30 @@ def test_the_environment_for_conda_holds_what_jobs_need_at_the_pinned_versions(c
 
 def test_continuous_integration_runs_the_oldest_and_the_newest_that_is_promised(constraints):
     jobs = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())["jobs"]
-    runs = {name: [step["run"] for step in job["steps"] if "run" in step] for name, job in jobs.items()}
-    assert runs == {"tests": [".ci/run"], "numpy": [".ci/numpy.sh"], "snakemake": [".ci/snakemake.sh"]}
+    runs = {
+        name: [step["run"] for step in job["steps"] if "run" in step] for name, job in jobs.items()
+    }
+    assert runs == {
+        "tests": [".ci/run"],
+        "numpy": [".ci/numpy.sh"],
+        "snakemake": [".ci/snakemake.sh"],
+    }
     pythons = jobs["tests"]["strategy"]["matrix"]["python"]
     assert pythons[0] == PROJECT["requires-python"].removeprefix(">=")
     (asked,) = [item for item in PROJECT["dependencies"] if plain(item) == "numpy"]
     oldest, below = re.fullmatch(r"numpy>=([\d.]+),<([\d.]+)", asked).groups()
-    first, last = re.search(r'^NUMPYS="(\S+) (\S+)"$', (ROOT / ".ci/numpy.sh").read_text(), re.MULTILINE).groups()
+    first, last = re.search(
+        r'^NUMPYS="(\S+) (\S+)"$', (ROOT / ".ci/numpy.sh").read_text(), re.MULTILINE
+    ).groups()
     assert first == f"{oldest}.0" and last == constraints["numpy"]
     # The newest lies in the last minor version below the bound.
     assert int(last.split(".")[1]) + 1 == int(below.split(".")[1])
     (snakemake,) = [item for item in EXTRAS["workflow"] if plain(item) == "snakemake"]
-    (oldest,) = re.findall(r"^OLDEST_SNAKEMAKE=(\S+)$", (ROOT / ".ci/snakemake.sh").read_text(), re.MULTILINE)
+    (oldest,) = re.findall(
+        r"^OLDEST_SNAKEMAKE=(\S+)$", (ROOT / ".ci/snakemake.sh").read_text(), re.MULTILINE
+    )
     assert snakemake.removeprefix("snakemake>=") + ".0" == oldest
-    assert f'min_version("{snakemake.removeprefix("snakemake>=")}")' in (ROOT / "Snakefile").read_text()
+    assert (
+        f'min_version("{snakemake.removeprefix("snakemake>=")}")'
+        in (ROOT / "Snakefile").read_text()
+    )

@@ -1,4 +1,6 @@
-"""Rooms whose bytes are promised use no function whose last bit depends on the processor or on a library."""
+"""Rooms whose bytes are promised use no function whose last bit depends on the processor or on a
+library.
+"""
 
 import ast
 from pathlib import Path
@@ -6,24 +8,82 @@ from pathlib import Path
 import pytest
 
 TARGETS = (
-    "aircraft", "assemble", "bird", "builtin", "cyclist", "gait", "gait_run", "gait_walk", "quadruped",
-    "skeleton", "surfaces", "uav", "uav_pieces", "vehicle",
-)  # fmt: skip
+    "aircraft",
+    "assemble",
+    "bird",
+    "builtin",
+    "cyclist",
+    "gait",
+    "gait_run",
+    "gait_walk",
+    "quadruped",
+    "skeleton",
+    "surfaces",
+    "uav",
+    "uav_pieces",
+    "vehicle",
+)
 ROOT = Path(__file__).parent.parent / "src/lowalt"
 FILES = sorted(
-    [*(ROOT / f"targets/{name}.py" for name in TARGETS), *ROOT.glob("motion/*.py"), *ROOT.glob("noise/*.py")]
+    [
+        *(ROOT / f"targets/{name}.py" for name in TARGETS),
+        *ROOT.glob("motion/*.py"),
+        *ROOT.glob("noise/*.py"),
+    ]
 )
-FIXED = {"sqrt", "floor", "ceil", "isqrt", "fabs", "isfinite", "isinf", "isnan", "copysign", "radians", "degrees"}
+FIXED = {
+    "sqrt",
+    "floor",
+    "ceil",
+    "isqrt",
+    "fabs",
+    "isfinite",
+    "isinf",
+    "isnan",
+    "copysign",
+    "radians",
+    "degrees",
+}
 """Functions of `math` that IEEE 754 or whole numbers fix."""
 DEPENDS = {
-    "sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh", "exp", "exp2", "expm1", "log",
-    "log2", "log10", "log1p", "power", "float_power", "cbrt", "hypot", "dot", "matmul", "einsum", "inner", "interp",
-    "norm", "inv", "solve", "svd", "eigh", "lstsq",
-}  # fmt: skip
-"""Functions of NumPy that are other code on other processors, or that sum in an order of their own."""
+    "sin",
+    "cos",
+    "tan",
+    "arcsin",
+    "arccos",
+    "arctan",
+    "arctan2",
+    "sinh",
+    "cosh",
+    "tanh",
+    "exp",
+    "exp2",
+    "expm1",
+    "log",
+    "log2",
+    "log10",
+    "log1p",
+    "power",
+    "float_power",
+    "cbrt",
+    "hypot",
+    "dot",
+    "matmul",
+    "einsum",
+    "inner",
+    "interp",
+    "norm",
+    "inv",
+    "solve",
+    "svd",
+    "eigh",
+    "lstsq",
+}
+"""Functions of NumPy that are other code on other processors, or that sum in an order of their own.
+"""
 ALLOWED = {("surfaces.py", "arctan2"), ("drawing.py", "hypot"), ("poses.py", "@")}
-"""Turns around a point and a mast's clearance are only held against a limit; places of all points are for scenes with
-effects, whose bytes are not promised."""
+"""Turns around a point and a mast's clearance are only held against a limit; places of all points
+are for scenes with effects, whose bytes are not promised."""
 
 
 def loose(text: str) -> list[str]:
@@ -39,7 +99,11 @@ def loose(text: str) -> list[str]:
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name | ast.Attribute):
             library = ast.unparse(node.value)
             of_numpy = library in ("np", "numpy", "np.linalg") and node.attr in DEPENDS
-            of_math = library == "math" and node.attr not in FIXED and node.attr not in ("pi", "inf", "nan", "tau")
+            of_math = (
+                library == "math"
+                and node.attr not in FIXED
+                and node.attr not in ("pi", "inf", "nan", "tau")
+            )
             found += [node.attr] if of_numpy or of_math else []
     return found
 

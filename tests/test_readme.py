@@ -12,8 +12,11 @@ README = (ROOT / "README.md").read_text()
 def test_the_library_example_runs_as_printed(monkeypatch):
     monkeypatch.chdir(ROOT)
     names: dict = {}
-    exec(compile(re.search(r"```python\n(.*?)```", README, re.DOTALL)[1], "README.md", "exec"), names)
-    image, signal = names["image"], names["signal"]
+    exec(
+        compile(re.search(r"```python\n(.*?)```", README, re.DOTALL)[1], "README.md", "exec"), names
+    )
+    image = names["image"]
+    signal = names["signal"]
     assert (image.shape, image.dtype) == ((768, 768), np.uint8)
     assert (signal.shape, signal.dtype) == ((3, 400), np.complex64)
     assert names["record"]["category"] == names["samples"].classes[names["label"]]

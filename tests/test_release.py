@@ -1,4 +1,6 @@
-"""A release: one version everywhere; citation, recipe for conda and entry of the catalogue name what is there."""
+"""A release: one version everywhere; citation, recipe for conda and entry of the catalogue name
+what is there.
+"""
 
 import os
 import re
@@ -24,7 +26,9 @@ CONDA_NAMES = {"matplotlib": "matplotlib-base", "snakemake": "snakemake-minimal"
 
 
 def test_every_place_states_the_version_of_the_package():
-    released = re.findall(r"^## (\d\S*?)(?:, (\S+))?$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    released = re.findall(
+        r"^## (\d\S*?)(?:, (\S+))?$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE
+    )
     stated = {PROJECT["version"], CITATION["version"], RECIPE["context"]["version"], released[0][0]}
     assert stated == {lowalt.__version__}
     assert released[0][1] == str(CITATION["date-released"])
@@ -37,7 +41,11 @@ def test_the_citation_names_the_benchmark_by_the_configuration_that_makes_it():
     assert config["run"] == name
     assert data["license"] == CITATION["license"] == PROJECT["license"]
     for entry in (CITATION, *CITATION["references"]):
-        assert entry["authors"] and entry["title"] and {"name", "family-names"} & set(entry["authors"][0])
+        assert (
+            entry["authors"]
+            and entry["title"]
+            and {"name", "family-names"} & set(entry["authors"][0])
+        )
 
 
 def on_conda(requirements: list[str]) -> list[str]:
@@ -52,13 +60,21 @@ def test_the_recipe_for_conda_asks_for_what_the_package_does():
     asked = RECIPE["requirements"]
     assert asked["run"][0] == "python >=${{ python_min }}"
     assert sorted(asked["run"][1:]) == on_conda(PROJECT["dependencies"])
-    assert sorted(asked["run_constraints"]) == on_conda(PROJECT["optional-dependencies"]["workflow"])
+    assert sorted(asked["run_constraints"]) == on_conda(
+        PROJECT["optional-dependencies"]["workflow"]
+    )
     build = tomllib.loads((ROOT / "pyproject.toml").read_text())["build-system"]["requires"]
-    assert asked["host"] == ["python ${{ python_min }}.*", "pip", *(item.replace(">", " >") for item in build)]
+    assert asked["host"] == [
+        "python ${{ python_min }}.*",
+        "pip",
+        *(item.replace(">", " >") for item in build),
+    ]
     commands = [f"{name} = {place}" for name, place in PROJECT["scripts"].items()]
     assert RECIPE["build"]["python"]["entry_points"] == commands
     assert (ROOT / "envs/conda-forge" / RECIPE["source"]["path"]).resolve() == ROOT.resolve()
-    assert (ROOT / RECIPE["about"]["license_file"]).is_file() and RECIPE["about"]["license"] == PROJECT["license"]
+    assert (ROOT / RECIPE["about"]["license_file"]).is_file() and RECIPE["about"][
+        "license"
+    ] == PROJECT["license"]
     assert RECIPE["about"]["summary"] == PROJECT["description"]
 
 
@@ -76,7 +92,9 @@ def test_what_the_recipe_tries_runs(tmp_path):
 
 
 def test_the_catalogue_of_workflows_finds_what_it_lists():
-    """Its conditions for standardised usage. Source: README of snakemake/snakemake-workflow-catalog."""
+    """Its conditions for standardised usage. Source: README of
+    snakemake/snakemake-workflow-catalog.
+    """
     text = (ROOT / "README.md").read_text().lower()
     assert "snakemake" in text and "workflow" in text
     assert (ROOT / "workflow/Snakefile").is_file() and (ROOT / "config/README.md").is_file()
@@ -95,7 +113,9 @@ def test_the_catalogue_of_workflows_finds_what_it_lists():
 @pytest.mark.slow
 @pytest.mark.workflow
 def test_a_workflow_deployed_from_the_catalogue_can_be_planned(tmp_path):
-    """The folder that snakedeploy makes: configuration and profiles of the checkout, and its workflow as a module."""
+    """The folder that snakedeploy makes: configuration and profiles of the checkout, and its
+    workflow as a module.
+    """
     for name in ("config", "profiles"):
         shutil.copytree(ROOT / name, tmp_path / name)
     (tmp_path / "workflow").mkdir()

@@ -1,4 +1,6 @@
-"""Side channels of a data set: those said to be closed give chance, those that are forbidden give the class."""
+"""Side channels of a data set: those said to be closed give chance, those that are forbidden give
+the class.
+"""
 
 import csv
 import re
@@ -33,7 +35,9 @@ def found(tmp_path_factory):
 
 @pytest.mark.slow
 def test_every_channel_gives_what_its_verdict_says(found):
-    rows = [dict(zip(side_channels.COLUMNS, row, strict=True)) for row in side_channels.measured(found)]
+    rows = [
+        dict(zip(side_channels.COLUMNS, row, strict=True)) for row in side_channels.measured(found)
+    ]
     assert len(rows) == len(KEPT) - 1
     for row in rows:
         assert (float(row["p_value"]) <= SURE) == (row["verdict"] != "chance"), row
@@ -41,7 +45,8 @@ def test_every_channel_gives_what_its_verdict_says(found):
 
 @pytest.mark.slow
 def test_no_sample_stands_in_two_folds_and_all_of_a_motion_model_are_in_one(found):
-    signals, folds = {}, {}
+    signals = {}
+    folds = {}
     for number, record in enumerate(found.records):
         signal = found.shards.signal(number)
         assert signals.setdefault(signal.tobytes(), record["key"]) == record["key"]
@@ -51,9 +56,13 @@ def test_no_sample_stands_in_two_folds_and_all_of_a_motion_model_are_in_one(foun
 
 
 def test_kept_figures_agree_with_their_verdicts_and_with_the_rules():
-    written = re.findall(r"^\| ([^|]+) \| ([\d.]+) \| (no information|no rule needed|forbidden)", RULES, re.MULTILINE)
+    written = re.findall(
+        r"^\| ([^|]+) \| ([\d.]+) \| (no information|no rule needed|forbidden)", RULES, re.MULTILINE
+    )
     words = {"chance": "no information", "in the image": "no rule needed", "forbidden": "forbidden"}
-    assert written == [(row["channel"], row["accuracy_percent"], words[row["verdict"]]) for row in KEPT]
+    assert written == [
+        (row["channel"], row["accuracy_percent"], words[row["verdict"]]) for row in KEPT
+    ]
     assert {row["verdict"] for row in KEPT} == set(words)
     for row in KEPT:
         assert (float(row["p_value"]) <= SURE) == (row["verdict"] != "chance"), row
@@ -71,7 +80,9 @@ def test_the_size_of_an_image_s_file_follows_from_its_pixels(tmp_path):
 
 
 def test_a_channel_that_leaks_is_seen_and_one_that_does_not_is_not():
-    """Forty motion models of each class with two samples each: in the order of the classes, and shuffled."""
+    """Forty motion models of each class with two samples each: in the order of the classes, and
+    shuffled.
+    """
     labels = np.repeat(np.arange(4), 80)
     groups = np.repeat(np.arange(160), 2)
     order = np.arange(320.0).reshape(-1, 1)

@@ -1,4 +1,6 @@
-"""Studies: each says what it is, its commands start, its configurations fit the schema, and nothing imports it."""
+"""Studies: each says what it is, its commands start, its configurations fit the schema, and nothing
+imports it.
+"""
 
 import re
 import shlex
@@ -16,10 +18,15 @@ STUDIES = sorted(path.parent for path in (ROOT / "studies").glob("*/Makefile"))
 
 def commands(study: Path) -> list[list[str]]:
     """The commands that `make` runs in a study's folder."""
-    said = subprocess.run(["make", "-n", "-C", study], capture_output=True, text=True, check=True).stdout.replace(
-        "\\\n", ""
-    )
-    return [shlex.split(part) for line in said.splitlines() for part in re.split("&&|;", line) if "studies/" in part]
+    said = subprocess.run(
+        ["make", "-n", "-C", study], capture_output=True, text=True, check=True
+    ).stdout.replace("\\\n", "")
+    return [
+        shlex.split(part)
+        for line in said.splitlines()
+        for part in re.split("&&|;", line)
+        if "studies/" in part
+    ]
 
 
 @pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
@@ -30,11 +37,20 @@ def test_a_study_says_what_it_is_and_its_configurations_fit_the_schema(study):
     for words in asked:
         if "--configfile" in words:
             rest = words[words.index("--configfile") + 1 :]
-            files = rest[: next((place for place, word in enumerate(rest) if word.startswith("--")), len(rest))]
+            files = rest[
+                : next(
+                    (place for place, word in enumerate(rest) if word.startswith("--")), len(rest)
+                )
+            ]
             files = [name for name in files if "$" not in name]
             load(["config/default.yaml", *files], "workflow/schemas/config.schema.yaml")
-        missing = [word for word in words if word.startswith("studies/") and Path(word).suffix in (".py", ".yaml")
-                   and not (ROOT / word).is_file()]  # fmt: skip
+        missing = [
+            word
+            for word in words
+            if word.startswith("studies/")
+            and Path(word).suffix in (".py", ".yaml")
+            and not (ROOT / word).is_file()
+        ]
         assert not missing
 
 
@@ -43,7 +59,9 @@ def test_the_command_of_each_study_starts():
     # The folders that Python and `studies/study.mk` put first.
     start = "import runpy, sys; sys.path[:0] = {!r}; sys.argv = {!r}; runpy.run_path(sys.argv[0], run_name='__main__')"
     folders = [str(ROOT / "src"), str(ROOT / "studies")]
-    programs = [start.format([str(Path(path).parent), *folders], [path, "--help"]) for path in paths]
+    programs = [
+        start.format([str(Path(path).parent), *folders], [path, "--help"]) for path in paths
+    ]
     for path, (status, _, complaint) in zip(paths, ended(programs, "torch", "timm"), strict=True):
         # A program with several commands names them, with exit status 2.
         assert status in (0, 2) and "Traceback" not in complaint, (path, complaint)
@@ -53,4 +71,6 @@ def test_the_command_of_each_study_starts():
 def test_nothing_imports_a_study():
     names = {path.stem for path in (ROOT / "studies").rglob("*.py")} - {"study"}
     pattern = re.compile(rf"^\s*(?:from|import) (?:studies|{'|'.join(names)})\b", re.MULTILINE)
-    assert not [path.name for path in (ROOT / "src").rglob("*.py") if pattern.search(path.read_text())]
+    assert not [
+        path.name for path in (ROOT / "src").rglob("*.py") if pattern.search(path.read_text())
+    ]

@@ -71,11 +71,13 @@ def in_this_process(line, monkeypatch):
 
 
 def followed(page, folder, monkeypatch, more=None):
-    """Do what a page says: write the files it names, run its commands and its Python; returns (printed, names).
+    """Do what a page says: write the files it names, run its commands and its Python; returns
+    (printed, names).
 
     more: options by the line that gets them besides its own.
     """
-    printed, names = "", {"__name__": page}
+    printed = ""
+    names = {"__name__": page}
     for language, title, block in FENCE.findall((FOLDER / f"{page}.md").read_text()):
         if title:
             (folder / title).write_text(block)
@@ -92,9 +94,17 @@ def followed(page, folder, monkeypatch, more=None):
 def test_every_tutorial_is_followed_here():
     pages = {path.stem for path in FOLDER.glob("*.md")}
     assert pages == {
-        "first_data_set", "trajectory", "target", "effect", "backbone", "pytorch", "hugging_face", "recording",
-        "benchmark", "extension",
-    }  # fmt: skip
+        "first_data_set",
+        "trajectory",
+        "target",
+        "effect",
+        "backbone",
+        "pytorch",
+        "hugging_face",
+        "recording",
+        "benchmark",
+        "extension",
+    }
 
 
 def test_a_first_data_set(checkout, capsys, monkeypatch):
@@ -106,12 +116,20 @@ def test_a_first_data_set(checkout, capsys, monkeypatch):
 
 
 def test_a_submission_to_the_benchmark(checkout, monkeypatch):
-    """On a small copy of the benchmark; its data come from the test, so that no workflow starts and no byte is kept."""
+    """On a small copy of the benchmark; its data come from the test, so that no workflow starts and
+    no byte is kept.
+    """
     small_benchmark.shrink(monkeypatch)
-    monkeypatch.setattr(workflow, "ended", lambda options: {"status": small_benchmark.write(Path("results")) is None})
+    monkeypatch.setattr(
+        workflow,
+        "ended",
+        lambda options: {"status": small_benchmark.write(Path("results")) is None},
+    )
     monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: [])
     printed, _ = followed("benchmark", checkout, monkeypatch)
-    assert "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
+    assert (
+        "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
+    )
     test = lowalt.extensions.benchmark.load("unseen", "test")
     right = read_submission("mine.csv", test.track).argmax(1) == test.labels
     assert f"accuracy {100 * right.mean():.1f} (" in printed
@@ -120,7 +138,12 @@ def test_a_submission_to_the_benchmark(checkout, monkeypatch):
 
 def test_a_trajectory(checkout, monkeypatch):
     _, names = followed("trajectory", checkout, monkeypatch)
-    shapes = {"signals": (3, 400), "velocity": (3, 256, 144), "time": (3, 1024, 392), "transfer": (123, 392)}
+    shapes = {
+        "signals": (3, 400),
+        "velocity": (3, 256, 144),
+        "time": (3, 1024, 392),
+        "transfer": (123, 392),
+    }
     assert {name: names[name].shape for name in shapes} == shapes
     assert names["tile"].shape == (768, 768) and len(set(names["tile"].ravel().tolist())) > 100
     assert [(record["track"], record["look"]) for record in names["looks"]] == [
@@ -137,7 +160,9 @@ def test_a_target(checkout, monkeypatch):
     assert (checkout / "mydrone.png").is_file()
     assert len(names["samples"].clouds["DJI Mini 2"].kinds) == 5
     config = load(["config/default.yaml", "config/tiny.yaml", "with_mine.yaml"], SCHEMA)
-    assert "My drone" in names["lowalt"].Dataset(config, inputs=config["inputs"]).plan.groups["unseen"]
+    assert (
+        "My drone" in names["lowalt"].Dataset(config, inputs=config["inputs"]).plan.groups["unseen"]
+    )
 
 
 # The quick suite adds an effect to a copy of the tree in tests/test_contributing.py.
@@ -147,16 +172,24 @@ def test_a_target(checkout, monkeypatch):
 def test_an_effect(checkout, capsys, monkeypatch):
     printed, names = followed("effect", checkout, monkeypatch)
     # Table 5 of ITU-R P.838-3, vertical polarisation.
-    table = "1 GHz: k 3.08e-05, alpha 0.8592", "10 GHz: k 0.01129, alpha 1.2156", "20 GHz: k 0.09611, alpha 0.9847"
+    table = (
+        "1 GHz: k 3.08e-05, alpha 0.8592",
+        "10 GHz: k 0.01129, alpha 1.2156",
+        "20 GHz: k 0.09611, alpha 0.9847",
+    )
     assert capsys.readouterr().out.startswith("\n".join((*table, "80 GHz: k 1.167, alpha 0.7021")))
     (line,) = [line for line in printed.splitlines() if line.startswith("rain.py ")]
     assert line.split()[1] == "named" and float(line.split()[2].rstrip("%")) > 0
     assert "rain.py: ITU-R P.838-3" in printed
-    wet, dry, rain = names["wet"].maker, names["dry"].maker, names["rain"]
+    wet = names["wet"].maker
+    dry = names["dry"].maker
+    rain = names["rain"]
     row = names["wet"].row(names["wet"].place(0))
     station = wet.network.stations[0]
     heard = [maker.received(row, stations=[0])[1][0, 0] for maker in (wet, dry)]
-    way_km = 2e-3 * np.linalg.norm(np.subtract([row[f"{axis}_m"] for axis in "xyz"], station.position_m))
+    way_km = 2e-3 * np.linalg.norm(
+        np.subtract([row[f"{axis}_m"] for axis in "xyz"], station.position_m)
+    )
     expected_db = way_km * rain.attenuation(76e9 + 307.2e6 / 2, 50.0)
     assert 10 * np.log10(heard[1] / heard[0]) == pytest.approx(expected_db, rel=0.02)
     lost, *_ = re.findall(r"^ +rain, out and back +(-\d+\.\d) dB$", printed, re.MULTILINE)
@@ -174,7 +207,11 @@ def test_shards_in_other_tools(page, checkout, shards, capsys, monkeypatch):
         runpy.run_path("loop.py", run_name="__main__")
         assert capsys.readouterr().out == LOOP
     else:
-        assert {name: len(rows) for name, rows in names["seen"].items()} == {"train": 12, "validation": 6, "test": 6}
+        assert {name: len(rows) for name, rows in names["seen"].items()} == {
+            "train": 12,
+            "validation": 6,
+            "test": 6,
+        }
         assert names["images"].shape[:2] == (3, 3)
 
 
@@ -184,12 +221,20 @@ def test_the_loop_works_with_spawned_workers(checkout, shards):
     pytest.importorskip("torch")
     (checkout / "results/default").mkdir(parents=True)
     shutil.copytree(shards, checkout / "results/default/shards")
-    (text,) = (text for _, title, text in FENCE.findall((FOLDER / "pytorch.md").read_text()) if title == "loop.py")
+    (text,) = (
+        text
+        for _, title, text in FENCE.findall((FOLDER / "pytorch.md").read_text())
+        if title == "loop.py"
+    )
     (checkout / "loop.py").write_text(text)
     # As elsewhere than on Linux: a worker imports the file again.
-    (checkout / "sitecustomize.py").write_text("import multiprocessing\nmultiprocessing.set_start_method('spawn')\n")
+    (checkout / "sitecustomize.py").write_text(
+        "import multiprocessing\nmultiprocessing.set_start_method('spawn')\n"
+    )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(checkout), str(ROOT / "src")])}
-    run = subprocess.run([sys.executable, "loop.py"], capture_output=True, text=True, env=environment)
+    run = subprocess.run(
+        [sys.executable, "loop.py"], capture_output=True, text=True, env=environment
+    )
     assert run.stdout == LOOP, run.stderr
 
 
@@ -198,7 +243,8 @@ def test_the_first_hour_has_no_block_beyond_ten_lines():
     assert len(blocks) > 10 and max(len(block.splitlines()) for block in blocks) <= 10
 
 
-# A town at two bands, a target from its data sheet, two seconds of a walker, a network of its radar and of one station.
+# A town at two bands, a target from its data sheet, two seconds of a walker, a network of its radar
+# and of one station.
 @pytest.mark.slow
 def test_the_first_hour(checkout, capsys, monkeypatch):
     (checkout / "results/tiny").mkdir(parents=True)
@@ -210,28 +256,48 @@ def test_the_first_hour(checkout, capsys, monkeypatch):
     (checkout / "results/tiny/confusion_by_snr.csv").write_text(
         "protocol,scheme,snr_db,category,predicted,samples\nunseen,ABC:VRP+TRP+VT,3,Bird,Bird,8\n"
     )
-    block = load_yaml("config/measured/recognition.yaml") | {"size": 24, "echoes": {"train": 1, "validation": 1}}
+    block = load_yaml("config/measured/recognition.yaml") | {
+        "size": 24,
+        "echoes": {"train": 1, "validation": 1},
+    }
     block["training"] |= {"steps": 1, "batch": 4, "validate_every": 1}
     (checkout / "quick.yaml").write_text(yaml.safe_dump(block))
-    quick = {".venv/bin/lowalt recording train walk.yaml --out my_radar": "--recognition quick.yaml"}
+    quick = {
+        ".venv/bin/lowalt recording train walk.yaml --out my_radar": "--recognition quick.yaml"
+    }
     printed, names = followed("../first_hour", checkout, monkeypatch, quick)
     said = capsys.readouterr().out
-    assert "(400, 256) sqrt(W) ('body', 'right inner wing'" in said and "('Bird',)\n[[100.]]" in said
-    assert names["alone"].scheme.record["name"] == "A:VRP+TRP+VT" and list(names["scores"]["by_snr_percent"]) == [
+    assert (
+        "(400, 256) sqrt(W) ('body', 'right inner wing'" in said and "('Bird',)\n[[100.]]" in said
+    )
+    assert names["alone"].scheme.record["name"] == "A:VRP+TRP+VT" and list(
+        names["scores"]["by_snr_percent"]
+    ) == [
         "3",
         "inf",
     ]
     assert "windows right" in printed and printed.count("windows hold a target") == 2
-    for name, echo in {"town": names["echo"], "fourth": names["fourth"], "hexacopter": names["hexacopter"]}.items():
+    for name, echo in {
+        "town": names["echo"],
+        "fourth": names["fourth"],
+        "hexacopter": names["hexacopter"],
+    }.items():
         assert (checkout / f"{name}.png").is_file()
-        # In the cells around the target, the strongest line of the map is at the folded speed of the target.
-        spectrum = abs(np.fft.fftshift(np.fft.fft(np.hanning(400)[:, None] * echo.values, axis=0), axes=0)[::-1])
+        # In the cells around the target, the strongest line of the map is at the folded speed of
+        # the target.
+        spectrum = abs(
+            np.fft.fftshift(np.fft.fft(np.hanning(400)[:, None] * echo.values, axis=0), axes=0)[
+                ::-1
+            ]
+        )
         cell = int(echo.truth["observed_cell"].mean())
         line = spectrum[:, cell - 1 : cell + 3].max(axis=1)
         place = np.interp(echo.truth["observed_mps"].mean(), echo.speeds_mps, np.arange(400))
         assert line[max(0, int(place) - 25) : int(place) + 25].max() == line.max()
     # 12 dB/km, there and back.
-    assert names["lost_db"] == pytest.approx(0.012 * 2 * names["dry"].truth["range_m"].mean(), rel=1e-3)
+    assert names["lost_db"] == pytest.approx(
+        0.012 * 2 * names["dry"].truth["range_m"].mean(), rel=1e-3
+    )
     assert names["fourth"].station == "D" and len(names["hexacopter"].parts) == 7
     assert "m600.yaml: 'm600'" in printed and "reading 1; another" in printed
 

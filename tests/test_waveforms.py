@@ -1,4 +1,6 @@
-"""Other radars by the same echo: a continuous wave is one subcarrier, an FMCW sweep is the band's subcarriers."""
+"""Other radars by the same echo: a continuous wave is one subcarrier, an FMCW sweep is the band's
+subcarriers.
+"""
 
 import numpy as np
 import pytest
@@ -20,17 +22,27 @@ def delays(places: np.ndarray) -> np.ndarray:
 
 def radar(**waveform) -> Network:
     """One station of single elements at 24 GHz."""
-    return Network.from_settings({
-        "carrier_hz": 24e9, "waveform": waveform, "symbol_interval_s": 0.5e-3, "symbols": 400, "transmit_array": [1, 1],
-        "receive_array": [1, 1], "power_w": 1.0, "stations": {"A": {"position_m": [0, 0, 25], "normal_deg": 0}},
-    })  # fmt: skip
+    return Network.from_settings(
+        {
+            "carrier_hz": 24e9,
+            "waveform": waveform,
+            "symbol_interval_s": 0.5e-3,
+            "symbols": 400,
+            "transmit_array": [1, 1],
+            "receive_array": [1, 1],
+            "power_w": 1.0,
+            "stations": {"A": {"position_m": [0, 0, 25], "normal_deg": 0}},
+        }
+    )
 
 
 @pytest.mark.parametrize("speed_mps", [-3.0, 0.5])
 def test_one_subcarrier_is_a_continuous_wave(speed_mps):
     network = radar(kind="cw")
     places = moving(network, speed_mps)
-    found = pointwise_echo.subcarriers(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0))[:, 0]
+    found = pointwise_echo.subcarriers(
+        network, network.stations[0], places, np.ones(3), places[0].mean(axis=0)
+    )[:, 0]
     tau = delays(places)
     direct = (np.exp(-2j * np.pi * 24e9 * tau) / tau**2).sum(axis=1)
     np.testing.assert_allclose(found / found[0], direct / direct[0], atol=1e-8)
@@ -38,18 +50,26 @@ def test_one_subcarrier_is_a_continuous_wave(speed_mps):
 
 @pytest.mark.parametrize("speed_mps", [-3.0, 0.5])
 def test_the_subcarriers_of_a_band_are_the_samples_of_an_fmcw_sweep(speed_mps):
-    """Against dechirped samples with motion during the sweep and the residual video phase: equal but for a shift of
-    f_D T in range, below a tenth of a cell here, and a phase of the whole look."""
-    samples, sweep_hz, sweep_s = 128, 150e6, 50e-6
+    """Against dechirped samples with motion during the sweep and the residual video phase: equal
+    but for a shift of f_D T in range, below a tenth of a cell here, and a phase of the whole
+    look."""
+    samples = 128
+    sweep_hz = 150e6
+    sweep_s = 50e-6
     network = radar(kind="fmcw", sweep_hz=sweep_hz, sweep_s=sweep_s, samples=samples)
-    places, slope = moving(network, speed_mps), sweep_hz / sweep_s
-    found = pointwise_echo.range_cells(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0))
+    places = moving(network, speed_mps)
+    slope = sweep_hz / sweep_s
+    found = pointwise_echo.range_cells(
+        network, network.stations[0], places, np.ones(3), places[0].mean(axis=0)
+    )
     within_s = np.arange(samples) * sweep_s / samples
     later = places[:, None] + within_s[:, None, None] * np.array([speed_mps, 0.0, 0.0])
     tau = delays(later)
     phase = 24e9 * tau + slope * tau * within_s[:, None] - 0.5 * slope * tau**2
     sweeps = np.fft.ifft((np.exp(-2j * np.pi * phase) / tau**2).sum(axis=2), axis=1)
     cell = abs(found).argmax(axis=1)
-    assert (abs(abs(sweeps).argmax(axis=1) - cell) <= 1).all() and (abs(sweeps).argmax(axis=1) == cell).mean() > 0.9
+    assert (abs(abs(sweeps).argmax(axis=1) - cell) <= 1).all() and (
+        abs(sweeps).argmax(axis=1) == cell
+    ).mean() > 0.9
     ours, theirs = (matrix[np.arange(400), cell] for matrix in (found, sweeps))
     assert abs(np.vdot(ours, theirs)) > 0.995 * np.linalg.norm(ours) * np.linalg.norm(theirs)

@@ -1,6 +1,8 @@
-"""lowalt: from meshes and motion to echoes, spectra, images, shards and a recogniser for the low sky.
+"""lowalt: from meshes and motion to echoes, spectra, images, shards and a recogniser for the low
+sky.
 
-One folder a stage, in pipeline order: targets, motion, echo, noise, spectra, tiles, shards, recognition, report.
+One folder a stage, in pipeline order: targets, motion, echo, noise, spectra, tiles, shards,
+recognition, report.
 """
 
 import importlib
@@ -9,11 +11,16 @@ __version__ = "1.0.0"
 
 
 _HOMES = {
-    "Dataset": "shards.dataset", "Endless": "shards.dataset", "RawEcho": "shards.receive",
-    "confusion": "recognition.train_evaluate", "draft_target": "drafting.scaled",
-    "evaluate": "recognition.train_evaluate", "inspect_recording": "recordings.file_inspection",
-    "receive": "shards.receive", "train": "recognition.train_evaluate",
-}  # fmt: skip
+    "Dataset": "shards.dataset",
+    "Endless": "shards.dataset",
+    "RawEcho": "shards.receive",
+    "confusion": "recognition.train_evaluate",
+    "draft_target": "drafting.scaled",
+    "evaluate": "recognition.train_evaluate",
+    "inspect_recording": "recordings.file_inspection",
+    "receive": "shards.receive",
+    "train": "recognition.train_evaluate",
+}
 __all__ = sorted(_HOMES)
 
 

@@ -1,7 +1,8 @@
-"""The command `lowalt`, for people: run the workflow, look at scenes, spectra, samples and runs, make own targets.
+"""The command `lowalt`, for people: run the workflow, look at scenes, spectra, samples and runs,
+make own targets.
 
-Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input, 130 interrupted. Stages have commands of
-their own (python -m lowalt.STAGE).
+Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input, 130 interrupted.
+Stages have commands of their own (python -m lowalt.STAGE).
 """
 
 import argparse
@@ -18,7 +19,9 @@ from lowalt.files.errors import InputError
 
 
 def command_line(asked: str) -> argparse.ArgumentParser:
-    """Return the parser of `lowalt`, with the options of the command `asked`, or of all for "completion"."""
+    """Return the parser of `lowalt`, with the options of the command `asked`, or of all for
+    "completion".
+    """
     examples = "\n".join(f"  {entry.example}" for entry in COMMANDS.values())
     line = argparse.ArgumentParser(
         prog="lowalt",
@@ -74,7 +77,10 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("interrupted: the same command continues a run, and starts anything else again", file=sys.stderr)
+        print(
+            "interrupted: the same command continues a run, and starts anything else again",
+            file=sys.stderr,
+        )
         return 128 + signal.SIGINT
     return answer.status
 

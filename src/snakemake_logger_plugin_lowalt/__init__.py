@@ -1,10 +1,12 @@
-"""Snakemake's log as one line per stage: `snakemake --logger lowalt`, which this project's profiles select.
+"""Snakemake's log as one line per stage: `snakemake --logger lowalt`, which this project's profiles
+select.
 
-On a terminal, the lines of running stages are redrawn in place. In a log, each stage has a line when it starts, every
-half minute, and when it ends. Everything else is in files: Snakemake's own log, whose path it prints at the end, and
-the log of each job, whose last lines are shown if it fails. A dry run prints a table of stages, with their jobs and why
-these would run; with --printshellcmds it prints what Snakemake prints for every job. A quiet run shows only warnings
-and failures and keeps no status, because Snakemake then does not report which jobs have ended.
+On a terminal, the lines of running stages are redrawn in place. In a log, each stage has a line
+when it starts, every half minute, and when it ends. Everything else is in files: Snakemake's own
+log, whose path it prints at the end, and the log of each job, whose last lines are shown if it
+fails. A dry run prints a table of stages, with their jobs and why these would run; with
+--printshellcmds it prints what Snakemake prints for every job. A quiet run shows only warnings and
+failures and keeps no status, because Snakemake then does not report which jobs have ended.
 """
 
 import contextlib
@@ -35,16 +37,36 @@ EVERY_S = {True: 1.0, False: 30.0}
 LAST_LINES = 15
 """Lines of a failed job's log that are shown."""
 QUIET = {
-    LogEvent.RUN_INFO, LogEvent.WORKFLOW_STARTED, LogEvent.SHELLCMD, LogEvent.JOB_STARTED, LogEvent.PROGRESS,
-    LogEvent.RESOURCES_INFO, LogEvent.GROUP_INFO, LogEvent.DEBUG_DAG, LogEvent.RULEGRAPH,
-}  # fmt: skip
+    LogEvent.RUN_INFO,
+    LogEvent.WORKFLOW_STARTED,
+    LogEvent.SHELLCMD,
+    LogEvent.JOB_STARTED,
+    LogEvent.PROGRESS,
+    LogEvent.RESOURCES_INFO,
+    LogEvent.GROUP_INFO,
+    LogEvent.DEBUG_DAG,
+    LogEvent.RULEGRAPH,
+}
 NOISE = (
-    "Assuming unrestricted shared filesystem", "Building DAG of jobs", "Conda environments: ignored", "Config file",
-    "Job rate limit", "Removing temporary output", "Select jobs to execute", "Singularity containers: ignored",
-    "Using profile", "Using shell", "Using workflow specific profile", "host:", "Would remove temporary output",
-    "Some jobs were triggered by provenance", "If you prefer that only modification time", "If you are sure that",
-    "Rules with provenance triggered jobs", "Reasons:",
-)  # fmt: skip
+    "Assuming unrestricted shared filesystem",
+    "Building DAG of jobs",
+    "Conda environments: ignored",
+    "Config file",
+    "Job rate limit",
+    "Removing temporary output",
+    "Select jobs to execute",
+    "Singularity containers: ignored",
+    "Using profile",
+    "Using shell",
+    "Using workflow specific profile",
+    "host:",
+    "Would remove temporary output",
+    "Some jobs were triggered by provenance",
+    "If you prefer that only modification time",
+    "If you are sure that",
+    "Rules with provenance triggered jobs",
+    "Reasons:",
+)
 """Messages that begin like this say nothing about the run and are not shown."""
 FOLLOWS = "input files updated by another job"
 """Snakemake's reason for a job that runs only because another job does."""
@@ -54,7 +76,9 @@ INTERRUPTED = "on user request"
 
 
 def short_reason(reason: str) -> str:
-    """Return why a job would run without the files that Snakemake names, such as "missing output files"."""
+    """Return why a job would run without the files that Snakemake names, such as "missing output
+    files".
+    """
     kinds = dict.fromkeys(part.partition(":")[0].strip().lower() for part in reason.split("; "))
     # A job with another reason would run even if its inputs stayed the same.
     own = [kind for kind in kinds if kind and kind != FOLLOWS]
@@ -88,20 +112,29 @@ class LogHandler(LogHandlerBase):
         self._stream = sys.stdout if given.stdout else sys.stderr
         self._terminal = self._stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
         self._plain = ColorizingTextHandler(
-            given.nocolor, self._stream, DefaultFormatter(given.quiet, given.show_failed_logs),
-            DefaultFilter(given.quiet, given.debug_dag, given.verbose, given.dryrun, given.printshellcmds),
-        )  # fmt: skip
+            given.nocolor,
+            self._stream,
+            DefaultFormatter(given.quiet, given.show_failed_logs),
+            DefaultFilter(
+                given.quiet, given.debug_dag, given.verbose, given.dryrun, given.printshellcmds
+            ),
+        )
         # These options of Snakemake ask for its own messages.
         self._all = given.verbose or given.debug_dag or given.printshellcmds
-        self._planned: dict[str, Counter[str]] | None = {} if given.dryrun and not self._all else None
+        self._planned: dict[str, Counter[str]] | None = (
+            {} if given.dryrun and not self._all else None
+        )
         self._quiet = bool({Quietness.PROGRESS, Quietness.ALL} & set(given.quiet or ()))
         self._board: Board | None = None
-        self._drawn, self._shown = 0, 0.0
-        self._full, self._outcome = False, "ended"
+        self._drawn = 0
+        self._shown = 0.0
+        self._full = False
+        self._outcome = "ended"
         self._page: Path | None = None
         # Snakemake keeps its own log on the run's disk, and begins it before it reads any rule.
         mends.quiet_logs_on_a_full_disk()
-        self._guard, self._stop = threading.RLock(), threading.Event()
+        self._guard = threading.RLock()
+        self._stop = threading.Event()
         self._ticker = threading.Thread(target=self._tick, daemon=True)
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -129,7 +162,11 @@ class LogHandler(LogHandlerBase):
             if self._board:
                 self._erase()
                 self._keep(self._outcome)
-                print("\n".join([self._board.total(time.time()), *self._closing()]), file=self._stream, flush=True)
+                print(
+                    "\n".join([self._board.total(time.time()), *self._closing()]),
+                    file=self._stream,
+                    flush=True,
+                )
                 self._board = None
         super().close()
 
@@ -141,18 +178,28 @@ class LogHandler(LogHandlerBase):
         return []
 
     def _plan(self, record: logging.LogRecord) -> None:
-        """Add a job that would run to the file that `status.PLANNED_JOBS` names; rules without files only collect."""
+        """Add a job that would run to the file that `status.PLANNED_JOBS` names; rules without
+        files only collect.
+        """
         path = os.environ.get(status.PLANNED_JOBS)
         if path and getattr(record, "event", None) == LogEvent.JOB_INFO and record.output:
-            job = {"rule": record.rule_name, "files": list(map(str, record.output)), "reason": str(record.reason)}
+            job = {
+                "rule": record.rule_name,
+                "files": list(map(str, record.output)),
+                "reason": str(record.reason),
+            }
             with Path(path).open("a") as file:
                 file.write(json.dumps(job) + "\n")
 
     def _count(self, record: logging.LogRecord) -> None:
-        """Count a job that would run by its rule and reasons; show messages that say something about this run."""
+        """Count a job that would run by its rule and reasons; show messages that say something
+        about this run.
+        """
         event = getattr(record, "event", None)
         if event == LogEvent.JOB_INFO:
-            self._planned.setdefault(record.rule_name, Counter())[short_reason(str(record.reason))] += 1
+            self._planned.setdefault(record.rule_name, Counter())[
+                short_reason(str(record.reason))
+            ] += 1
         elif event not in QUIET and not self._noise(record):
             self._say(self._plain.format(record))
 
@@ -163,7 +210,8 @@ class LogHandler(LogHandlerBase):
             return
         if event == LogEvent.RUN_INFO and getattr(record, "stats", None):
             totals = {name: count for name, count in record.stats.items() if name != "total"}
-            self._board, self._shown = Board(totals, record.created), record.created
+            self._board = Board(totals, record.created)
+            self._shown = record.created
             if not self._ticker.is_alive():
                 self._ticker.start()
         elif event == LogEvent.JOB_INFO and self._board:
@@ -181,7 +229,9 @@ class LogHandler(LogHandlerBase):
             self._say_full(str(record.msg))
 
     def _say_full(self, text: str) -> None:
-        """Say once that the disk is full, if an error's text or the free space shows it; job logs may be cut short."""
+        """Say once that the disk is full, if an error's text or the free space shows it; job logs
+        may be cut short.
+        """
         free = free_bytes(Path.cwd())
         if not self._full and (free < NEARLY_FULL_BYTES or os.strerror(FULL[0]) in text):
             self._full = True
@@ -196,7 +246,10 @@ class LogHandler(LogHandlerBase):
         text = record.getMessage() if record.msg is not None else ""
         # The command of a failed job stands in Snakemake's own log; its error is shown by `_fail`.
         failed = hasattr(record, "exception") and "CalledProcessError" in text[:200]
-        return failed or (record.levelno <= logging.INFO and (not text or text == "None" or text.startswith(NOISE)))
+        return failed or (
+            record.levelno <= logging.INFO
+            and (not text or text == "None" or text.startswith(NOISE))
+        )
 
     def _start(self, record: logging.LogRecord) -> None:
         """Show that a job has started."""
@@ -233,7 +286,10 @@ class LogHandler(LogHandlerBase):
             if text[-1:] == ["KeyboardInterrupt"]:
                 lines[0] = f"interrupted: {record.rule_name}, job {record.jobid}"
                 continue
-            lines += [f"  its log: {log}" + ("; the last lines:" if text else ", which is empty or not there")]
+            lines += [
+                f"  its log: {log}"
+                + ("; the last lines:" if text else ", which is empty or not there")
+            ]
             lines += [f"    {line}" for line in text[-LAST_LINES:]]
         self._say("\n".join(lines))
 
@@ -254,12 +310,16 @@ class LogHandler(LogHandlerBase):
         """Draw the running stages in place; do nothing in a log."""
         if not (self._terminal and self._board):
             return
-        now, size = time.time(), shutil.get_terminal_size()
+        now = time.time()
+        size = shutil.get_terminal_size()
         lines = [self._board.line(name, now, progress.last) for name in self._board.running()]
-        lines = [line[: size.columns - 1] for line in [*lines, self._board.total(now)][-size.lines + 2 :]]
+        lines = [
+            line[: size.columns - 1] for line in [*lines, self._board.total(now)][-size.lines + 2 :]
+        ]
         self._erase()
         print("\n".join(lines), file=self._stream, flush=True)
-        self._drawn, self._shown = len(lines), now
+        self._drawn = len(lines)
+        self._shown = now
 
     def _tick(self) -> None:
         """Show the state from time to time, also while no job starts or ends."""
@@ -276,7 +336,11 @@ class LogHandler(LogHandlerBase):
                 else:
                     running = self._board.running()
                     text = [self._board.line(name, self._shown, progress.last) for name in running]
-                    print("\n".join([*text, self._board.total(self._shown)]), file=self._stream, flush=True)
+                    print(
+                        "\n".join([*text, self._board.total(self._shown)]),
+                        file=self._stream,
+                        flush=True,
+                    )
 
     def _keep(self, state: str) -> None:
         """Write the state of the run to its status file."""

@@ -1,14 +1,16 @@
-"""The authors' pedestrians, read from their videos: paths of the 31 nodes over a cycle, and lengths, angles and steps.
+"""The authors' pedestrians, read from their videos: paths of the 31 nodes over a cycle, and
+lengths, angles and steps.
 
-All dots have one colour. `starts.csv` tells by eye which dot of the first frame is which node, and each node is
-followed from there. One view gives two coordinates of a node. The third follows from the gait: the left half of the
-body does what the right half does, mirrored and half a cycle later, so both halves together are one half seen from two
-directions, 60 degrees apart. The paths are Fourier series in the time, so that all this is one linear fit; the cycle's
-duration is searched for, and the front is +y, as the paper says. What then is left is added to each side in the plane
-of the picture, so a person need not be as even as that; only depth is.
+All dots have one colour. `starts.csv` tells by eye which dot of the first frame is which node, and
+each node is followed from there. One view gives two coordinates of a node. The third follows from
+the gait: the left half of the body does what the right half does, mirrored and half a cycle later,
+so both halves together are one half seen from two directions, 60 degrees apart. The paths are
+Fourier series in the time, so that all this is one linear fit; the cycle's duration is searched
+for, and the front is +y, as the paper says. What then is left is added to each side in the plane of
+the picture, so a person need not be as even as that; only depth is.
 
-`python pedestrians.py FOLDER` says how far off all this is: it draws four of CMU's recordings in FOLDER
-(`SUBJECT/*.amc`) as the authors would and reads them back.
+`python pedestrians.py FOLDER` says how far off all this is: it draws four of CMU's recordings in
+FOLDER (`SUBJECT/*.amc`) as the authors would and reads them back.
 """
 
 import sys
@@ -42,7 +44,9 @@ BLUE = (0, 114, 189)
 CYCLES_S = (1.5, 6.0)
 """Durations of a cycle in the videos that are tried."""
 SLOWER = 4
-"""Times by which the videos are slower than the recordings, if each of their 30 frames a second is one of CMU's 120."""
+"""Times by which the videos are slower than the recordings, if each of their 30 frames a second is
+one of CMU's 120.
+"""
 LONGEST_SHANK_PIXELS = 72
 STRAY_PIXELS = 5.0
 """Distance (pixels) beyond which a dot counts less, since it may be another node's."""
@@ -50,12 +54,24 @@ PASSES = 2
 VIEW = np.array([[138.0, -106, 0], [-37, -49, -106]])
 """About how the authors' pictures show a metre of x, y and z, in pixels."""
 ERRORS = {
-    "highest to lowest node": 0.02, "thigh": 0.015, "shank": 0.01, "upper arm": 0.01, "forearm": 0.03, "stride": 0.25,
-    "step": 0.03, "trunk": 3, "hip": 2, "knee": 8, "ankle": 8, "shoulder": 10, "elbow": 15, "hand's path": 0.08,
+    "highest to lowest node": 0.02,
+    "thigh": 0.015,
+    "shank": 0.01,
+    "upper arm": 0.01,
+    "forearm": 0.03,
+    "stride": 0.25,
+    "step": 0.03,
+    "trunk": 3,
+    "hip": 2,
+    "knee": 8,
+    "ankle": 8,
+    "shoulder": 10,
+    "elbow": 15,
+    "hand's path": 0.08,
     "ankle's path": 0.025,
-}  # fmt: skip
-"""Errors (m or degrees) of what is measured: about twice what `main` finds, since here dots are also followed, and more
-where the dots are more than 3 pixels away from their paths."""
+}
+"""Errors (m or degrees) of what is measured: about twice what `main` finds, since here dots are
+also followed, and more where the dots are more than 3 pixels away from their paths."""
 
 
 def dot_pixels(frame: np.ndarray) -> np.ndarray:
@@ -68,15 +84,19 @@ def dot_pixels(frame: np.ndarray) -> np.ndarray:
 def followed(
     pixels: list[np.ndarray], times: np.ndarray, start: np.ndarray, model: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the places (F, 31, 2) of the nodes in frames, from their dots' pixels in each and their first places.
+    """Return the places (F, 31, 2) of the nodes in frames, from their dots' pixels in each and
+    their first places.
 
-    A node is expected where its speed leads, or where a model (F, 31, 2) has it, and belongs to the blob of dots that
-    is nearest then; a blob without a node takes the nearest one of a blob that has several. Inside a blob each pixel
-    belongs to its nearest node. The speed follows what is seen, less where a blob has several nodes. The root stays in
-    its place, and the nodes around it move little.
+    A node is expected where its speed leads, or where a model (F, 31, 2) has it, and belongs to the
+    blob of dots that is nearest then; a blob without a node takes the nearest one of a blob that
+    has several. Inside a blob each pixel belongs to its nearest node. The speed follows what is
+    seen, less where a blob has several nodes. The root stays in its place, and the nodes around it
+    move little.
     """
-    places, near = [np.array(start, float)], [NODES.index(name) for name in TRUNK]
-    speed, before = np.zeros_like(places[0]), times[0]
+    places = [np.array(start, float)]
+    near = [NODES.index(name) for name in TRUNK]
+    speed = np.zeros_like(places[0])
+    before = times[0]
     for number, (shown, now) in enumerate(zip(pixels, times, strict=True)):
         if model is None:
             expected = places[-1] + speed * (now - before)
@@ -95,12 +115,16 @@ def followed(
 
 
 def two_feet(places: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """Return places (31, 2) with the six dots of the feet shared out anew: three near each other, no shank too long,
-    and the feet near to where they are expected (31, 2)."""
-    left, right = ([NODES.index(side + name) for name in ("tibia", "foot", "toes")] for side in "lr")
-    both, best = np.array(left + right), (np.inf, None)
+    """Return places (31, 2) with the six dots of the feet shared out anew: three near each other,
+    no shank too long, and the feet near to where they are expected (31, 2)."""
+    left, right = (
+        [NODES.index(side + name) for name in ("tibia", "foot", "toes")] for side in "lr"
+    )
+    both = np.array(left + right)
+    best = (np.inf, None)
     for chosen in combinations(range(6), 3):
-        cost, shared = 0.0, [both[list(chosen)], both[[place for place in range(6) if place not in chosen]]]
+        cost = 0.0
+        shared = [both[list(chosen)], both[[place for place in range(6) if place not in chosen]]]
         for nodes, foot in zip(shared, (left, right), strict=True):
             apart = np.linalg.norm(places[nodes][:, None] - places[nodes], axis=2)
             shank = np.linalg.norm(places[nodes] - places[foot[0] - 1], axis=1).min()
@@ -116,25 +140,33 @@ def two_feet(places: np.ndarray, expected: np.ndarray) -> np.ndarray:
 
 
 def in_order(places: np.ndarray) -> np.ndarray:
-    """Return places (31, 2) with the three dots of each foot and the two of each forearm in their order.
+    """Return places (31, 2) with the three dots of each foot and the two of each forearm in their
+    order.
 
-    Ankle, ball and toes lie about in line, twice as far apart from ankle to ball as from ball to toes.
+    Ankle, ball and toes lie about in line, twice as far apart from ankle to ball as from ball to
+    toes.
     """
     for side in "lr":
         foot = [NODES.index(side + name) for name in ("tibia", "foot", "toes")]
         apart = np.linalg.norm(places[foot][:, None] - places[foot], axis=2)
         ball = apart.sum(1).argmin()
         toes, ankle = sorted(set(range(3)) - {ball}, key=apart[ball].__getitem__)
-        if apart[ball, ankle] > 1.4 * apart[ball, toes] and apart[ankle, toes] > 1.3 * apart[ball, ankle]:
+        if (
+            apart[ball, ankle] > 1.4 * apart[ball, toes]
+            and apart[ankle, toes] > 1.3 * apart[ball, ankle]
+        ):
             places[foot] = places[[foot[ankle], foot[ball], foot[toes]]]
-        elbow, arm = NODES.index(side + "humerus"), [NODES.index(side + name) for name in ("radius", "wrist")]
-        places[arm] = places[sorted(arm, key=np.linalg.norm(places - places[elbow], axis=1).__getitem__)]
+        elbow = NODES.index(side + "humerus")
+        arm = [NODES.index(side + name) for name in ("radius", "wrist")]
+        places[arm] = places[
+            sorted(arm, key=np.linalg.norm(places - places[elbow], axis=1).__getitem__)
+        ]
     return places
 
 
 def in_blobs(shown: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places (31, 2) of nodes in the pixels (K, 2) of a frame's dots, nearest to where they are expected,
-    and which (31,) have a blob of their own."""
+    """Return the places (31, 2) of nodes in the pixels (K, 2) of a frame's dots, nearest to where
+    they are expected, and which (31,) have a blob of their own."""
     first = shown.min(0)
     mask = np.zeros(np.ptp(shown, axis=0) + 1, bool)
     mask[tuple((shown - first).T)] = True
@@ -157,7 +189,11 @@ def in_blobs(shown: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.nd
             away = ((inside[:, None] - places[None, nodes]) ** 2).sum(2)
             nearest = away.argmin(1)
             for place, node in enumerate(nodes):
-                own = inside[nearest == place] if (nearest == place).any() else inside[[away[:, place].argmin()]]
+                own = (
+                    inside[nearest == place]
+                    if (nearest == place).any()
+                    else inside[[away[:, place].argmin()]]
+                )
                 places[node] = own.mean(0)
     return places, np.bincount(owner, minlength=count)[owner] == 1
 
@@ -168,16 +204,28 @@ def series(turns: np.ndarray) -> np.ndarray:
     return np.hstack([np.cos(angles), np.sin(angles[:, 1:])])
 
 
-def even(seen: np.ndarray, view: np.ndarray, turns: np.ndarray, nodes: np.ndarray, rounds: int) -> np.ndarray:
+def even(
+    seen: np.ndarray, view: np.ndarray, turns: np.ndarray, nodes: np.ndarray, rounds: int
+) -> np.ndarray:
     """Return the coefficients (2 H + 1, 3, nodes) of paths that both halves of the body share.
 
-    seen: (F, 31, 2) pixels from the root; view: (2, 3) pixels a metre; turns: (F,) cycles. Each round gives less weight
-    to dots that are more than some pixels off, which are those of another node.
+    seen: (F, 31, 2) pixels from the root; view: (2, 3) pixels a metre; turns: (F,) cycles. Each
+    round gives less weight to dots that are more than some pixels off, which are those of another
+    node.
     """
-    terms = np.vstack([np.einsum("ft,ij->fitj", series(turns + later), view @ mirror).reshape(2 * len(turns), -1)
-                       for later, mirror in ((0.0, np.eye(3)), (0.5, MIRROR))])  # fmt: skip
+    terms = np.vstack(
+        [
+            np.einsum("ft,ij->fitj", series(turns + later), view @ mirror).reshape(
+                2 * len(turns), -1
+            )
+            for later, mirror in ((0.0, np.eye(3)), (0.5, MIRROR))
+        ]
+    )
     both = np.vstack(
-        [np.swapaxes(half, 1, 2).reshape(-1, len(nodes)) for half in (seen[:, nodes], seen[:, MIRRORED[nodes]])]
+        [
+            np.swapaxes(half, 1, 2).reshape(-1, len(nodes))
+            for half in (seen[:, nodes], seen[:, MIRRORED[nodes]])
+        ]
     )
     found = np.linalg.lstsq(terms, both, rcond=None)[0]
     for _ in range(rounds):
@@ -195,8 +243,12 @@ def drawn(coefficients: np.ndarray, view: np.ndarray, turns: np.ndarray) -> np.n
 
 
 def cycle_of(seen: np.ndarray, view: np.ndarray, times: np.ndarray) -> float:
-    """Return the duration (s) of the cycle: the one that leaves least of knees, shoulders and elbows."""
-    nodes = np.array([NODES.index(side + name) for side in "lr" for name in ("femur", "clavicle", "humerus")])
+    """Return the duration (s) of the cycle: the one that leaves least of knees, shoulders and
+    elbows.
+    """
+    nodes = np.array(
+        [NODES.index(side + name) for side in "lr" for name in ("femur", "clavicle", "humerus")]
+    )
 
     def left(cycle: float) -> float:
         """Mean distance of the dots from paths of this cycle, each counted up to some pixels."""
@@ -205,19 +257,25 @@ def cycle_of(seen: np.ndarray, view: np.ndarray, times: np.ndarray) -> float:
         return float(np.minimum(off, 2 * STRAY_PIXELS).mean())
 
     near = min((cycle for cycle in np.geomspace(*CYCLES_S, 40) if cycle < np.ptp(times)), key=left)
-    return float(minimize_scalar(left, bounds=(0.96 * near, 1.04 * near), options={"xatol": 1e-3 * near}).x)
+    return float(
+        minimize_scalar(left, bounds=(0.96 * near, 1.04 * near), options={"xatol": 1e-3 * near}).x
+    )
 
 
 def lifted(seen: np.ndarray, view: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the coefficients (2 H + 1, 3, 31) of the nodes' paths, and those that both halves would share.
+    """Return the coefficients (2 H + 1, 3, 31) of the nodes' paths, and those that both halves
+    would share.
 
     seen, view, turns: as of `even`.
     """
     shared = even(seen, view, turns, np.arange(len(NODES)), 4)
     off = seen - drawn(shared, view, turns)
     weights = 1 / (1 + (off**2).sum(2) / STRAY_PIXELS**2)
-    across, terms, own = off @ np.linalg.pinv(view).T, series(turns), np.zeros_like(shared)
-    # Where a clip is no longer than a cycle, little would hold the rest of it: a small weight draws it to zero.
+    across = off @ np.linalg.pinv(view).T
+    terms = series(turns)
+    own = np.zeros_like(shared)
+    # Where a clip is no longer than a cycle, little would hold the rest of it: a small weight draws
+    # it to zero.
     hold = 0.02 * len(turns) * np.eye(terms.shape[1])
     for node in range(len(NODES)):
         weighted = terms * weights[:, node, None]
@@ -243,12 +301,16 @@ def bend(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
 
 
 def stride(paths: np.ndarray) -> float:
-    """Return the distance (m) of one cycle on the ground, from the speed at which feet move back against the root.
+    """Return the distance (m) of one cycle on the ground, from the speed at which feet move back
+    against the root.
 
-    No part of a foot slides back on the ground, and while a foot carries the body some part of it stands still, so the
-    fastest part has the body's speed; half of all moments are faster than what is returned.
+    No part of a foot slides back on the ground, and while a foot carries the body some part of it
+    stands still, so the fastest part has the body's speed; half of all moments are faster than what
+    is returned.
     """
-    feet = paths[:, [NODES.index(side + name) for side in "lr" for name in ("tibia", "foot", "toes")], 1]
+    feet = paths[
+        :, [NODES.index(side + name) for side in "lr" for name in ("tibia", "foot", "toes")], 1
+    ]
     back = (np.roll(feet, 1, 0) - np.roll(feet, -1, 0)) * len(paths) / 2
     return float(np.median(back.max(1)))
 
@@ -258,17 +320,30 @@ def measured(paths: np.ndarray) -> dict[str, tuple[float, str]]:
     lengths = {name: np.linalg.norm(bone(paths, name), axis=1) for name in NODES[1:]}
     rows = {}
     rows["highest to lowest node, most"] = np.ptp(paths[..., 2], axis=1).max(), "m"
-    for word, name in (("thigh", "femur"), ("shank", "tibia"), ("upper arm", "humerus"), ("forearm", "radius")):
+    for word, name in (
+        ("thigh", "femur"),
+        ("shank", "tibia"),
+        ("upper arm", "humerus"),
+        ("forearm", "radius"),
+    ):
         rows[f"{word}, length"] = np.mean([lengths[side + name].mean() for side in "lr"]), "m"
     rows["stride"] = stride(paths), "m"
     ankles = [paths[:, NODES.index(side + "tibia"), 1] for side in "lr"]
     rows["step, ankles apart at most"] = abs(ankles[0] - ankles[1]).max(), "m"
-    rows["trunk, lean to the front"] = pitch(paths[:, NODES.index("thorax")] * [1, 1, -1]).mean(), "degrees"
+    rows["trunk, lean to the front"] = (
+        pitch(paths[:, NODES.index("thorax")] * [1, 1, -1]).mean(),
+        "degrees",
+    )
     for side, word in (("l", "left"), ("r", "right")):
         thigh, shank, foot = (bone(paths, side + name) for name in ("femur", "tibia", "foot"))
         arm, forearm = (bone(paths, side + name) for name in ("humerus", "radius"))
-        for what, angle in (("hip", pitch(thigh)), ("knee", bend(thigh, shank)), ("ankle", bend(shank, foot)),
-                            ("shoulder", pitch(arm)), ("elbow", bend(arm, forearm))):  # fmt: skip
+        for what, angle in (
+            ("hip", pitch(thigh)),
+            ("knee", bend(thigh, shank)),
+            ("ankle", bend(shank, foot)),
+            ("shoulder", pitch(arm)),
+            ("elbow", bend(arm, forearm)),
+        ):
             rows[f"{word} {what}, least"] = angle.min(), "degrees"
             rows[f"{word} {what}, most"] = angle.max(), "degrees"
         for what, name in (("hand", "hand"), ("ankle", "tibia")):
@@ -278,11 +353,13 @@ def measured(paths: np.ndarray) -> dict[str, tuple[float, str]]:
     return rows
 
 
-def read(start: np.ndarray, view: np.ndarray, times: np.ndarray, pixels: list[np.ndarray]) -> tuple[np.ndarray, dict]:
+def read(
+    start: np.ndarray, view: np.ndarray, times: np.ndarray, pixels: list[np.ndarray]
+) -> tuple[np.ndarray, dict]:
     """Return the paths (PHASES, 31, 3) m of a cycle, front +y, and what was found on the way.
 
-    start: (31, 2) places of the nodes in the first frame; view: (2, 3) pixels a metre; times: (F,) s; pixels: those of
-    each frame's dots.
+    start: (31, 2) places of the nodes in the first frame; view: (2, 3) pixels a metre; times: (F,)
+    s; pixels: those of each frame's dots.
     """
     places = followed(pixels, times, start)
     cycle = cycle_of(places - start[0], view, times)
@@ -295,7 +372,10 @@ def read(start: np.ndarray, view: np.ndarray, times: np.ndarray, pixels: list[np
     own, shared = lifted(places - start[0], view, times / cycle)
     off, uneven = (drawn(paths, view, times / cycle) + start[0] - places for paths in (own, shared))
     found = {"cycle": cycle, "cycles": np.ptp(times) / cycle}
-    found |= {name: float(np.sqrt((array**2).sum(2).mean())) for name, array in (("off", off), ("uneven", uneven))}
+    found |= {
+        name: float(np.sqrt((array**2).sum(2).mean()))
+        for name, array in (("off", off), ("uneven", uneven))
+    }
     return np.einsum("ft,tjn->fnj", series(np.arange(PHASES) / PHASES), own), found
 
 
@@ -303,24 +383,39 @@ def readings(paths: np.ndarray, found: dict) -> list[tuple]:
     """Return (quantity, value, error, unit) of a pedestrian; for paths and findings see `read`."""
     rows = [
         ("cycle in the video", found["cycle"], 0.02 * found["cycle"], "s"),
-        ("cycle, a frame of the video being 1/120 s", found["cycle"] / SLOWER, 0.02 * found["cycle"] / SLOWER, "s"),
+        (
+            "cycle, a frame of the video being 1/120 s",
+            found["cycle"] / SLOWER,
+            0.02 * found["cycle"] / SLOWER,
+            "s",
+        ),
         ("cycles shown", found["cycles"], 0.02 * found["cycles"], "1"),
         ("dots away from their paths", found["off"], 0.1, "pixels"),
         ("dots away from paths that both sides share", found["uneven"], 0.1, "pixels"),
     ]
     for what, (value, unit) in measured(paths).items():
-        error = ERRORS[what.split(",")[0].removeprefix("left ").removeprefix("right ")] * max(1, found["off"] / 3)
+        error = ERRORS[what.split(",")[0].removeprefix("left ").removeprefix("right ")] * max(
+            1, found["off"] / 3
+        )
         rows.append((what, value, error, unit))
         if what == "stride":
             rows.append(
-                ("forward speed, likewise", *(part / found["cycle"] * SLOWER for part in (value, error)), "m/s")
+                (
+                    "forward speed, likewise",
+                    *(part / found["cycle"] * SLOWER for part in (value, error)),
+                    "m/s",
+                )
             )
     return rows
 
 
 def recordings(folder: Path) -> Iterable[tuple[str, np.ndarray]]:
-    """Yield name and nodes (F, 31, 3) m from the root, front +y, of four of CMU's walks and runs in a folder."""
-    for path in (folder / name[:2] / f"{name}.amc" for name in ("02_01", "02_03", "07_01", "09_01")):
+    """Yield name and nodes (F, 31, 3) m from the root, front +y, of four of CMU's walks and runs in
+    a folder.
+    """
+    for path in (
+        folder / name[:2] / f"{name}.amc" for name in ("02_01", "02_03", "07_01", "09_01")
+    ):
         skeleton = read_skeleton(path.with_name(f"{path.parent.name}.asf"))
         channels, _ = read_motion(path, skeleton)
         motion = posed(skeleton, channels, 120)
@@ -329,8 +424,11 @@ def recordings(folder: Path) -> Iterable[tuple[str, np.ndarray]]:
 
 
 def main(folder: Path) -> None:
-    """Print by how much the readings of CMU's recordings are off, the root mean square over the recordings."""
-    rng, off = np.random.default_rng(0), {}
+    """Print by how much the readings of CMU's recordings are off, the root mean square over the
+    recordings.
+    """
+    rng = np.random.default_rng(0)
+    off = {}
     for name, nodes in recordings(folder):
         times = np.arange(len(nodes)) / 120 * SLOWER
         seen = np.einsum("ij,fnj->fni", VIEW, nodes) + rng.normal(0, 1, (*nodes.shape[:2], 2))
@@ -339,8 +437,11 @@ def main(folder: Path) -> None:
         paths = np.einsum("ft,tjn->fnj", moments, lifted(seen, VIEW, times / cycle)[0])
         known = np.linalg.lstsq(series(times / cycle), nodes.reshape(len(nodes), -1), rcond=None)[0]
         known = (moments @ known).reshape(PHASES, -1, 3)
-        print(name, f"cycle {cycle / SLOWER:.3f} s, nodes off by",
-              f"{np.linalg.norm(paths - known, axis=2).mean():.3f} m")  # fmt: skip
+        print(
+            name,
+            f"cycle {cycle / SLOWER:.3f} s, nodes off by",
+            f"{np.linalg.norm(paths - known, axis=2).mean():.3f} m",
+        )
         for what, (value, _) in measured(paths).items():
             off.setdefault(what, []).append(value - measured(known)[what][0])
     for what, values in off.items():

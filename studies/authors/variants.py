@@ -1,8 +1,10 @@
-"""Which change of a target's geometry or gait moves its recognition: `python variants.py RUN OUT.csv`.
+"""Which change of a target's geometry or gait moves its recognition: `python variants.py RUN
+OUT.csv`.
 
-RUN is a finished run whose networks were trained on the other subtypes (protocol unseen, three stations). Each variant
-changes one figure of a record back, or the paths of a pedestrian's nodes to those that `read.py` read, and the run's
-networks are asked about 40 new motion models of each subtype at 13 dB.
+RUN is a finished run whose networks were trained on the other subtypes (protocol unseen, three
+stations). Each variant changes one figure of a record back, or the paths of a pedestrian's nodes to
+those that `read.py` read, and the run's networks are asked about 40 new motion models of each
+subtype at 13 dB.
 """
 
 import copy
@@ -29,37 +31,51 @@ from lowalt.targets.skeleton import NODES, rotation
 from lowalt.tiles import split
 
 ROOT = Path(__file__).parents[2]
-EH, SPARROW = "EH 216 S", "Sparrow"
+EH = "EH 216 S"
+SPARROW = "Sparrow"
 WALKERS = (*(f"Walking Pedestrian {number}" for number in (5, 6, 7)), "Running Pedestrian 2")
-"""The pedestrians that the networks have not seen, without the one whose dots are followed badly."""
+"""The pedestrians that the networks have not seen, without the one whose dots are followed badly.
+"""
 
 
 def read_paths(subtype: str) -> np.ndarray:
-    """Return the paths (K, 31, 3) m of a pedestrian's nodes over a cycle, as read from the authors' video."""
+    """Return the paths (K, 31, 3) m of a pedestrian's nodes over a cycle, as read from the authors'
+    video.
+    """
     with (Path(__file__).parent / "paths.csv").open() as file:
         rows = [row for row in csv.reader(file) if row[0].endswith(subtype.replace(" ", "_"))]
     return np.array([row[2:] for row in rows], float).reshape(len(rows), len(NODES), 3) / 1000
 
 
 def still(cloud: Cloud) -> Cloud:
-    """Return a pedestrian whose root stays in its place, as the authors' does: it neither bobs nor sways."""
+    """Return a pedestrian whose root stays in its place, as the authors' does: it neither bobs nor
+    sways.
+    """
     return with_track(cloud, cloud.track - cloud.track[:, :1])
 
 
 def bent(cloud: Cloud) -> Cloud:
-    """Return a pedestrian whose elbows are bent more, by as much as the read mean bend exceeds ours."""
+    """Return a pedestrian whose elbows are bent more, by as much as the read mean bend exceeds
+    ours.
+    """
     track = cloud.track.copy()
     theirs = read_paths(cloud.subtype)
     for side in "lr":
-        elbow, below = NODES.index(f"{side}humerus"), [NODES.index(side + name) for name in BELOW_ELBOW]
+        elbow = NODES.index(f"{side}humerus")
+        below = [NODES.index(side + name) for name in BELOW_ELBOW]
         more = elbow_bend(theirs, side).mean() - elbow_bend(track, side).mean()
-        track[:, below] = (track[:, below] - track[:, [elbow]]) @ rotation("x", more).T + track[:, [elbow]]
+        track[:, below] = (track[:, below] - track[:, [elbow]]) @ rotation("x", more).T + track[
+            :, [elbow]
+        ]
     return with_track(cloud, track)
 
 
 def on_read_paths(cloud: Cloud) -> Cloud:
-    """Return a pedestrian whose nodes all are on the paths that were read, at the rate of our own cycle."""
-    theirs, frames = read_paths(cloud.subtype), len(cloud.track)
+    """Return a pedestrian whose nodes all are on the paths that were read, at the rate of our own
+    cycle.
+    """
+    theirs = read_paths(cloud.subtype)
+    frames = len(cloud.track)
     # The series of a cycle, with zeros for higher frequencies: the same curve at more moments.
     track = np.fft.irfft(np.fft.rfft(theirs, axis=0), frames, axis=0) * frames / len(theirs)
     return with_track(cloud, track)
@@ -75,8 +91,11 @@ BELOW_ELBOW = ("radius", "wrist", "hand", "fingers", "thumb")
 
 def elbow_bend(track: np.ndarray, side: str) -> np.ndarray:
     """Return the bend (F,) rad of an elbow, 0 for a straight arm; track: (F, 31, 3), side: l or r."""
-    shoulder, elbow, wrist = (track[:, NODES.index(side + name)] for name in ("clavicle", "humerus", "radius"))
-    upper, lower = elbow - shoulder, wrist - elbow
+    shoulder, elbow, wrist = (
+        track[:, NODES.index(side + name)] for name in ("clavicle", "humerus", "radius")
+    )
+    upper = elbow - shoulder
+    lower = wrist - elbow
     cosine = (upper * lower).sum(1) / np.linalg.norm(upper, axis=1) / np.linalg.norm(lower, axis=1)
     return np.arccos(np.clip(cosine, -1, 1))
 
@@ -96,8 +115,11 @@ VARIANTS = (
     (WALKERS, "elbows bent as read", bent),
     (WALKERS, "all nodes on the read paths", on_read_paths),
 )
-"""Subtype or subtypes, what is changed, and the keys of the record that are changed or a function of the cloud."""
-MODELS, SNR_DB = 40, 13.0
+"""Subtype or subtypes, what is changed, and the keys of the record that are changed or a function
+of the cloud.
+"""
+MODELS = 40
+SNR_DB = 13.0
 
 
 def changed(subtype: str, changes: dict) -> dict:
@@ -129,7 +151,10 @@ def samples_of(subtype: str, changes, folder: Path) -> Dataset:
 
 def main(run: Path, out: Path) -> None:
     """Ask the run's networks about every variant and write the shares of their answers."""
-    networks = [load_model(path) for path in sorted(run.glob("models/unseen/abc-vrp-trp-vt/*/model.safetensors"))]
+    networks = [
+        load_model(path)
+        for path in sorted(run.glob("models/unseen/abc-vrp-trp-vt/*/model.safetensors"))
+    ]
     rows = []
     for subtypes, words, changes in VARIANTS:
         subtypes = [subtypes] if isinstance(subtypes, str) else subtypes

@@ -1,11 +1,14 @@
-"""Classical methods on physical features: linear ones, support-vector machines and trees, chosen on validation alone.
+"""Classical methods on physical features: linear ones, support-vector machines and trees, chosen on
+validation alone.
 
-Each method tries the candidates of GRID on the training samples and keeps the one with the least cross entropy on the
-validation samples; the test folds are never read. Boosting rounds, at most ROUNDS in steps of EVERY, and the
-temperature of the softmax over scores are chosen on validation too.
-Sources: Cortes and Vapnik, Mach. Learn. 20, 1995; Rifkin and Klautau, J. Mach. Learn. Res. 5, 2004 (one against the
-rest); Hoerl and Kennard, Technometrics 12, 1970 (ridge); Friedman, Ann. Stat. 29, 2001; Chen and Guestrin, XGBoost,
-2016; Breiman, Mach. Learn. 45, 2001 (forests); Guo et al., 2017 (temperature).
+Each method tries the candidates of GRID on the training samples and keeps the one with the least
+cross entropy on the validation samples; the test folds are never read. Boosting rounds, at most
+ROUNDS in steps of EVERY, and the temperature of the softmax over scores are chosen on validation
+too.
+Sources: Cortes and Vapnik, Mach. Learn. 20, 1995; Rifkin and Klautau, J. Mach. Learn. Res. 5, 2004
+(one against the rest); Hoerl and Kennard, Technometrics 12, 1970 (ridge); Friedman, Ann. Stat. 29,
+2001; Chen and Guestrin, XGBoost, 2016; Breiman, Mach. Learn. 45, 2001 (forests); Guo et al., 2017
+(temperature).
 """
 
 from collections.abc import Callable, Iterator
@@ -27,45 +30,64 @@ GRID = {
     "ridge": [{"penalties": (1e2, 1e3, 1e4, 1e5)}],
 }
 """Candidates of each method; gamma is relative to one over the number of features."""
-ROUNDS, EVERY = 200, 25
+ROUNDS = 200
+EVERY = 25
 MANY = 10
 """With so many classes or more, only the first candidate is tried, since each takes minutes."""
 Scores = Callable[[np.ndarray], np.ndarray]
 
 
 def _svm(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
-    """Yield the decision functions of one candidate's machines: one class against the rest, or of MANY classes each
-    against each, which needs smaller machines."""
+    """Yield the decision functions of one candidate's machines: one class against the rest, or of
+    MANY classes each against each, which needs smaller machines."""
     from sklearn.multiclass import OneVsRestClassifier
     from sklearn.svm import SVC
 
-    mean, scale = features.mean(0), np.maximum(features.std(0), 1e-9)
+    mean = features.mean(0)
+    scale = np.maximum(features.std(0), 1e-9)
     machine = SVC(C=candidate["c"], gamma=candidate["gamma"] / features.shape[1])
     many = len(np.unique(labels)) >= MANY
-    model = (machine if many else OneVsRestClassifier(machine)).fit((features - mean) / scale, labels)
+    model = (machine if many else OneVsRestClassifier(machine)).fit(
+        (features - mean) / scale, labels
+    )
     yield lambda asked: model.decision_function((asked - mean) / scale)
 
 
-def _boosting(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+def _boosting(
+    features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int
+) -> Iterator[Scores]:
     """Yield the scores of scikit-learn's boosted trees of one candidate after every EVERY rounds."""
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     model = HistGradientBoostingClassifier(
-        learning_rate=candidate["rate"], max_leaf_nodes=candidate["leaves"], max_iter=ROUNDS, early_stopping=False,
+        learning_rate=candidate["rate"],
+        max_leaf_nodes=candidate["leaves"],
+        max_iter=ROUNDS,
+        early_stopping=False,
         random_state=seed,
-    ).fit(features, labels)  # fmt: skip
+    ).fit(features, labels)
     for count in range(EVERY, ROUNDS + 1, EVERY):
-        yield lambda asked, last=count: next(islice(model.staged_decision_function(asked), last - 1, None))
+        yield lambda asked, last=count: next(
+            islice(model.staged_decision_function(asked), last - 1, None)
+        )
 
 
-def _xgboost(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+def _xgboost(
+    features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int
+) -> Iterator[Scores]:
     """Yield the scores of XGBoost's trees of one candidate after every EVERY rounds."""
     import xgboost
 
     given = {
-        "objective": "multi:softprob", "num_class": int(labels.max()) + 1, "max_depth": candidate["depth"],
-        "eta": candidate["rate"], "tree_method": "hist", "nthread": 1, "seed": seed, "base_score": 0.5,
-    }  # fmt: skip
+        "objective": "multi:softprob",
+        "num_class": int(labels.max()) + 1,
+        "max_depth": candidate["depth"],
+        "eta": candidate["rate"],
+        "tree_method": "hist",
+        "nthread": 1,
+        "seed": seed,
+        "base_score": 0.5,
+    }
     model = xgboost.train(given, xgboost.DMatrix(features, labels), ROUNDS)
     for count in range(EVERY, ROUNDS + 1, EVERY):
         yield lambda asked, last=count: model.predict(
@@ -73,32 +95,51 @@ def _xgboost(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: in
         )
 
 
-def _forest(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+def _forest(
+    features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int
+) -> Iterator[Scores]:
     """Yield the scores of a random forest: logarithms of its smoothed votes."""
     from sklearn.ensemble import RandomForestClassifier
 
-    model = RandomForestClassifier(300, min_samples_leaf=candidate["leaf"], random_state=seed).fit(features, labels)
+    model = RandomForestClassifier(300, min_samples_leaf=candidate["leaf"], random_state=seed).fit(
+        features, labels
+    )
     yield lambda asked: np.log(model.predict_proba(asked) + 1 / 300)
 
 
-def _logistic(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+def _logistic(
+    features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int
+) -> Iterator[Scores]:
     """Yield the decision functions of a logistic regression on standardised features."""
     from sklearn.linear_model import LogisticRegression
 
-    mean, scale = features.mean(0), np.maximum(features.std(0), 1e-9)
-    model = LogisticRegression(C=candidate["c"], max_iter=300).fit((features - mean) / scale, labels)
+    mean = features.mean(0)
+    scale = np.maximum(features.std(0), 1e-9)
+    model = LogisticRegression(C=candidate["c"], max_iter=300).fit(
+        (features - mean) / scale, labels
+    )
     yield lambda asked: model.decision_function((asked - mean) / scale)
 
 
-def _ridge(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
-    """Yield the scores of least squares on standardised features for each penalty, whose products are formed once."""
-    mean, scale = features.mean(0), np.maximum(features.std(0), 1e-6)
+def _ridge(
+    features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int
+) -> Iterator[Scores]:
+    """Yield the scores of least squares on standardised features for each penalty, whose products
+    are formed once.
+    """
+    mean = features.mean(0)
+    scale = np.maximum(features.std(0), 1e-6)
     features = (features - mean) / scale
     wanted = np.eye(int(labels.max()) + 1, dtype=features.dtype)[labels]
     share = wanted.mean(0)
-    products, answers = features.T @ features, features.T @ (wanted - share)
+    products = features.T @ features
+    answers = features.T @ (wanted - share)
     for penalty in candidate["penalties"]:
-        weights = solve(products + penalty * np.eye(len(products), dtype=products.dtype), answers, assume_a="pos")
+        weights = solve(
+            products + penalty * np.eye(len(products), dtype=products.dtype),
+            answers,
+            assume_a="pos",
+        )
         yield lambda asked, weights=weights: (asked - mean) / scale @ weights + share
 
 
@@ -113,19 +154,25 @@ MAKERS = {
 
 
 def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
-    """Return the function from features (B, D) to class probabilities (B, classes) with the least cross entropy.
+    """Return the function from features (B, D) to class probabilities (B, classes) with the least
+    cross entropy.
 
-    train, validation: features (B, D) and labels (B,) of both parts; every class has training samples.
+    train, validation: features (B, D) and labels (B,) of both parts; every class has training
+    samples.
     """
     asked, labels = validation
-    least, best = np.inf, None
+    least = np.inf
+    best = None
     candidates = GRID[method]
     for candidate in candidates[:1] if train[1].max() >= MANY else candidates:
         for scores in MAKERS[method](*train, candidate, seed):
             found = scores(asked)
-            cost = lambda logarithm, found=found: cross_entropy(softmax(np.exp(logarithm) * found, 1), labels)  # noqa: E731
+            cost = lambda logarithm, found=found: cross_entropy(  # noqa: E731
+                softmax(np.exp(logarithm) * found, 1), labels
+            )
             chosen = minimize_scalar(cost, bounds=(-3, 4), method="bounded")
             if chosen.fun < least:
-                least, best = chosen.fun, (scores, float(np.exp(chosen.x)))
+                least = chosen.fun
+                best = (scores, float(np.exp(chosen.x)))
     scores, temperature = best
     return lambda features: softmax(temperature * scores(features), 1)

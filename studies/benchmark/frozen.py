@@ -1,7 +1,8 @@
-"""A frozen backbone with ImageNet's weights: its features of the images, for a linear classifier (`classical.py`).
+"""A frozen backbone with ImageNet's weights: its features of the images, for a linear classifier
+(`classical.py`).
 
-The three images of a station stand side by side and are enlarged, so that the backbone, which halves its images five
-times, still tells rows and columns apart.
+The three images of a station stand side by side and are enlarged, so that the backbone, which
+halves its images five times, still tells rows and columns apart.
 Source: Kornblith, Shlens and Le, Do Better ImageNet Models Transfer Better?, CVPR 2019.
 """
 
@@ -30,7 +31,8 @@ BATCH = 64
 
 
 def embedded(images: np.ndarray, model: nn.Module, colours: str) -> np.ndarray:
-    """Return features (samples, stations, F) float16 of index images (samples, stations * 3, S, S) uint8.
+    """Return features (samples, stations, F) float16 of index images (samples, stations * 3, S, S)
+    uint8.
 
     model: a backbone of timm without classifier; colours: name of the colour map.
     """
@@ -49,7 +51,8 @@ def embedded(images: np.ndarray, model: nn.Module, colours: str) -> np.ndarray:
 
 
 def embedded_chunk(path: Path, folder: Path) -> Path:
-    """Return the file of the keys (n,) and features (n, stations, F) of a file of images; made once, then kept.
+    """Return the file of the keys (n,) and features (n, stations, F) of a file of images; made
+    once, then kept.
 
     path: a file of a run's index images; folder: where features and weights are kept.
     """
@@ -58,8 +61,12 @@ def embedded_chunk(path: Path, folder: Path) -> Path:
         torch.set_num_threads(1)
         group, fold = path.stem.split("-")[:2]
         begun = time.process_time()
-        samples = ViewSamples([path], Scheme("all spectra", STATIONS, VIEWS).columns, {(group, fold)})
-        model = backbone(BACKBONE, str(write_weights(folder / f"{BACKBONE}.pth")), SCALE * samples.size).eval()
+        samples = ViewSamples(
+            [path], Scheme("all spectra", STATIONS, VIEWS).columns, {(group, fold)}
+        )
+        model = backbone(
+            BACKBONE, str(write_weights(folder / f"{BACKBONE}.pth")), SCALE * samples.size
+        ).eval()
         found = embedded(samples.images, model, config_of(MAIN)["images"]["colour_map"])
         with replacing(kept) as temporary, temporary.open("wb") as file:
             np.savez(file, key=samples.facts.key, features=found)
@@ -75,13 +82,18 @@ def embedded_of(samples: TrackSamples, folder: Path) -> np.ndarray:
     result: np.ndarray | None = None
     for path in sorted((samples.run / f"views/{samples.size}").glob("*.npz")):
         with np.load(embedded_chunk(path, folder)) as data:
-            keys, features = data["key"], data["features"]
+            keys = data["key"]
+            features = data["features"]
         if result is None:
-            result = np.empty((len(samples), len(samples.track.stations), features.shape[-1]), np.float32)
+            result = np.empty(
+                (len(samples), len(samples.track.stations), features.shape[-1]), np.float32
+            )
         places = [(wanted.pop(key), row) for row, key in enumerate(keys.tolist()) if key in wanted]
         if places:
             numbers, rows = map(list, zip(*places, strict=True))
             result[numbers] = features[rows][:, list(samples.track.stations)]
     if wanted or result is None:
-        raise InputError(f"{samples.run}/views: no image of {next(iter(wanted))}, expected one of every sample")
+        raise InputError(
+            f"{samples.run}/views: no image of {next(iter(wanted))}, expected one of every sample"
+        )
     return result.reshape(len(samples), -1)

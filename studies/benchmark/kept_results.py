@@ -1,7 +1,9 @@
-"""What the study keeps in results/reference: the table with its groups, and what each method got right.
+"""What the study keeps in results/reference: the table with its groups, and what each method got
+right.
 
-Methods are sorted by their headline number. Going down, a method belongs to the group of the one that opened the group
-unless the interval of their difference excludes zero; otherwise it opens the next group.
+Methods are sorted by their headline number. Going down, a method belongs to the group of the one
+that opened the group unless the interval of their difference excludes zero; otherwise it opens the
+next group.
 """
 
 from itertools import combinations
@@ -18,24 +20,35 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.recognition.predictions import Predictions
 
 
-def groups(track: Track, weight: np.ndarray, subtypes: np.ndarray, values: dict[str, np.ndarray]) -> dict[str, int]:
+def groups(
+    track: Track, weight: np.ndarray, subtypes: np.ndarray, values: dict[str, np.ndarray]
+) -> dict[str, int]:
     """Return the number of each method's group, from 1, best methods first.
 
     weight, subtypes (models,): of the motion models; values: (seeds, models) by method.
     """
-    average = {name: float(np.average(array.mean(0), weights=weight)) for name, array in values.items()}
+    average = {
+        name: float(np.average(array.mean(0), weights=weight)) for name, array in values.items()
+    }
     found: dict[str, int] = {}
-    opener, count = "", 0
+    opener = ""
+    count = 0
     for name in sorted(values, key=lambda name: -average[name]):
-        lead = difference(track, Values(values[opener], weight, subtypes), values[name]) if opener else None
+        lead = (
+            difference(track, Values(values[opener], weight, subtypes), values[name])
+            if opener
+            else None
+        )
         if lead is None or lead.low > 0:
-            opener, count = name, count + 1
+            opener = name
+            count = count + 1
         found[name] = count
     return found
 
 
 def alike(rows: list[dict], count: int = 5) -> list[str]:
-    """Return a line for each of the `count` pairs of tracks that rank the methods of a table's rows most alike.
+    """Return a line for each of the `count` pairs of tracks that rank the methods of a table's rows
+    most alike.
 
     Source: Kendall, Biometrika 30, 1938 (tau: 1 for equal orders, 0 for unrelated ones).
     """
@@ -43,10 +56,23 @@ def alike(rows: list[dict], count: int = 5) -> list[str]:
     for row in rows:
         percent.setdefault(row["track"], {})[row["method"]] = row["percent"]
     pairs = [
-        (float(kendalltau(*([percent[track][method] for method in percent[first]] for track in (first, second)))[0]),
-         f"{first} and {second}") for first, second in combinations(percent, 2)
-    ]  # fmt: skip
-    return [f"order of the methods: {words}, tau {tau:.2f}" for tau, words in sorted(pairs, reverse=True)[:count]]
+        (
+            float(
+                kendalltau(
+                    *(
+                        [percent[track][method] for method in percent[first]]
+                        for track in (first, second)
+                    )
+                )[0]
+            ),
+            f"{first} and {second}",
+        )
+        for first, second in combinations(percent, 2)
+    ]
+    return [
+        f"order of the methods: {words}, tau {tau:.2f}"
+        for tau, words in sorted(pairs, reverse=True)[:count]
+    ]
 
 
 def write_table(rows: list[dict], folder: str | Path) -> None:
@@ -54,13 +80,16 @@ def write_table(rows: list[dict], folder: str | Path) -> None:
     order = list(TRACKS)
     rows = sorted(rows, key=lambda row: (order.index(row["track"]), -row["percent"], row["method"]))
     plain = [
-        {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()} for row in rows
+        {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()}
+        for row in rows
     ]
     write_csv(Path(folder) / TABLE, COLUMNS, plain)
 
 
 def packed(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> np.ndarray:
-    """Return what is kept of a method: counts (seeds, models) uint8, or values float16; parts: of each seed."""
+    """Return what is kept of a method: counts (seeds, models) uint8, or values float16; parts: of
+    each seed.
+    """
     found: Values = values_of(track, parts, classes)
     if track.headline != "accuracy":
         return found.values.astype(np.float16)

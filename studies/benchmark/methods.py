@@ -1,10 +1,12 @@
-"""The baselines by name: each trains on a track's samples and returns a function from samples to probabilities.
+"""The baselines by name: each trains on a track's samples and returns a function from samples to
+probabilities.
 
 majority class                  the class with the most training samples, always
 nearest centroid on moments     distance to each class's mean of the power spectrum's moments
-... on features                 classical methods on the physical features of `features.py` (`classical.py`)
-small CNN on images             the default's network: the reference
-frozen EfficientNet-Lite0, linear   ImageNet's features of the images, and least squares (`frozen.py`)
+... on features                 classical methods on the physical features of `features.py`
+(`classical.py`) small CNN on images             the default's network: the reference
+frozen EfficientNet-Lite0, linear   ImageNet's features of the images, and least squares
+(`frozen.py`)
 ... on signals                  networks on the stations' complex signals (`signal_networks.py`)
 audio-spectrogram transformer   on images (`backbones.py`)
 """
@@ -33,8 +35,8 @@ LEVELS = 2
 
 @dataclass(frozen=True)
 class Given:
-    """What a training is given: both parts with labels among `classes`, the training seed, the folder of its files, the
-    folder of kept features, and the configuration."""
+    """What a training is given: both parts with labels among `classes`, the training seed, the
+    folder of its files, the folder of kept features, and the configuration."""
 
     train: TrackSamples
     validation: TrackSamples
@@ -46,8 +48,8 @@ class Given:
 
 
 class Kept(NamedTuple):
-    """What methods see, computed once for all of them: by which function, of which files of a run, and by which
-    function of a file and the folder that keeps the results."""
+    """What methods see, computed once for all of them: by which function, of which files of a run,
+    and by which function of a file and the folder that keeps the results."""
 
     of: Callable
     files: str
@@ -63,9 +65,12 @@ def majority(given: Given) -> Answer:
 def centroid(given: Given) -> Answer:
     """Answer by the distance to the mean of each class's moments, in units of their deviations."""
     told = features_of(given.train, given.features, spectral_moments)
-    mean, scale = told.mean(0), np.maximum(told.std(0), 1e-9)
+    mean = told.mean(0)
+    scale = np.maximum(told.std(0), 1e-9)
     told = (told - mean) / scale
-    centres = np.array([told[given.train.labels == label].mean(0) for label in range(len(given.classes))])
+    centres = np.array(
+        [told[given.train.labels == label].mean(0) for label in range(len(given.classes))]
+    )
 
     def answer(samples: TrackSamples) -> np.ndarray:
         """Probabilities that fall off with the squared distance."""
@@ -90,26 +95,41 @@ def on_features(method: str, given: Given) -> Answer:
 def on_frozen(given: Given) -> Answer:
     """Train a linear classifier on the features of a frozen backbone with ImageNet's weights."""
     told, held = (embedded_of(part, given.features) for part in (given.train, given.validation))
-    answer = classical.fit("ridge", (told, given.train.labels), (held, given.validation.labels), given.seed)
+    answer = classical.fit(
+        "ridge", (told, given.train.labels), (held, given.validation.labels), given.seed
+    )
     return lambda samples: answer(embedded_of(samples, given.features))
 
 
-def network(given: Given, scheme: Scheme, build: Callable, source: Callable[[TrackSamples], Any]) -> Answer:
-    """Train a network and return its answers; source: makes the source of a training of a track's samples."""
+def network(
+    given: Given, scheme: Scheme, build: Callable, source: Callable[[TrackSamples], Any]
+) -> Answer:
+    """Train a network and return its answers; source: makes the source of a training of a track's
+    samples.
+    """
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
 
-    block, model = given.config["recognition"], given.folder / "model.safetensors"
+    block = given.config["recognition"]
+    model = given.folder / "model.safetensors"
     if not model.is_file():
         samples = {"train": source(given.train), "validation": source(given.validation)}
         kept = {key: block[key] for key in ("network", "training", "augmentation")}
-        settings = scheme.settled({
-            **kept, "size": samples["train"].size, "seed": given.seed, "classes": list(given.classes),
-            "colour_map": given.config["images"]["colour_map"],
-        })  # fmt: skip
+        settings = scheme.settled(
+            {
+                **kept,
+                "size": samples["train"].size,
+                "seed": given.seed,
+                "classes": list(given.classes),
+                "colour_map": given.config["images"]["colour_map"],
+            }
+        )
         runs.train(samples, scheme, given.train.track.protocol, settings, given.folder, build=build)
-    trained, settings = runs.load(model, build=build), block["evaluation"]
-    return lambda samples: runs.answers(trained, source(samples), settings, Machine.here(settings["precision"]))
+    trained = runs.load(model, build=build)
+    settings = block["evaluation"]
+    return lambda samples: runs.answers(
+        trained, source(samples), settings, Machine.here(settings["precision"])
+    )
 
 
 def on_images(backbone: str, given: Given) -> Answer:
@@ -124,7 +144,9 @@ def on_signals(backbone: str, given: Given) -> Answer:
     """Train a network on signals."""
     from signal_networks import SignalRecogniser
 
-    def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) -> SignalRecogniser:
+    def built(
+        scheme: Scheme, block: dict, size: int, colours: str, classes: int
+    ) -> SignalRecogniser:
         """Return a network on signals with fresh weights."""
         return SignalRecogniser(replace(scheme, backbone=backbone), block, size, classes)
 
@@ -145,7 +167,9 @@ METHODS: dict[str, Callable[[Given], Answer]] = {
     "complex-valued CNN on signals": lambda given: on_signals("complex", given),
     "XGBoost on features": lambda given: on_features("xgboost", given),
     "frozen EfficientNet-Lite0, linear": on_frozen,
-    "audio-spectrogram transformer": lambda given: on_images("studies/benchmark/backbones.py:ast_micro", given),
+    "audio-spectrogram transformer": lambda given: on_images(
+        "studies/benchmark/backbones.py:ast_micro", given
+    ),
     "transformer on signals": lambda given: on_signals("transformer", given),
 }
 """In the order in which a study trains them."""

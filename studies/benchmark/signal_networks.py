@@ -1,7 +1,8 @@
-"""Networks on the complex slow-time signals of the stations, without spectra: tokens, fusion and classifier.
+"""Networks on the complex slow-time signals of the stations, without spectra: tokens, fusion and
+classifier.
 
-A backbone turns signals (B, N) complex of unit power into features (B, width); the stations share it, and fuse as the
-images' views do. A scheme names one as its backbone:
+A backbone turns signals (B, N) complex of unit power into features (B, width); the stations share
+it, and fuse as the images' views do. A scheme names one as its backbone:
     cnn          real convolutions over time, real and imaginary part as two channels
     complex      complex convolutions, whose features do not depend on the signal's phase
     transformer  an encoder over short pieces of the signal
@@ -28,18 +29,25 @@ DEPTH = 3
 class Convolutions(nn.Module):
     """A one-dimensional convolutional network with mean and maximum over time.
 
-    Source: Wang, Yan and Oates, Time Series Classification from Scratch with Deep Neural Networks, IJCNN 2017. Group
-    norm instead of batch norm: statistics of one signal are the same on any number of ranks.
+    Source: Wang, Yan and Oates, Time Series Classification from Scratch with Deep Neural Networks,
+    IJCNN 2017. Group norm instead of batch norm: statistics of one signal are the same on any
+    number of ranks.
     """
 
     def __init__(self, symbols: int) -> None:
         """symbols: of a signal; any number works."""
         super().__init__()
-        layers, channels = [], 2
+        layers = []
+        channels = 2
         for count, kernel, stride in LAYERS:
-            layers += [nn.Conv1d(channels, count, kernel, stride, kernel // 2), nn.GroupNorm(8, count), nn.GELU()]
+            layers += [
+                nn.Conv1d(channels, count, kernel, stride, kernel // 2),
+                nn.GroupNorm(8, count),
+                nn.GELU(),
+            ]
             channels = count
-        self.layers, self.width = nn.Sequential(*layers), 2 * channels
+        self.layers = nn.Sequential(*layers)
+        self.width = 2 * channels
 
     def forward(self, signals: torch.Tensor) -> torch.Tensor:
         """Signals (B, N) complex -> features (B, width)."""
@@ -48,17 +56,20 @@ class Convolutions(nn.Module):
 
 
 class ComplexConvolution(nn.Module):
-    """One complex convolution, normalised to unit power per channel group, with modReLU as its nonlinearity.
+    """One complex convolution, normalised to unit power per channel group, with modReLU as its
+    nonlinearity.
 
-    No bias and no mean is taken off, so a signal turned by a phase gives the same output turned by that phase.
-    Source: Trabelsi et al., Deep Complex Networks, ICLR 2018 (initial weights); Arjovsky, Shah and Bengio, Unitary
-    Evolution Recurrent Neural Networks, ICML 2016 (modReLU).
+    No bias and no mean is taken off, so a signal turned by a phase gives the same output turned by
+    that phase.
+    Source: Trabelsi et al., Deep Complex Networks, ICLR 2018 (initial weights); Arjovsky, Shah and
+    Bengio, Unitary Evolution Recurrent Neural Networks, ICML 2016 (modReLU).
     """
 
     def __init__(self, channels: int, count: int, kernel: int, stride: int) -> None:
         """channels, count: of input and output; kernel, stride: in symbols."""
         super().__init__()
-        self.stride, self.padding = stride, kernel // 2
+        self.stride = stride
+        self.padding = kernel // 2
         # Rayleigh magnitudes and uniform phases are independent normal real and imaginary parts.
         deviation = (2 * channels * kernel) ** -0.5
         self.real = nn.Parameter(deviation * torch.randn(count, channels, kernel))
@@ -78,14 +89,20 @@ class ComplexConvolution(nn.Module):
 
 
 class ComplexConvolutions(nn.Module):
-    """A complex-valued convolutional network; mean and maximum of the magnitudes over time are its features."""
+    """A complex-valued convolutional network; mean and maximum of the magnitudes over time are its
+    features.
+    """
 
     def __init__(self, symbols: int) -> None:
         """symbols: of a signal; any number works."""
         super().__init__()
         counts = [1, *(count for count, _, _ in COMPLEX_LAYERS)]
-        layers = [ComplexConvolution(before, *layer) for before, layer in zip(counts, COMPLEX_LAYERS, strict=False)]
-        self.layers, self.width = nn.Sequential(*layers), 2 * counts[-1]
+        layers = [
+            ComplexConvolution(before, *layer)
+            for before, layer in zip(counts, COMPLEX_LAYERS, strict=False)
+        ]
+        self.layers = nn.Sequential(*layers)
+        self.width = 2 * counts[-1]
 
     def forward(self, signals: torch.Tensor) -> torch.Tensor:
         """Signals (B, N) complex -> features (B, width), the same for signals turned by a phase."""
@@ -95,10 +112,11 @@ class ComplexConvolutions(nn.Module):
 
 
 class Pieces(nn.Module):
-    """A small transformer: pieces of PIECE symbols as tokens, their places learned, the mean of all as the feature.
+    """A small transformer: pieces of PIECE symbols as tokens, their places learned, the mean of all
+    as the feature.
 
-    Source: Vaswani et al., Attention Is All You Need, NeurIPS 2017; pieces as in Nie et al., A Time Series is Worth 64
-    Words, ICLR 2023.
+    Source: Vaswani et al., Attention Is All You Need, NeurIPS 2017; pieces as in Nie et al., A Time
+    Series is Worth 64 Words, ICLR 2023.
     """
 
     def __init__(self, symbols: int) -> None:
@@ -109,7 +127,8 @@ class Pieces(nn.Module):
         super().__init__()
         if symbols < PIECE:
             raise InputError(f"network: signals of {symbols} symbols, expected at least {PIECE}")
-        self.count, self.width = symbols // PIECE, TOKEN
+        self.count = symbols // PIECE
+        self.width = TOKEN
         self.embed = nn.Linear(2 * PIECE, TOKEN)
         self.place = nn.Parameter(0.02 * torch.randn(self.count, TOKEN))
         self.encode = encoder(TOKEN, DEPTH, 4, 2, 0.0)
@@ -125,11 +144,13 @@ BACKBONES = {"cnn": Convolutions, "complex": ComplexConvolutions, "transformer":
 
 
 class SignalRecogniser(Fused):
-    """Slow-time signals of a scheme's stations to a logit for each class: shared backbone, fusion, classifier."""
+    """Slow-time signals of a scheme's stations to a logit for each class: shared backbone, fusion,
+    classifier.
+    """
 
     def __init__(self, scheme: Scheme, block: dict, symbols: int, classes: int) -> None:
-        """scheme: stations, backbone and fusion; block: `recognition.network`; symbols: of a signal; classes: their
-        number.
+        """scheme: stations, backbone and fusion; block: `recognition.network`; symbols: of a
+        signal; classes: their number.
 
         Raises: InputError for an unknown or missing key, or heads that do not fit.
         """
@@ -139,12 +160,16 @@ class SignalRecogniser(Fused):
         self.add_head(scheme.fusion, self.backbone.width, (len(scheme.stations), 1), block, classes)
 
     def tokens(self, signals: torch.Tensor) -> torch.Tensor:
-        """Signals (B, K, N) complex64 -> tokens (B, K, 1, features); each signal is brought to unit power."""
+        """Signals (B, K, N) complex64 -> tokens (B, K, 1, features); each signal is brought to unit
+        power.
+        """
         power = torch.view_as_real(signals).square().sum(-1).mean(-1, keepdim=True)
         scaled = signals * torch.rsqrt(torch.where(power > 0, power, 1))
         return self.backbone(scaled.flatten(0, 1)).unflatten(0, signals.shape[:2]).unsqueeze(2)
 
     @staticmethod
     def mirrored(signals: torch.Tensor) -> torch.Tensor:
-        """Return the signals with the opposite Doppler frequencies: the target turned by 180 degrees."""
+        """Return the signals with the opposite Doppler frequencies: the target turned by 180
+        degrees.
+        """
         return signals.conj().resolve_conj()

@@ -1,13 +1,16 @@
-"""Measured against simulated in numbers: figures of each class with intervals, distributions with floor and ceiling.
+"""Measured against simulated in numbers: figures of each class with intervals, distributions with
+floor and ceiling.
 
-measured-figures.csv: figures of whole recordings and of simulated scenes of the same length, one row a pair and figure.
-measured-distances.csv: Wasserstein distances of the figures of windows, in the figure's unit,
+measured-figures.csv: figures of whole recordings and of simulated scenes of the same length, one
+row a pair and figure. measured-distances.csv: Wasserstein distances of the figures of windows, in
+the figure's unit,
     floor      between the two halves of the measured set (by file)
     before     measured to simulated without the corrections of the model (`unmended`)
     distance   measured to simulated as recorded, low and high its 95 % interval over files
-    tuning     the same with the half of the recordings that set the scenes, test with the other half
-    learnt     measured to the wider scenes that networks learn from
-    ceiling    measured to the nearest other class: a measured one where the radar has one, else the twin's
+    tuning     the same with the half of the recordings that set the scenes, test with the other
+    half learnt     measured to the wider scenes that networks learn from
+    ceiling    measured to the nearest other class: a measured one where the radar has one, else the
+    twin's
 """
 
 from dataclasses import replace
@@ -27,19 +30,49 @@ from lowalt.extensions.recordings.windows import at_symbol_rate
 from lowalt.numerics.streams import stream
 
 FIGURES = (
-    "pair", "set", "label", "figure", "unit", "files", "measured", "measured_low", "measured_high", "scenes", "before",
-    "before_low", "before_high", "simulated", "simulated_low", "simulated_high",
-)  # fmt: skip
+    "pair",
+    "set",
+    "label",
+    "figure",
+    "unit",
+    "files",
+    "measured",
+    "measured_low",
+    "measured_high",
+    "scenes",
+    "before",
+    "before_low",
+    "before_high",
+    "simulated",
+    "simulated_low",
+    "simulated_high",
+)
 FILES = ("pair", "half", "file", "figure", "value")
 DISTANCES = (
-    "radar", "label", "figure", "unit", "files", "windows", "floor", "before", "distance", "low", "high", "tuning",
-    "test", "learnt", "ceiling", "ceiling_class",
-)  # fmt: skip
+    "radar",
+    "label",
+    "figure",
+    "unit",
+    "files",
+    "windows",
+    "floor",
+    "before",
+    "distance",
+    "low",
+    "high",
+    "tuning",
+    "test",
+    "learnt",
+    "ceiling",
+    "ceiling_class",
+)
 REPEATS = 400
 
 
 def unmended(scene: dict, mended: list[str]) -> dict:
-    """Return a scene without the keys `mended`, which correct the model; the foil on blades stays, as it was real."""
+    """Return a scene without the keys `mended`, which correct the model; the foil on blades stays,
+    as it was real.
+    """
     plain = {key: item for key, item in scene.items() if key not in mended}
     if "foils" in scene:
         plain["strength_db"] = {"foil": scene["strength_db"]["foil"]}
@@ -56,7 +89,9 @@ def summary(values: list[float], rng: np.random.Generator) -> tuple[float, float
 
 
 def figures_of(signal: np.ndarray, twin: Twin, pair: dict) -> dict[str, float]:
-    """Return the figures of a signal at the symbol rate, by the function that pair["figures"]["kind"] names."""
+    """Return the figures of a signal at the symbol rate, by the function that
+    pair["figures"]["kind"] names.
+    """
     spec = {**pair["figures"], "window": pair["window"], "hop": pair["hop"]}
     wavelength = SPEED_OF_LIGHT / twin.carrier_hz
     return KINDS[spec["kind"]](signal, 1 / twin.symbol_interval_s, wavelength, spec)
@@ -65,16 +100,22 @@ def figures_of(signal: np.ndarray, twin: Twin, pair: dict) -> dict[str, float]:
 def figure_rows(
     name: str, pair: dict, recordings: list[Measured], records: dict, settings: dict
 ) -> tuple[list[list], list[list]]:
-    """Return the rows of `FIGURES` of one pair, and those of `FILES` of every recording that its figures name.
+    """Return the rows of `FIGURES` of one pair, and those of `FILES` of every recording that its
+    figures name.
 
     settings: seed, mended and realisations of the file of pairs.
     """
     pattern = pair["figures"]["files"]
-    named = [recording for recording in recordings
-             if recording.like == pair["set"] and recording.record.file.match(pattern)]  # fmt: skip
+    named = [
+        recording
+        for recording in recordings
+        if recording.like == pair["set"] and recording.record.file.match(pattern)
+    ]
     if not named:
         return [], []
-    twin, seed, repeats = Twin.from_settings(pair["radar"]), settings["seed"], range(settings["realisations"])
+    twin = Twin.from_settings(pair["radar"])
+    seed = settings["seed"]
+    repeats = range(settings["realisations"])
     measured = []
     for recording in named:
         signal = at_symbol_rate(recording.record, twin, recording.read())
@@ -82,13 +123,18 @@ def figure_rows(
     sides = [measured]
     for scene in (unmended(pair["scene"], settings["mended"]), pair["scene"]):
         drawn = {**pair, "scene": scene}
-        sides.append([
-            figures_of(simulated_stretch(name, drawn, records, seed, again), twin, pair) for again in repeats
-        ])  # fmt: skip
+        sides.append(
+            [
+                figures_of(simulated_stretch(name, drawn, records, seed, again), twin, pair)
+                for again in repeats
+            ]
+        )
     rows = []
     for figure in measured[0]:
         rng = stream(seed, "figures", name, figure)
-        of_files, before, simulated = (summary([entry[figure] for entry in side], rng) for side in sides)
+        of_files, before, simulated = (
+            summary([entry[figure] for entry in side], rng) for side in sides
+        )
         head = [name, pair["set"], named[0].record.label, figure, unit(figure), len(named)]
         rows.append([*head, *of_files, len(repeats), *before, *simulated])
     return rows, [
@@ -105,35 +151,51 @@ def _table(intervals: np.ndarray, twin: Twin) -> np.ndarray:
 
 
 def _apart(tables: list[np.ndarray], other: np.ndarray, column: int) -> float:
-    """Return the Wasserstein distance of one figure between the joined tables and `other`; NaN without tables."""
+    """Return the Wasserstein distance of one figure between the joined tables and `other`; NaN
+    without tables.
+    """
     if not tables:
         return float("nan")
     return float(wasserstein_distance(np.concatenate(tables)[:, column], other[:, column]))
 
 
-def _measured(recordings: list[Measured], library: Library) -> dict[str, list[tuple[str, np.ndarray]]]:
+def _measured(
+    recordings: list[Measured], library: Library
+) -> dict[str, list[tuple[str, np.ndarray]]]:
     """Class -> (half, table) of each recording; files without a target are left out."""
     tables: dict[str, list[tuple[str, np.ndarray]]] = {}
     for recording in recordings:
         twin = recording.twin(library)
         windows = recording.windows(twin)
         if len(windows):
-            tables.setdefault(recording.record.label, []).append((recording.half, _table(windows, twin)))
+            tables.setdefault(recording.record.label, []).append(
+                (recording.half, _table(windows, twin))
+            )
     return tables
 
 
 def distance_rows(
-    name: str, recordings: list[Measured], library: Library, recorded: Library, mended: list[str], count: int
+    name: str,
+    recordings: list[Measured],
+    library: Library,
+    recorded: Library,
+    mended: list[str],
+    count: int,
 ) -> list[list]:
     """Return the rows of `DISTANCES` of one radar; `count` simulated windows stand for each class.
 
     recorded: scenes as they were in front of the radar; library: those that networks learn from.
     The interval resamples whole recordings: windows of one are not independent.
     """
-    measured = _measured([recording for recording in recordings if recording.radar == name], library)
+    measured = _measured(
+        [recording for recording in recordings if recording.radar == name], library
+    )
     if not measured:
         return []
-    before = {label: [unmended(scene, mended) for scene in scenes] for label, scenes in recorded.scenes[name].items()}
+    before = {
+        label: [unmended(scene, mended) for scene in scenes]
+        for label, scenes in recorded.scenes[name].items()
+    }
     plain = replace(recorded, scenes={name: before})
 
     def model(scenes: Library, label: str) -> np.ndarray:
@@ -145,14 +207,22 @@ def distance_rows(
     rows = []
     for label, files in measured.items():
         simulated = model(recorded, label), model(plain, label)
-        others = {other: [table for _, table in tables] for other, tables in measured.items() if other != label}
+        others = {
+            other: [table for _, table in tables]
+            for other, tables in measured.items()
+            if other != label
+        }
         if not others:
-            others = {f"{other}, simulated": [table] for other, table in learnt.items() if other != label}
+            others = {
+                f"{other}, simulated": [table] for other, table in learnt.items() if other != label
+            }
         for column, figure in enumerate(INTERVAL):
             rng = stream(library.seed, "distances", name, label, figure)
             row = _distances(files, simulated, column, rng)
-            far = {other: _apart([table for _, table in files], np.concatenate(tables), column)
-                   for other, tables in others.items()}  # fmt: skip
+            far = {
+                other: _apart([table for _, table in files], np.concatenate(tables), column)
+                for other, tables in others.items()
+            }
             nearest = min(far, key=far.get)
             windows = sum(len(table) for _, table in files)
             to_learnt = _apart([table for _, table in files], learnt[label], column)
@@ -162,9 +232,14 @@ def distance_rows(
 
 
 def _distances(
-    files: list[tuple[str, np.ndarray]], simulated: tuple[np.ndarray, np.ndarray], column: int, rng: np.random.Generator
+    files: list[tuple[str, np.ndarray]],
+    simulated: tuple[np.ndarray, np.ndarray],
+    column: int,
+    rng: np.random.Generator,
 ) -> list[float]:
-    """Floor, before, distance with its interval, tuning and test of one figure; simulated: as recorded, and before."""
+    """Floor, before, distance with its interval, tuning and test of one figure; simulated: as
+    recorded, and before.
+    """
     as_recorded, before = simulated
     tables = [table for _, table in files]
     sides = [[table for half, table in files if half == wanted] for wanted in HALVES]
@@ -175,4 +250,10 @@ def _distances(
     ]
     low, high = np.quantile(spread, [0.025, 0.975])
     whole = _apart(tables, before, column), _apart(tables, as_recorded, column)
-    return [floor, *whole, float(low), float(high), *(_apart(side, as_recorded, column) for side in sides)]
+    return [
+        floor,
+        *whole,
+        float(low),
+        float(high),
+        *(_apart(side, as_recorded, column) for side in sides),
+    ]

@@ -1,12 +1,13 @@
-"""What networks say of what they did not learn: noise, a waving hand, and cars in front of other radars.
+"""What networks say of what they did not learn: noise, a waving hand, and cars in front of other
+radars.
 
     python studies/measured/foreign.py --inputs FOLDER --out FOLDER [--models MODEL ...]
 
-Some inputs are simulated at each network's own carrier, rate and channel: white noise, and a hand that waves in front
-of a body that stands still (`hand`). The others are public recordings (`foreign.yaml`). The table
-measured-foreign.csv has one row a network and input: of the windows, how many hold nothing, are clipped, have a
-line beyond the network's speeds, or are named as which class. A recording at another carrier is refused: its windows
-are 0.
+Some inputs are simulated at each network's own carrier, rate and channel: white noise, and a hand
+that waves in front of a body that stands still (`hand`). The others are public recordings
+(`foreign.yaml`). The table measured-foreign.csv has one row a network and input: of the windows,
+how many hold nothing, are clipped, have a line beyond the network's speeds, or are named as which
+class. A recording at another carrier is refused: its windows are 0.
 """
 
 import argparse
@@ -29,19 +30,24 @@ from lowalt.recognition.zoo import opened
 
 RECORDS = Path(__file__).with_name("foreign.yaml")
 COLUMNS = ("network", "input", "windows", "nothing", "clipped", "beyond", *CATEGORIES)
-SECONDS, SEED = 12.0, 20260701
-HAND_M, HAND_HZ, DISTANCE_M = 0.15, 1.2, 0.8
+SECONDS = 12.0
+SEED = 20260701
+HAND_M = 0.15
+HAND_HZ = 1.2
+DISTANCE_M = 0.8
 HAND_DB = 20.0
 """How far the hand's echo stands above the noise of the receiver's band."""
 
 
 def hand(twin: Twin, share: float, rng: np.random.Generator) -> np.ndarray:
-    """Return the samples (n,) complex128 of a hand that moves to and fro by `HAND_M`, `HAND_HZ` times a second, in the
-    last `share` of the time, and of a body behind it that stands still, ten times as strong, in white noise of unit
-    power."""
+    """Return the samples (n,) complex128 of a hand that moves to and fro by `HAND_M`, `HAND_HZ`
+    times a second, in the last `share` of the time, and of a body behind it that stands still, ten
+    times as strong, in white noise of unit power."""
     times = np.arange(round(SECONDS * twin.rate_hz)) / twin.rate_hz
     wave = 4 * np.pi * twin.carrier_hz / SPEED_OF_LIGHT
-    distance_m = DISTANCE_M + HAND_M * np.sin(2 * np.pi * HAND_HZ * np.maximum(times - (1 - share) * SECONDS, 0))
+    distance_m = DISTANCE_M + HAND_M * np.sin(
+        2 * np.pi * HAND_HZ * np.maximum(times - (1 - share) * SECONDS, 0)
+    )
     size = 10 ** (HAND_DB / 20)
     body = np.sqrt(10) * size * np.exp(-1j * wave * (DISTANCE_M + 0.4))
     return size * np.exp(-1j * wave * distance_m) + body + noise(len(times), rng)
@@ -54,7 +60,9 @@ def noise(count: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, Record]]:
-    """Yield the name and record of each input of a radar; recorded: folder of the recordings; folder: for samples."""
+    """Yield the name and record of each input of a radar; recorded: folder of the recordings;
+    folder: for samples.
+    """
     count = round(SECONDS * twin.rate_hz)
     simulated = {
         "white noise": lambda rng: noise(count, rng),
@@ -68,7 +76,10 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
         yield name, record({"file": "samples.npy", **about}, folder, name)
     for block in load_yaml(RECORDS, "records")["records"]:
         name = block["what"]
-        yield name, record({key: value for key, value in block.items() if key != "what"}, recorded, name)
+        yield (
+            name,
+            record({key: value for key, value in block.items() if key != "what"}, recorded, name),
+        )
 
 
 def row(network: str, name: str, said: Answers | None) -> list:
@@ -77,8 +88,16 @@ def row(network: str, name: str, said: Answers | None) -> list:
         return [network, name, *[0] * (len(COLUMNS) - 2)]
     beyond = np.isfinite(said.beyond_mps) & ~said.clipped
     nothing = ~(said.present | said.clipped | beyond)
-    named = np.bincount(said.probabilities.argmax(1)[said.present], minlength=len(CATEGORIES)).tolist()
-    return [network, name, len(said.present), *(int(which.sum()) for which in (nothing, said.clipped, beyond)), *named]
+    named = np.bincount(
+        said.probabilities.argmax(1)[said.present], minlength=len(CATEGORIES)
+    ).tolist()
+    return [
+        network,
+        name,
+        len(said.present),
+        *(int(which.sum()) for which in (nothing, said.clipped, beyond)),
+        *named,
+    ]
 
 
 def main(arguments: list[str]) -> None:
@@ -86,7 +105,9 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser(prog="foreign.py", description=main.__doc__)
     line.add_argument("--inputs", required=True, type=Path, help="folder of the recordings")
     line.add_argument("--out", required=True, type=Path, help="folder to write")
-    line.add_argument("--models", nargs="+", default=list(radars()), help="files of networks, or names of the zoo")
+    line.add_argument(
+        "--models", nargs="+", default=list(radars()), help="files of networks, or names of the zoo"
+    )
     options = line.parse_args(arguments)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -94,7 +115,9 @@ def main(arguments: list[str]) -> None:
             trained, settings = opened(model)
             twin = Twin.from_settings(settings["radar"])
             for name, about in inputs_of(twin, options.inputs, Path(folder)):
-                said = answers(trained, settings, about, name) if twin.near(about.carrier_hz) else None
+                said = (
+                    answers(trained, settings, about, name) if twin.near(about.carrier_hz) else None
+                )
                 rows.append(row(trained.path.stem, name, said))
                 print(*rows[-1], sep=", ", flush=True)
     write_csv(options.out / "measured-foreign.csv", COLUMNS, rows)

@@ -1,4 +1,6 @@
-"""Pictures of the pairs, measured above simulated, and the page of all tables: what `study.py page` writes."""
+"""Pictures of the pairs, measured above simulated, and the page of all tables: what `study.py page`
+writes.
+"""
 
 import zipfile
 from pathlib import Path
@@ -16,7 +18,11 @@ from lowalt.report.page import assembled, templates
 
 TITLE = "Held against measurement"
 TEMPLATE = Path(__file__).with_name("page.html")
-ROWS = {"measured": "measured", "simulated": "simulated", "before": "simulated, before the model was mended"}
+ROWS = {
+    "measured": "measured",
+    "simulated": "simulated",
+    "before": "simulated, before the model was mended",
+}
 
 
 def read_pair(path: str | Path) -> dict:
@@ -26,19 +32,29 @@ def read_pair(path: str | Path) -> dict:
     """
     try:
         with np.load(existing(path, "pair of pictures"), allow_pickle=False) as data:
-            return {"caption": str(data["caption"]), **{name: data[name] for name in ("times_s", "speeds_mps", *ROWS)}}
+            return {
+                "caption": str(data["caption"]),
+                **{name: data[name] for name in ("times_s", "speeds_mps", *ROWS)},
+            }
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: not a pair of pictures ({error})") from error
 
 
 def pair_picture(pair: dict, rows: tuple[str, ...] = tuple(ROWS)) -> bytes:
-    """Return a PNG of some of a pair's images below each other, in decibels below each image's own largest value."""
-    speeds, times = pair["speeds_mps"], pair["times_s"]
+    """Return a PNG of some of a pair's images below each other, in decibels below each image's own
+    largest value.
+    """
+    speeds = pair["speeds_mps"]
+    times = pair["times_s"]
     corners = (times[0], times[-1], speeds[0], speeds[-1])
-    figure, panels = plt.subplots(len(rows), 1, figsize=(7, 2.6 * len(rows)), sharex=True, squeeze=False)
+    figure, panels = plt.subplots(
+        len(rows), 1, figsize=(7, 2.6 * len(rows)), sharex=True, squeeze=False
+    )
     floor_db = float(min(pair[row].min() for row in rows))
     for panel, row in zip(panels[:, 0], rows, strict=True):
-        drawn = panel.imshow(pair[row], extent=corners, origin="lower", aspect="auto", vmin=floor_db, vmax=0)
+        drawn = panel.imshow(
+            pair[row], extent=corners, origin="lower", aspect="auto", vmin=floor_db, vmax=0
+        )
         panel.set(title=ROWS[row], ylabel="radial speed (m/s)")
     panels[-1, 0].set_xlabel("time (s)")
     figure.suptitle(pair["caption"], fontsize=10)
@@ -55,7 +71,8 @@ def _address(path: Path) -> str:
 def page(folder: Path) -> str:
     """Return the page of the tables measured-*.csv and pictures in a folder.
 
-    Every recording's answers by all networks together stand there, the least right first, beside its spectra.
+    Every recording's answers by all networks together stand there, the least right first, beside
+    its spectra.
     Raises: InputError for a table that is missing or lacks a column.
     """
     figures = read_csv(folder / "measured-figures.csv", *FIGURES)
@@ -66,15 +83,32 @@ def page(folder: Path) -> str:
     for label in (label for label in CATEGORIES if label in {row["label"] for row in figures}):
         rows = [row for row in figures if row["label"] == label]
         pictures = {
-            pair: _address(folder / f"measured-{pair}.png") for pair in dict.fromkeys(row["pair"] for row in rows)
+            pair: _address(folder / f"measured-{pair}.png")
+            for pair in dict.fromkeys(row["pair"] for row in rows)
         }
-        classes.append({
-            "label": label, "figures": rows, "distances": [row for row in distances if row["label"] == label],
-            "pictures": [(pair, address) for pair, address in pictures.items() if address],
-        })  # fmt: skip
-    answers = sorted((row for row in recognition if row["seed"] == "mean"), key=lambda row: float(row["right_percent"]))
-    html = templates().from_string(TEMPLATE.read_text()).render(
-        classes=classes, categories=CATEGORIES, accuracy=[row for row in accuracy if row["class"] == "balanced"],
-        answers=[(row, _address(folder / f"spectra-{row['set']}-{row['file']}.png")) for row in answers],
-    )  # fmt: skip
+        classes.append(
+            {
+                "label": label,
+                "figures": rows,
+                "distances": [row for row in distances if row["label"] == label],
+                "pictures": [(pair, address) for pair, address in pictures.items() if address],
+            }
+        )
+    answers = sorted(
+        (row for row in recognition if row["seed"] == "mean"),
+        key=lambda row: float(row["right_percent"]),
+    )
+    html = (
+        templates()
+        .from_string(TEMPLATE.read_text())
+        .render(
+            classes=classes,
+            categories=CATEGORIES,
+            accuracy=[row for row in accuracy if row["class"] == "balanced"],
+            answers=[
+                (row, _address(folder / f"spectra-{row['set']}-{row['file']}.png"))
+                for row in answers
+            ],
+        )
+    )
     return assembled(TITLE, [{"id": "measured", "title": TITLE, "html": html}])

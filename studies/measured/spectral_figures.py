@@ -1,7 +1,8 @@
-"""Figures of spectra that a radar engineer reads off: edges, lines, widths, cycles, kurtosis and entropy.
+"""Figures of spectra that a radar engineer reads off: edges, lines, widths, cycles, kurtosis and
+entropy.
 
-All take signals or magnitudes of spectra with their axes and give numbers in m/s, Hz or s; measured and simulated
-signals go through the same functions.
+All take signals or magnitudes of spectra with their axes and give numbers in m/s, Hz or s; measured
+and simulated signals go through the same functions.
 """
 
 import numpy as np
@@ -18,7 +19,8 @@ EDGE_SHARE = 0.95
 
 
 def spectrum(interval: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return radial speeds (m/s, positive approaches) and power (n,) of an interval (symbols,), Hann window.
+    """Return radial speeds (m/s, positive approaches) and power (n,) of an interval (symbols,),
+    Hann window.
 
     edge_mps: the unambiguous speed; sides: as `speeds_shown` has them.
     """
@@ -39,7 +41,9 @@ def above_floor(power: np.ndarray) -> np.ndarray:
 
 
 def quantile(values: np.ndarray, weights: np.ndarray, shares: list[float]) -> np.ndarray:
-    """Return the values (shares,) at cumulative shares of weights (n,); values (n,) ascending, linear inside a bin."""
+    """Return the values (shares,) at cumulative shares of weights (n,); values (n,) ascending,
+    linear inside a bin.
+    """
     total = np.cumsum(weights)
     if total[-1] <= 0:
         return np.zeros(len(shares))
@@ -49,9 +53,10 @@ def quantile(values: np.ndarray, weights: np.ndarray, shares: list[float]) -> np
 def interval_figures(interval: np.ndarray, edge_mps: float, sides: str) -> dict[str, float]:
     """Return the figures `INTERVAL` of a coherent interval (symbols,).
 
-    edge: |speed| below which 95 % of the energy above the floor lies; line: |speed| of the strongest bin; width:
-    distance of the speeds below which 25 % and 75 % of that energy lie (all m/s). kurtosis: of the magnitudes, 3 for a
-    Gaussian; entropy: of the power as a distribution, over its largest value (0 for one line, 1 for white noise).
+    edge: |speed| below which 95 % of the energy above the floor lies; line: |speed| of the
+    strongest bin; width: distance of the speeds below which 25 % and 75 % of that energy lie (all
+    m/s). kurtosis: of the magnitudes, 3 for a Gaussian; entropy: of the power as a distribution,
+    over its largest value (0 for one line, 1 for white noise).
     """
     speeds, power = spectrum(interval, edge_mps, sides)
     shown = above_floor(power)
@@ -69,8 +74,11 @@ def interval_figures(interval: np.ndarray, edge_mps: float, sides: str) -> dict[
     }
 
 
-def spectrogram(signal: np.ndarray, rate_hz: float, window: int, hop: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times (s), frequencies (Hz) and magnitudes (frequencies, times) of a signal; the project's transform.
+def spectrogram(
+    signal: np.ndarray, rate_hz: float, window: int, hop: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times (s), frequencies (Hz) and magnitudes (frequencies, times) of a signal; the
+    project's transform.
 
     window: symbols, a power of two; times are the middles of the windows.
     """
@@ -81,13 +89,17 @@ def spectrogram(signal: np.ndarray, rate_hz: float, window: int, hop: int) -> tu
 
 
 def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: float) -> float:
-    """Return the spacing (Hz) of the lines of a comb in a signal's spectrum, searched between two bounds.
+    """Return the spacing (Hz) of the lines of a comb in a signal's spectrum, searched between two
+    bounds.
 
-    The spacing is a peak of the autocorrelation over frequency of the log spectrum less its running median. Multiples
-    of the spacing give peaks too, so the smallest spacing whose peak reaches 70 % of the highest is taken.
+    The spacing is a peak of the autocorrelation over frequency of the log spectrum less its running
+    median. Multiples of the spacing give peaks too, so the smallest spacing whose peak reaches 70 %
+    of the highest is taken.
     """
     length = min(len(signal), 1 << int(np.log2(rate_hz)))
-    frequency, power = welch(signal, rate_hz, nperseg=length, return_onesided=False, detrend="constant")
+    frequency, power = welch(
+        signal, rate_hz, nperseg=length, return_onesided=False, detrend="constant"
+    )
     order = np.argsort(frequency)
     level = 10 * np.log10(power[order] + 1e-300)
     step = rate_hz / length
@@ -95,7 +107,8 @@ def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: 
     level = np.clip(level, 0.0, 20.0)
     level -= level.mean()
     spread = np.fft.ifft(np.abs(np.fft.fft(level, 2 * len(level))) ** 2).real
-    first, last = round(low_hz / step), round(high_hz / step)
+    first = round(low_hz / step)
+    last = round(high_hz / step)
     peaks, _ = find_peaks(spread[first - 1 : last + 2])
     if not len(peaks):
         return float("nan")
@@ -108,15 +121,20 @@ def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: 
 
 
 def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> float:
-    """Return the time (s) after which a spectrogram (frequencies, times) repeats itself, between two bounds.
+    """Return the time (s) after which a spectrogram (frequencies, times) repeats itself, between
+    two bounds.
 
-    The mean autocorrelation over time of the rows' magnitudes, each row weighted by its own variance.
+    The mean autocorrelation over time of the rows' magnitudes, each row weighted by its own
+    variance.
     """
     rows = shown - shown.mean(axis=1, keepdims=True)
     count = rows.shape[1]
-    alike = np.fft.ifft(np.abs(np.fft.fft(rows, 2 * count, axis=1)) ** 2, axis=1).real.sum(axis=0)[:count]
+    alike = np.fft.ifft(np.abs(np.fft.fft(rows, 2 * count, axis=1)) ** 2, axis=1).real.sum(axis=0)[
+        :count
+    ]
     alike /= np.arange(count, 0, -1)
-    first, last = max(1, round(low_s / hop_s)), min(count - 2, round(high_s / hop_s))
+    first = max(1, round(low_s / hop_s))
+    last = min(count - 2, round(high_s / hop_s))
     peaks, _ = find_peaks(alike[first : last + 1])
     if not len(peaks):
         return float("nan")
@@ -126,14 +144,16 @@ def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> flo
 
 
 def tracks(shown: np.ndarray, speeds: np.ndarray, slowest_mps: float) -> dict[str, np.ndarray]:
-    """Return the speed of the strongest line (m/s), the edge (m/s) and whether the line counts, each (times,).
+    """Return the speed of the strongest line (m/s), the edge (m/s) and whether the line counts,
+    each (times,).
 
-    shown: magnitudes (speeds, times); speeds: (m/s), ascending. Speeds below `slowest_mps` are left out: they hold the
-    static part. edge: 95 % of the energy above the floor lies below it; counts: the line is 15 dB above the frame's
-    median.
+    shown: magnitudes (speeds, times); speeds: (m/s), ascending. Speeds below `slowest_mps` are left
+    out: they hold the static part. edge: 95 % of the energy above the floor lies below it; counts:
+    the line is 15 dB above the frame's median.
     """
     keep = np.abs(speeds) >= slowest_mps
-    power, kept = shown[keep] ** 2, np.abs(speeds[keep])
+    power = shown[keep] ** 2
+    kept = np.abs(speeds[keep])
     top = power.argmax(axis=0)
     floor = np.median(power, axis=0)
     order = np.argsort(kept, kind="stable")

@@ -1,10 +1,11 @@
 """Recordings of real radars held against the twins of these radars.
 
-    python studies/measured/study.py pairs | compare | noise | recognise --inputs FOLDER --out FOLDER
-    python studies/measured/study.py presence | page --out FOLDER
+    python studies/measured/study.py pairs | compare | noise | recognise --inputs FOLDER --out
+    FOLDER python studies/measured/study.py presence | page --out FOLDER
 
-FOLDER of the inputs: one folder a measured set (`sets.yaml`). `--out` gets the tables measured-*.csv, the pictures and
-report.html. `recognise` trains networks into the folder `--models`.
+FOLDER of the inputs: one folder a measured set (`sets.yaml`). `--out` gets the tables
+measured-*.csv, the pictures and report.html. `recognise` trains networks into the folder
+`--models`.
 """
 
 import argparse
@@ -38,7 +39,9 @@ class Inputs(NamedTuple):
 
 
 def _inputs(name: str, description: str, arguments: list[str], *, trains: bool = False) -> Inputs:
-    """Read a command's arguments and what they name; trains: whether it has the arguments of a training."""
+    """Read a command's arguments and what they name; trains: whether it has the arguments of a
+    training.
+    """
     line = argparse.ArgumentParser(f"study.py {name}", description=description)
     line.add_argument("--inputs", required=True, type=Path, help="folder of the measured sets")
     line.add_argument("--out", required=True, type=Path, help="folder to write")
@@ -47,10 +50,16 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
         line.add_argument("--count", type=int, default=60, help="simulated windows per class")
     if trains:
         line.add_argument("--models", required=True, type=Path, help="folder of the networks")
-        line.add_argument("--recognition", type=Path, default=Path("config/measured/recognition.yaml"))
+        line.add_argument(
+            "--recognition", type=Path, default=Path("config/measured/recognition.yaml")
+        )
     if name == "recognise":
-        line.add_argument("--reuse", action="store_true", help="take the networks that --models holds, train none")
-        line.add_argument("--only", type=Path, help="list of files by set (.yaml): take no other recordings")
+        line.add_argument(
+            "--reuse", action="store_true", help="take the networks that --models holds, train none"
+        )
+        line.add_argument(
+            "--only", type=Path, help="list of files by set (.yaml): take no other recordings"
+        )
         line.add_argument("--jobs", type=int, default=os.cpu_count(), help="radars at a time")
     options = line.parse_args(arguments)
     library = Library.read(options.radars)
@@ -66,7 +75,9 @@ def _cell(value: object) -> object:
 
 def _write(folder: Path, name: str, columns: tuple[str, ...], rows: list[list]) -> None:
     """Write rows as measured-NAME.csv into a folder."""
-    write_csv(folder / f"measured-{name}.csv", columns, ([_cell(value) for value in row] for row in rows))
+    write_csv(
+        folder / f"measured-{name}.csv", columns, ([_cell(value) for value in row] for row in rows)
+    )
 
 
 def pairs(arguments: list[str]) -> None:
@@ -76,39 +87,54 @@ def pairs(arguments: list[str]) -> None:
 
     from lowalt.extensions.recordings.twin import Twin
 
-    inputs, block = _inputs("pairs", pairs.__doc__, arguments), load_yaml(PAIRS)
+    inputs = _inputs("pairs", pairs.__doc__, arguments)
+    block = load_yaml(PAIRS)
     records = inputs.library.records
     files = {(recording.set, recording.name): recording for recording in inputs.recordings}
     for name, pair in block["pairs"].items():
-        recording, twin = files.get((pair["set"], pair["file"])), Twin.from_settings(pair["radar"])
+        recording = files.get((pair["set"], pair["file"]))
+        twin = Twin.from_settings(pair["radar"])
         if recording is None:
             print(f"{name}: {pair['file']} is not there, left out")
             continue
         before = {**pair, "scene": unmended(pair["scene"], block["mended"])}
-        measured = picture(measured_stretch(recording, twin, pair["start_s"], pair["seconds"]), twin, pair)
+        measured = picture(
+            measured_stretch(recording, twin, pair["start_s"], pair["seconds"]), twin, pair
+        )
         sides = {
             side: picture(simulated_stretch(name, drawn, records, block["seed"]), twin, pair)
             for side, drawn in (("simulated", pair), ("before", before))
         }
         with replacing(inputs.options.out / f"pair-{name}.npz") as temporary:
             np.savez(
-                temporary, caption=np.array(pair["caption"]), times_s=measured.times_s, speeds_mps=measured.speeds_mps,
-                **{side: shown.level_db.astype(np.float32) for side, shown in {"measured": measured, **sides}.items()},
-            )  # fmt: skip
+                temporary,
+                caption=np.array(pair["caption"]),
+                times_s=measured.times_s,
+                speeds_mps=measured.speeds_mps,
+                **{
+                    side: shown.level_db.astype(np.float32)
+                    for side, shown in {"measured": measured, **sides}.items()
+                },
+            )
 
 
 def compare(arguments: list[str]) -> None:
     """Compute measured-figures.csv, measured-files.csv and measured-distances.csv."""
     from comparison import DISTANCES, FIGURES, FILES, distance_rows, figure_rows
 
-    inputs, block = _inputs("compare", compare.__doc__, arguments), load_yaml(PAIRS)
-    options, library = inputs.options, inputs.library
+    inputs = _inputs("compare", compare.__doc__, arguments)
+    block = load_yaml(PAIRS)
+    options = inputs.options
+    library = inputs.library
     recorded = Library.read(options.radars, load_yaml(HERE / "recorded.yaml"))
     parts = [
-        figure_rows(name, pair, inputs.recordings, library.records, block) for name, pair in block["pairs"].items()
+        figure_rows(name, pair, inputs.recordings, library.records, block)
+        for name, pair in block["pairs"].items()
     ]
-    apart = [distance_rows(name, inputs.recordings, library, recorded, block["mended"], options.count)
-             for name in library.twins]  # fmt: skip
+    apart = [
+        distance_rows(name, inputs.recordings, library, recorded, block["mended"], options.count)
+        for name in library.twins
+    ]
     _write(options.out, "figures", FIGURES, [row for rows, _ in parts for row in rows])
     _write(options.out, "files", FILES, [row for _, rows in parts for row in rows])
     _write(options.out, "distances", DISTANCES, [row for rows in apart for row in rows])
@@ -119,11 +145,18 @@ def noise(arguments: list[str]) -> None:
     inputs = _inputs("noise", noise.__doc__, arguments)
     from noise_floors import NOISE, row
 
-    _write(inputs.options.out, "noise", NOISE, [row(one) for one in inputs.recordings if one.record.channel == "real"])
+    _write(
+        inputs.options.out,
+        "noise",
+        NOISE,
+        [row(one) for one in inputs.recordings if one.record.channel == "real"],
+    )
 
 
 def presence(arguments: list[str]) -> None:
-    """Compute measured-presence.csv: false alarms in simulated noise, and simulated targets that are found."""
+    """Compute measured-presence.csv: false alarms in simulated noise, and simulated targets that
+    are found.
+    """
     line = argparse.ArgumentParser("study.py presence", description=presence.__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder to write")
     line.add_argument("--radars", type=Path, default=RADARS, help="folder of the records of radars")
@@ -139,7 +172,9 @@ def presence(arguments: list[str]) -> None:
 
 
 def recognise(arguments: list[str]) -> None:
-    """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
+    """Train networks on the twins, test them on recordings: measured-recognition.csv and
+    measured-accuracy.csv.
+    """
     inputs = _inputs("recognise", recognise.__doc__, arguments, trains=True)
     from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
     from fetch import addresses
@@ -150,8 +185,8 @@ def recognise(arguments: list[str]) -> None:
     named = addresses(load_yaml(options.only, "list of recordings")) if options.only else None
     taken = [one for one in inputs.recordings if named is None or f"{one.set}/{one.name}" in named]
     shared = taken, inputs.library, block, options.models, options.out, options.reuse
-    # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
-    # last radar takes longest, so it starts first.
+    # The radars do not depend on each other, so neither their order nor the number of processes
+    # changes a result. The last radar takes longest, so it starts first.
     calls = [partial(radar_rows, name, *shared) for name in reversed(inputs.library.twins)]
     rows = [row for rows in reversed(together(calls, options.jobs, "spawn")) for row in rows]
     _write(options.out, "recognition", RECOGNITION, rows)
@@ -161,11 +196,16 @@ def recognise(arguments: list[str]) -> None:
 def write_page(arguments: list[str]) -> None:
     """Draw the pairs of pictures that there are, then write the page of all tables, report.html."""
     options = argparse.ArgumentParser("study.py page", description=write_page.__doc__)
-    options.add_argument("--out", required=True, type=Path, help="folder of measured-*.csv and pair-NAME.npz")
+    options.add_argument(
+        "--out", required=True, type=Path, help="folder of measured-*.csv and pair-NAME.npz"
+    )
     folder = options.parse_args(arguments).out
     from page import page, pair_picture, read_pair
 
-    pairs = {path.stem.removeprefix("pair-"): read_pair(path) for path in sorted(folder.glob("pair-*.npz"))}
+    pairs = {
+        path.stem.removeprefix("pair-"): read_pair(path)
+        for path in sorted(folder.glob("pair-*.npz"))
+    }
     pictures = {name: pair_picture(pair) for name, pair in pairs.items()}
     if "vehicle" in pairs:
         pictures["short"] = pair_picture(pairs["vehicle"], ("measured", "simulated"))

@@ -8,13 +8,25 @@ import pytest
 from lowalt.extensions.recordings.twin import Twin
 from lowalt.extensions.recordings.twin_echo import radii, sized
 from lowalt.extensions.recordings.twin_receiver import Receiver, clipped, highpassed, received
-from lowalt.extensions.recordings.twin_scenes import MARGIN, Library, clouds_of, intervals, samples, stretch
+from lowalt.extensions.recordings.twin_scenes import (
+    MARGIN,
+    Library,
+    clouds_of,
+    intervals,
+    samples,
+    stretch,
+)
 from lowalt.files.errors import InputError
 
 QUIET = {
-    "snr_db": 80.0, "flicker_db": -80.0, "flicker_hz": 5.0, "wander_db": 0.0, "leak_db": -80.0, "hum_db": -80.0,
+    "snr_db": 80.0,
+    "flicker_db": -80.0,
+    "flicker_hz": 5.0,
+    "wander_db": 0.0,
+    "leak_db": -80.0,
+    "hum_db": -80.0,
     "hum_hz": 50.0,
-}  # fmt: skip
+}
 LOOKING = Twin(24.0e9, "real", 6000.0, 1 / 3000.0, 400, "one_sided", 0.4, 15.0)
 
 
@@ -35,11 +47,14 @@ def test_the_high_pass_has_half_the_power_at_its_corner_and_falls_by_its_order()
 
 def test_levels_are_those_of_what_passes_the_high_pass():
     time = np.arange(60_000) / 6000.0
-    slow, fast = np.exp(2j * np.pi * 10.0 * time), 0.1 * np.exp(2j * np.pi * 1000.0 * time)
+    slow = np.exp(2j * np.pi * 10.0 * time)
+    fast = 0.1 * np.exp(2j * np.pi * 1000.0 * time)
     settings = Receiver.from_settings({**QUIET, "snr_db": 0.0, "highpass_hz": 100.0})
     noise = received(slow + fast, 6000.0, settings, False, np.random.default_rng(0), target=False)
     # The slow part is 40 dB down behind the filter, as strong as a tenth of the fast one.
-    assert np.mean(abs(noise) ** 2) == pytest.approx((0.01 + 1e-4) * (1 - 100.0 * 2 / 6000.0), rel=0.05)
+    assert np.mean(abs(noise) ** 2) == pytest.approx(
+        (0.01 + 1e-4) * (1 - 100.0 * 2 / 6000.0), rel=0.05
+    )
 
 
 def test_clipping_limits_and_hum_has_its_harmonics():
@@ -49,7 +64,11 @@ def test_clipping_limits_and_hum_has_its_harmonics():
     time = np.arange(6000) / 6000.0
     settings = Receiver.from_settings({**QUIET, "hum_db": 0.0, "hum_lines": 2.0})
     lines = abs(
-        np.fft.rfft(received(np.exp(2j * np.pi * 700 * time), 6000.0, settings, True, np.random.default_rng(0)))
+        np.fft.rfft(
+            received(
+                np.exp(2j * np.pi * 700 * time), 6000.0, settings, True, np.random.default_rng(0)
+            )
+        )
     )
     assert lines[50] / lines[700] == pytest.approx(1.0, rel=1e-3)
     assert lines[100] / lines[50] == pytest.approx(0.5, rel=1e-3)
@@ -80,8 +99,9 @@ def test_a_stretch_is_as_long_as_asked_and_begins_behind_the_margin():
 def test_simulated_windows_hold_a_target_where_a_receiver_can_hear_it(library):
     scene = {
         **library.scenes["cw_24ghz"]["Vehicle"][1],
-        "receiver": {**QUIET, "snr_db": [-60.0, 30.0]}, "second": {"share": 1.0, "level_db": 0.0},
-    }  # fmt: skip
+        "receiver": {**QUIET, "snr_db": [-60.0, 30.0]},
+        "second": {"share": 1.0, "level_db": 0.0},
+    }
     clouds = clouds_of(library.records, scene["subtypes"], 1)
     found, names = intervals(LOOKING, scene, clouds, 1, ("here",), 3, 2)
     np.testing.assert_array_equal(found, intervals(LOOKING, scene, clouds, 1, ("here",), 3, 2)[0])

@@ -6,23 +6,43 @@ import pytest
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.extensions.recordings.twin import Twin
 from lowalt.extensions.recordings.twin_courses import hover, straight, to_and_fro
-from lowalt.extensions.recordings.twin_echo import beam_gain, blade_points, echo, still_row, strengthened, textured
+from lowalt.extensions.recordings.twin_echo import (
+    beam_gain,
+    blade_points,
+    echo,
+    still_row,
+    strengthened,
+    textured,
+)
 from lowalt.extensions.recordings.twin_receiver import Receiver, received
-from lowalt.extensions.recordings.twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch
+from lowalt.extensions.recordings.twin_scenes import (
+    MARGIN,
+    Library,
+    clouds_of,
+    heard,
+    samples,
+    stretch,
+)
 from lowalt.files.errors import InputError
 from lowalt.targets.records import load_records
 
 QUIET = {
-    "snr_db": 60.0, "flicker_db": -60.0, "flicker_hz": 5.0, "wander_db": 0.0, "leak_db": -80.0, "hum_db": -80.0,
+    "snr_db": 60.0,
+    "flicker_db": -60.0,
+    "flicker_hz": 5.0,
+    "wander_db": 0.0,
+    "leak_db": -80.0,
+    "hum_db": -80.0,
     "hum_hz": 50.0,
-}  # fmt: skip
+}
 TWIN = Twin(3.3e9, "complex", 5000.0, 2e-4, 400, "bare", 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
 def records():
     return load_records(
-        "config/targets.csv", [f"config/targets/{name}.yaml" for name in ("uav", "bird", "vehicle", "pedestrian")]
+        "config/targets.csv",
+        [f"config/targets/{name}.yaml" for name in ("uav", "bird", "vehicle", "pedestrian")],
     )
 
 
@@ -39,9 +59,16 @@ def signal(records, twin, scene, seconds, seed=0):
 
 
 HOVER = {
-    "subtypes": ["DJI Mini 2"], "course": "hover", "distance_m": 3.0, "height_m": 0.5, "sway_m": 0.0, "sway_hz": 0.5,
-    "rock_deg": 0.0, "rate_hz": 161.0, "receiver": QUIET,
-}  # fmt: skip
+    "subtypes": ["DJI Mini 2"],
+    "course": "hover",
+    "distance_m": 3.0,
+    "height_m": 0.5,
+    "sway_m": 0.0,
+    "sway_hz": 0.5,
+    "rock_deg": 0.0,
+    "rate_hz": 161.0,
+    "receiver": QUIET,
+}
 
 
 def powers(signal, rate_hz):
@@ -50,13 +77,17 @@ def powers(signal, rate_hz):
     return np.fft.fftfreq(len(signal), 1 / rate_hz), power
 
 
-@pytest.mark.parametrize("foil, all_lines", [("10000000", True), ("11000000", False), ("11111111", False)])
+@pytest.mark.parametrize(
+    "foil, all_lines", [("10000000", True), ("11000000", False), ("11111111", False)]
+)
 def test_foil_on_one_blade_of_two_halves_the_spacing_of_the_lines(records, foil, all_lines):
     scene = {**HOVER, "strength_db": {"rotor": -20.0, "foil": 40.0}, "foils": [foil]}
     frequency, power = powers(signal(records, TWIN, scene, 1.2), 5000.0)
     turns = frequency / 161.0
     line = np.abs(turns - np.rint(turns)) < 0.02
-    odd, even = (power[line & (np.rint(turns) % 2 == rest) & (turns > 0.5)].sum() for rest in (1, 0))
+    odd, even = (
+        power[line & (np.rint(turns) % 2 == rest) & (turns > 0.5)].sum() for rest in (1, 0)
+    )
     assert (odd > 0.1 * even) == all_lines and (odd < 1e-3 * even) != all_lines
 
 
@@ -67,20 +98,33 @@ def test_the_doppler_edge_is_the_blade_tip_speed(records, quadrotor):
     share = np.cumsum(power[order]) / power.sum()
     edge = abs(frequency[order])[np.searchsorted(share, 0.95)] * SPEED_OF_LIGHT / 3.3e9 / 2
     blade = blade_points(quadrotor)[0]
-    reach = np.hypot(*(quadrotor.points[blade] - quadrotor.hinges[quadrotor.part[blade[0]]])[:, :2].T).max()
+    reach = np.hypot(
+        *(quadrotor.points[blade] - quadrotor.hinges[quadrotor.part[blade[0]]])[:, :2].T
+    ).max()
     assert edge == pytest.approx(2 * np.pi * 161.0 * reach, rel=0.12)
 
 
 def test_a_car_that_drives_past_shows_the_cosine_of_its_aspect(records):
     twin = Twin(24.0e9, "real", 12000.0, 2.5e-4, 400, "anti_aliased", 0.3, 15.0)
     scene = {
-        "subtypes": ["Audi A6L 2019"], "course": "pass", "lateral_m": 4.0, "ahead_m": 10.0, "height_m": 0.0,
-        "speed_mps": 8.0, "receiver": QUIET, "strength_db": {"wheel": -40.0},
-    }  # fmt: skip
+        "subtypes": ["Audi A6L 2019"],
+        "course": "pass",
+        "lateral_m": 4.0,
+        "ahead_m": 10.0,
+        "height_m": 0.0,
+        "speed_mps": 8.0,
+        "receiver": QUIET,
+        "strength_db": {"wheel": -40.0},
+    }
     received_signal = signal(records, twin, scene, 1.5)
     starts = np.arange(0, len(received_signal) - 512, 128)
     spectra = [powers(received_signal[start : start + 512], 4000.0) for start in starts]
-    line = np.array([frequency[power.argmax()] for frequency, power in spectra]) * SPEED_OF_LIGHT / 24.0e9 / 2
+    line = (
+        np.array([frequency[power.argmax()] for frequency, power in spectra])
+        * SPEED_OF_LIGHT
+        / 24.0e9
+        / 2
+    )
     along = 10.0 + 8.0 * (starts + 256 + MARGIN) * 2.5e-4
     wanted = 8.0 * along / np.hypot(along, 4.0)
     # The car is 5 m long, and its near end is the strong one: half its length shifts the aspect.
@@ -136,11 +180,21 @@ def test_the_twins_echo_is_a_direct_sum_over_the_points(quadrotor):
 
 
 def test_a_walker_s_gait_begins_where_its_row_says(records):
-    cloud, times = clouds_of(records, ["Walking Pedestrian 1"], 1)["Walking Pedestrian 1"], np.arange(16) / 5000.0
+    cloud = clouds_of(records, ["Walking Pedestrian 1"], 1)["Walking Pedestrian 1"]
+    times = np.arange(16) / 5000.0
     course = straight(times, np.array([0.5, 4.0, 1.0]), 1.0, 0.7)
     row = still_row(cloud, 0.0, np.random.default_rng(1))
     later, moved, first = (
-        echo(TWIN, cloud, row | {"start_s": start_s}, course._replace(clock_s=times + clock_s), times, 0.0, 0.0, None)
+        echo(
+            TWIN,
+            cloud,
+            row | {"start_s": start_s},
+            course._replace(clock_s=times + clock_s),
+            times,
+            0.0,
+            0.0,
+            None,
+        )
         for start_s, clock_s in ((0.4, 0.0), (0.0, 0.4), (0.0, 0.0))
     )
     np.testing.assert_allclose(later, moved, atol=1e-9 * abs(moved).max())
@@ -162,7 +216,9 @@ def test_strengths_and_textures_touch_what_they_name(quadrotor):
         mine = quadrotor.part == part
         assert uneven.rcs_m2[mine].mean() == pytest.approx(quadrotor.rcs_m2[mine].mean())
         assert uneven.rcs_m2[mine].std() > 0
-    assert textured(quadrotor, 0.0, 0.0, np.random.default_rng(0)).rcs_m2 == pytest.approx(quadrotor.rcs_m2)
+    assert textured(quadrotor, 0.0, 0.0, np.random.default_rng(0)).rcs_m2 == pytest.approx(
+        quadrotor.rcs_m2
+    )
 
 
 def test_the_beam_is_half_the_power_one_way_at_half_its_width():
@@ -184,15 +240,22 @@ def test_the_receiver_adds_as_much_as_set():
 
 
 def test_wander_has_its_rms_in_decibels_and_flicker_its_corner():
-    rng, steady = np.random.default_rng(0), np.exp(2j * np.pi * 700 / 5000 * np.arange(200_000))
-    wandering = received(steady, 5000.0, Receiver.from_settings({**QUIET, "wander_db": 3.0}), False, rng)
+    rng = np.random.default_rng(0)
+    steady = np.exp(2j * np.pi * 700 / 5000 * np.arange(200_000))
+    wandering = received(
+        steady, 5000.0, Receiver.from_settings({**QUIET, "wander_db": 3.0}), False, rng
+    )
     assert np.std(20 * np.log10(abs(wandering))) == pytest.approx(3.0, rel=0.02)
     # Flicker has half of its density at the corner, and a hundredth at ten times that.
-    settings = Receiver.from_settings({**QUIET, "snr_db": 0.0, "flicker_db": 30.0, "flicker_hz": 50.0})
+    settings = Receiver.from_settings(
+        {**QUIET, "snr_db": 0.0, "flicker_db": 30.0, "flicker_hz": 50.0}
+    )
     noise = received(steady, 5000.0, settings, False, rng, target=False).reshape(100, 2000)
     density = np.mean(abs(np.fft.fft(noise, axis=1)) ** 2, axis=0) / 2000
-    low, corner, high = (density[np.arange(2000) * 2.5 // width == place].mean()
-                         for width, place in ((5.0, 0), (5.0, 10), (50.0, 10)))  # fmt: skip
+    low, corner, high = (
+        density[np.arange(2000) * 2.5 // width == place].mean()
+        for width, place in ((5.0, 0), (5.0, 10), (50.0, 10))
+    )
     assert (corner / low, high / low) == pytest.approx((0.5, 0.0106), rel=0.15)
 
 
@@ -203,4 +266,6 @@ def test_the_craft_at_3_ghz_has_propellers_of_its_maker_s_length():
     for blades in range(1, 5):
         tips = cloud.points[cloud.part == blades]
         # 4.7 inches from tip to tip.
-        assert np.linalg.norm(tips[:, None] - tips, axis=2).max() == pytest.approx(4.7 * 0.0254, abs=5e-4)
+        assert np.linalg.norm(tips[:, None] - tips, axis=2).max() == pytest.approx(
+            4.7 * 0.0254, abs=5e-4
+        )

@@ -1,6 +1,8 @@
-"""Draw a few targets under choices: `python studies/open-choices/picture.py OUT.png [--rows NAME ...]`.
+"""Draw a few targets under choices: `python studies/open-choices/picture.py OUT.png [--rows NAME
+...]`.
 
-One row per target, two columns per choice (VRP and TRP of station A, no noise, the same motion model throughout).
+One row per target, two columns per choice (VRP and TRP of station A, no noise, the same motion
+model throughout).
 """
 
 import argparse
@@ -17,18 +19,32 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.shards.dataset import Dataset
 from lowalt.tiles import colour_map
 
-TARGETS = ("DJI Mini 2", "Type-A Firefighting UAV", "EH 216 S", "Audi A6L 2019", "Kingfisher", "Sparrow")
+TARGETS = (
+    "DJI Mini 2",
+    "Type-A Firefighting UAV",
+    "EH 216 S",
+    "Audi A6L 2019",
+    "Kingfisher",
+    "Sparrow",
+)
 
 
 def images_of(table: dict, block: dict, model: int) -> dict[str, np.ndarray]:
-    """Return the images (9, S, S) uint8 of each target's motion model under a row's choice, without noise."""
+    """Return the images (9, S, S) uint8 of each target's motion model under a row's choice, without
+    noise.
+    """
     config = merge(merge(trainings.config_of(), table["base"]), block.get("overlay", {}))
     config["targets"]["select"] = list(TARGETS)
-    dataset, local = Dataset(config), block.get("local", {})
+    dataset = Dataset(config)
+    local = block.get("local", {})
     rows = [row for row in motion_rows(dataset, local) if row["model"] == model]
-    signals = clean(dataset, local, rows, list(config["network"]["stations"]))[local.get("cell", "")]
-    return {row["subtype"]: dataset.maker.renderer.some(signals[:, place], list(range(9)))
-            for place, row in enumerate(rows)}  # fmt: skip
+    signals = clean(dataset, local, rows, list(config["network"]["stations"]))[
+        local.get("cell", "")
+    ]
+    return {
+        row["subtype"]: dataset.maker.renderer.some(signals[:, place], list(range(9)))
+        for place, row in enumerate(rows)
+    }
 
 
 def main(arguments: list[str]) -> None:
@@ -39,8 +55,13 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--model", type=int, default=0, help="motion model (default: 0)")
     given = line.parse_args(arguments)
     table = load_yaml(HERE / "choices.yaml")
-    figure, axes = plt.subplots(len(TARGETS), 2 * len(given.rows), squeeze=False, layout="constrained",
-                                figsize=(3.2 * len(given.rows), 1.6 * len(TARGETS)))  # fmt: skip
+    figure, axes = plt.subplots(
+        len(TARGETS),
+        2 * len(given.rows),
+        squeeze=False,
+        layout="constrained",
+        figsize=(3.2 * len(given.rows), 1.6 * len(TARGETS)),
+    )
     for place, name in enumerate(given.rows):
         images = images_of(table, table["rows"][name], given.model)
         for row, target in enumerate(TARGETS):
@@ -49,7 +70,9 @@ def main(arguments: list[str]) -> None:
                 axis.imshow(colour_map("viridis")[images[target][number]])
                 axis.set(xticks=[], yticks=[])
                 if row == 0:
-                    axis.set_title(f"{name}\n{kind}" if column == 0 else kind, fontsize=7, loc="left")
+                    axis.set_title(
+                        f"{name}\n{kind}" if column == 0 else kind, fontsize=7, loc="left"
+                    )
                 if place == column == 0:
                     axis.set_ylabel(target, fontsize=7)
     figure.savefig(given.out, dpi=75)

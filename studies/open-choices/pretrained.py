@@ -1,8 +1,8 @@
 """What ImageNet's weights bring: `python studies/open-choices/pretrained.py [--weights FILE.pth]`.
 
-EfficientNet-Lite0 as a frozen backbone, with ImageNet's weights and with random ones, and a linear classifier on the
-features of all images, on samples as those of the row `base` of `choices.yaml`. Both protocols share one extraction.
-Writes results/pretrained.csv.
+EfficientNet-Lite0 as a frozen backbone, with ImageNet's weights and with random ones, and a linear
+classifier on the features of all images, on samples as those of the row `base` of `choices.yaml`.
+Both protocols share one extraction. Writes results/pretrained.csv.
 """
 
 import argparse
@@ -33,7 +33,9 @@ from lowalt.tiles import colour_map
 
 
 class Run(NamedTuple):
-    """Samples: pixels a side, stations, motion models of each subtype, SNRs (dB); and seeds of random weights."""
+    """Samples: pixels a side, stations, motion models of each subtype, SNRs (dB); and seeds of
+    random weights.
+    """
 
     pixels: int
     stations: str
@@ -53,7 +55,8 @@ STRENGTHS = (1e-4, 1e-3, 1e-2)
 
 
 def features(images: np.ndarray, weights: str, seed: int, colours: str) -> np.ndarray:
-    """Return the features (samples, views, 1280) float32 of index images (samples, views, S, S), frozen.
+    """Return the features (samples, views, 1280) float32 of index images (samples, views, S, S),
+    frozen.
 
     weights: a file, or "none" for random ones of a seed; colours: name of the colour map.
     """
@@ -67,33 +70,56 @@ def features(images: np.ndarray, weights: str, seed: int, colours: str) -> np.nd
         for start in range(0, len(images), 32):
             batch = torch.from_numpy(images[start : start + 32])
             coloured = palettes(batch.flatten(0, 1)[:, None, None]).flatten(0, 2)
-            found.append(model(coloured.contiguous(memory_format=torch.channels_last)).view(*batch.shape[:2], -1))
+            found.append(
+                model(coloured.contiguous(memory_format=torch.channels_last)).view(
+                    *batch.shape[:2], -1
+                )
+            )
     return torch.cat(found).numpy()
 
 
 def answers(told: np.ndarray, facts: Facts, protocol: str) -> np.ndarray:
-    """Return the label (samples,) that a linear classifier gives each sample; told: features (samples, F).
+    """Return the label (samples,) that a linear classifier gives each sample; told: features
+    (samples, F).
 
-    Weights of the least penalty are combinations of the samples that train, so it is trained on these alone: on as many
-    coordinates as there are of them.
+    Weights of the least penalty are combinations of the samples that train, so it is trained on
+    these alone: on as many coordinates as there are of them.
     """
-    pairs = np.array([f"{group} {fold}" for group, fold in zip(facts.group, facts.fold, strict=True)])
-    parts = {part: np.isin(pairs, [" ".join(pair) for pair in folds(protocol, part)]) for part in trainings.PARTS}
+    pairs = np.array(
+        [f"{group} {fold}" for group, fold in zip(facts.group, facts.fold, strict=True)]
+    )
+    parts = {
+        part: np.isin(pairs, [" ".join(pair) for pair in folds(protocol, part)])
+        for part in trainings.PARTS
+    }
     scaled = StandardScaler().fit(told[parts["train"]]).transform(told)
     values, vectors = np.linalg.eigh(scaled[parts["train"]] @ scaled[parts["train"]].T)
     kept = values > values[-1] * 1e-6
     seen = (scaled @ scaled[parts["train"]].T) @ (vectors[:, kept] / np.sqrt(values[kept]))
     tried = []
     for strength in STRENGTHS:
-        model = LogisticRegression(C=strength, max_iter=300).fit(seen[parts["train"]], facts.label[parts["train"]])
-        tried.append((model.score(seen[parts["validation"]], facts.label[parts["validation"]]), strength, model))
+        model = LogisticRegression(C=strength, max_iter=300).fit(
+            seen[parts["train"]], facts.label[parts["train"]]
+        )
+        tried.append(
+            (
+                model.score(seen[parts["validation"]], facts.label[parts["validation"]]),
+                strength,
+                model,
+            )
+        )
     return max(tried, key=lambda one: one[:2])[2].predict(seen)
 
 
 def samples_of(run: Run, base: dict) -> tuple[ViewSamples, str, dict]:
     """Return the samples of a run, a name for what decides them, and their configuration."""
-    more = {"motion": {"models": run.models, "models_per_chunk": run.models}, "noise": {"snr_db": run.snr_db}}
-    config = merge(merge(merge(trainings.config_of(), base), more), {"recognition": {"size": run.pixels}})
+    more = {
+        "motion": {"models": run.models, "models_per_chunk": run.models},
+        "noise": {"snr_db": run.snr_db},
+    }
+    config = merge(
+        merge(merge(trainings.config_of(), base), more), {"recognition": {"size": run.pixels}}
+    )
     scheme = named(TABLE, f"{run.stations}:VRP+TRP+VT", list(config["network"]["stations"]))
     name = key_of(config["seed"], run.models, run.snr_db, run.pixels, run.stations)
     path = OUT / f"views/pretrained-{name}.npz"
@@ -122,13 +148,16 @@ def rows_of(run: Run, base: dict) -> list[list]:
             views = told if stations == run.stations else told[:, :3]
             answer = answers(views.reshape(len(told), -1), every.facts, protocol)
             right.setdefault((stations, protocol, words), []).append(answer == every.facts.label)
-    rows, facts = [], every.facts
+    rows = []
+    facts = every.facts
     pairs = list(zip(facts.group.tolist(), facts.fold.tolist(), strict=True))
     for (stations, protocol, words), correct in right.items():
         tests = np.array([pair in folds(protocol, "test") for pair in pairs])
         found = Held(facts.take(tests), [one[tests] for one in correct])
         # Subtypes are drawn again only where they are held out.
-        whole = found.difference(None, "", config["seed"], words, protocol, stations, whole=protocol == "unseen")
+        whole = found.difference(
+            None, "", config["seed"], words, protocol, stations, whole=protocol == "unseen"
+        )
         each = percents(found.share(subtype) for subtype in list(NAMED.values())[1:])
         about = run.pixels, run.models, len(run.snr_db), stations, protocol, words, len(correct)
         rows.append([*about, *percents(whole), *each, found.worst(), describe()])
@@ -138,16 +167,34 @@ def rows_of(run: Run, base: dict) -> list[list]:
 def main(arguments: list[str]) -> None:
     """Extract features, train the classifiers and write the table after each run."""
     line = argparse.ArgumentParser("pretrained.py", description=__doc__.splitlines()[0])
-    line.add_argument("--out", type=Path, default=HERE / "results/pretrained.csv", help="table to write (.csv)")
-    line.add_argument("--weights", type=Path, help="write ImageNet's weights into this file (.pth), and nothing else")
+    line.add_argument(
+        "--out", type=Path, default=HERE / "results/pretrained.csv", help="table to write (.csv)"
+    )
+    line.add_argument(
+        "--weights",
+        type=Path,
+        help="write ImageNet's weights into this file (.pth), and nothing else",
+    )
     given = line.parse_args(arguments)
     if given.weights:
         print(f"{write_weights(given.weights)}: weights of {BACKBONE}")
         return
-    base, rows = load_yaml(HERE / "choices.yaml")["base"], []
+    base = load_yaml(HERE / "choices.yaml")["base"]
+    rows = []
     for one in RUNS:
         rows += rows_of(one, base)
-        columns = "pixels", "models", "snrs", "stations", "protocol", "weights", "seeds", "percent", "low", "high"
+        columns = (
+            "pixels",
+            "models",
+            "snrs",
+            "stations",
+            "protocol",
+            "weights",
+            "seeds",
+            "percent",
+            "low",
+            "high",
+        )
         write_csv(given.out, (*columns, *list(NAMED)[1:], "worst", "hardware"), rows)
 
 

@@ -1,9 +1,11 @@
-"""One choice of the paper at a time: `python studies/open-choices/study.py [--table TABLE.yaml] [--rows NAME ...]`.
+"""One choice of the paper at a time: `python studies/open-choices/study.py [--table TABLE.yaml]
+[--rows NAME ...]`.
 
-Each row of `choices.yaml` makes the data of its change, trains the small network three times on the subtypes that the
-unseen protocol trains on, and is judged by the twenty others. Clean signals are kept by what decides them, so a row
-repeats only the stages that it changes, and an interrupted run goes on where it stopped.
-Writes NAME.csv (a row a choice) and NAME-subtypes.csv (a row a choice and held-out subtype), NAME that of the table.
+Each row of `choices.yaml` makes the data of its change, trains the small network three times on the
+subtypes that the unseen protocol trains on, and is judged by the twenty others. Clean signals are
+kept by what decides them, so a row repeats only the stages that it changes, and an interrupted run
+goes on where it stopped. Writes NAME.csv (a row a choice) and NAME-subtypes.csv (a row a choice and
+held-out subtype), NAME that of the table.
 """
 
 import argparse
@@ -21,13 +23,19 @@ from lowalt.files.yaml_files import load_yaml
 
 
 def side_by_side(table: dict, seeds: int, workers: int) -> None:
-    """Make the samples of all rows or, of so many of the table's seeds, their trainings, in processes side by side."""
+    """Make the samples of all rows or, of so many of the table's seeds, their trainings, in
+    processes side by side.
+    """
     jobs = [
-        (merge(merge(trainings.config_of(), table["base"]), block.get("overlay", {})), block.get("local", {}),
-         table["scheme"], seed)
+        (
+            merge(merge(trainings.config_of(), table["base"]), block.get("overlay", {})),
+            block.get("local", {}),
+            table["scheme"],
+            seed,
+        )
         for seed in table["base"]["recognition"]["seeds"][:seeds] or [None]
         for block in table["rows"].values()
-    ]  # fmt: skip
+    ]
     trainings.side_by_side(made, jobs, workers)
 
 
@@ -39,19 +47,35 @@ def made(job: tuple) -> None:
 def main(arguments: list[str]) -> None:
     """Run every row that is not there yet, and write the tables after each."""
     line = argparse.ArgumentParser("study.py", description=__doc__.splitlines()[0])
-    line.add_argument("--table", type=Path, default=HERE / "choices.yaml", help="table of rows (.yaml)")
+    line.add_argument(
+        "--table", type=Path, default=HERE / "choices.yaml", help="table of rows (.yaml)"
+    )
     line.add_argument("--out", type=Path, default=HERE / "results", help="folder of the tables")
     line.add_argument("--rows", nargs="+", help="first row and others to run (default: all)")
-    line.add_argument("--finished", action="store_true", help="tables of what is finished, without a training")
-    line.add_argument("--svm", action="store_true", help="a support vector machine instead of the network")
-    line.add_argument("--scheme", help="another scheme than the table's; its name goes into those of the tables")
-    line.add_argument("--workers", type=int, help="make samples, then trainings, in as many processes side by side")
+    line.add_argument(
+        "--finished", action="store_true", help="tables of what is finished, without a training"
+    )
+    line.add_argument(
+        "--svm", action="store_true", help="a support vector machine instead of the network"
+    )
+    line.add_argument(
+        "--scheme", help="another scheme than the table's; its name goes into those of the tables"
+    )
+    line.add_argument(
+        "--workers",
+        type=int,
+        help="make samples, then trainings, in as many processes side by side",
+    )
     given = line.parse_args(arguments)
     table = load_yaml(given.table)
     if given.scheme:
         table["name"] += f"-{given.scheme.partition(':')[0]}"
         table["scheme"] = given.scheme
-    table["rows"] = {name: block for name, block in table["rows"].items() if name in (given.rows or table["rows"])}
+    table["rows"] = {
+        name: block
+        for name, block in table["rows"].items()
+        if name in (given.rows or table["rows"])
+    }
     paths: dict[str, list[Path]] = {}
     if given.svm:
         table["name"] += "-svm"
@@ -67,7 +91,11 @@ def main(arguments: list[str]) -> None:
             path = judged(config, block.get("local", {}), table["scheme"], seed, not given.finished)
             if path is not None:
                 paths.setdefault(name, []).append(path)
-                print(f"{name}, seed {seed}: {time.process_time() - began:.0f} core-s", file=sys.stderr, flush=True)
+                print(
+                    f"{name}, seed {seed}: {time.process_time() - began:.0f} core-s",
+                    file=sys.stderr,
+                    flush=True,
+                )
         if not given.finished:
             write_tables(table, paths, given.out)
     if given.finished:

@@ -2,7 +2,14 @@
 
 import numpy as np
 import pytest
-from local_choices import changed_cloud, changed_row, continuous, local_effects, sample_of, signals_by_cell
+from local_choices import (
+    changed_cloud,
+    changed_row,
+    continuous,
+    local_effects,
+    sample_of,
+    signals_by_cell,
+)
 
 from lowalt.config.layers import overlaid
 from lowalt.config.network import SPEED_OF_LIGHT
@@ -28,17 +35,22 @@ def row(dataset):
 
 def test_rotors_start_together_turn_in_one_sense_or_at_rates_of_their_own(dataset, row):
     cloud = dataset.clouds[CRAFT]
-    rotors, phases = cloud.parts_of("rotor"), [f"phase_{order}_rad" for order in range(8)]
+    rotors = cloud.parts_of("rotor")
+    phases = [f"phase_{order}_rad" for order in range(8)]
     assert len(rotors) == 8 and len({row[name] for name in phases}) == 8
     assert {changed_row(row, cloud, {"rotors": "aligned"})[name] for name in phases} == {0.0}
-    assert {changed_row(row, cloud, {"rotors": "step"})[name] for name in phases} == {row[phases[0]]}
+    assert {changed_row(row, cloud, {"rotors": "step"})[name] for name in phases} == {
+        row[phases[0]]
+    }
     assert {-1.0, 1.0} == set(cloud.axes[rotors, 2]) and set(
         changed_cloud(cloud, {"rotors": "alike"}, {}).axes[rotors, 2]
     ) == {1.0}
     (effect,) = local_effects({"rotors": "rates"}, dataset.published[CRAFT], 1)
     turns = effect.module.perturb({}, cloud, row, np.array([0.0, 1.0]), None).angle_rad
     rates = [row["rate_hz"] + angle[1] / (2 * np.pi) for angle in turns.values()]
-    assert list(turns) == list(rotors) and len(set(rates)) == 8 and 30 <= min(rates) < max(rates) <= 60
+    assert (
+        list(turns) == list(rotors) and len(set(rates)) == 8 and 30 <= min(rates) < max(rates) <= 60
+    )
 
 
 def test_a_craft_flies_along_its_nose_as_fast_as_drawn(dataset, row):
@@ -52,9 +64,20 @@ def test_a_craft_flies_along_its_nose_as_fast_as_drawn(dataset, row):
 def moving_point(speed: float) -> tuple[Cloud, dict]:
     """One point that leaves station A along its normal, 30 degrees from +x, from 200 m on."""
     away = np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0.0])
-    nothing, one = np.zeros((1, 3)), np.zeros(1, np.int64)
-    names = {"kinds": ("body",), "names": ("body",), "record": {"subtype": "point", "category": "UAV"}}
-    arrays = {"hinges": nothing, "axes": nothing, "track": np.zeros((0, 0, 3)), "parents": one - 1, "part": one}
+    nothing = np.zeros((1, 3))
+    one = np.zeros(1, np.int64)
+    names = {
+        "kinds": ("body",),
+        "names": ("body",),
+        "record": {"subtype": "point", "category": "UAV"},
+    }
+    arrays = {
+        "hinges": nothing,
+        "axes": nothing,
+        "track": np.zeros((0, 0, 3)),
+        "parents": one - 1,
+        "part": one,
+    }
     cloud = Cloud(points=nothing, normals=nothing, rcs_m2=np.ones(1), **arrays, **names)
     places = dict(zip(("x_m", "y_m", "z_m"), 200 * away + (0, 0, 25), strict=True))
     speeds = dict(zip(("vx_mps", "vy_mps", "vz_mps"), speed * away, strict=True))
@@ -66,7 +89,10 @@ def test_a_continuous_phase_turns_evenly_where_the_point_crosses_into_other_cell
     network, (cloud, row) = dataset.maker.network, moving_point(20.0)
     signal = continuous(network, network.stations[0], cloud, row)
     steps = np.angle(signal[1:] * signal[:-1].conj())
-    middle = network.stations[0].frequency_hz + (network.subcarriers - 1) * network.subcarrier_spacing_hz / 2
+    middle = (
+        network.stations[0].frequency_hz
+        + (network.subcarriers - 1) * network.subcarrier_spacing_hz / 2
+    )
     expected = -4 * np.pi * middle * 20.0 * network.symbol_interval_s / SPEED_OF_LIGHT
     np.testing.assert_allclose(np.angle(np.exp(1j * (steps - expected))), 0, atol=1e-6)
 

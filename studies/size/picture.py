@@ -1,4 +1,6 @@
-"""Draw accuracy over the number of motion models: `python studies/size/picture.py`, from and into `results/`."""
+"""Draw accuracy over the number of motion models: `python studies/size/picture.py`, from and into
+`results/`.
+"""
 
 import argparse
 from pathlib import Path
@@ -10,7 +12,10 @@ from lowalt.files.csv_tables import read_csv
 
 RESULTS = Path(__file__).parent / "results"
 PARTS = {"seen_test": "subtypes trained on", "test": "held-out subtypes"}
-SCHEMES = {"ABC:VRP+TRP+VT": ("three stations", "C0", 0.97), "A:VRP+TRP+VT": ("station A", "C1", 1.03)}
+SCHEMES = {
+    "ABC:VRP+TRP+VT": ("three stations", "C0", 0.97),
+    "A:VRP+TRP+VT": ("station A", "C1", 1.03),
+}
 """Words, colour, and a factor that keeps bars apart."""
 
 
@@ -23,16 +28,38 @@ def main(arguments: list[str]) -> None:
     for axis, (part, title) in zip(axes, PARTS.items(), strict=True):
         for scheme, (words, colour, apart) in SCHEMES.items():
             for equal in (True, False):
-                mine = [row for row in rows if (row["scheme"], row["part"]) == (scheme, part)
-                        and (row["steps"] == "1000") == equal]  # fmt: skip
-                share, low, high = ([float(row[name]) for row in mine] for name in ("percent", "low", "high"))
-                bars = [[value - end for value, end in zip(share, low, strict=True)],
-                        [end - value for value, end in zip(share, high, strict=True)]]  # fmt: skip
-                said = f"{words}, " + ("1000 steps, three trainings" if equal else "18 000 steps, one training")
-                axis.errorbar([int(row["models"]) * (apart if equal else apart**4) for row in mine], share, bars,
-                              fmt="o-" if equal else "s", mfc=colour if equal else "white", color=colour, capsize=3,
-                              label=said)  # fmt: skip
-        axis.set(xscale="log", title=title, xlabel="motion models per subtype", xticks=(100, 400, 1600, 6000))
+                mine = [
+                    row
+                    for row in rows
+                    if (row["scheme"], row["part"]) == (scheme, part)
+                    and (row["steps"] == "1000") == equal
+                ]
+                share, low, high = (
+                    [float(row[name]) for row in mine] for name in ("percent", "low", "high")
+                )
+                bars = [
+                    [value - end for value, end in zip(share, low, strict=True)],
+                    [end - value for value, end in zip(share, high, strict=True)],
+                ]
+                said = f"{words}, " + (
+                    "1000 steps, three trainings" if equal else "18 000 steps, one training"
+                )
+                axis.errorbar(
+                    [int(row["models"]) * (apart if equal else apart**4) for row in mine],
+                    share,
+                    bars,
+                    fmt="o-" if equal else "s",
+                    mfc=colour if equal else "white",
+                    color=colour,
+                    capsize=3,
+                    label=said,
+                )
+        axis.set(
+            xscale="log",
+            title=title,
+            xlabel="motion models per subtype",
+            xticks=(100, 400, 1600, 6000),
+        )
         axis.set_xticklabels(("100", "400", "1600", "6000"))
         axis.minorticks_off()
         axis.grid(alpha=0.3)

@@ -2,8 +2,9 @@
 
     python studies/size/stages.py --run results/paper --out studies/size/results/stages.csv
 
-Reads the measurements that Snakemake leaves of each job. Processor time is sampled, so jobs of less than a second have
-none; their time by the clock is an upper bound for it. Both are sums over the jobs of a stage.
+Reads the measurements that Snakemake leaves of each job. Processor time is sampled, so jobs of less
+than a second have none; their time by the clock is an upper bound for it. Both are sums over the
+jobs of a stage.
 """
 
 import argparse
@@ -16,11 +17,24 @@ from lowalt.report.stage_times import stage_times
 from lowalt.shards import ShardSet
 
 COLUMNS = (
-    "stage", "jobs", "clock_s", "processor_s", "processor_s_per_million", "peak_mib", "bytes_per_sample", "samples",
+    "stage",
+    "jobs",
+    "clock_s",
+    "processor_s",
+    "processor_s_per_million",
+    "peak_mib",
+    "bytes_per_sample",
+    "samples",
     "hardware",
-)  # fmt: skip
-FILES = {"cloud": "clouds/*.npz", "motion": "motion/*.csv", "echo": "echo/*/*.npy", "noise": "noisy/*.npy",
-         "shard": "shards/*.tar", "index": "shards/index.json"}  # fmt: skip
+)
+FILES = {
+    "cloud": "clouds/*.npz",
+    "motion": "motion/*.csv",
+    "echo": "echo/*/*.npy",
+    "noise": "noisy/*.npy",
+    "shard": "shards/*.tar",
+    "index": "shards/index.json",
+}
 """What a stage leaves on disk."""
 
 
@@ -32,12 +46,25 @@ def main(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     samples = len(ShardSet(given.run / "shards/index.json", check=False))
     rows = []
-    found = {one["rule"]: one for one in stage_times(sorted((given.run / "benchmarks").rglob("*.jsonl")))}
+    found = {
+        one["rule"]: one for one in stage_times(sorted((given.run / "benchmarks").rglob("*.jsonl")))
+    }
     for name in (name for name in FILES if name in found):
-        stage, stored = found[name], sum(path.stat().st_size for path in given.run.glob(FILES[name]))
-        rows.append([name, stage["jobs"], f"{stage['wall_s']:.0f}", f"{stage['cpu_s']:.0f}",
-                     f"{1e6 * stage['cpu_s'] / samples:.0f}", f"{stage['peak_mib']:.0f}", f"{stored / samples:.0f}",
-                     samples, describe()])  # fmt: skip
+        stage = found[name]
+        stored = sum(path.stat().st_size for path in given.run.glob(FILES[name]))
+        rows.append(
+            [
+                name,
+                stage["jobs"],
+                f"{stage['wall_s']:.0f}",
+                f"{stage['cpu_s']:.0f}",
+                f"{1e6 * stage['cpu_s'] / samples:.0f}",
+                f"{stage['peak_mib']:.0f}",
+                f"{stored / samples:.0f}",
+                samples,
+                describe(),
+            ]
+        )
     write_csv(given.out, COLUMNS, rows)
 
 

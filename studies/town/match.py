@@ -1,7 +1,8 @@
-"""The paths of the effect `town` matched one by one with those of a ray tracer, Sionna RT, in its own towns.
+"""The paths of the effect `town` matched one by one with those of a ray tracer, Sionna RT, in its
+own towns.
 
-One row for each town, kind of target and order of path: how many both have, by how much delay, direction and gain
-differ, and how much power the paths carry that one side lacks.
+One row for each town, kind of target and order of path: how many both have, by how much delay,
+direction and gain differ, and how much power the paths carry that one side lacks.
 """
 
 import argparse
@@ -26,50 +27,92 @@ from lowalt.motion.drawing import region_polygon
 
 CARRIER_HZ = 4.9e9
 SLAB_M = 1000.0
-"""Thickness of the ray tracer's walls, which here are half spaces; its default of 0.1 m changes reflections."""
-DELAY_S, ANGLE_DEG = 1e-9, 0.1
+"""Thickness of the ray tracer's walls, which here are half spaces; its default of 0.1 m changes
+reflections.
+"""
+DELAY_S = 1e-9
+ANGLE_DEG = 0.1
 """Paths match if they differ by less."""
-SAME_S, SAME_DEG = 1e-11, 0.05
+SAME_S = 1e-11
+SAME_DEG = 0.05
 """Paths of one side that differ by less are one path that is listed twice: repeats."""
-SEED, OTHER_SEEDS = 42, (1, 2)
+SEED = 42
+OTHER_SEEDS = (1, 2)
 """Random seeds of the ray tracer, and of the runs that look for the paths that it lacks."""
 HEIGHTS_M = {"drone": (30.0, 150.0), "car": (1.5, 1.5)}
 COLUMNS = (
-    "town", "target", "reflections", "positions", "lowalt", "sionna", "lowalt_repeats", "sionna_repeats", "matched",
-    "only_lowalt", "found_again", "only_sionna", "delay_ns_max", "angle_deg_max", "gain_db_median", "gain_db_p95",
-    "gain_db_max", "within_1_db", "only_lowalt_power", "only_sionna_power",
-)  # fmt: skip
+    "town",
+    "target",
+    "reflections",
+    "positions",
+    "lowalt",
+    "sionna",
+    "lowalt_repeats",
+    "sionna_repeats",
+    "matched",
+    "only_lowalt",
+    "found_again",
+    "only_sionna",
+    "delay_ns_max",
+    "angle_deg_max",
+    "gain_db_median",
+    "gain_db_p95",
+    "gain_db_max",
+    "within_1_db",
+    "only_lowalt_power",
+    "only_sionna_power",
+)
 
 
 def drawn(
-    rng: np.random.Generator, corners: np.ndarray, heights: tuple[float, float], count: int, town: Town
+    rng: np.random.Generator,
+    corners: np.ndarray,
+    heights: tuple[float, float],
+    count: int,
+    town: Town,
 ) -> np.ndarray:
-    """Return positions (count, 3) m in a triangle of corners (3, 2) m under the open sky, as targets have them."""
+    """Return positions (count, 3) m in a triangle of corners (3, 2) m under the open sky, as
+    targets have them.
+    """
     found: list[np.ndarray] = []
     while len(found) < count:
         u, v = np.sort(rng.random(2))
-        place = np.array([*(corners[0] * u + corners[1] * (v - u) + corners[2] * (1 - v)), rng.uniform(*heights)])
-        if not shadow_loops.blocked(town.occluders, place[None], place[None] + [0.0, 0.0, 1000.0])[0]:
+        place = np.array(
+            [*(corners[0] * u + corners[1] * (v - u) + corners[2] * (1 - v)), rng.uniform(*heights)]
+        )
+        if not shadow_loops.blocked(town.occluders, place[None], place[None] + [0.0, 0.0, 1000.0])[
+            0
+        ]:
             found.append(place)
     return np.array(found)
 
 
 def roof_m(occluders: Occluders, place: np.ndarray) -> float:
-    """Return the height (m) of the highest surface over a place (2,) m of the plan, 0 where there is none."""
-    low, high = np.array([*place, -1.0]), np.array([*place, 2000.0])
+    """Return the height (m) of the highest surface over a place (2,) m of the plan, 0 where there
+    is none.
+    """
+    low = np.array([*place, -1.0])
+    high = np.array([*place, 2000.0])
     for _ in range(40):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if shadow_loops.blocked(occluders, middle[None], high[None])[0] else (low, middle)
+        low, high = (
+            (middle, high)
+            if shadow_loops.blocked(occluders, middle[None], high[None])[0]
+            else (low, middle)
+        )
     return (
         float(high[2])
-        if shadow_loops.blocked(occluders, low[None] - [0.0, 0.0, 1.0], np.array([[*place, 2000.0]]))[0]
+        if shadow_loops.blocked(
+            occluders, low[None] - [0.0, 0.0, 1.0], np.array([[*place, 2000.0]])
+        )[0]
         else 0.0
     )
 
 
 def of_lowalt(town: Town, epsilon: np.ndarray, mast: np.ndarray, place: np.ndarray) -> list[tuple]:
     """Return (reflections, delay s, unit vector from the mast, gain) of each path to a place."""
-    places, wavelength = place[None, None], SPEED_OF_LIGHT / CARRIER_HZ
+    places = place[None, None]
+    wavelength = SPEED_OF_LIGHT / CARRIER_HZ
     rays = image_paths.rays_to(places, 0.0)
     lit, _ = image_paths.direct(town, mast, places, rays, wavelength, False)
     images = [(0, place, 1.0)] if lit[0, 0] else []
@@ -84,7 +127,9 @@ def of_lowalt(town: Town, epsilon: np.ndarray, mast: np.ndarray, place: np.ndarr
 
 
 def ray_tracer(llvm: str | None):
-    """Return the module of the ray tracer, on the CPU; llvm: path of its libLLVM.so, None for the one it finds."""
+    """Return the module of the ray tracer, on the CPU; llvm: path of its libLLVM.so, None for the
+    one it finds.
+    """
     if llvm:
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm
     import mitsuba
@@ -95,7 +140,9 @@ def ray_tracer(llvm: str | None):
     return sionna.rt
 
 
-def of_sionna(rt, scene, mast: np.ndarray, samples: int, places: np.ndarray, seed: int = SEED) -> list[list[tuple]]:
+def of_sionna(
+    rt, scene, mast: np.ndarray, samples: int, places: np.ndarray, seed: int = SEED
+) -> list[list[tuple]]:
     """Return the same of the ray tracer for each of some places (K, 3) m."""
     for name in [*scene.transmitters, *scene.receivers]:
         scene.remove(name)
@@ -103,18 +150,38 @@ def of_sionna(rt, scene, mast: np.ndarray, samples: int, places: np.ndarray, see
     for k, place in enumerate(places):
         scene.add(rt.Receiver(f"place{k:03d}", place.tolist()))
     paths = rt.PathSolver()(
-        scene, max_depth=2, samples_per_src=samples, los=True, specular_reflection=True, diffuse_reflection=False,
-        refraction=False, diffraction=False, synthetic_array=True, seed=seed,
-    )  # fmt: skip
+        scene,
+        max_depth=2,
+        samples_per_src=samples,
+        los=True,
+        specular_reflection=True,
+        diffuse_reflection=False,
+        refraction=False,
+        diffraction=False,
+        synthetic_array=True,
+        seed=seed,
+    )
     gains, delays = paths.cir(normalize_delays=False, out_type="numpy")
-    gains, delays = abs(gains[:, 0, 0, 0, :, 0]), np.reshape(delays, (len(places), -1))
-    theta, phi = (np.reshape(angle.numpy(), (len(places), -1)) for angle in (paths.theta_t, paths.phi_t))
+    gains = abs(gains[:, 0, 0, 0, :, 0])
+    delays = np.reshape(delays, (len(places), -1))
+    theta, phi = (
+        np.reshape(angle.numpy(), (len(places), -1)) for angle in (paths.theta_t, paths.phi_t)
+    )
     counts = (paths.interactions.numpy() != 0).sum(axis=0).reshape(len(places), -1)
     result = []
     for k in range(len(places)):
         there = np.flatnonzero((gains[k] > 0) & (delays[k] > 0))
-        way = np.stack([np.sin(theta[k]) * np.cos(phi[k]), np.sin(theta[k]) * np.sin(phi[k]), np.cos(theta[k])], axis=1)
-        result.append([(int(counts[k, p]), float(delays[k, p]), way[p], float(gains[k, p])) for p in there])
+        way = np.stack(
+            [
+                np.sin(theta[k]) * np.cos(phi[k]),
+                np.sin(theta[k]) * np.sin(phi[k]),
+                np.cos(theta[k]),
+            ],
+            axis=1,
+        )
+        result.append(
+            [(int(counts[k, p]), float(delays[k, p]), way[p], float(gains[k, p])) for p in there]
+        )
     return result
 
 
@@ -124,19 +191,28 @@ def apart_deg(first: tuple, second: tuple) -> float:
 
 
 def once(paths: list[tuple]) -> tuple[list[tuple], int]:
-    """Return the paths of one order, the strongest first, without repeats, and the number of repeats."""
+    """Return the paths of one order, the strongest first, without repeats, and the number of
+    repeats.
+    """
     kept: list[tuple] = []
     for path in sorted(paths, key=lambda path: -path[3]):
-        if not any(abs(path[1] - old[1]) < SAME_S and apart_deg(path, old) < SAME_DEG for old in kept):
+        if not any(
+            abs(path[1] - old[1]) < SAME_S and apart_deg(path, old) < SAME_DEG for old in kept
+        ):
             kept.append(path)
     return kept, len(paths) - len(kept)
 
 
 def matched(mine: list[tuple], theirs: list[tuple]) -> tuple[list[tuple], list[tuple], list[tuple]]:
     """Return the pairs of paths of one order that are one, and the paths that only either side has."""
-    pairs, left = [], list(theirs)
+    pairs = []
+    left = list(theirs)
     for path in mine:
-        near = [other for other in left if abs(other[1] - path[1]) < DELAY_S and apart_deg(path, other) < ANGLE_DEG]
+        near = [
+            other
+            for other in left
+            if abs(other[1] - path[1]) < DELAY_S and apart_deg(path, other) < ANGLE_DEG
+        ]
         if near:
             best = min(near, key=lambda other: abs(other[1] - path[1]))
             left = [other for other in left if other is not best]
@@ -148,16 +224,20 @@ def matched(mine: list[tuple], theirs: list[tuple]) -> tuple[list[tuple], list[t
 def found_again(
     tracer: Callable[[np.ndarray, int], list[list[tuple]]], alone: list[tuple[np.ndarray, tuple]]
 ) -> list[tuple]:
-    """Return those of our paths, each with its place (3,) m, that the ray tracer finds with OTHER_SEEDS.
+    """Return those of our paths, each with its place (3,) m, that the ray tracer finds with
+    OTHER_SEEDS.
 
     tracer: returns its paths to some places (K, 3) m with a seed.
     """
-    found, left = [], alone
+    found = []
+    left = alone
     for seed in OTHER_SEEDS:
         if left:
             others = tracer(np.array([place for place, _ in left]), seed)
-            there = [bool(matched([path], [other for other in listed if other[0] == path[0]])[0])
-                     for (_, path), listed in zip(left, others, strict=True)]  # fmt: skip
+            there = [
+                bool(matched([path], [other for other in listed if other[0] == path[0]])[0])
+                for (_, path), listed in zip(left, others, strict=True)
+            ]
             found += [path for (_, path), is_there in zip(left, there, strict=True) if is_there]
             left = [each for each, is_there in zip(left, there, strict=True) if not is_there]
     return found
@@ -168,7 +248,9 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser(description=__doc__)
     line.add_argument("--towns", nargs="+", default=["simple_street_canyon", "munich", "etoile"])
     line.add_argument("--positions", type=int, default=25, help="of each kind of target")
-    line.add_argument("--samples", type=int, default=1_000_000, help="rays that the ray tracer starts with")
+    line.add_argument(
+        "--samples", type=int, default=1_000_000, help="rays that the ray tracer starts with"
+    )
     line.add_argument("--llvm", help="path of libLLVM.so of version 19")
     line.add_argument("--out", type=Path, required=True)
     options = line.parse_args(arguments)
@@ -180,14 +262,18 @@ def main(arguments: list[str]) -> None:
     for name in options.towns:
         file = getattr(rt.scene, name)
         whole = read(DEFAULTS | {"buildings": file, "ground": "concrete"})
-        low, high = np.array(whole.facts["low_m"])[:2], np.array(whole.facts["high_m"])[:2]
+        low = np.array(whole.facts["low_m"])[:2]
+        high = np.array(whole.facts["high_m"])[:2]
         # The stations' triangle in the middle of the town, shrunk where the town is smaller.
         scale = min(1.0, 0.8 * float((high - low).min()) / 500.0)
-        middle, town = (low + high) / 2, whole.town
+        middle = (low + high) / 2
+        town = whole.town
         epsilon = image_paths.epsilons(town, CARRIER_HZ, name)
         scene = rt.load_scene(file)
         scene.frequency = CARRIER_HZ
-        scene.tx_array = scene.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
+        scene.tx_array = scene.rx_array = rt.PlanarArray(
+            num_rows=1, num_cols=1, pattern="iso", polarization="V"
+        )
         for material in scene.radio_materials.values():
             material.thickness = SLAB_M
         inside = middle + scale * (corners - corners.mean(axis=0))
@@ -205,7 +291,10 @@ def main(arguments: list[str]) -> None:
                 for place, other in zip(places, theirs, strict=True):
                     mine = of_lowalt(town, epsilon, mast, place)
                     for count in range(3):
-                        sides = [once([path for path in side if path[0] == count]) for side in (mine, other)]
+                        sides = [
+                            once([path for path in side if path[0] == count])
+                            for side in (mine, other)
+                        ]
                         both, repeats = zip(*sides, strict=True)
                         news = (*both, *matched(*both), *([number] for number in repeats))
                         for held, new in zip(found[count], news, strict=False):
@@ -214,7 +303,9 @@ def main(arguments: list[str]) -> None:
                 for path in found_again(tracer, alone):
                     found[path[0]][7].append(path)
             for count, sides in sorted(found.items()):
-                rows.append((name, target, count, len(places) * len(network.stations), *compared(*sides)))
+                rows.append(
+                    (name, target, count, len(places) * len(network.stations), *compared(*sides))
+                )
                 print(dict(zip(COLUMNS, rows[-1], strict=True)), file=sys.stderr, flush=True)
     with replacing(options.out) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -222,9 +313,17 @@ def main(arguments: list[str]) -> None:
 
 
 def compared(
-    ours: list, others: list, pairs: list, alone: list, missed: list, repeats: list, others_repeats: list, again: list
+    ours: list,
+    others: list,
+    pairs: list,
+    alone: list,
+    missed: list,
+    repeats: list,
+    others_repeats: list,
+    again: list,
 ) -> tuple:
-    """Return the columns of a line that say how well the paths agree; repeats: numbers of them, left out before;
+    """Return the columns of a line that say how well the paths agree; repeats: numbers of them,
+    left out before;
     again: those of `alone` that the ray tracer finds with another seed."""
     delays = [1e9 * abs(a[1] - b[1]) for a, b in pairs]
     angles = [apart_deg(*pair) for pair in pairs]
@@ -236,7 +335,16 @@ def compared(
         numbers = [f"{np.max(delays):.4f}", f"{np.max(angles):.4f}"]
         numbers += [f"{np.percentile(gains, share):.3f}" for share in (50, 95, 100)]
         numbers.append(f"{np.mean(np.array(gains) < 1.0):.4f}")
-    counts = len(ours), len(others), sum(repeats), sum(others_repeats), len(pairs), len(alone), len(again), len(missed)
+    counts = (
+        len(ours),
+        len(others),
+        sum(repeats),
+        sum(others_repeats),
+        len(pairs),
+        len(alone),
+        len(again),
+        len(missed),
+    )
     return *counts, *numbers, *shares
 
 

@@ -1,9 +1,9 @@
 """The processor time (ms) that a town adds to one signal, by kind of target and by town.
 
-`finding` is that of finding the paths, `echo` that of the echo on all of them over that on the direct one alone. The
-towns are the blocks of the study and a thousand houses on a regular grid, whose facades are aligned. Each row has the
-mean and the largest of three targets at three stations. The pairs of facets that a station's rays may meet are found
-before, once per station and process.
+`finding` is that of finding the paths, `echo` that of the echo on all of them over that on the
+direct one alone. The towns are the blocks of the study and a thousand houses on a regular grid,
+whose facades are aligned. Each row has the mean and the largest of three targets at three stations.
+The pairs of facets that a station's rays may meet are found before, once per station and process.
 """
 
 import argparse
@@ -24,7 +24,8 @@ from lowalt.scene.chain import SceneSample
 from lowalt.scene.observe import observe
 
 GRID_M = (np.arange(-740.0, 1170.0, 60.0), np.arange(-780.0, 1130.0, 60.0))
-"""Coordinates x and y of the 1024 houses of the regular grid; those next to a station are left out."""
+"""Coordinates x and y of the 1024 houses of the regular grid; those next to a station are left out.
+"""
 STREETS_M = ((130.0, 170.0), (250.0, 225.0), (310.0, 350.0))
 """Where targets begin: streets that run along y, between blocks or at a corner of them."""
 TARGETS = {
@@ -37,17 +38,23 @@ TARGETS = {
 
 
 def measured(config: dict, subtype: str, height_m: float, speed_mps: float) -> np.ndarray:
-    """Return for each signal the number of its paths, and the processor times (ms) of finding them, of the echo on all
-    of them over that on the direct one alone, and of both, (signals, 4)."""
+    """Return for each signal the number of its paths, and the processor times (ms) of finding them,
+    of the echo on all of them over that on the direct one alone, and of both, (signals, 4)."""
     (sample,) = explanation.samples(config, None, [(subtype, 0)])
-    scene, rows = explanation.scene_of(config), []
+    scene = explanation.scene_of(config)
+    rows = []
     settings = next(effect.settings for effect in scene.effects if effect.name == "town")
     for (x, y), station, again in product(STREETS_M, scene.network.stations, (False, True)):
         row = sample.row | {"x_m": x, "y_m": y, "vx_mps": 0.0, "vy_mps": speed_mps, "vz_mps": 0.0}
         view = observe(scene, station, sample.cloud, row | ({"z_m": height_m} if height_m else {}))
-        one, times_s = SceneSample(scene, view), []
+        one = SceneSample(scene, view)
+        times_s = []
         with one_blas_thread():
-            for work in (partial(paths, settings, view), partial(one.direct_echo, view), partial(one.echo, view)):
+            for work in (
+                partial(paths, settings, view),
+                partial(one.direct_echo, view),
+                partial(one.echo, view),
+            ):
                 start_s = time.process_time()
                 work()
                 times_s.append(time.process_time() - start_s)
@@ -64,7 +71,9 @@ def main() -> None:
     line.add_argument("--towns", nargs="+", default=["blocks", "grid"], choices=["blocks", "grid"])
     line.add_argument("--targets", nargs="+", default=list(TARGETS), choices=list(TARGETS))
     options = line.parse_args()
-    heads = "".join(f"{name + ', mean':>14}{'largest':>9}" for name in ("paths", "finding", "echo", "both"))
+    heads = "".join(
+        f"{name + ', mean':>14}{'largest':>9}" for name in ("paths", "finding", "echo", "both")
+    )
     print(f"{'town':<8}{'target':<18}{heads}")
     with tempfile.TemporaryDirectory() as folder:
         grid = Path(folder) / "grid.geojson"

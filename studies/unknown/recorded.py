@@ -1,9 +1,10 @@
 """Recordings at the threshold that keeps 95 % of a twin's own validation windows.
 
-    python studies/unknown/recorded.py --inputs MEASURED --foreign FOLDER --out studies/unknown/results/recorded.csv
+    python studies/unknown/recorded.py --inputs MEASURED --foreign FOLDER --out
+    studies/unknown/results/recorded.csv
 
-MEASURED: folder of the measured sets (design/measured.md); FOLDER: the files of foreign.yaml by the paths given there.
-The table has one row per network, kind of window and score:
+MEASURED: folder of the measured sets (design/measured.md); FOLDER: the files of foreign.yaml by the
+paths given there. The table has one row per network, kind of window and score:
     windows         simulated by the network's twin, or what was recorded
     known           whether the network knows its class
     count           number of windows; "all windows" includes those in which nothing moves
@@ -57,8 +58,14 @@ def logits(model: torch.nn.Module, samples: Samples, batch: int = 256) -> np.nda
     """Return the logits (n, classes) float64 of all samples of a source."""
     model = Machine.here("fp32").placed(model).eval()
     with torch.inference_mode():
-        parts = [model(torch.from_numpy(samples.views(np.arange(start, min(start + batch, len(samples.facts))))))
-                 for start in range(0, len(samples.facts), batch)]  # fmt: skip
+        parts = [
+            model(
+                torch.from_numpy(
+                    samples.views(np.arange(start, min(start + batch, len(samples.facts))))
+                )
+            )
+            for start in range(0, len(samples.facts), batch)
+        ]
     return torch.cat(parts).double().numpy()
 
 
@@ -80,12 +87,16 @@ class Radar:
         """Return the logits (n, classes) of intervals (n, symbols) at a recording's own carrier."""
         shown = self.rendered(intervals, twin)
         count = len(shown)
-        known = facts(np.zeros(count, int), ["window"] * count, np.arange(count), np.zeros(count), "")
+        known = facts(
+            np.zeros(count, int), ["window"] * count, np.arange(count), np.zeros(count), ""
+        )
         return logits(self.model, Windows(shown, known))
 
 
 class Part(NamedTuple):
-    """Windows of one kind: what they are, their logits (n, classes), and their labels, None where it knows none."""
+    """Windows of one kind: what they are, their logits (n, classes), and their labels, None where
+    it knows none.
+    """
 
     windows: str
     logits: np.ndarray
@@ -100,7 +111,9 @@ def opened(name: str) -> Radar:
 
 
 def of_text(path: Path) -> Baseband:
-    """Return samples and rate (Hz) of a text file of times (s) and volts below three lines of names and units."""
+    """Return samples and rate (Hz) of a text file of times (s) and volts below three lines of names
+    and units.
+    """
     times, volts = np.loadtxt(path, skiprows=3).T
     return Baseband(volts, (len(times) - 1) / (times[-1] - times[0]))
 
@@ -119,28 +132,45 @@ def foreign(entry: dict, folder: Path, twin: Twin) -> np.ndarray:
 
 
 def swung(times_s: np.ndarray, wavelength_m: float, rng: np.random.Generator) -> np.ndarray:
-    """Return the echo (N,) complex128 of a point that swings, at three random rates and sizes, while it drifts."""
+    """Return the echo (N,) complex128 of a point that swings, at three random rates and sizes,
+    while it drifts.
+    """
     range_m = rng.uniform(-2, 2) * times_s
     for _ in range(3):
-        size_m, rate_hz = 10 ** rng.uniform(-2.5, -0.3), 10 ** rng.uniform(-0.5, 0.7)
+        size_m = 10 ** rng.uniform(-2.5, -0.3)
+        rate_hz = 10 ** rng.uniform(-0.5, 0.7)
         range_m = range_m + size_m * np.sin(2 * np.pi * (rate_hz * times_s + rng.random()))
     return np.exp(-4j * np.pi / wavelength_m * range_m)
 
 
 def empty(radar: Radar, library: Library, kind: str, count: int, fold: str) -> np.ndarray:
-    """Return windows (count, symbols) without a target of the four classes through the twin's receivers.
+    """Return windows (count, symbols) without a target of the four classes through the twin's
+    receivers.
 
-    kind: "noise", which is that beside an echo of unit power, or "swinging point"; fold: keys the random streams.
+    kind: "noise", which is that beside an echo of unit power, or "swinging point"; fold: keys the
+    random streams.
     """
-    twin, found = radar.twin, []
-    receivers = [scene["receiver"] for category in CATEGORIES for scene in library.scenes[radar.name][category]]
+    twin = radar.twin
+    found = []
+    receivers = [
+        scene["receiver"]
+        for category in CATEGORIES
+        for scene in library.scenes[radar.name][category]
+    ]
     seconds = twin.symbols * twin.symbol_interval_s
-    times = np.arange(int((seconds + 2 * MARGIN * twin.symbol_interval_s) * twin.rate_hz) + 1) / twin.rate_hz
+    times = (
+        np.arange(int((seconds + 2 * MARGIN * twin.symbol_interval_s) * twin.rate_hz) + 1)
+        / twin.rate_hz
+    )
     for number in range(count):
         rng = stream(library.seed, "unknown", radar.name, kind, fold, number)
         signal = swung(times, SPEED_OF_LIGHT / twin.carrier_hz, rng)
-        values = samples(twin, receivers[number % len(receivers)], signal, rng, target=kind != "noise")
-        found.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)[0])
+        values = samples(
+            twin, receivers[number % len(receivers)], signal, rng, target=kind != "noise"
+        )
+        found.append(
+            coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)[0]
+        )
     return np.array(found)
 
 
@@ -153,14 +183,19 @@ class Kept(Windows):
 
 
 def with_empty(radar: Radar, library: Library, block: dict, fold: str) -> Kept:
-    """Return the twin's windows of a fold, "train" or "validation", and as many of an extra class as of another."""
+    """Return the twin's windows of a fold, "train" or "validation", and as many of an extra class
+    as of another.
+    """
     known = twin_training.simulated(library, radar.name, block, fold)
     count = len(known.facts) // (2 * len(CATEGORIES))
-    parts, told = [known.images], [known.facts]
+    parts = [known.images]
+    told = [known.facts]
     for kind in EMPTY:
         parts.append(radar.rendered(empty(radar, library, kind, count, fold), radar.twin))
         numbers = np.arange(count)
-        told.append(facts(np.full(count, len(CATEGORIES)), [kind] * count, numbers, np.zeros(count), fold))
+        told.append(
+            facts(np.full(count, len(CATEGORIES)), [kind] * count, numbers, np.zeros(count), fold)
+        )
     return Kept(np.concatenate(parts), joined(told))
 
 
@@ -168,16 +203,23 @@ def with_extra(radar: Radar, library: Library, block: dict, folder: Path) -> Rad
     """Return the radar with a network of five classes that is trained here, unless that is done."""
     path = folder / radar.name / "model.safetensors"
     if not path.is_file():
-        windows = {fold: with_empty(radar, library, block, fold) for fold in ("train", "validation")}
-        settings = {key: block[key] for key in ("seed", "size", "network", "training", "augmentation")}
+        windows = {
+            fold: with_empty(radar, library, block, fold) for fold in ("train", "validation")
+        }
+        settings = {
+            key: block[key] for key in ("seed", "size", "network", "training", "augmentation")
+        }
         settings |= {"colour_map": block["images"]["colour_map"], "classes": [*CATEGORIES, "Other"]}
         runs.train(windows, named(TABLE, block["scheme"], ["A"]), "seen", settings, path.parent)
     return replace(radar, model=runs.load(path).model)
 
 
 def known_parts(radar: Radar, library: Library, inputs: Path) -> list[Part]:
-    """Return the parts of the recordings that a network knows, one a category: windows that hold a target."""
-    every, parts = recorded_sets.recordings(inputs), []
+    """Return the parts of the recordings that a network knows, one a category: windows that hold a
+    target.
+    """
+    every = recorded_sets.recordings(inputs)
+    parts = []
     of_radar = [recording for recording in every if recording.radar == radar.name]
     for label, category in enumerate(CATEGORIES):
         of_category = []
@@ -191,7 +233,9 @@ def known_parts(radar: Radar, library: Library, inputs: Path) -> list[Part]:
 
 
 def foreign_parts(radar: Radar, folder: Path) -> list[Part]:
-    """Return the parts of the files of foreign.yaml: all windows, and those with a target where these are fewer."""
+    """Return the parts of the files of foreign.yaml: all windows, and those with a target where
+    these are fewer.
+    """
     parts = []
     for entry in load_yaml(Path(__file__).with_name("foreign.yaml"), "recordings")["files"]:
         if entry["network"] != radar.name:
@@ -199,7 +243,9 @@ def foreign_parts(radar: Radar, folder: Path) -> list[Part]:
         twin = radar.twin.at_carrier(entry["carrier_hz"])
         windows = foreign(entry, folder, twin)
         moving = present(windows, twin)
-        parts.append(Part(f"recorded, {entry['what']}, all windows", radar.logits(windows, twin), None))
+        parts.append(
+            Part(f"recorded, {entry['what']}, all windows", radar.logits(windows, twin), None)
+        )
         if moving.any() and not moving.all():
             some = radar.logits(windows[moving], twin)
             parts.append(Part(f"recorded, {entry['what']}, windows with a target", some, None))
@@ -215,19 +261,27 @@ def rows_of(radar: Radar, library: Library, inputs: Path, folder: Path, models: 
     for asked, scores in ((radar, SCORES), (with_extra(radar, library, block, models), EXTRA)):
         parts = [
             Part("simulated, validation", logits(asked.model, own), own.facts.label),
-            *(Part(f"simulated, {kind}", asked.logits(windows, asked.twin), None) for kind, windows in hollow.items()),
-            *known_parts(asked, library, inputs), *foreign_parts(asked, folder),
-        ]  # fmt: skip
+            *(
+                Part(f"simulated, {kind}", asked.logits(windows, asked.twin), None)
+                for kind, windows in hollow.items()
+            ),
+            *known_parts(asked, library, inputs),
+            *foreign_parts(asked, folder),
+        ]
         for name, score in scores.items():
             values = [score(part.logits, len(CATEGORIES)) for part in parts]
             level = rejection.level(values[0], np.ones(len(values[0])))
-            rows += [[radar.name, part.windows, name, *shares(part, found >= level)]
-                     for part, found in zip(parts, values, strict=True)]  # fmt: skip
+            rows += [
+                [radar.name, part.windows, name, *shares(part, found >= level)]
+                for part, found in zip(parts, values, strict=True)
+            ]
     return rows
 
 
 def shares(part: Part, kept: np.ndarray) -> list:
-    """Return count, share kept and, of a class that the network knows, share kept and named rightly, percent."""
+    """Return count, share kept and, of a class that the network knows, share kept and named
+    rightly, percent.
+    """
     named_as = part.logits[:, : len(CATEGORIES)].argmax(1)
     right = "" if part.label is None else f"{100 * np.mean(kept & (named_as == part.label)):.1f}"
     return [part.label is not None, len(kept), f"{100 * kept.mean():.1f}", right]
@@ -237,12 +291,16 @@ def main(arguments: list[str]) -> None:
     """Write the table of all networks of radars in the zoo."""
     line = argparse.ArgumentParser("recorded.py", description=__doc__.splitlines()[0])
     line.add_argument("--inputs", type=Path, required=True, help="folder of the measured sets")
-    line.add_argument("--foreign", type=Path, required=True, help="folder of the files that foreign.yaml names")
+    line.add_argument(
+        "--foreign", type=Path, required=True, help="folder of the files that foreign.yaml names"
+    )
     line.add_argument("--out", type=Path, required=True, help="table to write (.csv)")
     given = line.parse_args(arguments)
     library = Library.read()
     rows = [
-        row for name in library.twins for row in rows_of(opened(name), library, given.inputs, given.foreign, MODELS)
+        row
+        for name in library.twins
+        for row in rows_of(opened(name), library, given.inputs, given.foreign, MODELS)
     ]
     write_csv(given.out, COLUMNS, rows)
 

@@ -1,6 +1,7 @@
 """Scores that say how well a window fits the classes that a network knows.
 
-A score is high for a window of a known class. A window is kept where its score is at least a threshold.
+A score is high for a window of a known class. A window is kept where its score is at least a
+threshold.
 """
 
 import numpy as np
@@ -13,13 +14,15 @@ KEPT = 0.95
 def probability(logits: np.ndarray, known: int) -> np.ndarray:
     """Return the largest probability (n,) of the first `known` classes, of logits (n, classes).
 
-    Source: Hendrycks and Gimpel, A baseline for detecting misclassified and out-of-distribution examples, 2017.
+    Source: Hendrycks and Gimpel, A baseline for detecting misclassified and out-of-distribution
+    examples, 2017.
     """
     return np.exp(logits[:, :known].max(1) - logsumexp(logits, axis=1))
 
 
 def energy(logits: np.ndarray, known: int) -> np.ndarray:
-    """Return the negative free energy (n,) of the first `known` classes at temperature 1, of logits (n, classes).
+    """Return the negative free energy (n,) of the first `known` classes at temperature 1, of logits
+    (n, classes).
 
     Source: Liu et al., Energy-based out-of-distribution detection, 2020, Eq. 4.
     """
@@ -27,7 +30,9 @@ def energy(logits: np.ndarray, known: int) -> np.ndarray:
 
 
 def no_extra(logits: np.ndarray, known: int) -> np.ndarray:
-    """Return the log odds (n,) that a window is of one of the first `known` classes and not of the extra one."""
+    """Return the log odds (n,) that a window is of one of the first `known` classes and not of the
+    extra one.
+    """
     return logsumexp(logits[:, :known], axis=1) - logits[:, known]
 
 

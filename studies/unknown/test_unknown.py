@@ -12,7 +12,8 @@ def test_the_threshold_keeps_the_share_of_the_known():
     known = GENERATOR.permutation(100.0 + np.arange(200))
     # 190 of 200 known scores are 110 or more.
     assert rejection.level(known, np.ones(200)) == 110
-    # A known window that counts as ten: 199 of 209 must be kept, and the lowest that counts as ten is not among them.
+    # A known window that counts as ten: 199 of 209 must be kept, and the lowest that counts as ten
+    # is not among them.
     heavy = np.where(known == 100, 10, 1)
     assert rejection.level(known, heavy) == 101
 

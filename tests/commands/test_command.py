@@ -62,13 +62,17 @@ def test_a_path_that_the_system_refuses_is_named_in_one_line(tmp_path, monkeypat
         run(lambda arguments: (file / "below").write_text("x"))
     said = capsys.readouterr().err
     assert (
-        stopped.value.code == 2 and said.startswith(f"error: {file}/below: Not a directory") and said.count("\n") == 1
+        stopped.value.code == 2
+        and said.startswith(f"error: {file}/below: Not a directory")
+        and said.count("\n") == 1
     )
     with pytest.raises(OSError, match="space"):
         refusal(OSError(errno.ENOSPC, "no space", "file"))
 
 
-def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs_it(tmp_path, monkeypatch, capsys):
+def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs_it(
+    tmp_path, monkeypatch, capsys
+):
     sample = tmp_path / "sample.png"
     sample.write_bytes(b"")
     for module in [name for name in sys.modules if name.startswith("lowalt.recognition.predict")]:
@@ -85,7 +89,9 @@ def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs
 def test_a_reader_that_has_enough_ends_a_command_without_a_traceback():
     reading, writing = os.pipe()
     os.close(reading)
-    ended = subprocess.run([sys.executable, "-m", "lowalt", "completion"], stdout=writing, stderr=subprocess.PIPE)
+    ended = subprocess.run(
+        [sys.executable, "-m", "lowalt", "completion"], stdout=writing, stderr=subprocess.PIPE
+    )
     os.close(writing)
     assert (ended.returncode, ended.stderr) == (141, b"")
 

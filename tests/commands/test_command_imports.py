@@ -1,13 +1,26 @@
-"""What a command imports before it answers: packages that are slow to import come with the work that needs them."""
+"""What a command imports before it answers: packages that are slow to import come with the work
+that needs them.
+"""
 
 import subprocess
 import sys
 
 import pytest
 
-SLOW = ("numpy", "scipy", "numba", "matplotlib", "torch", "jsonschema", "pymeshlab", "trimesh", "snakemake")
+SLOW = (
+    "numpy",
+    "scipy",
+    "numba",
+    "matplotlib",
+    "torch",
+    "jsonschema",
+    "pymeshlab",
+    "trimesh",
+    "snakemake",
+)
 PLANNING = (
-    "from lowalt.config.layers import overlaid; from lowalt.workflow.run import Run; import lowalt.workflow.options\n"
+    "from lowalt.config.layers import overlaid; from lowalt.workflow.run import Run; import "
+    "lowalt.workflow.options\n"
     "Run.of(overlaid([]), 'workflow/schemas/config.schema.yaml', None)"
 )
 
@@ -22,11 +35,14 @@ def imported(program: str) -> set[str]:
     return set(run.stdout.splitlines()[-1].split())
 
 
-@pytest.mark.parametrize(("words", "packages"), [
-    (["--help"], set()),
-    (["run", "--help"], {"jsonschema", "numpy"}),
-    (["predict", "default-seen", "missing.png"], {"numpy", "jsonschema"}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("words", "packages"),
+    [
+        (["--help"], set()),
+        (["run", "--help"], {"jsonschema", "numpy"}),
+        (["predict", "default-seen", "missing.png"], {"numpy", "jsonschema"}),
+    ],
+)
 def test_a_command_imports_what_its_answer_needs(words, packages):
     assert imported(f"from lowalt.__main__ import main; main({words})") <= packages
 

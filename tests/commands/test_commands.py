@@ -39,9 +39,15 @@ def renderer():
 @pytest.mark.parametrize("name", ["vrp", "trp"])
 def test_a_target_of_known_speed_stands_at_that_speed_on_the_axes(name, speed):
     render = renderer()
-    times, column = render.network.times_s, list(render.spectra).index(name)
-    phases = [4 * np.pi * place.frequency_hz * speed * times / SPEED_OF_LIGHT for place in render.network.stations]
-    images = split(render.tile(np.exp(-1j * np.array(phases)).astype(np.complex64)), len(render.spectra))
+    times = render.network.times_s
+    column = list(render.spectra).index(name)
+    phases = [
+        4 * np.pi * place.frequency_hz * speed * times / SPEED_OF_LIGHT
+        for place in render.network.stations
+    ]
+    images = split(
+        render.tile(np.exp(-1j * np.array(phases)).astype(np.complex64)), len(render.spectra)
+    )
     for number, station in enumerate(render.network.stations):
         axes = axes_of(name, station, render)
         rows = images[3 * number + column][:, 100].astype(int)
@@ -53,10 +59,15 @@ def test_a_target_of_known_speed_stands_at_that_speed_on_the_axes(name, speed):
 @pytest.mark.parametrize("name", ["vrp", "trp"])
 def test_an_echo_that_sets_in_stands_at_half_its_strength_at_that_time_on_the_axes(name):
     render = renderer()
-    signal = np.where(np.arange(400) < 190, 0, np.exp(-2j * np.pi * 0.125 * np.arange(400))).astype(np.complex64)
-    image = split(render.tile(np.array([signal] * 3)), len(render.spectra))[list(render.spectra).index(name)]
+    signal = np.where(np.arange(400) < 190, 0, np.exp(-2j * np.pi * 0.125 * np.arange(400))).astype(
+        np.complex64
+    )
+    image = split(render.tile(np.array([signal] * 3)), len(render.spectra))[
+        list(render.spectra).index(name)
+    ]
     line = image[image.max(axis=1).argmax()].astype(float)
-    # Squares of the images are amplitudes: the share of a window after the onset, over that of the last window.
+    # Squares of the images are amplitudes: the share of a window after the onset, over that of the
+    # last window.
     last = min(1.0, 210 / render.spectra[name].window)
     place = (np.flatnonzero((line / line.max()) ** 2 * last > 0.5)[0] + 0.5) / len(line)
     _, left, right = axes_of(name, render.network.stations[0], render).across
@@ -67,7 +78,12 @@ def test_sample_writes_the_bytes_of_the_data_set_and_a_picture(tmp_path, capsys)
     assert main(["sample", "Crow", "3", "--snr", "13", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out.split()
     stem = "crow-000003-snr013"
-    assert [Path(path).name for path in said] == [f"{stem}.png", f"{stem}.json", f"{stem}-axes.png", f"{stem}.npy"]
+    assert [Path(path).name for path in said] == [
+        f"{stem}.png",
+        f"{stem}.json",
+        f"{stem}-axes.png",
+        f"{stem}.npy",
+    ]
     alone = {**CONFIG, "targets": {**CONFIG["targets"], "select": ["Crow"]}}
     dataset = Dataset(alone)
     (number,) = [n for n in range(len(dataset)) if dataset.key(n) == stem]
@@ -82,7 +98,10 @@ def test_every_command_has_help_with_an_example_that_parses(capsys, monkeypatch)
     with pytest.raises(SystemExit):
         main(["--help"])
     whole = capsys.readouterr().out
-    assert all(f"\n    {name}" in whole and f"\n  {entry.example}\n" in whole for name, entry in COMMANDS.items())
+    assert all(
+        f"\n    {name}" in whole and f"\n  {entry.example}\n" in whole
+        for name, entry in COMMANDS.items()
+    )
     actions = [["target", action] for action in ("inspect", "new", "make", "show")]
     for words in [[name] for name in COMMANDS] + actions:
         with pytest.raises(SystemExit) as ended:
@@ -109,19 +128,48 @@ def parsed_only(monkeypatch, words):
 
 
 ODD = (
-    "run none.yaml", "run config", "run README.md", "explain none.yaml", "explain config",
-    "explain README.md --no-table", "explain config/scenes/urban.yaml --station Z --no-table",
-    "explain config/tiny.yaml --sample Nobody:1 --no-table", "sample Nobody 3", "sample Crow -1",
-    "sample Crow 3 --snr nan", "sample Crow 3 --overlay none.yaml", "predict none.pt a.png",
-    "predict README.md README.md", "predict README.md none.npy", "verify none.json", "verify README.md",
-    "verify config", "verify config/targets.csv --remake 2", "remake none.json KEY", "remake README.md KEY",
-    "compare none nowhere", "compare config docs", "report --gallery --results none",
-    "report --gallery --results config", "report", "report none", "report config", "report none --gallery",
-    "spectra none.yaml", "spectra README.md", "target inspect none.stl", "target inspect README.md",
-    "target inspect config", "target new none.stl --subtype Crow", "target new README.md --subtype Nobody",
-    "target make none.yaml", "target make README.md", "target make config/tiny.yaml", "target show none.npz",
+    "run none.yaml",
+    "run config",
+    "run README.md",
+    "explain none.yaml",
+    "explain config",
+    "explain README.md --no-table",
+    "explain config/scenes/urban.yaml --station Z --no-table",
+    "explain config/tiny.yaml --sample Nobody:1 --no-table",
+    "sample Nobody 3",
+    "sample Crow -1",
+    "sample Crow 3 --snr nan",
+    "sample Crow 3 --overlay none.yaml",
+    "predict none.pt a.png",
+    "predict README.md README.md",
+    "predict README.md none.npy",
+    "verify none.json",
+    "verify README.md",
+    "verify config",
+    "verify config/targets.csv --remake 2",
+    "remake none.json KEY",
+    "remake README.md KEY",
+    "compare none nowhere",
+    "compare config docs",
+    "report --gallery --results none",
+    "report --gallery --results config",
+    "report",
+    "report none",
+    "report config",
+    "report none --gallery",
+    "spectra none.yaml",
+    "spectra README.md",
+    "target inspect none.stl",
+    "target inspect README.md",
+    "target inspect config",
+    "target new none.stl --subtype Crow",
+    "target new README.md --subtype Nobody",
+    "target make none.yaml",
+    "target make README.md",
+    "target make config/tiny.yaml",
+    "target show none.npz",
     "target show README.md",
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("line", ODD)
@@ -159,9 +207,16 @@ def test_a_shell_completes_commands_options_and_files(words, current, wanted, ca
     for shell in shells:
         # A login's own settings of zsh stay out.
         ran = subprocess.run(
-            [shell, *(["-f"] if shell.endswith("zsh") else []), "-c", text + '; printf "%s\\n" "${COMPREPLY[@]}"'],
-            capture_output=True, text=True, cwd=ROOT,
-        )  # fmt: skip
+            [
+                shell,
+                *(["-f"] if shell.endswith("zsh") else []),
+                "-c",
+                text + '; printf "%s\\n" "${COMPREPLY[@]}"',
+            ],
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+        )
         # Zsh itself leaves out what does not begin as the word does.
         found = [word for word in ran.stdout.split() if word.startswith(current)]
         assert ran.stderr == "" and found == wanted
@@ -192,7 +247,9 @@ def test_predict_names_the_classes_by_their_probability(tmp_path, capsys):
     assert main([*line, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     settings = {key: CONFIG[key] for key in ("network", "spectra", "images")}
-    assert found == predict_sample.predict(runs.load(trained / "model.safetensors"), tmp_path / "a.npy", settings)
+    assert found == predict_sample.predict(
+        runs.load(trained / "model.safetensors"), tmp_path / "a.npy", settings
+    )
     assert main(line) == 0
     shown = [text.split()[-1] for text in capsys.readouterr().out.splitlines()]
     assert shown == sorted(found, key=found.get, reverse=True)
@@ -204,7 +261,9 @@ def test_report_asks_the_workflow_for_the_page_of_the_same_run(tmp_path, monkeyp
 
     def snakemake(line):
         overlay = line[line.index("--configfile") + 1 :]
-        asked.append((load([*overlay[: overlay.index("--")]], SCHEMA), overlay[overlay.index("--") + 1 :]))
+        asked.append(
+            (load([*overlay[: overlay.index("--")]], SCHEMA), overlay[overlay.index("--") + 1 :])
+        )
         return SimpleNamespace(returncode=0)
 
     config = load(["config/default.yaml", "config/tiny.yaml"], SCHEMA)
@@ -216,5 +275,7 @@ def test_report_asks_the_workflow_for_the_page_of_the_same_run(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(workflow.subprocess, "run", snakemake)
     assert main(["report", "results/tiny"]) == 0
-    assert plain(asked[0][0]) == plain(located(config)) and asked[0][1] == ["results/tiny/report.html"]
+    assert plain(asked[0][0]) == plain(located(config)) and asked[0][1] == [
+        "results/tiny/report.html"
+    ]
     assert main(["report", "results/moved"]) == 2 and "of the run 'tiny'" in capsys.readouterr().err

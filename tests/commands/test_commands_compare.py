@@ -44,7 +44,8 @@ data: {one} | {other}
 
 
 def test_compare_holds_two_methods_of_the_benchmark_against_each_other(tmp_path, capsys):
-    first, second = "nearest centroid on moments", "majority class"
+    first = "nearest centroid on moments"
+    second = "majority class"
     assert main(["compare", first, second, "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)["tracks"]
     kept = {row["track"]: row for row in baseline_table.read() if row["method"] == first}
@@ -53,11 +54,20 @@ def test_compare_holds_two_methods_of_the_benchmark_against_each_other(tmp_path,
         value, low, high = found["difference"]
         assert found["first"] == [float(kept[track][name]) for name in ("percent", "low", "high")]
         # What is kept of AUROC has three digits.
-        assert value == pytest.approx(found["first"][0] - found["second"][0], abs=0.05) and low < value < high
+        assert (
+            value == pytest.approx(found["first"][0] - found["second"][0], abs=0.05)
+            and low < value < high
+        )
     assert main(["compare", first, second]) == 0
     text = capsys.readouterr().out
-    assert text.startswith(f"paired difference in percent: {first} | {second}\n  seen ") and "  better; " in text
-    for wrong, words in (("majority clas", "expected perhaps ['majority class']"), ("none", "lowalt benchmark table")):
+    assert (
+        text.startswith(f"paired difference in percent: {first} | {second}\n  seen ")
+        and "  better; " in text
+    )
+    for wrong, words in (
+        ("majority clas", "expected perhaps ['majority class']"),
+        ("none", "lowalt benchmark table"),
+    ):
         assert main(["compare", first, wrong]) == 2
         error = capsys.readouterr().err
         assert f"{wrong!r}: neither a folder nor a method" in error and words in error
@@ -65,23 +75,52 @@ def test_compare_holds_two_methods_of_the_benchmark_against_each_other(tmp_path,
 
 @pytest.mark.parametrize(
     ("file", "text"),
-    [(file, text) for file, texts in {
-        "shards/index.json": ["", "[" * 100_000, "[]", "{}", '{"samples": "x", "bytes": []}',
-                              '{"samples": NaN, "bytes": 1}',
-                              f'{{"samples": 1, "bytes": {"9" * 5000}}}'],
-        "stages.csv": ["rule,cpu_s\necho,abc\n", "rule,cpu_s\necho,\n", "rule,cpu_s\necho,nan\n"],
-        "accuracy.csv": ["protocol,scheme,snr_db,accuracy_percent\nseen,A:VT,avg," + "9" * 5000 + "x\n"],
-        "config.yaml": ["run: {1: 2}\n", "seed: .nan\n", "run: 2026-01-01\n", "a: " + "{a: " * 300 + "1" + "}" * 300],
-    }.items() for text in texts],
-)  # fmt: skip
+    [
+        (file, text)
+        for file, texts in {
+            "shards/index.json": [
+                "",
+                "[" * 100_000,
+                "[]",
+                "{}",
+                '{"samples": "x", "bytes": []}',
+                '{"samples": NaN, "bytes": 1}',
+                f'{{"samples": 1, "bytes": {"9" * 5000}}}',
+            ],
+            "stages.csv": [
+                "rule,cpu_s\necho,abc\n",
+                "rule,cpu_s\necho,\n",
+                "rule,cpu_s\necho,nan\n",
+            ],
+            "accuracy.csv": [
+                "protocol,scheme,snr_db,accuracy_percent\nseen,A:VT,avg," + "9" * 5000 + "x\n"
+            ],
+            "config.yaml": [
+                "run: {1: 2}\n",
+                "seed: .nan\n",
+                "run: 2026-01-01\n",
+                "a: " + "{a: " * 300 + "1" + "}" * 300,
+            ],
+        }.items()
+        for text in texts
+    ],
+)
 def test_a_damaged_file_of_a_run_is_refused_in_one_line(tmp_path, capsys, file, text):
-    one, other = run_folder(tmp_path / "one", 80, 5.0), run_folder(tmp_path / "other", 81, 2.5)
+    one = run_folder(tmp_path / "one", 80, 5.0)
+    other = run_folder(tmp_path / "other", 81, 2.5)
     (one / "shards").mkdir()
     (one / file).write_text(text)
-    for line in (["compare", str(one), str(other)], ["report", "--gallery", "--results", str(tmp_path)]):
+    for line in (
+        ["compare", str(one), str(other)],
+        ["report", "--gallery", "--results", str(tmp_path)],
+    ):
         assert main(line) == 2
         told = capsys.readouterr().err
-        assert told.count("\n") == 1 and f"{one / file}: " in told and len(told) <= LONGEST + len("error: \n")
+        assert (
+            told.count("\n") == 1
+            and f"{one / file}: " in told
+            and len(told) <= LONGEST + len("error: \n")
+        )
     assert not (tmp_path / "index.html").exists()
 
 
@@ -92,4 +131,7 @@ def test_an_interrupted_command_ends_with_one_line_and_130(tmp_path, capsys, mon
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(workflow.subprocess, "run", interrupted)
     assert main(["run"]) == 130
-    assert capsys.readouterr().err == "interrupted: the same command continues a run, and starts anything else again\n"
+    assert (
+        capsys.readouterr().err
+        == "interrupted: the same command continues a run, and starts anything else again\n"
+    )

@@ -1,4 +1,6 @@
-"""Where a run's configuration, profile and cores come from, and words of command lines that stand for numbers."""
+"""Where a run's configuration, profile and cores come from, and words of command lines that stand
+for numbers.
+"""
 
 import argparse
 import sys
@@ -17,11 +19,20 @@ from lowalt.files.shipped import SHIPPED
 
 
 def given(**changes):
-    usual = {"overlay": [], "configfile": [], "target": [], "cores": None, "dry_run": False, "printshellcmds": False}
+    usual = {
+        "overlay": [],
+        "configfile": [],
+        "target": [],
+        "cores": None,
+        "dry_run": False,
+        "printshellcmds": False,
+    }
     return SimpleNamespace(**{**usual, "profile": None, **changes})
 
 
-def test_outside_a_checkout_a_run_gets_the_package_s_configuration_and_profile(tmp_path, monkeypatch):
+def test_outside_a_checkout_a_run_gets_the_package_s_configuration_and_profile(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     head = [sys.executable, "-m", "snakemake", "--snakefile", str(workflow.SNAKEFILE)]
     base = str(SHIPPED / "config/default.yaml")
@@ -35,7 +46,13 @@ def test_outside_a_checkout_a_run_gets_the_package_s_configuration_and_profile(t
     (tmp_path / "profiles/slurm").mkdir()
     (tmp_path / "profiles/slurm/config.yaml").write_text("")
     cluster = given(profile=Path("profiles/slurm"))
-    assert workflow.command(cluster) == [*head, "--workflow-profile", "profiles/slurm", "--configfile", base]
+    assert workflow.command(cluster) == [
+        *head,
+        "--workflow-profile",
+        "profiles/slurm",
+        "--configfile",
+        base,
+    ]
     cluster.cores = "4"
     assert workflow.command(cluster)[5:7] == ["--cores", "4"]
 
@@ -80,15 +97,28 @@ def test_the_page_of_a_run_is_refused_where_its_folder_names_code(tmp_path, monk
 
 
 def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatch, capsys):
-    line = workflow.command(given(overlay=[Path("config/tiny.yaml")], target=["data"], cores="2", dry_run=True))
-    assert line[3:] == ["--snakefile", str(workflow.SNAKEFILE), "--cores", "2", "--configfile", "config/tiny.yaml",
-                        "--dry-run", "--", "data"]  # fmt: skip
+    line = workflow.command(
+        given(overlay=[Path("config/tiny.yaml")], target=["data"], cores="2", dry_run=True)
+    )
+    assert line[3:] == [
+        "--snakefile",
+        str(workflow.SNAKEFILE),
+        "--cores",
+        "2",
+        "--configfile",
+        "config/tiny.yaml",
+        "--dry-run",
+        "--",
+        "data",
+    ]
     assert workflow.SNAKEFILE.is_file()
     assert lowalt_command(["run", str(tmp_path / "none.yaml")]) == 2
     assert "configuration: no file at" in capsys.readouterr().err
     # 137 is how shells name the end by SIGKILL.
     for code, seen in ((7, 7), (-9, 137)):
-        monkeypatch.setattr(workflow.subprocess, "run", lambda line, code=code: given(returncode=code))
+        monkeypatch.setattr(
+            workflow.subprocess, "run", lambda line, code=code: given(returncode=code)
+        )
         assert lowalt_command(["run"]) == seen
     monkeypatch.setattr(workflow, "SNAKEFILE", tmp_path / "Snakefile")
     assert lowalt_command(["run"]) == 2 and "has no workflow" in capsys.readouterr().err

@@ -1,4 +1,6 @@
-"""Classes are the words of the table of targets, stations those of the network: all go from clouds to the page."""
+"""Classes are the words of the table of targets, stations those of the network: all go from clouds
+to the page.
+"""
 
 import json
 import re
@@ -37,14 +39,21 @@ def rows(targets):
     return {name: row | {"name": name, "category": category} for name, category in targets.items()}
 
 
-@pytest.mark.parametrize(("count", "targets"), [(1, FIVE), (5, TWO)], ids=["five classes", "five stations"])
+@pytest.mark.parametrize(
+    ("count", "targets"), [(1, FIVE), (5, TWO)], ids=["five classes", "five stations"]
+)
 def test_every_command_takes_the_classes_of_the_table_and_any_stations(tmp_path, count, targets):
     pytest.importorskip("torch")
     names = tuple(dict.fromkeys(targets.values()))
     network = WAVE | {"stations": {name: PLACES[name] for name in STATIONS[:count]}}
     schema = "workflow/schemas/config.schema.yaml"
-    config = load(["config/default.yaml"], schema) | {"run": "own", "network": network, "noise": {"snr_db": SNRS}}
-    clouds, stations = simulated(tmp_path, network, targets), sorted(STATIONS[:count])
+    config = load(["config/default.yaml"], schema) | {
+        "run": "own",
+        "network": network,
+        "noise": {"snr_db": SNRS},
+    }
+    clouds = simulated(tmp_path, network, targets)
+    stations = sorted(STATIONS[:count])
     from lowalt.recognition.runs import load as load_model
     from lowalt.recognition.score import score
     from lowalt.shards import ShardSet
@@ -74,20 +83,29 @@ def test_every_command_takes_the_classes_of_the_table_and_any_stations(tmp_path,
     predictions = read_csv(tmp_path / "p.csv")
     columns = [f"p_{classes.word(name)}" for name in names]
     assert [name for name in predictions[0] if name.startswith("p_")] == columns
-    assert len(score(tmp_path / "p.csv", tmp_path / "index.json", "seen")["confusion"]) == len(names)
+    assert len(score(tmp_path / "p.csv", tmp_path / "index.json", "seen")["confusion"]) == len(
+        names
+    )
     (average,) = [line for line in read_csv(tmp_path / "accuracy.csv") if line["snr_db"] == "avg"]
     assert average["scheme"] == scheme and int(average["samples"]) == len(SNRS) * len(targets)
     confusion = read_csv(tmp_path / "confusion.csv")
-    assert {row["category"] for row in confusion} == {row["predicted"] for row in confusion} == set(names)
+    assert (
+        {row["category"] for row in confusion}
+        == {row["predicted"] for row in confusion}
+        == set(names)
+    )
     for name in names:
         of_class = sum(int(row["samples"]) for row in confusion if row["category"] == name)
         assert of_class == len(SNRS) * list(targets.values()).count(name)
     header = (tmp_path / "alarms.csv").read_text().splitlines()[0].split(",")
-    words, ends = [classes.word(name) for name in names[1:]], ("percent", "low", "high")
+    words = [classes.word(name) for name in names[1:]]
+    ends = ("percent", "low", "high")
     assert header[4:] == [f"{rate}_{end}" for rate in ("detected", *words) for end in ends]
     text = reported(tmp_path, config, clouds, rows(targets))
     # Parts that the run has nothing for are left out.
-    assert sound(text).links[1:] == [f"#{part.id}" for part in PARTS if f'<section id="{part.id}"' in text]
+    assert sound(text).links[1:] == [
+        f"#{part.id}" for part in PARTS if f'<section id="{part.id}"' in text
+    ]
     assert f"<code>{sha256(tmp_path / 'index.json')}</code>" in text
     assert f"{count} base station" in text and f"<td>{scheme}</td>" in text
     # A panel of the viewer for the echo and for each of the three spectra of each station.
@@ -105,14 +123,20 @@ def test_a_station_of_the_layer_below_is_taken_out_and_a_scheme_must_name_known_
     path.write_text(yaml.safe_dump(overlay))
     config = load(["config/default.yaml", path], schema)
     assert station_names(config["network"]) == ["B", "tower"]
-    path.write_text(yaml.safe_dump(merge(config, {"network": {"stations": {"B": None, "tower": None}}})))
+    path.write_text(
+        yaml.safe_dump(merge(config, {"network": {"stations": {"B": None, "tower": None}}}))
+    )
     with pytest.raises(InputError, match="stations"):
         load([path], schema)
     table = tmp_path / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nboth,B+tower,VRP,mean,,seen\none,tower,VRP,mean,,seen\n")
+    table.write_text(
+        ",".join(schemes.COLUMNS) + "\nboth,B+tower,VRP,mean,,seen\none,tower,VRP,mean,,seen\n"
+    )
     assert schemes.named(table, "both", ["B", "tower"]).stations == (0, 1)
     assert schemes.named(table, "one", ["B", "tower"]).stations == (1,)
-    with pytest.raises(InputError, match=r"line 2: stations 'B\+tower', expected some of \('A', 'B'\)"):
+    with pytest.raises(
+        InputError, match=r"line 2: stations 'B\+tower', expected some of \('A', 'B'\)"
+    ):
         schemes.named(table, "both", ["A", "B"])
 
 
@@ -142,7 +166,9 @@ def test_a_class_of_its_own_needs_to_know_what_it_is_like():
         merged(row, {"source": "builtin"}, "here")
     with pytest.raises(InputError, match="here: like: value 'Plane'"):
         merged(row, {"source": "builtin", "like": "Plane"}, "here")
-    with pytest.raises(InputError, match=r"no \['speed_lo', 'speed_hi'\], expected m/s for a target like a Vehicle"):
+    with pytest.raises(
+        InputError, match=r"no \['speed_lo', 'speed_hi'\], expected m/s for a target like a Vehicle"
+    ):
         merged(row, {"source": "builtin", "like": "Vehicle"}, "here")
 
 
@@ -165,12 +191,24 @@ def test_a_training_names_the_class_without_samples_and_wants_two():
         facts = type("Facts", (), {"label": np.zeros(3, int)})
 
     settings = {"seed": 1, "training": None, "augmentation": {}, "classes": ["Bat", "Bird"]}
-    block = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")["recognition"]["training"]
+    block = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")["recognition"][
+        "training"
+    ]
     with pytest.raises(InputError, match=r"no training sample of \['Bird'\]"):
         training.Trainer(
-            torch.nn.Linear(1, 2), {"train": Source, "validation": Source}, [0], settings | {"training": block},
-            None, None,
-        )  # fmt: skip
-    given = settings | {"training": block, "size": 24, "colour_map": "gray", "network": {}, "classes": ["Bat"]}
+            torch.nn.Linear(1, 2),
+            {"train": Source, "validation": Source},
+            [0],
+            settings | {"training": block},
+            None,
+            None,
+        )
+    given = settings | {
+        "training": block,
+        "size": 24,
+        "colour_map": "gray",
+        "network": {},
+        "classes": ["Bat"],
+    }
     with pytest.raises(InputError, match="expected two or more"):
         runs.train({}, None, "seen", given, None)

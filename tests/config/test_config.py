@@ -26,10 +26,19 @@ def test_every_shipped_configuration_is_valid(overlay):
 @pytest.mark.parametrize(
     ("overlay", "words"),
     [
-        ({"network": {"carrier_hz": 4.9}}, r"network.carrier_hz: value 4.9, expected at least 100000000"),
-        ({"network": {"carrier_hz": "4.9 GHz"}}, r"network.carrier_hz: value '4.9 GHz', expected type number"),
+        (
+            {"network": {"carrier_hz": 4.9}},
+            r"network.carrier_hz: value 4.9, expected at least 100000000",
+        ),
+        (
+            {"network": {"carrier_hz": "4.9 GHz"}},
+            r"network.carrier_hz: value '4.9 GHz', expected type number",
+        ),
         ({"network": {"symbols": 0}}, r"network.symbols: value 0, expected at least 1"),
-        ({"network": {"stations": {"A": {"position_m": [0, 0]}}}}, r"stations.A.position_m: .* at least 3 item"),
+        (
+            {"network": {"stations": {"A": {"position_m": [0, 0]}}}},
+            r"stations.A.position_m: .* at least 3 item",
+        ),
         ({"noise": {"snr_db": []}}, r"noise.snr_db: value \[\], expected at least 1 item"),
         ({"noise": {"snr_db": [3, 3]}}, r"noise.snr_db: .* every item once"),
         ({"targets": {"select": ["Crow", "Crow"]}}, r"targets.select: .* every item once"),
@@ -39,11 +48,18 @@ def test_every_shipped_configuration_is_valid(overlay):
         ({"echo": {"job": "all"}}, r"echo.job: value 'all', expected"),
         ({"run": "../x"}, r"run: value '../x', expected text like"),
         ({"run": "reference"}, r"run: value 'reference', expected none of"),
-        ({"moton": {}}, r"^configuration refused: configuration: unknown key\(s\) \['moton'\], .* \['motion'\]$"),
+        (
+            {"moton": {}},
+            r"^configuration refused: configuration: unknown key\(s\) \['moton'\], .* "
+            r"\['motion'\]$",
+        ),
         ({"effects": {"adcs": {}}}, r"expected perhaps \['adc'\]$"),
         ({"effects": None}, r"effects: value None, expected type object"),
         ({"motion": {"tilt_deg": math.nan}}, r"motion.tilt_deg: value nan, expected type number"),
-        ({"noise": {"snr_db": ["a", "b"]}}, r"refused: noise.snr_db.0: value 'a', expected number or inf$"),
+        (
+            {"noise": {"snr_db": ["a", "b"]}},
+            r"refused: noise.snr_db.0: value 'a', expected number or inf$",
+        ),
         ({"noise": {"snr_db": [500]}}, r"noise.snr_db.0: value 500, expected at most 300$"),
         ({"network": {"stations": {1: {}}}}, r"key 1 among .*, expected text"),
         (
@@ -58,12 +74,27 @@ def test_a_wrong_value_is_refused_by_key_value_and_expectation(overlay, words):
 
 
 def test_a_null_takes_out_what_a_lower_layer_has_wherever_the_key_may_be_left_out():
-    layers = {"effects": {"adc": {"bits": 8}}, "recognition": {"gpu": True}, "targets": {"own": {"x": "x.yaml"}}}
-    nulls = {"effects": {"adc": None}, "recognition": {"gpu": None}, "targets": {"own": {"x": None}},
-             "network": {"stations": {"C": None}}, "spectra": {"vt": None}, "echo": {"tolerance": None}}  # fmt: skip
+    layers = {
+        "effects": {"adc": {"bits": 8}},
+        "recognition": {"gpu": True},
+        "targets": {"own": {"x": "x.yaml"}},
+    }
+    nulls = {
+        "effects": {"adc": None},
+        "recognition": {"gpu": None},
+        "targets": {"own": {"x": None}},
+        "network": {"stations": {"C": None}},
+        "spectra": {"vt": None},
+        "echo": {"tolerance": None},
+    }
     found = check(merge(merge(copy.deepcopy(DEFAULT), layers), nulls), SCHEMA)
-    assert found["effects"] == found["targets"].pop("own") == {} and "gpu" not in found["recognition"]
-    assert list(found["network"]["stations"]) == ["A", "B"] and list(found["spectra"]) == ["vrp", "trp"]
+    assert (
+        found["effects"] == found["targets"].pop("own") == {} and "gpu" not in found["recognition"]
+    )
+    assert list(found["network"]["stations"]) == ["A", "B"] and list(found["spectra"]) == [
+        "vrp",
+        "trp",
+    ]
     assert found["echo"] == DEFAULT["echo"]
 
 
@@ -71,12 +102,20 @@ def test_a_number_is_a_number_however_it_is_written(tmp_path):
     path = tmp_path / "overlay.yaml"
     path.write_text(
         "run: 1e5\nnetwork: {carrier_hz: 28e9, symbols: 4.0e+2, subcarriers: 256.0}\n"
-        "noise: {snr_db: [1e1, .inf]}\nmotion: {height_m: {UAV: [3e1, 150]}}\neffects: {cell_noise: {snr_db: 2e1}}\n"
+        "noise: {snr_db: [1e1, .inf]}\nmotion: {height_m: {UAV: [3e1, 150]}}\neffects: "
+        "{cell_noise: {snr_db: 2e1}}\n"
     )
     found = load([ROOT / "config/default.yaml", path], SCHEMA)
     network = found["network"]
-    assert [repr(network[key]) for key in ("carrier_hz", "symbols", "subcarriers")] == ["28000000000.0", "400", "256"]
-    assert found["noise"]["snr_db"] == [10.0, math.inf] and found["motion"]["height_m"]["UAV"] == [30.0, 150]
+    assert [repr(network[key]) for key in ("carrier_hz", "symbols", "subcarriers")] == [
+        "28000000000.0",
+        "400",
+        "256",
+    ]
+    assert found["noise"]["snr_db"] == [10.0, math.inf] and found["motion"]["height_m"]["UAV"] == [
+        30.0,
+        150,
+    ]
     assert found["effects"] == {"cell_noise": {"snr_db": 20.0}} and found["run"] == "1e5"
 
 
@@ -107,7 +146,9 @@ def test_canonical_text_is_one_per_meaning():
     assert canonical({"snr": math.inf}) == '{"snr": "inf"}'
 
 
-PUBLISHED = {f"t{index}": {"unseen_protocol": "seen" if index % 2 else "unseen"} for index in range(4)}
+PUBLISHED = {
+    f"t{index}": {"unseen_protocol": "seen" if index % 2 else "unseen"} for index in range(4)
+}
 
 
 def plan(**motion) -> Plan:

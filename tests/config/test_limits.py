@@ -1,4 +1,6 @@
-"""Integers and offsets at 1.44 million and 100 million samples: shown on sparse files, whose holes take no space."""
+"""Integers and offsets at 1.44 million and 100 million samples: shown on sparse files, whose holes
+take no space.
+"""
 
 import json
 import tarfile
@@ -23,7 +25,8 @@ from lowalt.targets.records import records_of
 from lowalt.tiles.tile_files import Tiles, map_array, npy_header
 
 HOLE = 5 * 2**30
-"""Bytes of zeros in front of what a test reads: more than 32 bits count, and whole blocks of a tar."""
+"""Bytes of zeros in front of what a test reads: more than 32 bits count, and whole blocks of a tar.
+"""
 MANY = 100_000_000
 
 
@@ -49,7 +52,8 @@ def test_a_shard_beyond_4_gib_is_written_indexed_and_read(kind, tmp_path, monkey
         assert late.members(number) == plain.members(number)
     for shard in late.shards:
         path = tmp_path / "late" / shard["path"]
-        far, near = map_samples(table_path(path)), map_samples(table_path(tmp_path / "plain" / shard["path"]))
+        far = map_samples(table_path(path))
+        near = map_samples(table_path(tmp_path / "plain" / shard["path"]))
         for name in ("offset", "record_offset", "data_offset"):
             assert (far[name] - near[name] == HOLE + tarfile.BLOCKSIZE).all()
         with tarfile.open(path) as archive:
@@ -61,7 +65,8 @@ def test_a_shard_beyond_4_gib_is_written_indexed_and_read(kind, tmp_path, monkey
 
 
 def sparse_array(path, name, dtype, count, *more):
-    """An .npz whose one-dimensional array `name` is a hole of `count` items, with the arrays `more` behind it.
+    """An .npz whose one-dimensional array `name` is a hole of `count` items, with the arrays `more`
+    behind it.
 
     Returns where the hole begins.
     """
@@ -73,30 +78,40 @@ def sparse_array(path, name, dtype, count, *more):
             member._fileobj.seek(count * np.dtype(dtype).itemsize, 1)
             member._file_size += count * np.dtype(dtype).itemsize
         for other, values in more:
-            archive.writestr(zipfile.ZipInfo(other), npy_header(values.dtype.str, values.shape) + values.tobytes())
+            archive.writestr(
+                zipfile.ZipInfo(other),
+                npy_header(values.dtype.str, values.shape) + values.tobytes(),
+            )
     return first
 
 
 def test_the_last_of_100_million_samples_is_found(tmp_path, monkeypatch):
-    """One shard of 99 999 977 samples and five others; its table has 20 GB, all but the last row a hole."""
+    """One shard of 99 999 977 samples and five others; its table has 20 GB, all but the last row a
+    hole.
+    """
     monkeypatch.setattr(shard_module, "Writer", Late)
     folder = build(tmp_path, "signal")
     found = json.loads((folder / "index.json").read_text())
     last = found["shards"][-1]
     table = table_path(folder / last["path"])
-    row, count = np.array(map_samples(table)[-1:]), MANY - 24 + last["samples"]
+    row = np.array(map_samples(table)[-1:])
+    count = MANY - 24 + last["samples"]
     with np.load(table) as data:
         header = data["header"]
     # The type of the rows has several columns, which the short header of an array cannot state.
-    first = sparse_array(table, "samples.npy", "|V1", count * SAMPLE.itemsize, ("header.npy", header.reshape(1)))
+    first = sparse_array(
+        table, "samples.npy", "|V1", count * SAMPLE.itemsize, ("header.npy", header.reshape(1))
+    )
     with table.open("r+b") as file:
         file.seek(first + (count - 1) * SAMPLE.itemsize)
         file.write(row.tobytes())
-    last["samples"], found["samples"] = count, MANY
+    last["samples"] = count
+    found["samples"] = MANY
     found["sha256"] = index._checksum(found)
     (folder / "index.json").write_text(json.dumps(found))
     monkeypatch.setattr(
-        "lowalt.shards.read.map_samples", lambda path: _rows(path) if path == table else map_samples(path)
+        "lowalt.shards.read.map_samples",
+        lambda path: _rows(path) if path == table else map_samples(path),
     )
     shards = ShardSet(folder / "index.json", check=False)
     assert len(shards) == MANY
@@ -115,7 +130,9 @@ def _rows(path):
 def test_a_tiles_file_beyond_4_gib_is_read_image_by_image(tmp_path):
     images = [b"first image", b"the second one"]
     ends = np.cumsum([HOLE, *map(len, images)]).astype("<i8")
-    first = sparse_array(tmp_path / "a.npz", "data.npy", "|u1", int(ends[-1]), ("offsets.npy", ends))
+    first = sparse_array(
+        tmp_path / "a.npz", "data.npy", "|u1", int(ends[-1]), ("offsets.npy", ends)
+    )
     with (tmp_path / "a.npz").open("r+b") as file:
         file.seek(first + HOLE)
         file.write(b"".join(images))
@@ -125,8 +142,11 @@ def test_a_tiles_file_beyond_4_gib_is_read_image_by_image(tmp_path):
 
 
 def config_of(models, per_chunk):
-    """The default's configuration with other numbers of motion models, and shards as large as their folds."""
-    motion, shards = {"models": models, "models_per_chunk": per_chunk}, {"largest_mb": 30_000}
+    """The default's configuration with other numbers of motion models, and shards as large as their
+    folds.
+    """
+    motion = {"models": models, "models_per_chunk": per_chunk}
+    shards = {"largest_mb": 30_000}
     return merge(load_yaml(ROOT / "config/default.yaml"), {"motion": motion, "shards": shards})
 
 
@@ -147,12 +167,16 @@ def test_the_plan_names_each_shard_once_and_one_command_takes_them_all(
     held = [plan.chunk(name) for name in plan.chunks]
     assert sum(chunk.count * len(chunk.members) * len(chunk.snrs) for chunk in held) == samples
     assert (len(plan.chunks), len(plan.shards), len(set(plan.shards))) == (chunks, shards, shards)
-    # The command of the index names every shard; Linux takes 2 MiB of arguments, with a pointer to each.
+    # The command of the index names every shard; Linux takes 2 MiB of arguments, with a pointer to
+    # each.
     words = [f"results/default/shards/{name}.tar" for name in plan.shards]
     assert sum(len(word) + 1 + 8 for word in words) < 2**20
     if samples == 1_440_000:
         paper = load(["config/default.yaml", "config/paper.yaml"], SCHEMA)
-        assert (paper["motion"]["models"], paper["motion"]["models_per_chunk"]) == (models, per_chunk)
+        assert (paper["motion"]["models"], paper["motion"]["models_per_chunk"]) == (
+            models,
+            per_chunk,
+        )
 
 
 def test_at_the_schemas_most_motion_models_keys_and_parts_keep_their_digits(published):
@@ -162,7 +186,9 @@ def test_at_the_schemas_most_motion_models_keys_and_parts_keep_their_digits(publ
     plan = Plan.of(config_of(most, 10), published)
     assert plan.chunks[-1] == "unseen-99999" and plan.span(plan.chunks[-1]) == (most - 10, 10)
     assert {len(name.partition("-")[2]) for name in plan.chunks} == {5}
-    keys = [sample_key(name, most - 1, snr) for name in published for snr in (-60.0, 3.5, float("inf"))]
+    keys = [
+        sample_key(name, most - 1, snr) for name in published for snr in (-60.0, 3.5, float("inf"))
+    ]
     assert all("-999999-snr" in key for key in keys)
     assert max(len(f"{key}.json".encode()) for key in keys) <= 100
     assert max(map(len, keys)) <= SAMPLE["key"].itemsize

@@ -1,4 +1,6 @@
-"""The plan of a run that grows: every sample stands in one chunk, and no step moves what stood before it."""
+"""The plan of a run that grows: every sample stands in one chunk, and no step moves what stood
+before it.
+"""
 
 import itertools
 
@@ -13,7 +15,10 @@ from lowalt.files.errors import InputError
 from lowalt.motion.drawing import masts_in_reach
 from lowalt.shards.dataset import Dataset
 
-PUBLISHED = {name: {"unseen_protocol": group} for name, group in zip("abcdef", ["seen", "unseen"] * 3, strict=True)}
+PUBLISHED = {
+    name: {"unseen_protocol": group}
+    for name, group in zip("abcdef", ["seen", "unseen"] * 3, strict=True)
+}
 STEPS = [{"snr_db": [13]}, {"subtypes": ["d", "e"]}, {"subtypes": ["f"], "snr_db": [3, -5]}]
 
 
@@ -35,7 +40,9 @@ def held(plan, names):
     return [
         sample
         for chunk in chunks
-        for sample in itertools.product(chunk.members, range(chunk.first, chunk.first + chunk.count), chunk.snrs)
+        for sample in itertools.product(
+            chunk.members, range(chunk.first, chunk.first + chunk.count), chunk.snrs
+        )
     ]
 
 
@@ -45,20 +52,28 @@ def test_all_samples_stand_in_one_chunk_each_whatever_is_added(config, count):
     plan = Plan.of(config, PUBLISHED)
     subtypes = sorted(itertools.chain(*plan.groups.values()))
     assert subtypes == list("abcdef")[: {0: 3, 1: 3, 2: 5, 3: 6}[count]]
-    assert sorted(held(plan, plan.chunks)) == sorted(itertools.product(subtypes, range(25), snrs_of(config)))
+    assert sorted(held(plan, plan.chunks)) == sorted(
+        itertools.product(subtypes, range(25), snrs_of(config))
+    )
     # Motion models do not depend on SNRs: each stands in one table.
     moved = [(name, model) for name, model, _ in held(plan, plan.sources)]
     assert sorted(set(moved)) == sorted(itertools.product(subtypes, range(25)))
     for name in plan.chunks:
         chunk, source = plan.chunk(name), plan.chunk(plan.chunk(name).source)
-        assert (chunk.members, chunk.first, chunk.count) == (source.members, source.first, source.count)
+        assert (chunk.members, chunk.first, chunk.count) == (
+            source.members,
+            source.first,
+            source.count,
+        )
 
 
 def test_groups_are_the_table_s(config):
     plan = Plan.of(config | {"added": STEPS}, PUBLISHED)
     assert plan.groups == {"seen": ("a", "c", "e"), "unseen": ("b", "d", "f")}
     for name in plan.chunks:
-        assert {PUBLISHED[member]["unseen_protocol"] for member in plan.chunk(name).members} == {name.split("-")[0]}
+        assert {PUBLISHED[member]["unseen_protocol"] for member in plan.chunk(name).members} == {
+            name.split("-")[0]
+        }
 
 
 def test_a_step_moves_no_chunk_that_was_there(config):
@@ -66,7 +81,9 @@ def test_a_step_moves_no_chunk_that_was_there(config):
     for count in range(4):
         plans.append(Plan.of(config | {"added": STEPS[:count]}, PUBLISHED))
     for before, after in itertools.pairwise(plans):
-        assert {before.chunk(name) for name in before.chunks} < {after.chunk(name) for name in after.chunks}
+        assert {before.chunk(name) for name in before.chunks} < {
+            after.chunk(name) for name in after.chunks
+        }
         assert set(before.shards) < set(after.shards)
     more = Plan.of(merge(config, {"motion": {"models": 40}}) | {"added": STEPS}, PUBLISHED)
     whole = {name for name in plans[-1].chunks if plans[-1].span(name)[1] == 10}
@@ -105,11 +122,18 @@ def test_masts_out_of_reach_change_no_motion_model():
     near = masts_in_reach(masts, **region)
     assert near == [[250, 100], [90, 60]]
     assert masts_in_reach(masts, None, 30.0) == masts
-    config = merge(load_yaml(ROOT / "config/default.yaml"), config | {"motion": {"models": 10, "models_per_chunk": 10}})
+    config = merge(
+        load_yaml(ROOT / "config/default.yaml"),
+        config | {"motion": {"models": 10, "models_per_chunk": 10}},
+    )
     config = merge(config, {"motion": {"region": region}})
-    rows, clouds = [], None
+    rows = []
+    clouds = None
     for masts_m in (masts, near):
-        stations = {f"S{n}": {"position_m": [*mast, 25.0], "normal_deg": 0.0} for n, mast in enumerate(masts_m)}
+        stations = {
+            f"S{n}": {"position_m": [*mast, 25.0], "normal_deg": 0.0}
+            for n, mast in enumerate(masts_m)
+        }
         config["network"]["stations"] = stations
         dataset = Dataset(config, clouds, inputs=None)
         clouds = dataset.clouds

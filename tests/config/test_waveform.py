@@ -1,4 +1,6 @@
-"""The block network.waveform: what a sweep or a continuous wave is in OFDM's terms, and what contradicts it."""
+"""The block network.waveform: what a sweep or a continuous wave is in OFDM's terms, and what
+contradicts it.
+"""
 
 import copy
 from dataclasses import replace
@@ -35,25 +37,38 @@ def built(network: dict) -> Network:
         ({"kind": "ofdm"}, "ofdm", None, (256, 120e3, 10), 120e3, 120e3),
     ],
 )
-def test_a_waveform_says_its_band_in_its_own_terms(waveform, kind, sweep_s, ofdm, symbol_rate_hz, noise_bandwidth_hz):
+def test_a_waveform_says_its_band_in_its_own_terms(
+    waveform, kind, sweep_s, ofdm, symbol_rate_hz, noise_bandwidth_hz
+):
     keys = ("subcarriers", "subcarrier_spacing_hz", "guard_subcarriers")
     found = built({"waveform": waveform})
-    assert found == replace(built(dict(zip(keys, ofdm, strict=True))), waveform=kind, sweep_s=sweep_s)
-    assert (found.symbol_rate_hz, found.noise_bandwidth_hz) == pytest.approx((symbol_rate_hz, noise_bandwidth_hz))
+    assert found == replace(
+        built(dict(zip(keys, ofdm, strict=True))), waveform=kind, sweep_s=sweep_s
+    )
+    assert (found.symbol_rate_hz, found.noise_bandwidth_hz) == pytest.approx(
+        (symbol_rate_hz, noise_bandwidth_hz)
+    )
 
 
 def test_the_defaults_subcarriers_go_and_ofdm_by_name_leaves_no_trace():
     sweeping = checked({"waveform": SWEEP})
-    assert {"subcarriers", "subcarrier_spacing_hz", "guard_subcarriers"}.isdisjoint(sweeping["network"])
+    assert {"subcarriers", "subcarrier_spacing_hz", "guard_subcarriers"}.isdisjoint(
+        sweeping["network"]
+    )
     # A run writes its configuration into its folder, and reads it again.
-    assert check(copy.deepcopy(sweeping), SCHEMA) == check(merge(DEFAULT, sweeping), SCHEMA) == sweeping
+    assert (
+        check(copy.deepcopy(sweeping), SCHEMA)
+        == check(merge(DEFAULT, sweeping), SCHEMA)
+        == sweeping
+    )
     assert checked({"waveform": {"kind": "ofdm"}}) == checked({"waveform": None}) == DEFAULT
 
 
 def test_cubes_have_a_range_cell_for_each_sample():
     cubes = {"shards": {"kind": "cube"}}
     sweeping, same = (
-        sample_bytes(merge(checked(network), cubes)) for network in ({"waveform": SWEEP}, {"subcarriers": 128})
+        sample_bytes(merge(checked(network), cubes))
+        for network in ({"waveform": SWEEP}, {"subcarriers": 128})
     )
     assert sweeping == same < sample_bytes(merge(DEFAULT, cubes))
 
@@ -61,12 +76,30 @@ def test_cubes_have_a_range_cell_for_each_sample():
 @pytest.mark.parametrize(
     ("network", "words"),
     [
-        ({"waveform": SWEEP, "subcarriers": 512}, r"^network: \{'subcarriers': 512\} .* kind 'fmcw', expected none of"),
-        ({"waveform": {"kind": "cw"}, "guard_subcarriers": 0}, r"\{'guard_subcarriers': 0\} .* kind 'cw', expected"),
-        ({"waveform": {**SWEEP, "sweep_s": 3e-3}}, r"sweep_s is 0.003, expected at most symbol_interval_s, 0.0025$"),
-        ({"waveform": {"kind": "fmcw", "samples": 128}}, r"network.waveform: .*\{kind: fmcw, samples, sweep_hz, sweep"),
-        ({"waveform": {"kind": "cw", "samples": 3}}, r"network.waveform: \{'kind': 'cw', 'samples': 3\}, expected"),
-        ({"waveform": {**SWEEP, "kind": "ofdm"}}, r"network.waveform: .*, expected \{kind: ofdm\} or"),
+        (
+            {"waveform": SWEEP, "subcarriers": 512},
+            r"^network: \{'subcarriers': 512\} .* kind 'fmcw', expected none of",
+        ),
+        (
+            {"waveform": {"kind": "cw"}, "guard_subcarriers": 0},
+            r"\{'guard_subcarriers': 0\} .* kind 'cw', expected",
+        ),
+        (
+            {"waveform": {**SWEEP, "sweep_s": 3e-3}},
+            r"sweep_s is 0.003, expected at most symbol_interval_s, 0.0025$",
+        ),
+        (
+            {"waveform": {"kind": "fmcw", "samples": 128}},
+            r"network.waveform: .*\{kind: fmcw, samples, sweep_hz, sweep",
+        ),
+        (
+            {"waveform": {"kind": "cw", "samples": 3}},
+            r"network.waveform: \{'kind': 'cw', 'samples': 3\}, expected",
+        ),
+        (
+            {"waveform": {**SWEEP, "kind": "ofdm"}},
+            r"network.waveform: .*, expected \{kind: ofdm\} or",
+        ),
         ({"waveform": {"kind": "pulse"}}, r"network.waveform.kind: value 'pulse', expected one of"),
         ({"waveform": {}}, r"network.waveform: missing key\(s\) \['kind'\]"),
         ({"subcarriers": None}, r"network: missing key\(s\) \['subcarriers'\]"),

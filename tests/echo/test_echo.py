@@ -31,13 +31,16 @@ def cloud_in_motion(rng, symbols, points, centre, size=1.0, speed=10.0):
     turn[:, 1, 0] = np.sin(angle)
     turn[:, 0, 1] = -np.sin(angle)
     turn[:, 2, 2] = 1
-    path = np.asarray(centre) + np.linspace(0, 1, symbols)[:, None] * rng.normal(scale=speed, size=3)
+    path = np.asarray(centre) + np.linspace(0, 1, symbols)[:, None] * rng.normal(
+        scale=speed, size=3
+    )
     return Rigid(turn[:, None], path[:, None], body, np.zeros(points, int))
 
 
 def positions(motion: Rigid) -> np.ndarray:
     return (
-        np.einsum("nlij,lj->nli", motion.rotation[:, motion.part], motion.points) + motion.translation[:, motion.part]
+        np.einsum("nlij,lj->nli", motion.rotation[:, motion.part], motion.points)
+        + motion.translation[:, motion.part]
     )
 
 
@@ -66,11 +69,19 @@ def test_any_arrays_and_any_number_of_subcarriers(data):
     counts = st.tuples(st.integers(1, 9), st.integers(1, 9))
     spacing = data.draw(st.sampled_from([15e3, 120e3, 480e3]))
     net = network(
-        carrier_hz=data.draw(st.floats(0.5e9, 100e9)), subcarrier_spacing_hz=spacing,
-        subcarriers=data.draw(st.integers(1, 40)), transmit=data.draw(counts), receive=data.draw(counts),
+        carrier_hz=data.draw(st.floats(0.5e9, 100e9)),
+        subcarrier_spacing_hz=spacing,
+        subcarriers=data.draw(st.integers(1, 40)),
+        transmit=data.draw(counts),
+        receive=data.draw(counts),
         power=data.draw(st.floats(0.1, 100)),
-    )  # fmt: skip
-    seen = Station("A", (3.0, -2.0, 5.0), data.draw(st.floats(0, 7)), net.carrier_hz * data.draw(st.floats(0.9, 1.1)))
+    )
+    seen = Station(
+        "A",
+        (3.0, -2.0, 5.0),
+        data.draw(st.floats(0, 7)),
+        net.carrier_hz * data.draw(st.floats(0.9, 1.1)),
+    )
     rng = np.random.default_rng(data.draw(st.integers(0, 99)))
     away = 10 ** data.draw(st.floats(0, 3))
     centre = np.array(seen.position_m) + away * rng.normal(size=3)
@@ -92,7 +103,9 @@ def test_signal_cells_and_subcarriers_agree():
     rng = np.random.default_rng(5)
     motion = cloud_in_motion(rng, 4, 7, (90.0, 40.0, 10.0))
     arguments = net, net.stations[0], motion, np.ones(7), motion.translation[0, 0]
-    truth = reference.subcarriers(net, net.stations[0], positions(motion), np.ones(7), motion.translation[0, 0])
+    truth = reference.subcarriers(
+        net, net.stations[0], positions(motion), np.ones(7), motion.translation[0, 0]
+    )
     assert relative(pointwise_echo.subcarriers(*arguments), truth) < 1e-9
     cells = pointwise_echo.range_cells(*arguments)
     result = echo_signal(*arguments)
@@ -103,7 +116,8 @@ def test_signal_cells_and_subcarriers_agree():
 def test_a_moving_point_is_in_its_cell_with_its_doppler():
     net = network()
     seen = net.stations[0]
-    speed, start = 2.0, 30.05 * net.cell_m
+    speed = 2.0
+    start = 30.05 * net.cell_m
     x = start + speed * net.times_s
     path = np.stack([x, 0 * x, np.full_like(x, 25.0)], axis=1)[:, None]
     result = echo_signal(net, seen, path, 1.0, path[0, 0])
@@ -139,7 +153,8 @@ def test_the_command_s_memory_grows_by_its_output_alone():
     from craft import craft, row
     from lowalt.echo.chunk import clean_signals
 
-    net, cloud = network(), craft()
+    net = network()
+    cloud = craft()
 
     def peak(models: int) -> int:
         rows = [row(model) for model in range(models)]
@@ -151,6 +166,8 @@ def test_the_command_s_memory_grows_by_its_output_alone():
             tracemalloc.stop()
 
     peak(1)
-    # 200 more models: 400 complex64 values of each. Their positions alone would take sixty times as much.
-    more, output = peak(220) - peak(20), 200 * 400 * 8
+    # 200 more models: 400 complex64 values of each. Their positions alone would take sixty times as
+    # much.
+    more = peak(220) - peak(20)
+    output = 200 * 400 * 8
     assert output <= more < 1.5 * output

@@ -1,4 +1,6 @@
-"""Range cells from a target's moments: the tabulated kernels, and the bound on the cells that are not computed."""
+"""Range cells from a target's moments: the tabulated kernels, and the bound on the cells that are
+not computed.
+"""
 
 import numpy as np
 import pytest
@@ -37,17 +39,29 @@ def test_tabulated_kernels_keep_their_error(count, deep, error):
 
 
 def test_targets_too_deep_and_too_few_cells_are_left_to_the_general_kernel():
-    # A cell SIDE and a half away, seen from the deepest point, is as far as the rule of its kernel holds.
+    # A cell SIDE and a half away, seen from the deepest point, is as far as the rule of its kernel
+    # holds.
     deepest = CELL_REACH - SIDE - 0.5 - 0.5 / PLACES
-    assert cell_polynomials(256, deepest, 1e-6) is not None and cell_polynomials(256, deepest + 1e-9, 1e-6) is None
-    assert cell_polynomials(2 * SIDE + 3, 0.2, 1e-6) is not None and cell_polynomials(2 * SIDE + 2, 0.2, 1e-6) is None
+    assert (
+        cell_polynomials(256, deepest, 1e-6) is not None
+        and cell_polynomials(256, deepest + 1e-9, 1e-6) is None
+    )
+    assert (
+        cell_polynomials(2 * SIDE + 3, 0.2, 1e-6) is not None
+        and cell_polynomials(2 * SIDE + 2, 0.2, 1e-6) is None
+    )
 
 
 @settings(max_examples=60, deadline=None)
 @given(
-    seed=st.integers(0, 10_000), points=st.integers(1, 60), deep=st.floats(0.01, 1.5), count=st.integers(20, 300),
-    place=st.integers(0, PLACES), side=st.integers(2, SIDE), error=st.sampled_from([1e-4, 1e-12]),
-)  # fmt: skip
+    seed=st.integers(0, 10_000),
+    points=st.integers(1, 60),
+    deep=st.floats(0.01, 1.5),
+    count=st.integers(20, 300),
+    place=st.integers(0, PLACES),
+    side=st.integers(2, SIDE),
+    error=st.sampled_from([1e-4, 1e-12]),
+)
 def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, side, error):
     rng = np.random.default_rng(seed)
     table = cell_polynomials(count, deep, error)
@@ -57,24 +71,49 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
     z -= z.mean() * (seed % 2)
     powers = v[:, None] ** np.arange(table.kernels.shape[2])
     sums = z @ powers
-    far, centre = np.empty(4), place / PLACES - 0.5
-    total, second = abs(z).sum(), (abs(z) * v**2).sum()
-    far_moments(table.sines, place, np.stack([sums.real, sums.imag]), table.half, total, second, table.error, far)
+    far = np.empty(4)
+    centre = place / PLACES - 0.5
+    total = abs(z).sum()
+    second = (abs(z) * v**2).sum()
+    far_moments(
+        table.sines,
+        place,
+        np.stack([sums.real, sums.imag]),
+        table.half,
+        total,
+        second,
+        table.error,
+        far,
+    )
     gap = min(centre + side + 1, side + 1 - centre, 0.5 * count)
     limit = far_limit(far, gap, table.half, count)
     beyond = np.arange(side + 1, count - side)
     truth = abs(kernel(beyond[:, None] - (centre + table.half * v), count) @ z)
     assert (truth <= limit * (1 + 1e-9) + 1e-13 * total).all()
-    # The bound is not too loose: for a shallow target it is close to the value in the nearest cell beyond.
+    # The bound is not too loose: for a shallow target it is close to the value in the nearest cell
+    # beyond.
     assert deep > 0.3 or limit <= 1.6 * truth.max() + 1e-3 * total
 
 
 def test_moments_of_far_cells_are_bounded_with_the_orders_that_the_series_of_the_sine_lacks():
-    """|sum z sin(pi u) y^k| of points at one end of the stretch, where a sine of few orders is cut the most."""
+    """|sum z sin(pi u) y^k| of points at one end of the stretch, where a sine of few orders is cut
+    the most.
+    """
     table = cell_polynomials(64, 0.3, 1e-2)
     for place, v in ((3, 1.0), (16, -1.0), (29, 0.9)):
-        powers, far, y = v ** np.arange(table.kernels.shape[2]), np.empty(4), table.half * v
-        far_moments(table.sines, place, np.stack([2 * powers, -powers]), table.half, 2.3, 2.3 * v * v, table.error, far)
+        powers = v ** np.arange(table.kernels.shape[2])
+        far = np.empty(4)
+        y = table.half * v
+        far_moments(
+            table.sines,
+            place,
+            np.stack([2 * powers, -powers]),
+            table.half,
+            2.3,
+            2.3 * v * v,
+            table.error,
+            far,
+        )
         sine = abs(2 - 1j) * np.sin(np.pi * (place / PLACES - 0.5 + y))
         assert (far >= abs(sine) * abs(y) ** np.arange(4)).all()
 
@@ -95,11 +134,15 @@ def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
     moved = echo_signal(net, net.stations[0], Rigid(turned, nodes, points, part), 1.0, nodes[0, 0])
     places = nodes[:, part] + np.einsum("nlij,lj->nli", turned[:, part], points)
     truth = pointwise_echo.signal(net, net.stations[0], places, 1.0, nodes[0, 0])
-    assert relative(moved.signal, truth.signal) < 1e-11 and relative(moved.signal, plain.signal) > 1e-3
+    assert (
+        relative(moved.signal, truth.signal) < 1e-11 and relative(moved.signal, plain.signal) > 1e-3
+    )
 
 
 def test_a_point_half_way_between_two_cells_is_counted_as_a_tie_and_one_off_it_is_not():
-    """Both neighbours hold equal amplitudes there; a hundredth of a cell away they differ by more than a percent."""
+    """Both neighbours hold equal amplitudes there; a hundredth of a cell away they differ by more
+    than a percent.
+    """
     station = Station("A", (0.0, 0.0, 0.0), 0.0, 4.9e9)
     net = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (1, 1), (1, 1), 1.0, (station,))
     cell_m = SPEED_OF_LIGHT / (2 * 256 * 120e3)

@@ -19,9 +19,12 @@ from lowalt.targets.cloud import write
 
 def command(folder, **changes) -> list[str]:
     given = {
-        "--settings": json.dumps({"network": NETWORK, "tolerance": None}), "--motion": str(folder / "chunk.csv"),
-        "--clouds": str(folder / "craft.npz"), "--station": "B", "--out": str(folder / "B.npy"),
-    } | changes  # fmt: skip
+        "--settings": json.dumps({"network": NETWORK, "tolerance": None}),
+        "--motion": str(folder / "chunk.csv"),
+        "--clouds": str(folder / "craft.npz"),
+        "--station": "B",
+        "--out": str(folder / "B.npy"),
+    } | changes
     return [text for option, value in given.items() for text in (option, *value.split("|"))]
 
 
@@ -47,7 +50,9 @@ def test_signals_are_those_of_the_positions(folder):
 def test_stations_heard_together_are_those_heard_alone(folder):
     main(command(folder))
     alone = (folder / "B.npy").read_bytes()
-    main(command(folder, **{"--station": "A|B", "--out": f"{folder}/both-A.npy|{folder}/both-B.npy"}))
+    main(
+        command(folder, **{"--station": "A|B", "--out": f"{folder}/both-A.npy|{folder}/both-B.npy"})
+    )
     assert (folder / "both-B.npy").read_bytes() == alone != (folder / "both-A.npy").read_bytes()
     with pytest.raises(InputError, match="--out: 1 files, expected one for each of the stations"):
         main(command(folder, **{"--station": "A|B"}))
@@ -68,10 +73,18 @@ def test_a_target_checked_once_serves_every_station():
 
 def test_a_job_whose_kernels_are_compiled_loads_no_compiler(folder):
     main(command(folder))
-    code = "import sys; from lowalt.echo.__main__ import main; main(sys.argv[1:]); print(*sys.modules)"
-    again = subprocess.run([sys.executable, "-c", code, *command(folder)], capture_output=True, text=True, check=True)
+    code = (
+        "import sys; from lowalt.echo.__main__ import main; main(sys.argv[1:]); print(*sys.modules)"
+    )
+    again = subprocess.run(
+        [sys.executable, "-c", code, *command(folder)], capture_output=True, text=True, check=True
+    )
     loaded = again.stdout.split()
-    assert "numba" in loaded and not {"numba.np.linalg", "numba.np.random.generator_core", "scipy.linalg"} & set(loaded)
+    assert "numba" in loaded and not {
+        "numba.np.linalg",
+        "numba.np.random.generator_core",
+        "scipy.linalg",
+    } & set(loaded)
 
 
 def test_faults_are_named_and_leave_nothing_behind(folder):
@@ -82,7 +95,9 @@ def test_faults_are_named_and_leave_nothing_behind(folder):
     with pytest.raises(InputError, match="tolerance is 2"):
         main(command(folder, **{"--settings": json.dumps({"network": NETWORK, "tolerance": 2})}))
     with pytest.raises(InputError, match=r"DJI Mini 2, model 0, station B: .*below the floor"):
-        main(command(folder, **{"--settings": json.dumps({"network": NETWORK, "tolerance": 1e-15})}))
+        main(
+            command(folder, **{"--settings": json.dumps({"network": NETWORK, "tolerance": 1e-15})})
+        )
     write_table(folder / "chunk.csv", [row(0) | {"subtype": "Crow"}])
     with pytest.raises(InputError, match="Crow, model 0: no cloud"):
         main(command(folder))

@@ -1,4 +1,6 @@
-"""Kept machine code follows what it is compiled from: kernels, constants and settings, however deep, and no more."""
+"""Kept machine code follows what it is compiled from: kernels, constants and settings, however
+deep, and no more.
+"""
 
 import shutil
 import subprocess
@@ -33,28 +35,59 @@ from lowalt.echo.pointwise.results import matrix
 path.write_text(kept)
 print(digest(run.function), digest(matrix.function))
 """
-"""Edits a source file of a copy of the package and prints the digests of two of the echo's kernels."""
+"""Edits a source file of a copy of the package and prints the digests of two of the echo's kernels.
+"""
 
 # file, text, its replacement, and whether the keys of both kernels change by it
 EDITS = {
     "nothing": ("echo/api.py", "import numpy as np", "import numpy as np", [0, 0]),
-    "a module without kernels": ("echo/api.py", "import numpy as np", "import numpy as np\nUNUSED = 1", [0, 0]),
-    "a function that is not compiled": ("echo/fast/polynomials.py", "nodes = min(count, 32)", "nodes = 31", [0, 0]),
-    "a comment in a kernel": ("echo/fast/vector_loops.py", "    k = degree", "    # Why.\n    k = degree",
-                              [0, 0]),
-    "a called kernel": ("echo/fast/vector_loops.py", "k = degree - first", "k = degree - first + 0", [1, 0]),
-    "a kernel called by a called one": ("echo/fast/polynomials.py", "half = 0.5 * band", "half = band * 0.5", [1, 0]),
+    "a module without kernels": (
+        "echo/api.py",
+        "import numpy as np",
+        "import numpy as np\nUNUSED = 1",
+        [0, 0],
+    ),
+    "a function that is not compiled": (
+        "echo/fast/polynomials.py",
+        "nodes = min(count, 32)",
+        "nodes = 31",
+        [0, 0],
+    ),
+    "a comment in a kernel": (
+        "echo/fast/vector_loops.py",
+        "    k = degree",
+        "    # Why.\n    k = degree",
+        [0, 0],
+    ),
+    "a called kernel": (
+        "echo/fast/vector_loops.py",
+        "k = degree - first",
+        "k = degree - first + 0",
+        [1, 0],
+    ),
+    "a kernel called by a called one": (
+        "echo/fast/polynomials.py",
+        "half = 0.5 * band",
+        "half = band * 0.5",
+        [1, 0],
+    ),
     "a constant": ("echo/fast/cell_kernel.py", "SIDE = 4", "SIDE = 3", [1, 0]),
-    "the settings of a called kernel": ("echo/pointwise/terms.py", "@PLAIN\ndef dirichlet", "@LEAN\ndef dirichlet",
-                                        [0, 1]),
-}  # fmt: skip
+    "the settings of a called kernel": (
+        "echo/pointwise/terms.py",
+        "@PLAIN\ndef dirichlet",
+        "@LEAN\ndef dirichlet",
+        [0, 1],
+    ),
+}
 
 
 @pytest.fixture(scope="module")
 def digests(tmp_path_factory):
     """The two digests after each edit."""
     place = tmp_path_factory.mktemp("sources") / "lowalt"
-    shutil.copytree(Path(lowalt.__file__).parent, place, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        Path(lowalt.__file__).parent, place, ignore=shutil.ignore_patterns("__pycache__")
+    )
     programs = [PROGRAM.format((str(place), *edit[:3])) for edit in EDITS.values()]
     return dict(zip(EDITS, map(str.split, printed(programs)), strict=True))
 
@@ -62,7 +95,9 @@ def digests(tmp_path_factory):
 @pytest.mark.parametrize("case", EDITS)
 def test_the_key_changes_with_what_is_compiled_alone(case, digests):
     before = digests["nothing"]
-    assert [int(new != old) for new, old in zip(digests[case], before, strict=True)] == EDITS[case][-1]
+    assert [int(new != old) for new, old in zip(digests[case], before, strict=True)] == EDITS[case][
+        -1
+    ]
 
 
 def test_kernels_of_the_echo_are_kept_by_that_key():
@@ -70,11 +105,14 @@ def test_kernels_of_the_echo_are_kept_by_that_key():
         def magic_tuple(self):
             return ("processor",)
 
-    # numba offers no public name for the key of a cache entry; only the key shows that this cache is asked.
+    # numba offers no public name for the key of a cache entry; only the key shows that this cache
+    # is asked.
     for compiled in (run, matrix):
         cache = compiled.dispatcher._cache
         assert isinstance(cache, _DigestCache)
-        assert digest(compiled.function, compiled.options) in cache._index_key(("signature",), Codegen())
+        assert digest(compiled.function, compiled.options) in cache._index_key(
+            ("signature",), Codegen()
+        )
 
 
 def test_a_kernel_without_an_entry_for_python_refuses_a_call_and_serves_kernels():
@@ -98,11 +136,15 @@ def test_kept_code_for_a_type_that_has_moved_is_compiled_anew(tmp_path):
     (tmp_path / "use.py").write_text(
         "from lowalt.machine.jit import LEAN\n@LEAN\ndef total(pair):\n    return pair.a + pair.b\n"
     )
-    program = "import sys, use; print(use.total(getattr(__import__(sys.argv[1]), 'Pair')(1.0, 2.0)))"
+    program = (
+        "import sys, use; print(use.total(getattr(__import__(sys.argv[1]), 'Pair')(1.0, 2.0)))"
+    )
     paths = f"{tmp_path}:{Path(lowalt.__file__).parents[1]}"
     for module in ("one", "two"):
         call = [sys.executable, "-c", program, module]
-        done = subprocess.run(call, env={"PYTHONPATH": paths}, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            call, env={"PYTHONPATH": paths}, capture_output=True, text=True, check=True
+        )
         assert done.stdout == "3.0\n"
         (tmp_path / f"{module}.py").rename(tmp_path / "two.py")
 
@@ -135,7 +177,9 @@ print((found == written).all())
 def test_products_of_complex_numbers_are_fused_in_no_kernel_that_is_done_as_written(tmp_path):
     # numba compiles such a product once for all kernels, with the options of the first one.
     (tmp_path / "products.py").write_text(PRODUCTS)
-    ended = subprocess.run([sys.executable, "products.py"], cwd=tmp_path, capture_output=True, text=True)
+    ended = subprocess.run(
+        [sys.executable, "products.py"], cwd=tmp_path, capture_output=True, text=True
+    )
     assert ended.stdout == "True\n", ended.stderr
 
 
@@ -169,7 +213,9 @@ print((found == written).all() != fuses)
 
 def test_plain_numba_still_compiles_a_product_once_for_all_kernels(tmp_path):
     (tmp_path / "shared.py").write_text(SHARED)
-    ended = subprocess.run([sys.executable, "shared.py"], cwd=tmp_path, capture_output=True, text=True)
+    ended = subprocess.run(
+        [sys.executable, "shared.py"], cwd=tmp_path, capture_output=True, text=True
+    )
     assert ended.stdout == "True\n", ended.stderr
 
 
@@ -207,16 +253,25 @@ for kind in (INNER, LEAN, PLAIN, VECTOR):
 
 
 def test_a_function_done_as_written_stays_so_for_a_first_caller_that_may_fuse(tmp_path):
-    # An option that a function does not give, numba takes from the function that calls it first. The last kind is a
+    # An option that a function does not give, numba takes from the function that calls it first.
+    # The last kind is a
     # control: it is fused where the processor has such instructions.
     (tmp_path / "called.py").write_text(CALLED)
-    ended = subprocess.run([sys.executable, "called.py"], cwd=tmp_path, capture_output=True, text=True)
+    ended = subprocess.run(
+        [sys.executable, "called.py"], cwd=tmp_path, capture_output=True, text=True
+    )
     assert ended.stdout == "True\n" * 4, ended.stderr
 
 
 def test_the_key_of_kept_code_has_the_kernel_s_own_options():
     assert (
-        len({digest(run.function, options) for options in (None, {"fastmath": {"contract"}}, {"fastmath": set()})}) == 3
+        len(
+            {
+                digest(run.function, options)
+                for options in (None, {"fastmath": {"contract"}}, {"fastmath": set()})
+            }
+        )
+        == 3
     )
 
 
@@ -238,23 +293,32 @@ def caller(x):
 
 
 def test_a_kept_kernel_calls_the_function_that_it_was_compiled_with(tmp_path):
-    # As numba links, the function that was loaded first also serves a second caller, whose answer then is 2.0. In the
-    # same way the bits of a scene depended on whether its kernels had been compiled in the process.
+    # As numba links, the function that was loaded first also serves a second caller, whose answer
+    # then is 2.0. In the same way the bits of a scene depended on whether its kernels had been
+    # compiled in the process.
     uses = []
     for offset in ("1.0", "2.0"):
         module = tmp_path / offset / "linked.py"
         module.parent.mkdir()
         module.write_text(LINKED.format(60 * f"x = x * 0.5 + {offset}; "))
-        uses.append(f"sys.path.insert(0, {str(module.parent)!r}); sys.modules.pop('linked', None); import linked")
+        uses.append(
+            f"sys.path.insert(0, {str(module.parent)!r}); sys.modules.pop('linked', None); import linked"
+        )
     # The first two programs compile, the third finds machine code in the cache.
     programs = [["import sys", use, "print(linked.caller(0.0))"] for use in uses]
-    programs += [["import sys", uses[0], "print(linked.called(0.0))", uses[1], "print(linked.caller(0.0))"]]
+    programs += [
+        ["import sys", uses[0], "print(linked.called(0.0))", uses[1], "print(linked.caller(0.0))"]
+    ]
     assert printed(["\n".join(lines) for lines in programs]) == ["2.0\n", "4.0\n", "2.0\n4.0\n"]
 
 
-def test_machine_code_that_no_folder_can_keep_is_refused_with_the_variable_that_names_one(monkeypatch):
+def test_machine_code_that_no_folder_can_keep_is_refused_with_the_variable_that_names_one(
+    monkeypatch,
+):
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
     names: dict = {}
     exec(compile("def twice(x):\n    return 2 * x\n", "/proc/nowhere/kernel.py", "exec"), names)
-    with pytest.raises(InputError, match=r"beside /proc/nowhere/kernel.py nor .* expected XDG_CACHE_HOME: a folder"):
+    with pytest.raises(
+        InputError, match=r"beside /proc/nowhere/kernel.py nor .* expected XDG_CACHE_HOME: a folder"
+    ):
         dispatcher(names["twice"], {}, str)

@@ -1,7 +1,8 @@
-"""Poses and exact echoes have the same bytes whatever the processor: other ones are emulated in processes of their own.
+"""Poses and exact echoes have the same bytes whatever the processor: other ones are emulated in
+processes of their own.
 
-The quick test takes numpy's and the BLAS's vector instructions away. The slow one also compiles the kernels for two
-other processors, which takes some minutes the first time.
+The quick test takes numpy's and the BLAS's vector instructions away. The slow one also compiles the
+kernels for two other processors, which takes some minutes the first time.
 """
 
 import hashlib
@@ -19,62 +20,102 @@ from lowalt.echo.chunk import clean_signals
 from lowalt.motion import poses
 from lowalt.targets.cloud import Cloud
 
-NEW, OLD = "X86_V4 AVX512_ICL AVX512_SPR", "X86_V3 AVX2 FMA3"
+NEW = "X86_V4 AVX512_ICL AVX512_SPR"
+OLD = "X86_V3 AVX2 FMA3"
 LIBRARIES = {"NPY_DISABLE_CPU_FEATURES": f"{NEW} {OLD}", "OPENBLAS_CORETYPE": "Nehalem"}
 PROCESSORS = {
     "haswell": {
-        "NPY_DISABLE_CPU_FEATURES": NEW, "OPENBLAS_CORETYPE": "Haswell", "NUMBA_CPU_NAME": "haswell",
+        "NPY_DISABLE_CPU_FEATURES": NEW,
+        "OPENBLAS_CORETYPE": "Haswell",
+        "NUMBA_CPU_NAME": "haswell",
         "NUMBA_CPU_FEATURES": "+sse4.2,+avx,+avx2,+fma,+bmi,+bmi2,+popcnt,+lzcnt",
     },
     "nehalem": LIBRARIES | {"NUMBA_CPU_NAME": "nehalem", "NUMBA_CPU_FEATURES": "+sse4.2,+popcnt"},
-}  # fmt: skip
+}
 
 
 def bird() -> Cloud:
     """A body and a wing of two hinged segments."""
-    rng, nothing = np.random.default_rng(1), [np.nan] * 3
-    flap = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fold_lag_deg": 90.0}
+    rng = np.random.default_rng(1)
+    nothing = [np.nan] * 3
+    flap = {
+        "mean_deg": 15.0,
+        "amplitude_deg": 40.0,
+        "fold_amplitude_deg": 30.0,
+        "fold_lag_deg": 90.0,
+    }
     return Cloud(
-        points=rng.normal(scale=0.3, size=(45, 3)), part=np.repeat(np.arange(3), 15), kinds=("body", "wing", "wing"),
-        names=("body", "inner", "outer"), parents=np.array([-1, -1, 1]),
+        points=rng.normal(scale=0.3, size=(45, 3)),
+        part=np.repeat(np.arange(3), 15),
+        kinds=("body", "wing", "wing"),
+        names=("body", "inner", "outer"),
+        parents=np.array([-1, -1, 1]),
         hinges=np.array([nothing, [0.1, 0.0, 0.0], [0.4, 0.0, 0.0]]),
-        axes=np.array([nothing, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]), normals=np.full((45, 3), np.nan),
+        axes=np.array([nothing, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]),
+        normals=np.full((45, 3), np.nan),
         rcs_m2=rng.uniform(0.1, 2.0, 45),
-        record={"subtype": "Crow", "category": "Bird", "source": "test", "checksum": "0", "flap": flap},
-    )  # fmt: skip
+        record={
+            "subtype": "Crow",
+            "category": "Bird",
+            "source": "test",
+            "checksum": "0",
+            "flap": flap,
+        },
+    )
 
 
 def walker() -> Cloud:
     """Seven nodes of a cyclic recording."""
-    rng, nothing = np.random.default_rng(2), np.full((7, 3), np.nan)
+    rng = np.random.default_rng(2)
+    nothing = np.full((7, 3), np.nan)
     return Cloud(
-        points=np.zeros((7, 3)), part=np.arange(7), kinds=("node",) * 7, names=tuple(f"node {i}" for i in range(7)),
-        parents=np.full(7, -1), hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(7),
-        record={"subtype": "Walker", "category": "Pedestrian", "source": "test", "checksum": "0",
-                "track_rate_hz": 120.0},
+        points=np.zeros((7, 3)),
+        part=np.arange(7),
+        kinds=("node",) * 7,
+        names=tuple(f"node {i}" for i in range(7)),
+        parents=np.full(7, -1),
+        hinges=nothing,
+        axes=nothing,
+        normals=nothing,
+        rcs_m2=np.ones(7),
+        record={
+            "subtype": "Walker",
+            "category": "Pedestrian",
+            "source": "test",
+            "checksum": "0",
+            "track_rate_hz": 120.0,
+        },
         track=rng.normal(scale=0.5, size=(130, 7, 3)),
-    )  # fmt: skip
+    )
 
 
 def digest(count: int) -> str:
     """SHA-256 of the poses and of the stored signals of `count` motion models of each target."""
-    network, total = Network.from_settings(NETWORK | {"symbols": 400}), hashlib.sha256()
+    network = Network.from_settings(NETWORK | {"symbols": 400})
+    total = hashlib.sha256()
     for cloud, more in ((craft(), {}), (bird(), {}), (walker(), {"start_s": 0.3, "playback": 0.9})):
         for model in range(count):
             motion = row(model) | more | {"subtype": cloud.subtype, "rate_hz": 3.7 + model}
             for array in poses(cloud, motion, network.times_s):
                 total.update(np.ascontiguousarray(array).tobytes())
-            total.update(clean_signals(network, ["A", "B"], {cloud.subtype: cloud}, [motion], None).tobytes())
+            total.update(
+                clean_signals(network, ["A", "B"], {cloud.subtype: cloud}, [motion], None).tobytes()
+            )
     return total.hexdigest()
 
 
 def digest_on(processor: dict[str, str], count: int, folder: Path) -> str:
-    """The digest as a process of its own computes it, its libraries and compiler told of another processor."""
+    """The digest as a process of its own computes it, its libraries and compiler told of another
+    processor.
+    """
     call = [sys.executable, "-c", f"from test_echo_portable import digest; print(digest({count}))"]
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     kept = {"NUMBA_CACHE_DIR": str(folder)} if "NUMBA_CPU_NAME" in processor else {}
     run = subprocess.run(
-        call, env=os.environ | processor | kept | {"PYTHONPATH": paths}, capture_output=True, text=True
+        call,
+        env=os.environ | processor | kept | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
     )
     assert run.returncode == 0, run.stderr
     return run.stdout.strip()

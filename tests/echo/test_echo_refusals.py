@@ -31,30 +31,65 @@ REFUSED = [
     ({"motion": np.full((2, 3, 3), 1e308) * [1, 1, -np.inf]}, r"positions\[0, 0, 2\] is -inf"),
     ({"motion": np.zeros((2, 0, 3))}, r"positions has shape \(2, 0, 3\), expected \(N, L, 3\)"),
     ({"motion": np.zeros((2, 3))}, r"positions has shape \(2, 3\)"),
-    ({"motion": inside(PLACES, (1, 2))}, "position of point 2 at symbol 1 is .*, the place of station A .r = 0"),
-    ({"motion": STILL._replace(rotation=np.zeros((2, 3, 3, 2)))}, r"motion.rotation has shape \(2, 3, 3, 2\), "),
-    ({"motion": STILL._replace(rotation=np.zeros((0, 3, 3, 3)))}, r"motion.rotation .*expected \(N, P, 3, 3\)"),
-    ({"motion": STILL._replace(rotation=np.full((2, 3, 3, 3), np.nan))}, r"motion.rotation\[0, 0, 0, 0\] is nan"),
-    ({"motion": STILL._replace(translation=np.zeros((2, 4, 3)))}, r"motion.translation .*expected \(2, 3, 3\)"),
-    ({"motion": STILL._replace(points=np.zeros((3, 2)))}, r"motion.points has shape \(3, 2\), expected \(L, 3\)"),
-    ({"motion": STILL._replace(part=np.arange(2))}, r"motion.part has shape \(2,\) and type int64, expected \(3,\)"),
-    ({"motion": STILL._replace(part=np.zeros(3))}, r"motion.part has shape \(3,\) and type float64, expected"),
+    (
+        {"motion": inside(PLACES, (1, 2))},
+        "position of point 2 at symbol 1 is .*, the place of station A .r = 0",
+    ),
+    (
+        {"motion": STILL._replace(rotation=np.zeros((2, 3, 3, 2)))},
+        r"motion.rotation has shape \(2, 3, 3, 2\), ",
+    ),
+    (
+        {"motion": STILL._replace(rotation=np.zeros((0, 3, 3, 3)))},
+        r"motion.rotation .*expected \(N, P, 3, 3\)",
+    ),
+    (
+        {"motion": STILL._replace(rotation=np.full((2, 3, 3, 3), np.nan))},
+        r"motion.rotation\[0, 0, 0, 0\] is nan",
+    ),
+    (
+        {"motion": STILL._replace(translation=np.zeros((2, 4, 3)))},
+        r"motion.translation .*expected \(2, 3, 3\)",
+    ),
+    (
+        {"motion": STILL._replace(points=np.zeros((3, 2)))},
+        r"motion.points has shape \(3, 2\), expected \(L, 3\)",
+    ),
+    (
+        {"motion": STILL._replace(part=np.arange(2))},
+        r"motion.part has shape \(2,\) and type int64, expected \(3,\)",
+    ),
+    (
+        {"motion": STILL._replace(part=np.zeros(3))},
+        r"motion.part has shape \(3,\) and type float64, expected",
+    ),
     ({"motion": STILL._replace(part=np.array([0, 1, 3]))}, "motion.part spans 0..3, expected 0..2"),
-    ({"motion": STILL._replace(part=np.array([2, -1, 1]))}, "motion.part spans -1..2, expected 0..2"),
+    (
+        {"motion": STILL._replace(part=np.array([2, -1, 1]))},
+        "motion.part spans -1..2, expected 0..2",
+    ),
     ({"rcs_m2": np.array([1.0, -2.0, -3.0])}, r"rcs_m2\[2\] is -3.0, expected square metres >= 0"),
     ({"rcs_m2": np.ones(2)}, r"rcs_m2 has shape \(2,\), expected \(3,\)"),
     ({"rcs_m2": "much"}, "rcs_m2 is .*much.*, expected real numbers"),
-    ({"motion": target(PLACES, 1.0)}, "rcs_m2 is 1.0, expected None: a Target holds its cross sections"),
+    (
+        {"motion": target(PLACES, 1.0)},
+        "rcs_m2 is 1.0, expected None: a Target holds its cross sections",
+    ),
     ({"aim_m": SEEN.position_m}, "aim_m is .*no direction to aim at"),
     ({"aim_m": (np.nan, 0.0, 25.0)}, r"aim_m\[0\] is nan"),
-    *(({"tolerance": wrong}, "tolerance is .*, expected null or a number between 0 and 1")
-      for wrong in (0.0, 1.0, -1e-3, float("nan"), "1e-3", 2)),
-]  # fmt: skip
+    *(
+        ({"tolerance": wrong}, "tolerance is .*, expected null or a number between 0 and 1")
+        for wrong in (0.0, 1.0, -1e-3, float("nan"), "1e-3", 2)
+    ),
+]
 
 
 @pytest.mark.parametrize(("change", "told"), REFUSED, ids=[told for _, told in REFUSED])
 def test_a_wrong_argument_is_named_with_its_sample(change, told):
-    with np.errstate(over="ignore", invalid="ignore"), pytest.raises(InputError, match=f"^tern: {told}"):
+    with (
+        np.errstate(over="ignore", invalid="ignore"),
+        pytest.raises(InputError, match=f"^tern: {told}"),
+    ):
         echo_signal(NET, SEEN, **GOOD | change, sample="tern")
 
 

@@ -1,4 +1,6 @@
-"""Exact values round to complex64 as the true values do: the double-double sums, the decision, the strongest cell."""
+"""Exact values round to complex64 as the true values do: the double-double sums, the decision, the
+strongest cell.
+"""
 
 from types import SimpleNamespace
 
@@ -14,8 +16,10 @@ from lowalt.echo.rounding import nearest, sums
 from lowalt.machine.jit import LEAN
 from lowalt.numerics.exact import sines
 
-sine_cosine, dirichlet = LEAN(sines.sine_cosine.function), LEAN(sines.dirichlet.function)
-to_odd, same_double = LEAN(nearest.to_odd.function), LEAN(nearest.same_double.function)
+sine_cosine = LEAN(sines.sine_cosine.function)
+dirichlet = LEAN(sines.dirichlet.function)
+to_odd = LEAN(nearest.to_odd.function)
+same_double = LEAN(nearest.same_double.function)
 
 
 def exact(pair) -> mpmath.mpf:
@@ -24,7 +28,9 @@ def exact(pair) -> mpmath.mpf:
 
 
 def nearest_single(value: mpmath.mpf) -> np.float32:
-    """The float32 nearest to a number of many digits, ties to even, by exact comparison of its neighbours."""
+    """The float32 nearest to a number of many digits, ties to even, by exact comparison of its
+    neighbours.
+    """
     guess = np.float32(float(value))
     near = [np.nextafter(guess, np.float32(way)) for way in (-np.inf, np.inf)] + [guess]
     return min(near, key=lambda x: (abs(mpmath.mpf(float(x)) - value), int(x.view(np.int32)) & 1))
@@ -38,7 +44,10 @@ def test_sines_hold_twenty_digits(size):
             turn = (float(x), float(x) * 2.0**-54)
             s, c = sine_cosine(turn)
             angle = 2 * mpmath.pi * exact(turn)
-            assert abs(exact(s) - mpmath.sin(angle)) < 2.0**-69 and abs(exact(c) - mpmath.cos(angle)) < 2.0**-69
+            assert (
+                abs(exact(s) - mpmath.sin(angle)) < 2.0**-69
+                and abs(exact(c) - mpmath.cos(angle)) < 2.0**-69
+            )
     assert [sine_cosine((x, 0.0)) for x in (0.25, 0.5)] == [((1, 0), (0, 0)), ((0, 0), (-1, 0))]
 
 
@@ -51,11 +60,16 @@ def test_array_sums_hold_twenty_digits_and_their_limits(count):
             truth = mpmath.sin(count * angle) / mpmath.sin(angle)
             assert abs(exact(dirichlet((float(x), 0.0), float(count))) - truth) < count * 2.0**-66
     for whole in range(-3, 4):
-        assert dirichlet((float(whole), 0.0), float(count)) == ((-1.0) ** (whole * (count - 1)) * count, 0.0)
+        assert dirichlet((float(whole), 0.0), float(count)) == (
+            (-1.0) ** (whole * (count - 1)) * count,
+            0.0,
+        )
 
 
 def prepared(net, station, motion, rcs, aim):
-    """What `echo_signal` prepares and computes before values are rounded: (arguments of `nearest.correct`)."""
+    """What `echo_signal` prepares and computes before values are rounded: (arguments of
+    `nearest.correct`).
+    """
     scene, radio, refs, aims = api.prepared(net, station, motion, rcs, aim, "")
     found, _, method, sample = refine.compute(scene, radio, refs, aims, None)
     return sample, refs, found, method.pointwise_bound
@@ -67,30 +81,42 @@ def test_double_double_sums_keep_their_error(name):
     rcs = np.linspace(0.5, 1.5, len(points)) if len(points) != 2 else np.ones(2)
     result = echo_signal(net, station, points[None], rcs, aim)
     sample, *_ = prepared(net, station, points[None], rcs, aim)
-    cell, work = int(result.cell[0]), np.empty((sums.ROWS, len(sample.lay.root) + 4))
+    cell = int(result.cell[0])
+    work = np.empty((sums.ROWS, len(sample.lay.root) + 4))
     real, imag = sums.cell_value(sample, 0, cell, work)
     with mpmath.workdps(50):
         truth = reference.cells_mp(net, station, points.tolist(), rcs.tolist(), aim, [cell])[0]
         wrong = abs(mpmath.mpc(exact(real), exact(imag)) - truth)
         assert wrong < nearest.ERROR * result.totals[0]
         stored = result.signal.astype(np.complex64)[0]
-        assert stored.real == nearest_single(truth.real) and stored.imag == nearest_single(truth.imag)
+        assert stored.real == nearest_single(truth.real) and stored.imag == nearest_single(
+            truth.imag
+        )
 
 
 @pytest.mark.parametrize("rigid", [True, False])
 def test_whatever_errors_the_bounds_allow_the_same_values_are_stored(rigid):
-    net, rng = network(symbols=60), np.random.default_rng(3)
+    net = network(symbols=60)
+    rng = np.random.default_rng(3)
     motion = cloud_in_motion(rng, 60, 50, (180.0, 120.0, 60.0), 1.5, 30.0)
-    shape = motion if rigid else np.einsum("nlij,lj->nli", motion.rotation[:, motion.part], motion.points)
+    shape = (
+        motion
+        if rigid
+        else np.einsum("nlij,lj->nli", motion.rotation[:, motion.part], motion.points)
+    )
     if not rigid:
         shape = shape + motion.translation[:, motion.part]
-    stored, again, uncorrected = [], [], []
+    stored = []
+    again = []
+    uncorrected = []
     for _ in range(3):
         *before, found, bound = prepared(net, net.stations[0], shape, 1.3, motion.translation[0, 0])
-        # As if computed with a thousand times the error: another machine's values anywhere in that circle.
+        # As if computed with a thousand times the error: another machine's values anywhere in that
+        # circle.
         found.bounds[:] *= 1e3
         found.gaps[:] = np.maximum(found.gaps - 2 * found.bounds, 0.0)
-        turn, far = np.exp(2j * np.pi * rng.uniform(size=60)), rng.uniform(size=60)
+        turn = np.exp(2j * np.pi * rng.uniform(size=60))
+        far = rng.uniform(size=60)
         found.values[:] += found.bounds * far * turn
         uncorrected.append(found.values.astype(np.complex64))
         again.append(nearest.correct(*before, found, bound))
@@ -104,12 +130,16 @@ def test_a_value_is_computed_again_only_where_its_bound_leaves_the_nearest_singl
     tie = float(np.float32(1.0)) + 2.0**-24
     real = np.array([tie, tie + 1e-9, tie - 1e-9, 0.3, 0.3, 0.3, 0.0])
     values = real + 1j * np.array([0.2, 0.2, 0.2, tie, 0.2, 0.2, 0.0])
-    bounds, gaps = np.full(7, 1e-10), np.array([1.0, 1, 1, 1, 1, 0, 0])
-    totals, out = np.array([1.0, 1, 1, 1, 1, 1, 0]), np.empty(7, np.int64)
+    bounds = np.full(7, 1e-10)
+    gaps = np.array([1.0, 1, 1, 1, 1, 0, 0])
+    totals = np.array([1.0, 1, 1, 1, 1, 1, 0])
+    out = np.empty(7, np.int64)
     count, unproved = nearest.doubtful(values, bounds, totals, gaps, out)
     assert out[:count].tolist() == [0, 3, 5] and unproved == 1
     # Where every value is certain nothing is computed again, and nothing of the scene is asked for.
-    certain = SimpleNamespace(values=values[4:5], bounds=bounds[4:5], totals=totals[4:5], gaps=gaps[4:5])
+    certain = SimpleNamespace(
+        values=values[4:5], bounds=bounds[4:5], totals=totals[4:5], gaps=gaps[4:5]
+    )
     assert nearest.correct(None, np.empty((1, 7)), certain, (0.0, 0.0)) == (0, 0)
 
 
@@ -129,13 +159,18 @@ def test_a_sum_of_two_doubles_rounds_once():
 def test_near_ties_of_cells_go_to_the_truly_strongest():
     """Points half way between two cells in many directions: their distances round to either side."""
     net = network(symbols=1)
-    station, rng = net.stations[0], np.random.default_rng(1)
+    station = net.stations[0]
+    rng = np.random.default_rng(1)
     for _ in range(30):
         way = rng.normal((3.0, 0.0, 0.0))
-        edge = (np.array(station.position_m) + 30.5 * net.cell_m * way / np.linalg.norm(way))[None, None]
+        edge = (np.array(station.position_m) + 30.5 * net.cell_m * way / np.linalg.norm(way))[
+            None, None
+        ]
         result = echo_signal(net, station, edge, 1.0, (150.0, 1.0, 26.0))
         with mpmath.workdps(60):
-            values = reference.cells_mp(net, station, edge[0].tolist(), [1.0], (150.0, 1.0, 26.0), [30, 31], 60)
+            values = reference.cells_mp(
+                net, station, edge[0].tolist(), [1.0], (150.0, 1.0, 26.0), [30, 31], 60
+            )
             strengths = [abs(value) for value in values]
         assert result.gap[0] == 0 and result.cell[0] == 30 + (strengths[1] > strengths[0])
 
@@ -150,10 +185,19 @@ def test_a_sum_that_is_a_double_and_one_whose_last_bit_is_one_stay():
 
 def test_a_tie_between_two_singles_is_seen_in_the_low_half_of_a_double_double():
     """Both ends of the error round to the tie itself as doubles, and to two singles as numbers."""
-    tie, bits = 1.0 + 2.0**-24, np.empty(1, np.int64)
+    tie = 1.0 + 2.0**-24
+    bits = np.empty(1, np.int64)
     for low, error, decided in (
-        (0.0, 1e-20, False), (1e-20, 0.9e-20, True), (1e-20, 1.1e-20, False), (-1e-20, 0.9e-20, True),
-        (-1e-20, 1.1e-20, False), (-1e-16, 1.1e-16, False), (3e-17, 1e-17, True), (0.0, 0.0, True),
-    ):  # fmt: skip
-        assert same_double((tie, low), error, bits) == decided == same_double((-tie, low), error, bits)
+        (0.0, 1e-20, False),
+        (1e-20, 0.9e-20, True),
+        (1e-20, 1.1e-20, False),
+        (-1e-20, 0.9e-20, True),
+        (-1e-20, 1.1e-20, False),
+        (-1e-16, 1.1e-16, False),
+        (3e-17, 1e-17, True),
+        (0.0, 0.0, True),
+    ):
+        assert (
+            same_double((tie, low), error, bits) == decided == same_double((-tie, low), error, bits)
+        )
     assert same_double((0.3, 0.0), 1e-20, bits) and not same_double((0.0, 0.0), 1e-30, bits)

@@ -1,4 +1,6 @@
-"""Some of the random scenes of `benchmarks/echo_scenes.py`, and tests that their check finds errors."""
+"""Some of the random scenes of `benchmarks/echo_scenes.py`, and tests that their check finds
+errors.
+"""
 
 import sys
 from pathlib import Path
@@ -18,7 +20,14 @@ def test_random_scenes_keep_every_promise():
 
 
 def test_failures_are_seen():
-    good = {"tolerance": 1e-6, "error": 1e-8, "bound": 1e-7, "wrong_cells": 0, "carrier_hz": 5e9, "range_m": 100.0}
+    good = {
+        "tolerance": 1e-6,
+        "error": 1e-8,
+        "bound": 1e-7,
+        "wrong_cells": 0,
+        "carrier_hz": 5e9,
+        "range_m": 100.0,
+    }
     assert not echo_scenes.failures([good])
     for change in ({"error": 2e-6, "bound": 1}, {"bound": 1e-9}, {"wrong_cells": 1}):
         assert echo_scenes.failures([good | change])
@@ -33,7 +42,8 @@ def test_the_judge_agrees_with_fifty_digits():
         cells = echo_scenes.judge(network, station, motion, rcs, aim, 5)
         points = np.einsum("lij,lj->li", motion.rotation[5, motion.part], motion.points)
         best = int(abs(cells).argmax())
-        # 50 digits on positions rounded to doubles: only scenes near enough for that rounding not to matter.
+        # 50 digits on positions rounded to doubles: only scenes near enough for that rounding not
+        # to matter.
         points = points + motion.translation[5, motion.part]
         turns = network.carrier_hz * 2 * np.abs(points).max() / 3e8
         truth = reference.cell_mp(network, station, points.tolist(), rcs.tolist(), aim, best)

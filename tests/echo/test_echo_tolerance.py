@@ -1,4 +1,6 @@
-"""A tolerance is kept: errors stay below proved bounds, looser ones are cheaper, polynomials keep their bounds."""
+"""A tolerance is kept: errors stay below proved bounds, looser ones are cheaper, polynomials keep
+their bounds.
+"""
 
 import mpmath
 import numpy as np
@@ -17,15 +19,25 @@ from lowalt.echo.radar import radar
 
 @settings(max_examples=25, deadline=None)
 @given(
-    seed=st.integers(0, 10_000), points=st.integers(1, 700), size=st.floats(0.02, 3.0),
-    away=st.floats(30.0, 3000.0), tolerance=st.sampled_from([1e-2, 1e-3, 1e-5, 1e-7, 1e-9]),
-)  # fmt: skip
+    seed=st.integers(0, 10_000),
+    points=st.integers(1, 700),
+    size=st.floats(0.02, 3.0),
+    away=st.floats(30.0, 3000.0),
+    tolerance=st.sampled_from([1e-2, 1e-3, 1e-5, 1e-7, 1e-9]),
+)
 def test_error_and_bound_stay_within_the_tolerance(seed, points, size, away, tolerance):
     net = network(symbols=40)
     rng = np.random.default_rng(seed)
     motion = cloud_in_motion(rng, 40, points, (away, 0.3 * away, 40.0), size, 20.0)
-    arguments = (net, net.stations[0], motion, rng.exponential(size=points), motion.translation[0, 0])
-    # The pointwise kernel is independent of the fast one: it has no polynomials, and computes all cells where needed.
+    arguments = (
+        net,
+        net.stations[0],
+        motion,
+        rng.exponential(size=points),
+        motion.translation[0, 0],
+    )
+    # The pointwise kernel is independent of the fast one: it has no polynomials, and computes all
+    # cells where needed.
     truth = pointwise_echo.signal(*arguments)
     for allowed in (tolerance, None):
         result = echo_signal(*arguments, allowed)
@@ -62,10 +74,14 @@ def test_a_looser_tolerance_takes_shorter_polynomials(always_approximate):
 def test_fitted_cosines_keep_their_bound(band, error):
     degree = polynomials.degree_for(band, error)
     cosines = polynomials.CosineSum(np.array([0.25, 0.45, 0.3]), np.array([1.0, 0.6, 0.1]))
-    out, s = np.zeros(polynomials.TOP + 1), np.linspace(-1, 1, 401)
+    out = np.zeros(polynomials.TOP + 1)
+    s = np.linspace(-1, 1, 401)
     polynomials.economised(cosines, 1.7, band, degree, polynomials.folding(), np.empty((3, 3)), out)
     truth = np.cos(np.outer(1.7 + band * s, cosines.rates)) @ cosines.weights
-    assert abs(np.polynomial.polynomial.polyval(s, out) - truth).max() <= polynomials.tail(band, degree) + 2e-15
+    assert (
+        abs(np.polynomial.polynomial.polyval(s, out) - truth).max()
+        <= polynomials.tail(band, degree) + 2e-15
+    )
     assert polynomials.tail(band, degree) <= error
 
 
@@ -113,7 +129,12 @@ def test_reference_ranges_hold_more_than_a_double(distance):
         turn = 2 * centre * r / 299792458
         off = turn - mpmath.nint(turn) - mpmath.mpf(found[TURN])
         assert abs(off - mpmath.nint(off)) < 1e-15
-        assert abs(2 * 256 * 120000 * r / 299792458 - mpmath.mpf(found[CELL]) - mpmath.mpf(found[REST])) < 1e-15
+        assert (
+            abs(
+                2 * 256 * 120000 * r / 299792458 - mpmath.mpf(found[CELL]) - mpmath.mpf(found[REST])
+            )
+            < 1e-15
+        )
 
 
 @pytest.mark.parametrize("size, tolerance", [(0.4, None), (2.0, None), (2.0, 1e-2), (60.0, None)])
@@ -130,7 +151,9 @@ def test_the_gap_is_a_lower_bound_that_says_something(size, tolerance):
     assert (result.gap <= truth * (1 + 1e-9)).all() and (result.gap >= 0).all()
     # The bound on far cells seldom hides a clear lead, so most gaps are close to the true ones.
     assert np.median(result.gap / truth) > 0.5
-    assert (strengths.sum(axis=1) > 0).all() and (result.totals >= strengths[:, -1] * (1 - 1e-9)).all()
+    assert (strengths.sum(axis=1) > 0).all() and (
+        result.totals >= strengths[:, -1] * (1 - 1e-9)
+    ).all()
     general = pointwise_echo.signal(*arguments)
     assert (general.gap <= truth * (1 + 1e-9)).all() and general.gap.max() > 0
     assert relative(general.totals, result.totals) < (1e-2 if tolerance else 1e-9)

@@ -1,4 +1,6 @@
-"""One thread for BLAS: within the block alone, however blocks stand in each other, and the bits of scenes with it."""
+"""One thread for BLAS: within the block alone, however blocks stand in each other, and the bits of
+scenes with it.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from lowalt.machine.blas_threads import one_blas_thread
 def counts() -> set[int]:
     """Threads of every BLAS that is loaded."""
     np.ones((2, 2)) @ np.ones((2, 2))
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+    return {
+        library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"
+    }
 
 
 @pytest.fixture

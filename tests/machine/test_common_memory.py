@@ -1,4 +1,6 @@
-"""Memory that arrays have freed stays with the process: the next arrays fetch no pages from the system."""
+"""Memory that arrays have freed stays with the process: the next arrays fetch no pages from the
+system.
+"""
 
 import os
 import platform
@@ -31,7 +33,11 @@ PAGES = 10 * 4 * 200_000 * 8 // 4096
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="no glibc here")
 def test_arrays_fetch_no_pages_once_freed_memory_is_kept():
-    plain = {key: value for key, value in os.environ.items() if not key.startswith(("MALLOC_", "GLIBC_TUNABLES"))}
+    plain = {
+        key: value
+        for key, value in os.environ.items()
+        if not key.startswith(("MALLOC_", "GLIBC_TUNABLES"))
+    }
     done = subprocess.run([sys.executable, "-c", PROBE], env=plain, check=True, capture_output=True)
     before, after = map(int, done.stdout.split())
     pages = PAGES * 4096 / os.sysconf("SC_PAGE_SIZE")

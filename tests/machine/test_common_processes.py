@@ -27,9 +27,12 @@ def test_a_process_that_was_killed_does_not_live_though_its_id_is_kept(ended):
     assert not lives(2**40)
 
 
-def test_what_a_killed_process_left_of_a_file_is_removed_at_once_and_what_a_living_one_writes_is_not(tmp_path, ended):
+def test_what_a_killed_process_left_of_a_file_is_removed_at_once_and_what_a_living_one_writes_is_not(
+    tmp_path, ended
+):
     left, written, other = (
-        tmp_path / name for name in (f".table.{ended}.part.csv", ".table.1.part.csv", f".tables.{ended}.part.csv")
+        tmp_path / name
+        for name in (f".table.{ended}.part.csv", ".table.1.part.csv", f".tables.{ended}.part.csv")
     )
     for path in (left, written, other):
         path.write_text("half")

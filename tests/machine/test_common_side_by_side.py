@@ -43,7 +43,9 @@ def test_results_keep_the_order_of_the_calls_and_come_from_two_processes_at_a_ti
 
 
 def test_one_job_stays_in_this_process():
-    assert together([partial(told, number, 0) for number in range(3)], 1) == [(n, os.getpid()) for n in range(3)]
+    assert together([partial(told, number, 0) for number in range(3)], 1) == [
+        (n, os.getpid()) for n in range(3)
+    ]
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

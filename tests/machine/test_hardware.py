@@ -1,4 +1,6 @@
-"""The machine in words: the names that the system and the driver give, and no comma, since it stands in CSV cells."""
+"""The machine in words: the names that the system and the driver give, and no comma, since it
+stands in CSV cells.
+"""
 
 from types import SimpleNamespace
 
@@ -17,7 +19,9 @@ from lowalt.machine import hardware
     ],
 )
 @pytest.mark.parametrize("hidden", [None, "", "-1"])
-def test_a_machine_is_named_by_processor_cores_memory_and_first_gpu(tool, status, said, wanted, hidden, monkeypatch):
+def test_a_machine_is_named_by_processor_cores_memory_and_first_gpu(
+    tool, status, said, wanted, hidden, monkeypatch
+):
     if hidden is None:
         monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     else:
@@ -27,6 +31,10 @@ def test_a_machine_is_named_by_processor_cores_memory_and_first_gpu(tool, status
     asked = SimpleNamespace(returncode=status, stdout=said)
     monkeypatch.setattr(hardware.subprocess, "run", lambda line, **options: asked)
     monkeypatch.setattr(hardware, "processor", lambda: "AMD EPYC, 9B45")
-    monkeypatch.setattr(hardware.os, "sched_getaffinity", lambda process: {3, 4, 7} if process == 0 else {1})
-    monkeypatch.setattr(hardware.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 24 * 2**18}.get)
+    monkeypatch.setattr(
+        hardware.os, "sched_getaffinity", lambda process: {3, 4, 7} if process == 0 else {1}
+    )
+    monkeypatch.setattr(
+        hardware.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 24 * 2**18}.get
+    )
     assert hardware.describe() == f"AMD EPYC  9B45; 3 cores; 24 GiB; {wanted}"

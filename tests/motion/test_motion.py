@@ -21,7 +21,8 @@ def test_attitude_turns_about_z_then_x_then_y_as_published():
     np.testing.assert_allclose(attitude(quarter, 0, 0) @ [0, 1, 0], [-1, 0, 0], atol=1e-15)
     np.testing.assert_allclose(attitude(0, quarter, 0) @ [0, 1, 0], [0, 0, 1], atol=1e-15)
     np.testing.assert_allclose(attitude(0, 0, quarter) @ [0, 0, 1], [1, 0, 0], atol=1e-15)
-    whole, parts = attitude(0.3, 0.5, 0.7), (attitude(0.3, 0, 0), attitude(0, 0.5, 0), attitude(0, 0, 0.7))
+    whole = attitude(0.3, 0.5, 0.7)
+    parts = (attitude(0.3, 0, 0), attitude(0, 0.5, 0), attitude(0, 0, 0.7))
     np.testing.assert_allclose(whole, parts[0] @ parts[1] @ parts[2], atol=1e-15)
     for part in parts:
         np.testing.assert_allclose(part @ part.T, np.eye(3), atol=1e-15)
@@ -55,7 +56,9 @@ def test_parts_stay_rigid_and_do_not_drift_over_a_million_symbols():
         still = np.linalg.norm(cloud.points[1:, None] - cloud.points[None, 1:], axis=-1)
         np.testing.assert_allclose(moved, still, atol=1e-12)
     with mpmath.workdps(40):
-        angle = mpmath.mpf(motion["phase_0_rad"]) + 2 * mpmath.pi * mpmath.mpf(97.3) * mpmath.mpf(times[2])
+        angle = mpmath.mpf(motion["phase_0_rad"]) + 2 * mpmath.pi * mpmath.mpf(97.3) * mpmath.mpf(
+            times[2]
+        )
         turn = rodrigues(cloud.axes[1], np.array([float(mpmath.fmod(angle, 2 * mpmath.pi))]))[0]
     arm = cloud.points[1:] - cloud.hinges[1]
     expected = (arm @ turn.T + cloud.hinges[1]) @ attitude(1.0, 0.2, 0.0).T + [3.0 * times[2], 0, 0]
@@ -73,16 +76,24 @@ def test_blade_tip_moves_at_two_pi_rate_times_radius():
 
 
 def turning_cloud(kind: str, points: list, hinges: list, axes: list, **more) -> Cloud:
-    """A body of one point and parts of one kind, a point each; `more`: names or parents, and facts of the record."""
-    count, nothing = len(points) + 1, [np.nan] * 3
+    """A body of one point and parts of one kind, a point each; `more`: names or parents, and facts
+    of the record.
+    """
+    count = len(points) + 1
+    nothing = [np.nan] * 3
     fields = {key: more.pop(key) for key in ("names", "parents") if key in more}
     cloud = rigid_cloud(kind, "UAV", more)
     return replace(
-        cloud, points=np.array([[0.0, 0, 0], *points]), part=np.arange(count), kinds=("body", *[kind] * len(points)),
-        hinges=np.array([nothing, *hinges], float), axes=np.array([nothing, *axes], float),
-        normals=np.full((count, 3), np.nan), rcs_m2=np.ones(count),
+        cloud,
+        points=np.array([[0.0, 0, 0], *points]),
+        part=np.arange(count),
+        kinds=("body", *[kind] * len(points)),
+        hinges=np.array([nothing, *hinges], float),
+        axes=np.array([nothing, *axes], float),
+        normals=np.full((count, 3), np.nan),
+        rcs_m2=np.ones(count),
         **{"names": tuple(map(str, range(count))), "parents": np.full(count, -1)} | fields,
-    )  # fmt: skip
+    )
 
 
 def two_rotors(factors: dict) -> Cloud:
@@ -109,11 +120,14 @@ def test_each_rotor_turns_at_its_own_factor_of_the_rate():
 
 
 def test_a_wheel_point_on_the_ground_stands_still():
-    diameter, speed = 0.56, 13.0
+    diameter = 0.56
+    speed = 13.0
     hinge = np.array([0.8, 1.4, 0.0])
     cloud = turning_cloud("wheel", [hinge - [0, 0, diameter / 2]], [hinge], [[-1, 0, 0]])
     rate = speed / (math.pi * diameter)
-    found = positions(cloud, row(rate_hz=rate, phase_0_rad=0.0, vy_mps=speed), np.array([-1e-6, 1e-6]))
+    found = positions(
+        cloud, row(rate_hz=rate, phase_0_rad=0.0, vy_mps=speed), np.array([-1e-6, 1e-6])
+    )
     assert np.linalg.norm(found[1, 1] - found[0, 1]) / 2e-6 < 1e-4 * speed
 
 

@@ -1,4 +1,6 @@
-"""Motion models: the table's round trip, ranges of draws, named streams, and the region between the masts."""
+"""Motion models: the table's round trip, ranges of draws, named streams, and the region between the
+masts.
+"""
 
 import math
 
@@ -29,13 +31,18 @@ MOTION = {
 
 def test_the_table_reads_back_the_same_bits(tmp_path):
     rng = np.random.default_rng(2)
-    rows = [row(**{name: float(rng.normal()) for name in NUMBERS}, model=index) for index in range(5)]
+    rows = [
+        row(**{name: float(rng.normal()) for name in NUMBERS}, model=index) for index in range(5)
+    ]
     rows[1]["start_s"] = math.nan
     path = tmp_path / "motion.csv"
     write_table(path, rows)
     back = read_table(path)
     for was, now in zip(rows, back, strict=True):
-        assert all(was[name] == now[name] or (was[name] != was[name] and now[name] != now[name]) for name in was)
+        assert all(
+            was[name] == now[name] or (was[name] != was[name] and now[name] != now[name])
+            for name in was
+        )
 
 
 @pytest.mark.parametrize(
@@ -57,27 +64,47 @@ def test_a_broken_table_is_refused_with_its_place(tmp_path, change, words):
 def test_models_stay_in_their_ranges_and_streams_are_named():
     corners = region_polygon(MASTS, None)
     cloud = rigid_cloud("rotor", "UAV")
-    ranges = {"freq_lo_hz": 80, "freq_hi_hz": 256, "vx_abs_max": 10, "vy_abs_max": 5, "vz_abs_max": 3}
-    rows = [draw(stream(7, "motion", "test", i), cloud, ranges, MASTS, corners, MOTION) for i in range(300)]
+    ranges = {
+        "freq_lo_hz": 80,
+        "freq_hi_hz": 256,
+        "vx_abs_max": 10,
+        "vy_abs_max": 5,
+        "vz_abs_max": 3,
+    }
+    rows = [
+        draw(stream(7, "motion", "test", i), cloud, ranges, MASTS, corners, MOTION)
+        for i in range(300)
+    ]
     for drawn in rows:
         assert 80 <= drawn["rate_hz"] <= 256
         assert abs(drawn["vy_mps"]) <= 5
         assert 30 <= drawn["z_m"] <= 150
         assert np.hypot(*(MASTS - [drawn["x_m"], drawn["y_m"]]).T).min() >= 10
-        assert 0 <= drawn["y_m"] <= min(math.sqrt(3) * drawn["x_m"], math.sqrt(3) * (500 - drawn["x_m"])) + 1e-9
+        assert (
+            0
+            <= drawn["y_m"]
+            <= min(math.sqrt(3) * drawn["x_m"], math.sqrt(3) * (500 - drawn["x_m"])) + 1e-9
+        )
     tilt_deg = np.degrees([[drawn["pitch_rad"], drawn["roll_rad"]] for drawn in rows])
     assert (abs(tilt_deg).max(axis=0) > 19).all() and abs(tilt_deg).max() <= 20
     # Uniform over the triangle: the mean sits at the centroid, within five standard errors.
     mean = np.mean([[drawn["x_m"], drawn["y_m"]] for drawn in rows], axis=0)
     assert np.abs(mean - corners.mean(axis=0)).max() < 5 * 125 / math.sqrt(300)
     again = draw(stream(7, "motion", "test", 4), cloud, ranges, MASTS, corners, MOTION)
-    assert {k: v for k, v in again.items() if v == v} == {k: v for k, v in rows[4].items() if v == v}
+    assert {k: v for k, v in again.items() if v == v} == {
+        k: v for k, v in rows[4].items() if v == v
+    }
 
 
-@pytest.mark.parametrize("name", [name for name, given in TABLE.items() if given["category"] not in AIRBORNE])
+@pytest.mark.parametrize(
+    "name", [name for name, given in TABLE.items() if given["category"] not in AIRBORNE]
+)
 def test_every_ground_target_moves_to_its_front_and_its_wheels_roll(name):
-    records = load_records(CONFIG / "targets.csv", [CONFIG / f"targets/{kind}.yaml" for kind in KINDS])
-    cloud, corners = make(records[name], None, 1), region_polygon(MASTS, None)
+    records = load_records(
+        CONFIG / "targets.csv", [CONFIG / f"targets/{kind}.yaml" for kind in KINDS]
+    )
+    cloud = make(records[name], None, 1)
+    corners = region_polygon(MASTS, None)
     for index in range(4):
         drawn = draw(stream(1, name, index), cloud, TABLE[name], MASTS, corners, MOTION)
         velocity = np.array([drawn[f"v{axis}_mps"] for axis in "xyz"])
@@ -87,7 +114,9 @@ def test_every_ground_target_moves_to_its_front_and_its_wheels_roll(name):
         np.testing.assert_allclose(velocity, speed * front, atol=1e-12)
         # A rolling wheel stands still on the road, and its top has twice the car's speed.
         mine = np.isin(cloud.part, cloud.parts_of("wheel"))
-        before, now, after = positions(cloud, drawn | {"model": 0}, np.array([-1e-6, 0.0, 1e-6]))[:, mine]
+        before, now, after = positions(cloud, drawn | {"model": 0}, np.array([-1e-6, 0.0, 1e-6]))[
+            :, mine
+        ]
         along = (after - before) @ front / 2e-6
         rad_per_m = 2.0 / cloud.record.get("wheel_diameter_m", 1.0)
         np.testing.assert_allclose(along, speed * rad_per_m * now[:, 2], atol=1e-5 * speed)
@@ -96,8 +125,11 @@ def test_every_ground_target_moves_to_its_front_and_its_wheels_roll(name):
 def test_the_hull_of_many_stations_is_the_region_and_bad_polygons_are_refused():
     square = np.array([[0, 0], [0, 10], [10, 0], [10, 10], [4, 5]], dtype=float)
     assert sorted(map(tuple, region_polygon(square, None))) == sorted(map(tuple, square[:4]))
-    for masts, polygon, words in ((MASTS[:2], None, "polygon_m"), (square, square.tolist(), "not convex"),
-                                  (square, [[0, 0], [1, 1], [2, 2]], "flat")):  # fmt: skip
+    for masts, polygon, words in (
+        (MASTS[:2], None, "polygon_m"),
+        (square, square.tolist(), "not convex"),
+        (square, [[0, 0], [1, 1], [2, 2]], "flat"),
+    ):
         with pytest.raises(InputError, match=words):
             region_polygon(masts, polygon)
 
@@ -105,7 +137,8 @@ def test_the_hull_of_many_stations_is_the_region_and_bad_polygons_are_refused():
 @pytest.mark.parametrize(("cadence", "tied"), [("free", False), ("tied", True)])
 def test_cadence_follows_speed_only_where_tied(cadence, tied):
     cloud = recorded_cloud(origin_height_m=0.9, track_speed_mps=1.25)
-    settings, ranges = {**MOTION, "cadence": cadence}, {"speed_lo": 0.2, "speed_hi": 1.5}
+    settings = {**MOTION, "cadence": cadence}
+    ranges = {"speed_lo": 0.2, "speed_hi": 1.5}
     drawn = draw(stream(1, "m"), cloud, ranges, MASTS, region_polygon(MASTS, None), settings)
     speed = math.hypot(drawn["vx_mps"], drawn["vy_mps"])
     assert 0.2 <= speed <= 1.5

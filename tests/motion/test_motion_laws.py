@@ -1,4 +1,6 @@
-"""Each column of the motion table: its range, its distribution, and that it is drawn independently of the others."""
+"""Each column of the motion table: its range, its distribution, and that it is drawn independently
+of the others.
+"""
 
 import itertools
 import math
@@ -19,44 +21,74 @@ from moving_clouds import recorded_cloud
 
 ROWS = 600
 SQUARE = [[0.0, 0.0], [400.0, 0.0], [400.0, 300.0], [0.0, 300.0]]
-"""A region whose sides lie along the axes, so that x and y are uniform and independent; the mast is far away."""
+"""A region whose sides lie along the axes, so that x and y are uniform and independent; the mast is
+far away.
+"""
 MAST = np.array([[-500.0, -500.0]])
 MOTION = {
     "region": {"polygon_m": SQUARE, "mast_clearance_m": 10.0},
     "height_m": {"UAV": [30.0, 150.0], "Bird": [20.0, 120.0]},
-    "tilt_deg": 20.0, "cadence": "free", "sizes_m": {"UAV": [0.2, 3.0], "Vehicle": [2.0, 8.0]},
-}  # fmt: skip
-NAMES = {"UAV": "DJI Mavic 3 Pro", "Bird": "Crow", "Vehicle": "AITO M9 2024", "Pedestrian": "recorded"}
+    "tilt_deg": 20.0,
+    "cadence": "free",
+    "sizes_m": {"UAV": [0.2, 3.0], "Vehicle": [2.0, 8.0]},
+}
+NAMES = {
+    "UAV": "DJI Mavic 3 Pro",
+    "Bird": "Crow",
+    "Vehicle": "AITO M9 2024",
+    "Pedestrian": "recorded",
+}
 WALK = {"speed_lo": 0.2, "speed_hi": 1.5}
 
 
 def cloud_of_class(category):
-    """A built-in target of a class; for pedestrians, whose nodes need the published recordings, a small recording."""
+    """A built-in target of a class; for pedestrians, whose nodes need the published recordings, a
+    small recording.
+    """
     if category == "Pedestrian":
         return recorded_cloud(origin_height_m=0.9, track_speed_mps=1.25), WALK
     kinds = [CONFIG / f"targets/{kind}.yaml" for kind in ("uav", "bird", "vehicle", "pedestrian")]
-    return make(load_records(CONFIG / "targets.csv", kinds)[NAMES[category]], None, 1), TABLE[NAMES[category]]
+    return make(load_records(CONFIG / "targets.csv", kinds)[NAMES[category]], None, 1), TABLE[
+        NAMES[category]
+    ]
 
 
 def drawn(category):
     """A class's cloud, its published ranges and the columns (ROWS,) of as many motion models."""
     cloud, ranges = cloud_of_class(category)
     corners = region_polygon(MAST, SQUARE)
-    rows = [draw(stream(3, "motion", cloud.subtype, n), cloud, ranges, MAST, corners, MOTION) for n in range(ROWS)]
+    rows = [
+        draw(stream(3, "motion", cloud.subtype, n), cloud, ranges, MAST, corners, MOTION)
+        for n in range(ROWS)
+    ]
     columns = {name: np.array([row[name] for row in rows]) for name in (*NUMBERS, SCALE)}
-    return cloud, ranges, {name: column for name, column in columns.items() if not np.isnan(column).all()}
+    return (
+        cloud,
+        ranges,
+        {name: column for name, column in columns.items() if not np.isnan(column).all()},
+    )
 
 
 def drawn_quantities(cloud, ranges, columns):
-    """The quantities that are drawn, (ROWS,) each with its least and largest value, and the columns that they decide.
+    """The quantities that are drawn, (ROWS,) each with its least and largest value, and the columns
+    that they decide.
 
-    A velocity on the ground is that of a speed ahead; a resized target's rate falls as its size grows.
+    A velocity on the ground is that of a speed ahead; a resized target's rate falls as its size
+    grows.
     """
-    circle, tilt = (0, 2 * math.pi), (-math.radians(20), math.radians(20))
-    found = {"x_m": (columns["x_m"], 0, 400), "y_m": (columns["y_m"], 0, 300), "yaw_rad": (columns["yaw_rad"], *circle)}
-    moving = len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
+    circle = (0, 2 * math.pi)
+    tilt = (-math.radians(20), math.radians(20))
+    found = {
+        "x_m": (columns["x_m"], 0, 400),
+        "y_m": (columns["y_m"], 0, 300),
+        "yaw_rad": (columns["yaw_rad"], *circle),
+    }
+    moving = (
+        len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
+    )
     found |= {f"phase_{n}_rad": (columns[f"phase_{n}_rad"], *circle) for n in range(moving)}
-    scale, decided = columns[SCALE], {"playback"}
+    scale = columns[SCALE]
+    decided = {"playback"}
     if cloud.category in MOTION["sizes_m"]:
         low_m, high_m = MOTION["sizes_m"][cloud.category]
         found[SCALE] = np.log(scale * extent(cloud)), math.log(low_m), math.log(high_m)
@@ -79,11 +111,21 @@ def drawn_quantities(cloud, ranges, columns):
         assert not columns[name].any()
     found["speed"] = speed, ranges["speed_lo"], ranges["speed_hi"]
     if "rate_hz" in columns:
-        np.testing.assert_allclose(columns["rate_hz"] * scale * math.pi * cloud.record["wheel_diameter_m"], speed)
+        np.testing.assert_allclose(
+            columns["rate_hz"] * scale * math.pi * cloud.record["wheel_diameter_m"], speed
+        )
     if "start_s" in columns:
         found["start_s"] = columns["start_s"], 0, len(cloud.track) / cloud.record["track_rate_hz"]
         assert (columns["playback"] == 1).all()
-    return found, decided | {"vx_mps", "vy_mps", "vz_mps", "z_m", "pitch_rad", "roll_rad", "rate_hz"}
+    return found, decided | {
+        "vx_mps",
+        "vy_mps",
+        "vz_mps",
+        "z_m",
+        "pitch_rad",
+        "roll_rad",
+        "rate_hz",
+    }
 
 
 @pytest.fixture(scope="module", params=NAMES)

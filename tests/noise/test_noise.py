@@ -33,7 +33,9 @@ def test_set_snr_is_read_back(snr_db):
 def test_scale_does_not_matter(scale):
     signal = scale * np.exp(1j * np.arange(100))
     plain = add_noise(np.exp(1j * np.arange(100)), 3.0, np.random.default_rng(1))
-    np.testing.assert_allclose(add_noise(signal, 3.0, np.random.default_rng(1)) / scale, plain, rtol=1e-12)
+    np.testing.assert_allclose(
+        add_noise(signal, 3.0, np.random.default_rng(1)) / scale, plain, rtol=1e-12
+    )
 
 
 def test_noise_is_circular_and_white():
@@ -61,7 +63,8 @@ def test_200_db_is_below_double_resolution_but_finite():
 
 
 @pytest.mark.parametrize(
-    ("signal", "snr_db"), [([], 3.0), ([1, np.nan], 3.0), ([1, np.inf], 3.0), ([1.0], math.nan), ([1.0], -math.inf)]
+    ("signal", "snr_db"),
+    [([], 3.0), ([1, np.nan], 3.0), ([1, np.inf], 3.0), ([1.0], math.nan), ([1.0], -math.inf)],
 )
 def test_bad_input_is_refused(signal, snr_db):
     with pytest.raises(InputError, match="noise:"):
@@ -71,7 +74,9 @@ def test_bad_input_is_refused(signal, snr_db):
 def test_a_power_that_is_given_stands_for_the_signal_s_own():
     signal = 3 * np.exp(1j * np.arange(50))
     given = add_noise(np.zeros(50), 3.0, np.random.default_rng(1), 9.0)
-    np.testing.assert_allclose(given, add_noise(signal, 3.0, np.random.default_rng(1)) - signal, atol=1e-14)
+    np.testing.assert_allclose(
+        given, add_noise(signal, 3.0, np.random.default_rng(1)) - signal, atol=1e-14
+    )
     assert np.array_equal(add_noise(signal, 3.0, np.random.default_rng(1), 0.0), signal)
     for power in (-1.0, math.inf, math.nan):
         with pytest.raises(InputError, match="noise: power"):
@@ -80,17 +85,24 @@ def test_a_power_that_is_given_stands_for_the_signal_s_own():
 
 def test_each_echo_has_noise_of_its_own_power_as_the_canceller_leaves_it():
     rows = [{"subtype": "crow", "model": 4}, {"subtype": "owl", "model": 9}]
-    echoes, powers = np.exp(1j * np.arange(3 * 2 * 40)).reshape(3, 2, 40), np.arange(1.0, 7.0).reshape(3, 2)
+    echoes = np.exp(1j * np.arange(3 * 2 * 40)).reshape(3, 2, 40)
+    powers = np.arange(1.0, 7.0).reshape(3, 2)
     plain = noisy_signals(echoes, rows, ["A", "B", "C"], [3.0, math.inf], 1, powers)
     unit = noisy_signals(0 * echoes, rows, ["A", "B", "C"], [3.0], 1, np.ones((3, 2)))[:, 0]
     expected = echoes.swapaxes(0, 1) + np.sqrt(powers.T)[..., None] * unit
     np.testing.assert_allclose(plain[:, 0], expected, atol=1e-6)
-    turned = noisy_signals(echoes, rows, ["A", "B", "C"], [3.0, math.inf], 1, powers, lambda noise: -2 * noise)
-    np.testing.assert_allclose(turned[:, 0] - plain[:, 0], -3 * (plain[:, 0] - plain[:, 1]), atol=2e-5)
+    turned = noisy_signals(
+        echoes, rows, ["A", "B", "C"], [3.0, math.inf], 1, powers, lambda noise: -2 * noise
+    )
+    np.testing.assert_allclose(
+        turned[:, 0] - plain[:, 0], -3 * (plain[:, 0] - plain[:, 1]), atol=2e-5
+    )
     assert np.array_equal(turned[:, 1], plain[:, 1])
     # Echoes that hold the noise of each SNR are only put in order.
     held = np.arange(3 * 2 * 4 * 5).reshape(3, 2, 4, 5)
-    assert (noisy_signals(held, rows, ["A", "B", "C"], [1, 2, 3, 4], 1)[1, 2, 0] == held[0, 1, 2]).all()
+    assert (
+        noisy_signals(held, rows, ["A", "B", "C"], [1, 2, 3, 4], 1)[1, 2, 0] == held[0, 1, 2]
+    ).all()
 
 
 def test_noise_without_a_generator_is_refused():
@@ -110,7 +122,9 @@ def test_streams_do_not_depend_on_what_else_is_there():
 
 def test_noise_of_models_snrs_and_stations_is_independent():
     rows = [{"subtype": "crow", "model": model} for model in range(2)]
-    noise = noisy_signals(np.zeros((2, 2, 4000)), rows, ["A", "B"], [3.0, 8.0], seed=1, powers=np.ones((2, 2)))
+    noise = noisy_signals(
+        np.zeros((2, 2, 4000)), rows, ["A", "B"], [3.0, 8.0], seed=1, powers=np.ones((2, 2))
+    )
     draws = noise.reshape(8, 4000) / np.linalg.norm(noise.reshape(8, 4000), axis=1, keepdims=True)
     # The correlation of 4000 independent pairs is 1 / sqrt(4000) = 0.016 rms.
     assert abs(draws @ draws.conj().T - np.eye(8)).max() < 0.08
@@ -119,7 +133,9 @@ def test_noise_of_models_snrs_and_stations_is_independent():
 def test_many_normals_drawn_at_once_are_those_drawn_few_at_a_time():
     at_once, by_parts = (Draws(np.random.PCG64(5)) for _ in range(2))
     parts = [by_parts.standard_normal((500, 2)) for _ in range(9)] + [by_parts.standard_normal(1)]
-    assert np.array_equal(at_once.standard_normal(9001), np.concatenate([part.ravel() for part in parts]))
+    assert np.array_equal(
+        at_once.standard_normal(9001), np.concatenate([part.ravel() for part in parts])
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2, 399, 1001])
@@ -148,10 +164,24 @@ def test_the_command_adds_noise_at_every_snr_and_says_how_many_samples(tmp_path,
     echo = np.ones((3, 40), np.complex64)
     np.save(tmp_path / "A.npy", echo)
     settings = json.dumps({"seed": 1, "stations": ["A"], "snr_db": [3, "inf"]})
-    main(["--settings", settings, "--motion", str(tmp_path / "m.csv"), "--echoes", str(tmp_path / "A.npy"),
-          "--out", str(tmp_path / "noisy.npy")])  # fmt: skip
+    main(
+        [
+            "--settings",
+            settings,
+            "--motion",
+            str(tmp_path / "m.csv"),
+            "--echoes",
+            str(tmp_path / "A.npy"),
+            "--out",
+            str(tmp_path / "noisy.npy"),
+        ]
+    )
     noisy = np.load(tmp_path / "noisy.npy")
-    assert noisy.shape == (3, 2, 1, 40) and (noisy[:, 1, 0] == echo).all() and (noisy[:, 0, 0] != echo).all()
+    assert (
+        noisy.shape == (3, 2, 1, 40)
+        and (noisy[:, 1, 0] == echo).all()
+        and (noisy[:, 0, 0] != echo).all()
+    )
     assert capsys.readouterr().err.strip().endswith("noisy.npy: 6 samples")
 
 

@@ -1,4 +1,6 @@
-"""Large matrices in a written order: against the small ones' sums, NumPy's decompositions, and exact integrals."""
+"""Large matrices in a written order: against the small ones' sums, NumPy's decompositions, and
+exact integrals.
+"""
 
 import numpy as np
 import pytest
@@ -14,7 +16,8 @@ RNG = np.random.default_rng(7)
 @pytest.mark.parametrize("shape", [(1, 1, 1), (3, 2, 5), (7, 5, 4), (40, 64, 33), (2, 9, 257)])
 def test_a_product_has_the_bits_of_the_one_of_small_matrices(shape):
     rows, inner, columns = shape
-    a, b = RNG.standard_normal((rows, inner)), RNG.standard_normal((inner, columns))
+    a = RNG.standard_normal((rows, inner))
+    b = RNG.standard_normal((inner, columns))
     np.testing.assert_array_equal(matrix_product(a, b), portable.product(a, b))
     np.testing.assert_array_equal(matrix_product(b.T, a.T), portable.product(b.T, a.T))
 
@@ -22,7 +25,9 @@ def test_a_product_has_the_bits_of_the_one_of_small_matrices(shape):
 def test_a_triangular_root_is_cholesky_s_and_a_matrix_without_one_is_refused():
     parts = RNG.standard_normal((30, 50))
     covariance = parts @ parts.T
-    np.testing.assert_allclose(upper_root(covariance), np.linalg.cholesky(covariance).T, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        upper_root(covariance), np.linalg.cholesky(covariance).T, rtol=0, atol=1e-12
+    )
     with pytest.raises(ValueError, match="not positive definite"):
         upper_root(covariance - 60 * np.eye(30))
 
@@ -46,13 +51,18 @@ def test_gauss_and_legendre_s_rule_is_numpy_s(count):
     np.testing.assert_allclose(weight, there[1], rtol=1e-10)
     # Exact for polynomials below degree 2 n.
     for degree in range(0, min(2 * count, 40), 2):
-        assert float(portable.total(weight * node**degree)) == pytest.approx(2 / (degree + 1), rel=1e-13)
+        assert float(portable.total(weight * node**degree)) == pytest.approx(
+            2 / (degree + 1), rel=1e-13
+        )
 
 
 @pytest.mark.parametrize(("nodes", "spread"), [(1, 0.02), (1, 2.0), (7, 0.1), (1, 64.0)])
 def test_tables_of_a_band_give_the_waves_that_they_stand_for(nodes, spread):
-    """Moments of single points at places u, against exp(-j 2 pi spread x u / 2) itself at every subcarrier."""
-    count, u = 64, np.linspace(-1, 1, 9)
+    """Moments of single points at places u, against exp(-j 2 pi spread x u / 2) itself at every
+    subcarrier.
+    """
+    count = 64
+    u = np.linspace(-1, 1, 9)
     tables = band_tables(nodes, spread, count, 1e-11)
     orders = len(tables[0]) // (2 * nodes)
     terms = np.polynomial.chebyshev.chebvander(u, orders - 1)

@@ -1,4 +1,6 @@
-"""Portable arithmetic against exact values, and draws against NumPy's of today and against their distributions."""
+"""Portable arithmetic against exact values, and draws against NumPy's of today and against their
+distributions.
+"""
 
 import pickle
 
@@ -19,9 +21,17 @@ POSITIVE = np.concatenate([np.exp(RNG.uniform(-50, 50, 300)), 1 + RNG.uniform(-0
 
 @pytest.mark.parametrize(
     ("name", "points"),
-    [("sin", NEAR), ("sin", WIDE), ("cos", NEAR), ("cos", WIDE), ("exp", RNG.uniform(-50, 50, 300)),
-     ("log", POSITIVE), ("arctan", RNG.uniform(-5, 5, 300)), ("arctan", 1 / RNG.uniform(-1e-3, 1e-3, 50))],
-)  # fmt: skip
+    [
+        ("sin", NEAR),
+        ("sin", WIDE),
+        ("cos", NEAR),
+        ("cos", WIDE),
+        ("exp", RNG.uniform(-50, 50, 300)),
+        ("log", POSITIVE),
+        ("arctan", RNG.uniform(-5, 5, 300)),
+        ("arctan", 1 / RNG.uniform(-1e-3, 1e-3, 50)),
+    ],
+)
 def test_a_function_is_within_one_unit_in_the_last_place(name, points):
     exact = getattr(mpmath, name if name != "arctan" else "atan")
     with mpmath.workprec(200):
@@ -35,7 +45,12 @@ def test_quarter_turns_are_exact_and_other_turns_follow_the_sine():
     assert sine.tolist() == [0, 1, 0, -1, 0, 1, 0, -1, 0]
     assert cosine.tolist() == [1, 0, -1, 0, 1, 0, -1, 0, 1]
     turns = RNG.uniform(-3, 3, 200)
-    assert np.allclose(portable.sine_cosine_turns(turns), portable.sine_cosine(2 * np.pi * turns), atol=4e-15, rtol=0)
+    assert np.allclose(
+        portable.sine_cosine_turns(turns),
+        portable.sine_cosine(2 * np.pi * turns),
+        atol=4e-15,
+        rtol=0,
+    )
     with pytest.raises(ValueError, match="at most"):
         portable.sin(1e7)
 
@@ -59,7 +74,9 @@ def test_products_and_sums_are_added_in_their_written_order():
     expected = np.empty((5, 3, 3))
     for place in np.ndindex(5, 3, 3):
         n, i, j = place
-        expected[place] = a[n, i, 0] * b[n, 0, j] + a[n, i, 1] * b[n, 1, j] + a[n, i, 2] * b[n, 2, j]
+        expected[place] = (
+            a[n, i, 0] * b[n, 0, j] + a[n, i, 1] * b[n, 1, j] + a[n, i, 2] * b[n, 2, j]
+        )
     assert (portable.product(a, b) == expected).all()
     assert (portable.applied(a, b[:, :, 0]) == expected[:, :, 0]).all()
     values = RNG.normal(size=1000)
@@ -84,7 +101,9 @@ def test_draws_are_those_of_the_numpy_of_today_where_it_promises_none(seed):
         assert (mine.uniform([1, 2], [3, 4]) == numpys.uniform([1, 2], [3, 4])).all()
         assert mine.integers(10) == numpys.integers(10)
         assert (mine.integers(5, 900_001, 7) == numpys.integers(5, 900_001, 7)).all()
-        assert (mine.integers(3_000_000_000, size=50) == numpys.integers(3_000_000_000, size=50)).all()
+        assert (
+            mine.integers(3_000_000_000, size=50) == numpys.integers(3_000_000_000, size=50)
+        ).all()
         assert (mine.permutation(11) == numpys.permutation(11)).all()
         assert (mine.permutation(np.arange(7) * 2) == numpys.permutation(np.arange(7) * 2)).all()
 
@@ -112,7 +131,8 @@ def test_the_first_draws_of_a_stream_are_written_down():
 
 def test_normals_and_exponentials_have_their_moments():
     draws = Draws(np.random.PCG64(7))
-    normals, waits = draws.standard_normal(100_001), draws.exponential(2.0, 100_000)
+    normals = draws.standard_normal(100_001)
+    waits = draws.exponential(2.0, 100_000)
     # Five standard errors of mean, variance and fourth moment.
     assert abs(normals.mean()) < 5 / 316
     assert abs(normals.var() - 1) < 5 * np.sqrt(2) / 316
@@ -123,7 +143,9 @@ def test_normals_and_exponentials_have_their_moments():
 
 def test_a_choice_without_replacement_has_no_entry_twice_and_no_favourites():
     draws = Draws(np.random.PCG64(3))
-    counts = np.bincount(np.concatenate([draws.choice(10, 4, replace=False) for _ in range(2000)]), minlength=10)
+    counts = np.bincount(
+        np.concatenate([draws.choice(10, 4, replace=False) for _ in range(2000)]), minlength=10
+    )
     assert all(len(set(draws.choice(10, 4, replace=False))) == 4 for _ in range(100))
     assert abs(counts - 800).max() < 5 * np.sqrt(800 * 0.6)
     with pytest.raises(InputError, match="without replacement"):

@@ -1,4 +1,6 @@
-"""The network: token layout, pooling, palettes, parameter counts, on small timm backbones and one of the user's own."""
+"""The network: token layout, pooling, palettes, parameter counts, on small timm backbones and one
+of the user's own.
+"""
 
 from pathlib import Path
 
@@ -11,11 +13,19 @@ from lowalt.recognition import fusion as fusion_of
 from lowalt.recognition import own_backbone, recogniser, schemes
 
 BLOCK = {
-    "backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4, "feed_forward": 2,
-    "dropout": 0.0, "hidden": 0,
-}  # fmt: skip
+    "backbone": "test_vit2",
+    "weights": "none",
+    "intra_depth": 1,
+    "inter_depth": 1,
+    "heads": 4,
+    "feed_forward": 2,
+    "dropout": 0.0,
+    "hidden": 0,
+}
 SIZE = 32
-PALETTES = np.stack([np.arange(256)[:, None] * [1, 0.5, 0.25] + shift for shift in (0, 0, 0)]).astype(np.uint8)
+PALETTES = np.stack(
+    [np.arange(256)[:, None] * [1, 0.5, 0.25] + shift for shift in (0, 0, 0)]
+).astype(np.uint8)
 
 GOOD = """
 import torch
@@ -34,20 +44,29 @@ number = 3
 """
 
 
-def small_recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", own_backbone="", **changes):
+def small_recogniser(
+    stations="ABC", spectra="VRP+TRP+VT", fusion="attention", own_backbone="", **changes
+):
     torch.manual_seed(0)
-    places = tuple("ABC".index(name) for name in stations), tuple(schemes.SPECTRA.index(n) for n in spectra.split("+"))
+    places = (
+        tuple("ABC".index(name) for name in stations),
+        tuple(schemes.SPECTRA.index(n) for n in spectra.split("+")),
+    )
     scheme = schemes.Scheme("x", *places, fusion, own_backbone)
     return recogniser.Recogniser(scheme, {**BLOCK, **changes}, SIZE, PALETTES, 4).eval()
 
 
 def images(samples, views, seed=0):
     generator = torch.Generator().manual_seed(seed)
-    return torch.randint(0, 256, (samples, views, SIZE, SIZE), dtype=torch.uint8, generator=generator)
+    return torch.randint(
+        0, 256, (samples, views, SIZE, SIZE), dtype=torch.uint8, generator=generator
+    )
 
 
 @torch.inference_mode()
-@pytest.mark.parametrize(("stations", "spectra"), [("A", "VT"), ("B", "VRP+TRP+VT"), ("AC", "TRP"), ("ABC", "VRP+VT")])
+@pytest.mark.parametrize(
+    ("stations", "spectra"), [("A", "VT"), ("B", "VRP+TRP+VT"), ("AC", "TRP"), ("ABC", "VRP+VT")]
+)
 def test_tokens_are_the_backbones_features_of_each_view_in_its_place(stations, spectra):
     model = small_recogniser(stations, spectra)
     count = (len(stations), len(spectra.split("+")))
@@ -61,7 +80,9 @@ def test_tokens_are_the_backbones_features_of_each_view_in_its_place(stations, s
                 view = index[sample, station * count[1] + spectrum]
                 colour = torch.from_numpy(PALETTES[0])[view.long()] / 255
                 alone = model.backbone(((colour - mean) / std).permute(2, 0, 1)[None])[0]
-                torch.testing.assert_close(tokens[sample, station, spectrum], alone, atol=2e-5, rtol=1e-5)
+                torch.testing.assert_close(
+                    tokens[sample, station, spectrum], alone, atol=2e-5, rtol=1e-5
+                )
 
 
 @torch.inference_mode()
@@ -97,7 +118,10 @@ def test_a_station_alone_answers_as_if_it_were_the_only_one():
     torch.testing.assert_close(together, model(index))
     for station in range(3):
         torch.testing.assert_close(
-            alone.unflatten(0, (4, 3))[:, station], model(index[:, 3 * station : 3 * station + 3]), atol=1e-5, rtol=1e-4
+            alone.unflatten(0, (4, 3))[:, station],
+            model(index[:, 3 * station : 3 * station + 3]),
+            atol=1e-5,
+            rtol=1e-4,
         )
 
 
@@ -109,7 +133,8 @@ def test_samples_do_not_see_each_other():
 
 
 def test_parameter_counts_follow_from_the_shapes():
-    width, wide = 64, 128
+    width = 64
+    wide = 128
     layer = 4 * width * width + 4 * width + 2 * width * wide + wide + width + 4 * width
     features = small_recogniser("A", "VRP", "mean", hidden=0)
     assert features.backbone.num_features == width
@@ -126,12 +151,15 @@ def test_parameter_counts_follow_from_the_shapes():
 
 
 @pytest.mark.parametrize(
-    "name", ["test_resnet", "test_vit", "test_convnext", "test_efficientnet", "mobilenetv3_small_050"]
+    "name",
+    ["test_resnet", "test_vit", "test_convnext", "test_efficientnet", "mobilenetv3_small_050"],
 )
 def test_any_kind_of_backbone_trains_a_step(name):
     model = small_recogniser("AB", "VRP+VT", backbone=name, heads=1).train()
     model(images(2, 4)).square().sum().backward()
-    assert all(value.grad is not None and value.grad.isfinite().all() for value in model.parameters())
+    assert all(
+        value.grad is not None and value.grad.isfinite().all() for value in model.parameters()
+    )
 
 
 def test_a_row_of_the_table_chooses_its_own_backbone():
@@ -161,7 +189,9 @@ def test_weights_come_from_a_local_file_also_at_another_size(tmp_path: Path):
     source = create_model("test_vit2", img_size=48)
     save_file(source.state_dict(), tmp_path / "weights.safetensors")
     model = small_recogniser(weights=str(tmp_path / "weights.safetensors"))
-    torch.testing.assert_close(model.backbone.patch_embed.proj.weight, source.patch_embed.proj.weight)
+    torch.testing.assert_close(
+        model.backbone.patch_embed.proj.weight, source.patch_embed.proj.weight
+    )
     (tmp_path / "broken.safetensors").write_bytes(b"not weights")
     with pytest.raises(InputError, match=r"broken\.safetensors"):
         small_recogniser(weights=str(tmp_path / "broken.safetensors"))
@@ -176,12 +206,17 @@ def file(tmp_path, monkeypatch):
 
 def test_only_a_python_file_with_a_function_is_one_s_own():
     assert own_backbone.file_of("folder/mine.py:small").name == "mine.py"
-    assert own_backbone.file_of("test_resnet") is None and own_backbone.file_of("hf_hub:timm/resnet18") is None
+    assert (
+        own_backbone.file_of("test_resnet") is None
+        and own_backbone.file_of("hf_hub:timm/resnet18") is None
+    )
 
 
 def test_the_module_gives_its_features_and_learns(file):
     made = recogniser.backbone(f"{file}:small", "none", 24)
-    assert made.num_features == 5 and made.training and made.pretrained_cfg["std"] == (0.5, 0.5, 0.5)
+    assert (
+        made.num_features == 5 and made.training and made.pretrained_cfg["std"] == (0.5, 0.5, 0.5)
+    )
     assert made(torch.zeros(4, 3, 24, 24)).shape == (4, 5)
     # The trial of the module leaves no trace in its running means.
     assert float(made[1].num_batches_tracked) == 1

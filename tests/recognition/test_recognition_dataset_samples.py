@@ -1,4 +1,6 @@
-"""A training fed by samples made on the spot sees what a training fed by shards sees, batch by batch."""
+"""A training fed by samples made on the spot sees what a training fed by shards sees, batch by
+batch.
+"""
 
 import json
 import pickle
@@ -26,14 +28,19 @@ from lowalt.workflow import options
 from small_configuration import configuration
 from trainings import SCHEME
 
-SIZE, COLUMNS = 24, [0, 2, len(NAMES), len(NAMES) + 2]
-"""Views by the catalogue, whose spectra are four: images 0, 2, 3 and 5 of a data set with the first three."""
+SIZE = 24
+COLUMNS = [0, 2, len(NAMES), len(NAMES) + 2]
+"""Views by the catalogue, whose spectra are four: images 0, 2, 3 and 5 of a data set with the first
+three.
+"""
 ONE_OF_EACH = ["DJI Mini 2", "Crow", "AITO M9 2024", "Walking Pedestrian 1", "Owl"]
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """A run's folder with clouds, configuration and signal shards: two chunks of a group, one subtype a class."""
+    """A run's folder with clouds, configuration and signal shards: two chunks of a group, one
+    subtype a class.
+    """
     config = configuration()
     config["targets"]["select"] = ONE_OF_EACH
     config["motion"] |= {"models": 8, "models_per_chunk": 4}
@@ -54,8 +61,11 @@ def test_order_facts_and_pixels_are_those_of_the_shards(pair):
     made, stored = pair
     assert len(made.facts) == 2 * (4 * 6 + 2)
     for name in samples.FACTS:
-        one, other = getattr(made.facts, name), getattr(stored.facts, name)
-        assert one.dtype == other.dtype and np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
+        one = getattr(made.facts, name)
+        other = getattr(stored.facts, name)
+        assert one.dtype == other.dtype and np.array_equal(
+            one, other, equal_nan=one.dtype.kind == "f"
+        ), name
     some = np.array([0, 7, 30, 51, 3])
     assert (made.views(some) == stored.views(some)).all()
     copy = pickle.loads(pickle.dumps(made))
@@ -65,14 +75,17 @@ def test_order_facts_and_pixels_are_those_of_the_shards(pair):
 
 
 def test_clean_echoes_are_computed_once_a_motion_model(run, pair, monkeypatch):
-    made, calls = pair[0], []
+    made = pair[0]
+    calls = []
     maker = made.dataset.maker
     monkeypatch.setattr(type(maker), "_listen", lambda self, row: calls.append(row))
     made.views(np.arange(len(made.facts)))
     assert calls == [] and maker.kept >= len({place for place, _ in made.chosen}) == 26
     monkeypatch.undo()
     monkeypatch.setattr("lowalt.recognition.dataset_samples.CLEAN_BYTES", 9600)
-    small = DatasetSamples(opened(run / "config.yaml"), COLUMNS, {("unseen", "val")}, SIZE, placed=False)
+    small = DatasetSamples(
+        opened(run / "config.yaml"), COLUMNS, {("unseen", "val")}, SIZE, placed=False
+    )
     assert not small.dataset.maker._received and np.isnan(small.facts.range_m).all()
 
 
@@ -82,9 +95,18 @@ def test_a_training_on_made_samples_ends_in_the_same_weights(run, tmp_path):
     block["training"] |= {"steps": 3, "validate_every": 3, "batch": 4}
     settings = {key: block[key] for key in ("network", "training", "augmentation")}
     settings |= {"seed": 1, "size": SIZE, "colour_map": "viridis", "classes": list(CATEGORIES)}
-    line = ["train", "--settings", json.dumps({**settings, "scheme": SCHEME.record}), "--protocol", "seen"]
+    line = [
+        "train",
+        "--settings",
+        json.dumps({**settings, "scheme": SCHEME.record}),
+        "--protocol",
+        "seen",
+    ]
     weights = []
-    for name, source in (("dataset", run / "config.yaml"), ("index", run / "shards" / "index.json")):
+    for name, source in (
+        ("dataset", run / "config.yaml"),
+        ("index", run / "shards" / "index.json"),
+    ):
         main([*line, f"--{name}", str(source), "--out", str(tmp_path / name)])
         weights.append(model_files.load(tmp_path / name / "model.safetensors")[1]["weights"])
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[1])
@@ -94,7 +116,10 @@ def test_a_training_on_made_samples_ends_in_the_same_weights(run, tmp_path):
 
 def test_what_a_made_training_rests_on_is_in_its_identity(run, pair):
     folds = {("seen", "val")}
-    same = [DatasetSamples(opened(run / "config.yaml"), COLUMNS, folds, SIZE, placed=False).sha256() for _ in range(2)]
+    same = [
+        DatasetSamples(opened(run / "config.yaml"), COLUMNS, folds, SIZE, placed=False).sha256()
+        for _ in range(2)
+    ]
     other = opened(run / "config.yaml")
     other.clouds["Crow"].points[0, 0] += 1e-9
     changed = DatasetSamples(other, COLUMNS, folds, SIZE, placed=False).sha256()
@@ -106,11 +131,17 @@ def test_what_a_made_training_rests_on_is_in_its_identity(run, pair):
 
 
 def test_the_configuration_names_the_source():
-    overlay = {"recognition": {"cache": False, "input": "dataset"}, "effects": {"occlusion": {}},
-               "echo": {"tolerance": 1e-3}}  # fmt: skip
+    overlay = {
+        "recognition": {"cache": False, "input": "dataset"},
+        "effects": {"occlusion": {}},
+        "echo": {"tolerance": 1e-3},
+    }
     _, products, _ = parts(overlay)
     found = products.samples(SimpleNamespace(scheme="a-vrp-trp-vt"))
-    assert found["dataset"] == "results/default/config.yaml" and len(found["clouds"]) == len(found["surfaces"]) == 40
+    assert (
+        found["dataset"] == "results/default/config.yaml"
+        and len(found["clouds"]) == len(found["surfaces"]) == 40
+    )
     assert options.samples(None, Inputs(found)) == ["--dataset", "results/default/config.yaml"]
     with pytest.raises(InputError, match=r"recognition\.input"):
         parts({"recognition": {"input": "dataset"}})
@@ -118,7 +149,9 @@ def test_the_configuration_names_the_source():
 
 @pytest.mark.parametrize("effects", [{}, {"carrier_offset": {}}, {"cell_noise": {}}])
 def test_only_the_stations_that_a_scheme_sees_are_computed(run, effects, monkeypatch):
-    """The second station of three alone, and its signal has the same bits as with the others next to it."""
+    """The second station of three alone, and its signal has the same bits as with the others next
+    to it.
+    """
     dataset = opened(run / "config.yaml")
     asked = []
 
@@ -130,7 +163,9 @@ def test_only_the_stations_that_a_scheme_sees_are_computed(run, effects, monkeyp
         return counted
 
     monkeypatch.setattr(maker, "clean_signals", heard(maker.clean_signals, lambda given: given[1]))
-    monkeypatch.setattr(chain, "scene_signals", heard(chain.scene_signals, lambda given: [given[1]]))
+    monkeypatch.setattr(
+        chain, "scene_signals", heard(chain.scene_signals, lambda given: [given[1]])
+    )
     dataset.maker.echo["effects"] = effects
     row = dataset.row(dataset.place(3))
     whole = dataset.maker.signal(row, 8.0)
@@ -144,5 +179,7 @@ def test_all_stations_are_asked_for_range_cells(run):
     dataset = opened(run / "config.yaml")
     assert stations_of(dataset.maker, [3, 5]) == [1]
     assert stations_of(dataset.maker, [0, 2, 3]) == [0, 1]
-    dataset.maker.render["spectra"] = dataset.maker.render["spectra"] | {"hrrp": {"window": 1, "hop": 1, "cells": 9}}
+    dataset.maker.render["spectra"] = dataset.maker.render["spectra"] | {
+        "hrrp": {"window": 1, "hop": 1, "cells": 9}
+    }
     assert stations_of(dataset.maker, [4, 7]) is None

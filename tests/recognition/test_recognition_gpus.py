@@ -30,7 +30,9 @@ def locks(tmp_path, monkeypatch):
 
 def test_jobs_at_the_same_time_have_gpus_of_their_own_and_the_next_one_waits(locks):
     def job():
-        return subprocess.Popen([sys.executable, "-c", JOB], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            [sys.executable, "-c", JOB], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
 
     jobs = [job(), job()]
     assert sorted(process.stdout.readline() for process in jobs) == ["0\n", "1\n"]
@@ -54,4 +56,5 @@ def test_a_process_keeps_its_gpu_and_any_user_s_job_may_take_the_lock_later(lock
     finally:
         os.umask(before)
     assert [(path.name, path.stat().st_mode & 0o777) for path in sorted(locks.iterdir())] == [
-        (f"lowalt-gpu-{name}.lock", 0o644) for name in "ab"]  # fmt: skip
+        (f"lowalt-gpu-{name}.lock", 0o644) for name in "ab"
+    ]

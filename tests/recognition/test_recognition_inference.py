@@ -1,4 +1,6 @@
-"""Class probabilities (`lowalt.recognition.inference`) on one rank and on several, by a network that is a formula."""
+"""Class probabilities (`lowalt.recognition.inference`) on one rank and on several, by a network
+that is a formula.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from lowalt.recognition.inference import Machine, probabilities
 
 
 class Formula(nn.Module):
-    """Logits of three classes: the sample's number, its square over ten, and nought; mirrored, its sign is turned."""
+    """Logits of three classes: the sample's number, its square over ten, and nought; mirrored, its
+    sign is turned.
+    """
 
     classes = 3
 
@@ -41,23 +45,32 @@ def softmax(logits):
 
 
 def by_hand(numbers, mirror):
-    both = [softmax(np.stack([sign * numbers, numbers**2 / 10, 0.0 * numbers], -1)) for sign in (1, -1)]
+    both = [
+        softmax(np.stack([sign * numbers, numbers**2 / 10, 0.0 * numbers], -1)) for sign in (1, -1)
+    ]
     return np.mean(both, 0) if mirror else both[0]
 
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_answers_stand_in_the_order_asked_for_and_a_mirrored_input_counts_as_much(mirror):
-    asked, samples = np.array([4, 0, 2, 1, 3, 7, 5]), Numbers()
+    asked = np.array([4, 0, 2, 1, 3, 7, 5])
+    samples = Numbers()
     machine = Machine(torch.device("cpu"), "fp32")
     model = Formula().train()
     found = probabilities(model, samples, asked, machine, 3, mirror)
     np.testing.assert_allclose(found, by_hand(asked.astype(float), mirror), rtol=1e-6)
-    assert samples.read == [[4, 0, 2], [1, 3, 7], [5]] and found.dtype == np.float64 and not model.training
+    assert (
+        samples.read == [[4, 0, 2], [1, 3, 7], [5]]
+        and found.dtype == np.float64
+        and not model.training
+    )
 
 
 def test_ranks_that_train_unlike_things_are_refused_and_alike_ones_are_not(monkeypatch):
     sent = []
-    monkeypatch.setattr(inference.distributed, "all_reduce", lambda values, how: sent.append(values.clone()))
+    monkeypatch.setattr(
+        inference.distributed, "all_reduce", lambda values, how: sent.append(values.clone())
+    )
     machine = Machine(torch.device("cpu"), "fp32", 1, 2)
     for identity, steps in (("a", 3), ("a", 3), ("b", 3), ("a", 4)):
         machine.agree(identity, steps)
@@ -73,7 +86,9 @@ def test_ranks_that_train_unlike_things_are_refused_and_alike_ones_are_not(monke
     monkeypatch.setattr(inference.distributed, "all_reduce", largest)
     machine.agree("a", 3)
     for found[0] in sent[2:]:
-        with pytest.raises(InputError, match="rank 1 computes in fp32 and stands at step 3, another rank differs"):
+        with pytest.raises(
+            InputError, match="rank 1 computes in fp32 and stands at step 3, another rank differs"
+        ):
             machine.agree("a", 3)
 
 

@@ -1,4 +1,6 @@
-"""Large trainings fit and keep their GPU busy: batches in parts, activations computed again, lasting workers."""
+"""Large trainings fit and keep their GPU busy: batches in parts, activations computed again,
+lasting workers.
+"""
 
 import json
 import os
@@ -26,7 +28,8 @@ def gradients(views, backbone="test_vit2", again=False, dropout=0.0, **changes):
     if again:
         recogniser.checkpoint_activations(model)
     source = sources(views)["train"]
-    images, labels = torch.from_numpy(source.views(np.arange(10))), torch.from_numpy(source.facts.label[:10])
+    images = torch.from_numpy(source.views(np.arange(10)))
+    labels = torch.from_numpy(source.facts.label[:10])
     kept = []
 
     def keep(value):
@@ -57,13 +60,17 @@ def test_activations_computed_again_change_no_gradient_and_keep_less(views, back
     again, told, less = gradients(views, backbone, again=True, dropout=0.3)
     assert told == loss and less < 0.7 * kept
     for name, value in plain.items():
-        torch.testing.assert_close(again[name], value, rtol=0, atol=1e-6 * float(value.abs().max()), msg=name)
+        torch.testing.assert_close(
+            again[name], value, rtol=0, atol=1e-6 * float(value.abs().max()), msg=name
+        )
 
 
 def test_batch_norm_is_refused_where_it_would_count_twice(views, tmp_path):
     settings = with_training(activation_checkpointing=True)
     settings["network"] = {**SETTINGS["network"], "backbone": "test_resnet"}
-    with pytest.raises(InputError, match=r"activation_checkpointing: the backbone .* has batch norms"):
+    with pytest.raises(
+        InputError, match=r"activation_checkpointing: the backbone .* has batch norms"
+    ):
         train(views, tmp_path, settings)
 
 
@@ -90,12 +97,15 @@ def test_workers_read_in_order_and_live_as_long_as_their_reader():
 
 
 def test_evaluation_by_workers_writes_the_same_bytes(views, trained, tmp_path):
-    model, source = runs.load(trained / "model.safetensors"), sources(views)["validation"]
+    model = runs.load(trained / "model.safetensors")
+    source = sources(views)["validation"]
     block = {"batch": 7, "threads": 1, "precision": "fp32", "mirror": True}
     for name, more in (("here", {}), ("workers", {"workers": 2})):
         runs.evaluate(model, source, {**block, **more}, tmp_path / f"{name}.csv")
     assert (tmp_path / "here.csv").read_bytes() == (tmp_path / "workers.csv").read_bytes()
-    assert json.loads((tmp_path / "workers.json").read_text())["evaluated_samples"] == len(source.facts)
+    assert json.loads((tmp_path / "workers.json").read_text())["evaluated_samples"] == len(
+        source.facts
+    )
     with pytest.raises(InputError, match="unknown"):
         runs.evaluate(model, source, {**block, "worker": 2}, tmp_path / "none.csv")
 

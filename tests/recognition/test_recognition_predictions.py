@@ -15,23 +15,34 @@ GOOD = "a,Crow,seen,test,3,inf,1,,,0.1,0.6,0.2,0.1\n"
 
 
 def facts():
-    """Two samples at three stations; the second is near the second station, and the third knows no distance."""
+    """Two samples at three stations; the second is near the second station, and the third knows no
+    distance.
+    """
     return Facts(
-        key=np.array(["b", "a"]), subtype=np.array(["Crow", "Dove"]), model=np.array([3, 4]),
-        snr_db=np.array([3.0, math.inf]), group=np.array(["seen", "unseen"]), fold=np.array(["val", "test"]),
-        label=np.array([1, 0]), range_m=np.array([[90.0, 120.0, 30.0], [70.5, 60.25, math.nan]]),
+        key=np.array(["b", "a"]),
+        subtype=np.array(["Crow", "Dove"]),
+        model=np.array([3, 4]),
+        snr_db=np.array([3.0, math.inf]),
+        group=np.array(["seen", "unseen"]),
+        fold=np.array(["val", "test"]),
+        label=np.array([1, 0]),
+        range_m=np.array([[90.0, 120.0, 30.0], [70.5, 60.25, math.nan]]),
         aspect_rad=np.array([[0.5, 1.0, 1.5], [2.0, math.pi, 0.1]]),
-    )  # fmt: skip
+    )
 
 
 def test_range_and_aspect_are_those_of_the_nearest_station_used():
     shares = np.array([[0.5, 0.5, 0.0, 0.0], [0.25, 0.25, 0.25, 0.25]])
     found = predictions.from_facts(facts(), (0, 1), shares)
-    assert found.range_m.tolist() == [90.0, 60.25] and found.aspect_deg == pytest.approx([math.degrees(0.5), 180.0])
+    assert found.range_m.tolist() == [90.0, 60.25] and found.aspect_deg == pytest.approx(
+        [math.degrees(0.5), 180.0]
+    )
     alone = predictions.from_facts(facts(), (2,), shares)
     assert alone.range_m[0] == 30.0 and math.isnan(alone.range_m[1])
     others = predictions.from_facts(facts(), (1, 2), shares)
-    assert others.range_m.tolist() == [30.0, 60.25] and others.aspect_deg == pytest.approx([math.degrees(1.5), 180.0])
+    assert others.range_m.tolist() == [30.0, 60.25] and others.aspect_deg == pytest.approx(
+        [math.degrees(1.5), 180.0]
+    )
     assert found.guesses.tolist() == [0, 0] and found.correct.tolist() == [False, True]
     assert found.motion.tolist() == ["Crow/3", "Dove/4"]
     assert found.of({("unseen", "test"), ("seen", "val")}).key.tolist() == ["a", "b"]
@@ -60,11 +71,17 @@ def test_a_file_holds_every_column_and_is_read_back_as_it_was(tmp_path):
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        (GOOD + "b,Crow,seen,test,3,3,1,,,0.1,0.6,0.2,0.1021\n", "line 3: probabilities .*0.1021.*, expected 4 >= 0"),
+        (
+            GOOD + "b,Crow,seen,test,3,3,1,,,0.1,0.6,0.2,0.1021\n",
+            "line 3: probabilities .*0.1021.*, expected 4 >= 0",
+        ),
         (GOOD + "b,Crow,seen,test,3,3,1,,,0.1,0.6,0.2,0.0979\n", "line 3: probabilities"),
         ("b,Crow,seen,test,3,3,1,,,-0.1,0.8,0.2,0.1\n" + GOOD, "line 2: probabilities"),
         (GOOD + "b,Crow,seen,test,3,3,1,,,nan,0.6,0.2,0.1\n", "line 3: probabilities"),
-        (GOOD + GOOD.replace("a,", "b,", 1) + "c,Crow,seen,test,x,3,1,,,1,0,0,0\n", "line 4: invalid literal"),
+        (
+            GOOD + GOOD.replace("a,", "b,", 1) + "c,Crow,seen,test,x,3,1,,,1,0,0,0\n",
+            "line 4: invalid literal",
+        ),
         (GOOD + "b,Crow,seen,test,3\n", "line 3: "),
         (GOOD + GOOD, "a key stands twice"),
         ("", "no predictions"),

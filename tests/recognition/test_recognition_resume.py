@@ -20,11 +20,14 @@ from trainings import SCHEME, TRAINING, Killed, equal, kill_at, sources, train, 
 
 
 def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp_path, monkeypatch):
-    """Stops at 6 random moments of one run, each time just after a checkpoint or up to 5 steps later."""
+    """Stops at 6 random moments of one run, each time just after a checkpoint or up to 5 steps
+    later.
+    """
     whole = train(views, tmp_path / "whole")
     moments = iter(sorted(stream(1, "kill").integers(1, TRAINING["steps"], 6).tolist()))
     settings = with_training(checkpoint_s=0)
-    at, step = [next(moments)], runs.Trainer._step
+    at = [next(moments)]
+    step = runs.Trainer._step
 
     def breaking(self, *batch):
         if self.at.steps >= at[0]:
@@ -58,7 +61,9 @@ def test_checkpoints_come_by_the_clock_and_the_time_spent_waiting_for_data_is_to
 
     def run(**changes):
         found = sources(views) | {"train": Slow([views], SCHEME.columns, {("seen", "train")})}
-        runs.train(found, SCHEME, "seen", with_training(steps=6, validate_every=6, **changes), tmp_path)
+        runs.train(
+            found, SCHEME, "seen", with_training(steps=6, validate_every=6, **changes), tmp_path
+        )
 
     step = kill_at(monkeypatch, 5)
     with pytest.raises(Killed):
@@ -67,20 +72,26 @@ def test_checkpoints_come_by_the_clock_and_the_time_spent_waiting_for_data_is_to
     monkeypatch.setattr(runs.Trainer, "_step", step)
     run(checkpoint_s=1e9)
     told = capsys.readouterr().err
-    assert "resumed at step 3" in told and "2 samples/s, 100.0 % of the time waiting for data" in told
+    assert (
+        "resumed at step 3" in told and "2 samples/s, 100.0 % of the time waiting for data" in told
+    )
     record = json.loads((tmp_path / "run.json").read_text())
     assert (record["waiting_share"], record["samples_per_s"], record["train_s"]) == (1.0, 2.0, 12.0)
 
 
 def killed_at(moments, views, folder, settings):
-    """Kill one training at each of the moments, s after its first new checkpoint; what is left of it, as a command."""
+    """Kill one training at each of the moments, s after its first new checkpoint; what is left of
+    it, as a command.
+    """
     settings = json.dumps({**settings, "scheme": SCHEME.record})
     line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--out"]
     line.append(str(folder / "killed"))
     kept = folder / "killed" / "checkpoint.pt"
     for moment in moments:
         before = kept.stat().st_mtime_ns if kept.exists() else None
-        process = subprocess.Popen([sys.executable, "-m", "lowalt.recognition", *line], stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "lowalt.recognition", *line], stderr=subprocess.DEVNULL
+        )
         while process.poll() is None and (not kept.exists() or kept.stat().st_mtime_ns == before):
             time.sleep(0.01)
         time.sleep(moment)
@@ -90,22 +101,30 @@ def killed_at(moments, views, folder, settings):
 
 
 @pytest.mark.parametrize(
-    ("kills", "steps"), [(1, 24), pytest.param(20, 600, marks=pytest.mark.slow)], ids=["once", "twenty times"]
+    ("kills", "steps"),
+    [(1, 24), pytest.param(20, 600, marks=pytest.mark.slow)],
+    ids=["once", "twenty times"],
 )
 def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys, kills, steps):
     settings = with_training(steps=steps, validate_every=10, checkpoint_s=0)
     # A single kill comes with the first checkpoint, long before the last of few steps.
-    line = killed_at(stream(2, "kill").uniform(0, 0.3 * (kills > 1), kills), views, tmp_path, settings)
+    line = killed_at(
+        stream(2, "kill").uniform(0, 0.3 * (kills > 1), kills), views, tmp_path, settings
+    )
     main(line)
     assert "resumed at step" in capsys.readouterr().err
     name, state = model_files.load(tmp_path / "killed" / "model.safetensors")
-    weights, history = train(views, tmp_path / "whole", with_training(steps=steps, validate_every=10))
+    weights, history = train(
+        views, tmp_path / "whole", with_training(steps=steps, validate_every=10)
+    )
     assert equal(state["weights"], weights)
     assert (tmp_path / "killed" / "history.csv").read_text() == history
     assert json.loads(name)["protocol"] == "seen"
 
 
-def test_foreign_damaged_and_missing_checkpoints_and_models_are_refused_by_name(views, trained, tmp_path):
+def test_foreign_damaged_and_missing_checkpoints_and_models_are_refused_by_name(
+    views, trained, tmp_path
+):
     name, _ = model_files.load(trained / "model.safetensors")
     other = tmp_path / "other"
     checkpoint.save(other / "checkpoint.pt", name, {})
@@ -137,7 +156,8 @@ def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path
     with pytest.raises(Killed):
         train(views, tmp_path, settings)
     monkeypatch.setattr(runs.Trainer, "_step", step)
-    inverted, relabelled = sources(views), sources(views)
+    inverted = sources(views)
+    relabelled = sources(views)
     inverted["train"].images = 255 - inverted["train"].images
     facts = relabelled["validation"].facts
     relabelled["validation"].facts = dataclasses.replace(facts, label=(facts.label + 1) % 4)
@@ -150,12 +170,17 @@ def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path
 def test_a_gpu_s_generator_is_saved_and_taken_up_with_the_processor_s(monkeypatch):
     of_gpu = {"state": torch.arange(4, dtype=torch.uint8)}
     monkeypatch.setattr(torch.cuda, "get_rng_state", lambda device: of_gpu["state"].clone())
-    monkeypatch.setattr(torch.cuda, "set_rng_state", lambda state, device: of_gpu.update(state=state))
+    monkeypatch.setattr(
+        torch.cuda, "set_rng_state", lambda state, device: of_gpu.update(state=state)
+    )
     device = torch.device("cuda:1")
     states = recipe.random_state(device)
-    drawn, of_gpu["state"] = torch.rand(3), torch.zeros(4, dtype=torch.uint8)
+    drawn = torch.rand(3)
+    of_gpu["state"] = torch.zeros(4, dtype=torch.uint8)
     recipe.set_random_state(device, states)
     assert torch.equal(torch.rand(3), drawn) and of_gpu["state"].tolist() == [0, 1, 2, 3]
     assert set(recipe.random_state(torch.device("cpu"))) == {"cpu"}
-    with pytest.raises(InputError, match=r"random states of \['cpu', 'cuda'\], but this training runs on cpu"):
+    with pytest.raises(
+        InputError, match=r"random states of \['cpu', 'cuda'\], but this training runs on cpu"
+    ):
         recipe.set_random_state(torch.device("cpu"), states)

@@ -1,4 +1,6 @@
-"""Tables from prediction files: values by hand, orderings by intervals, and models of other runs compared by sample."""
+"""Tables from prediction files: values by hand, orderings by intervals, and models of other runs
+compared by sample.
+"""
 
 import json
 
@@ -30,16 +32,28 @@ def test_bands_begin_at_multiples_of_their_width_and_leave_out_samples_without_a
     paths = [run_files(tmp_path, "seen", "A:VT", 0.7, seed=seed)[0] for seed in (0, 1)]
     runs = [Evaluated(path) for path in paths]
     test = runs[0].test
-    values = np.where(np.arange(len(test)) % 7 == 0, np.nan, 49.9 + 0.1 * (np.arange(len(test)) % 5))
+    values = np.where(
+        np.arange(len(test)) % 7 == 0, np.nan, 49.9 + 0.1 * (np.arange(len(test)) % 5)
+    )
     right = np.mean([run.test.correct for run in runs], axis=0)
     rows = list(tables.band_rows(runs, lambda found: values, 50))
     for row, (start, chosen) in zip(rows, ((0, values < 50), (50, values >= 50)), strict=True):
-        assert row == [f"{start}", f"{start + 50}", f"{100 * right[chosen].mean():.4f}", chosen.sum()]
+        assert row == [
+            f"{start}",
+            f"{start + 50}",
+            f"{100 * right[chosen].mean():.4f}",
+            chosen.sum(),
+        ]
 
 
 @pytest.mark.parametrize(
     ("low", "high", "ordering"),
-    [("0.1", "2.0", "holds"), ("-2.0", "-0.1", "reversed"), ("-0.1", "0.1", "undecided"), ("0.0", "1.0", "undecided")],
+    [
+        ("0.1", "2.0", "holds"),
+        ("-2.0", "-0.1", "reversed"),
+        ("-0.1", "0.1", "undecided"),
+        ("0.0", "1.0", "undecided"),
+    ],
 )
 def test_an_ordering_holds_only_where_its_interval_lies_above_zero(low, high, ordering):
     row = ["seen", "ABC:X", "A:X", "stations", "seeds, motion models"]
@@ -72,17 +86,31 @@ def test_whole_subtypes_give_the_wider_interval_where_subtypes_differ(tmp_path):
 
 
 def predicted(path, right, trained_on="", scheme="A:VT", seed=0):
-    """Predictions for 40 motion models, at 3 dB and without noise, of which the `right` ones are called rightly."""
+    """Predictions for 40 motion models, at 3 dB and without noise, of which the `right` ones are
+    called rightly.
+    """
     count = len(right)
     label = np.arange(count // 2).repeat(2) % 4
     known = samples.Facts(
-        key=np.array([f"k{number:03d}" for number in range(count)]), subtype=np.char.add("s", label.astype(str)),
-        model=np.arange(count // 2).repeat(2), snr_db=np.tile(SNRS, count // 2), group=np.full(count, "seen"),
-        fold=np.full(count, "test"), label=label, range_m=np.ones((count, 3)), aspect_rad=np.ones((count, 3)),
-    )  # fmt: skip
+        key=np.array([f"k{number:03d}" for number in range(count)]),
+        subtype=np.char.add("s", label.astype(str)),
+        model=np.arange(count // 2).repeat(2),
+        snr_db=np.tile(SNRS, count // 2),
+        group=np.full(count, "seen"),
+        fold=np.full(count, "test"),
+        label=label,
+        range_m=np.ones((count, 3)),
+        aspect_rad=np.ones((count, 3)),
+    )
     guess = np.where(right, label, (label + 1) % 4)
     predictions.write(path, predictions.from_facts(known, (0,), np.eye(4)[guess]))
-    about = {"protocol": "seen", "scheme": scheme, "seed": seed, "hardware": "none", "trained_on": trained_on}
+    about = {
+        "protocol": "seen",
+        "scheme": scheme,
+        "seed": seed,
+        "hardware": "none",
+        "trained_on": trained_on,
+    }
     path.with_suffix(".json").write_text(json.dumps(about))
     return Evaluated(path)
 
@@ -93,7 +121,10 @@ def test_differences_are_paired_and_every_snr_stands_apart(tmp_path):
     other = own.copy()
     # The other model loses ten motion models at 3 dB and none without noise.
     other[20:40:2] = False
-    runs = predicted(tmp_path / "own.csv", own), predicted(tmp_path / "other.csv", other, "elsewhere")
+    runs = (
+        predicted(tmp_path / "own.csv", own),
+        predicted(tmp_path / "other.csv", other, "elsewhere"),
+    )
     transfer.write([runs[0]], [runs[1]], ["A:VT"], tmp_path / "transfer.csv", 1)
     rows = read_rows(tmp_path / "transfer.csv")
     assert [row["snr_db"] for row in rows] == ["3", "inf", "avg"]
@@ -101,7 +132,8 @@ def test_differences_are_paired_and_every_snr_stands_apart(tmp_path):
     assert [float(row["own_percent"]) for row in rows] == [90.0, 90.0, 90.0]
     assert [float(row["difference_points"]) for row in rows] == [-25.0, 0.0, -12.5]
     assert [int(row["samples"]) for row in rows] == [40, 40, 80]
-    low, high = float(rows[0]["low"]), float(rows[0]["high"])
+    low = float(rows[0]["low"])
+    high = float(rows[0]["high"])
     assert -45 < low < -25 < high < -10
     assert (float(rows[1]["low"]), float(rows[1]["high"])) == (0.0, 0.0)
     assert {(row["seeds"], row["spread_points"]) for row in rows} == {("1", "")}
@@ -136,6 +168,10 @@ def test_strangers_are_refused_by_name(tmp_path):
 def test_a_split_that_would_leak_is_refused():
     own = {"run": "here", "seed": 1, "split": {"by": "motion", "train": 8, "val": 1, "test": 1}}
     transfer.check_folds(own, {**own, "run": "there"})
-    transfer.check_folds(own, {"run": "there", "seed": 2, "split": {"by": "sample", "train": 7, "val": 2, "test": 1}})
+    transfer.check_folds(
+        own, {"run": "there", "seed": 2, "split": {"by": "sample", "train": 7, "val": 2, "test": 1}}
+    )
     with pytest.raises(InputError, match="'there' has the same seed 1"):
-        transfer.check_folds(own, {**own, "run": "there", "split": {**own["split"], "by": "sample"}})
+        transfer.check_folds(
+            own, {**own, "run": "there", "split": {**own["split"], "by": "sample"}}
+        )

@@ -1,4 +1,6 @@
-"""Training and evaluation in one call each: the model file and the accuracies that the commands give."""
+"""Training and evaluation in one call each: the model file and the accuracies that the commands
+give.
+"""
 
 import json
 import math
@@ -42,11 +44,17 @@ def run(tmp_path_factory):
 def test_one_call_trains_and_another_evaluates_as_the_commands_do(run, tmp_path):
     trained = lowalt.train(run, "A:VRP+TRP+VT", "seen", out=tmp_path / "model", steps=3)
     history = (tmp_path / "model/history.csv").read_text()
-    assert model_files.load(tmp_path / "model/model.safetensors")[1]["protocol"] == "seen" and "\n3," in history
+    assert (
+        model_files.load(tmp_path / "model/model.safetensors")[1]["protocol"] == "seen"
+        and "\n3," in history
+    )
     found = lowalt.evaluate(trained, run)
     assert found == lowalt.evaluate(trained, run)
-    block = json.dumps(yaml.safe_load((run / "config.yaml").read_text())["recognition"]["evaluation"])
-    index, table = str(run / "shards/index.json"), str(tmp_path / "p.csv")
+    block = json.dumps(
+        yaml.safe_load((run / "config.yaml").read_text())["recognition"]["evaluation"]
+    )
+    index = str(run / "shards/index.json")
+    table = str(tmp_path / "p.csv")
     main(
         [
             "evaluate",
@@ -60,19 +68,33 @@ def test_one_call_trains_and_another_evaluates_as_the_commands_do(run, tmp_path)
             table,
         ]
     )
-    assert found == score.score(table, index, "seen") == lowalt.evaluate(tmp_path / "model/model.safetensors", run)
+    assert (
+        found
+        == score.score(table, index, "seen")
+        == lowalt.evaluate(tmp_path / "model/model.safetensors", run)
+    )
     parts = [line.rpartition(",")[2] for line in (tmp_path / "p.csv").read_text().splitlines()]
-    assert parts[0] == "part" and parts.count("test") == found["samples"] and set(parts[1:]) == {"test", "validation"}
+    assert (
+        parts[0] == "part"
+        and parts.count("test") == found["samples"]
+        and set(parts[1:]) == {"test", "validation"}
+    )
 
 
 def test_training_reads_no_test_sample(run, tmp_path):
-    """No statistic of test samples, such as a mean for normalising, can enter: the weights come out without them."""
+    """No statistic of test samples, such as a mean for normalising, can enter: the weights come out
+    without them.
+    """
     without = shutil.copytree(run, tmp_path / "run")
     gone = list((without / "shards").glob("*-test-*"))
     for path in gone:
         path.unlink()
-    models = [lowalt.train(folder, "A:VRP+TRP+VT", "seen", out=tmp_path / f"model {number}", steps=3).model
-              for number, folder in enumerate((run, without))]  # fmt: skip
+    models = [
+        lowalt.train(
+            folder, "A:VRP+TRP+VT", "seen", out=tmp_path / f"model {number}", steps=3
+        ).model
+        for number, folder in enumerate((run, without))
+    ]
     kept, found = (model.state_dict() for model in models)
     assert gone and kept.keys() == found.keys()
     assert all(torch.equal(kept[name], found[name]) for name in kept)
@@ -81,7 +103,8 @@ def test_training_reads_no_test_sample(run, tmp_path):
 def test_an_answer_depends_on_its_own_sample_alone(run, tmp_path):
     trained = lowalt.train(run, "A:VRP+TRP+VT", "seen", out=tmp_path / "model", steps=3)
     source = Source.of_run(run / "shards/index.json", trained.size)
-    settings, machine = {"batch": 3, "threads": 1, "precision": "float32", "mirror": False}, Machine.here("float32")
+    settings = {"batch": 3, "threads": 1, "precision": "float32", "mirror": False}
+    machine = Machine.here("float32")
     of_fold = {}
     for pairs in ({("seen", "test")}, {("seen", "val"), ("seen", "test")}):
         samples = source.samples(trained.scheme.columns, pairs, trained.size)
@@ -102,15 +125,25 @@ def test_a_folder_that_is_no_run_and_a_setting_that_is_none_are_refused(run, tmp
 def test_confusion_is_read_at_one_snr_or_summed_over_all(tmp_path):
     counts = {"seen,A,3": [3, 1, 0, 4], "seen,A,inf": [4, 0, 1, 3], "seen,B,3": [9, 9, 9, 9]}
     pairs = ["Bird,Bird", "Bird,UAV", "UAV,Bird", "UAV,UAV"]
-    lines = [f"{about},{pair},{count}" for about, row in counts.items() for pair, count in zip(pairs, row, strict=True)]
+    lines = [
+        f"{about},{pair},{count}"
+        for about, row in counts.items()
+        for pair, count in zip(pairs, row, strict=True)
+    ]
     head = "protocol,scheme,snr_db,category,predicted,samples"
     (tmp_path / "confusion_by_snr.csv").write_text("\n".join([head, *lines, ""]))
     at_3 = lowalt.confusion(tmp_path, "A", "seen", snr_db=3)
     assert at_3.classes == ("Bird", "UAV") and at_3.samples.tolist() == [[3, 1], [0, 4]]
     assert at_3.percent.tolist() == [[75, 25], [0, 100]]
-    assert lowalt.confusion(tmp_path, "A", "seen", snr_db=math.inf).samples.tolist() == [[4, 0], [1, 3]]
+    assert lowalt.confusion(tmp_path, "A", "seen", snr_db=math.inf).samples.tolist() == [
+        [4, 0],
+        [1, 3],
+    ]
     assert lowalt.confusion(tmp_path, "A", "seen").samples.tolist() == [[7, 1], [1, 7]]
-    for wrong, words in (({"snr_db": 5}, "snr_db 5 is not there"), ({"scheme": "C"}, "scheme 'C' is not there")):
+    for wrong, words in (
+        ({"snr_db": 5}, "snr_db 5 is not there"),
+        ({"scheme": "C"}, "scheme 'C' is not there"),
+    ):
         with pytest.raises(InputError, match=words):
             lowalt.confusion(tmp_path, **{"scheme": "A", "protocol": "seen", **wrong})
 

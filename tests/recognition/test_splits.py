@@ -20,7 +20,9 @@ def test_full_blocks_have_exact_shares():
 def test_a_motion_model_never_leaks_and_the_papers_way_does():
     assert len({fold(SPLIT, 5, "Crow", 3, snr) for snr in (3.0, 8.0, 13.0)}) == 1
     paper = {**SPLIT, "by": "sample"}
-    mixed = [len({fold(paper, 5, "Crow", model, snr) for snr in (3.0, 8.0, 13.0)}) for model in range(50)]
+    mixed = [
+        len({fold(paper, 5, "Crow", model, snr) for snr in (3.0, 8.0, 13.0)}) for model in range(50)
+    ]
     assert max(mixed) > 1
     shares = [fold(paper, 5, "Crow", model, 3.0) for model in range(100)]
     assert shares.count("train") == 80
@@ -28,7 +30,12 @@ def test_a_motion_model_never_leaks_and_the_papers_way_does():
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"by": "model"}, "by is 'model'"), ({"train": 0}, "shares"), ({"val": -1}, "shares"), ({"by": "sample"}, "SNR")],
+    [
+        ({"by": "model"}, "by is 'model'"),
+        ({"train": 0}, "shares"),
+        ({"val": -1}, "shares"),
+        ({"by": "sample"}, "SNR"),
+    ],
 )
 def test_bad_split_is_refused(change, words):
     with pytest.raises(InputError, match=words):

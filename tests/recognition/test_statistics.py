@@ -1,4 +1,6 @@
-"""Statistics of predictions: exact small cases, laws, coverage of the intervals, an independent slow reference."""
+"""Statistics of predictions: exact small cases, laws, coverage of the intervals, an independent
+slow reference.
+"""
 
 import math
 import sys
@@ -28,12 +30,16 @@ def test_bootstrap_depends_on_the_generator_alone_and_not_on_names_of_clusters()
 @pytest.mark.parametrize("level", ["seeds", "subtypes", "models of known subtypes", "all three"])
 def test_a_95_percent_interval_holds_the_truth_about_that_often(level):
     """93 to 97 % should hold it, give or take two standard errors of 400 trials, 1.1 % each."""
-    share = interval_coverage.held(interval_coverage.CASES[level], 400, 200, stream(11, "coverage", level))
+    share = interval_coverage.held(
+        interval_coverage.CASES[level], 400, 200, stream(11, "coverage", level)
+    )
     assert 0.93 - 0.022 <= share <= 0.97 + 0.022
 
 
 def test_a_difference_that_only_the_subtypes_decide_is_not_called_certain():
-    """One subtype of five gains a whole point in every model and seed, the others lose a fifth of one."""
+    """One subtype of five gains a whole point in every model and seed, the others lose a fifth of
+    one.
+    """
     names = np.repeat(np.arange(5), 40)
     one = np.tile(np.where(names == 0, 1.0, -0.2), (3, 1))
     given = (one, np.zeros_like(one), np.full(200, 6), names)
@@ -52,10 +58,12 @@ def test_a_motion_model_brings_one_value_however_many_snrs_it_has():
 
 
 def test_bands_of_confidence_are_fifteen_of_equal_width():
-    """0.66 and 0.67 lie on two sides of 10/15, 0.93 and 0.94 of 14/15; a certain guess belongs to the last band, with
-    one of 0.95. Too little confidence in one band does not make up for too much in the next."""
+    """0.66 and 0.67 lie on two sides of 10/15, 0.93 and 0.94 of 14/15; a certain guess belongs to
+    the last band, with one of 0.95. Too little confidence in one band does not make up for too much
+    in the next."""
     top = np.array([0.66, 0.67, 1.0, 0.95])
-    probabilities, labels = np.stack([top, 1 - top], 1), np.array([1, 0, 1, 0])
+    probabilities = np.stack([top, 1 - top], 1)
+    labels = np.array([1, 0, 1, 0])
     found = statistics.calibration(probabilities, labels)
     assert found["calibration_error"] == pytest.approx((0.66 + 0.33 + 0.95) / 4)
     near = np.array([0.93, 0.94])
@@ -73,7 +81,9 @@ def test_one_seed_and_one_subtype_leave_nothing_to_draw():
 
 def test_a_difference_is_the_first_less_the_second_whatever_their_numbers_of_seeds():
     """All samples alike, so that nothing is left to chance."""
-    high, low, names = np.full(12, 0.75), np.full(12, 0.5), np.repeat(np.arange(4), 3)
+    high = np.full(12, 0.75)
+    low = np.full(12, 0.5)
+    names = np.repeat(np.arange(4), 3)
     for seeds, others in ((1, 3), (3, 1), (2, 4)):
         given = np.tile(high, (seeds, 1)), np.tile(low, (others, 1)), np.ones(12), names
         for whole in (False, True):
@@ -91,14 +101,27 @@ def test_every_cluster_is_drawn_as_often_as_any_other(place):
 
 def test_a_difference_and_a_mean_count_each_motion_model_by_its_samples():
     """Fifty models of nine samples are right and fifty of one are wrong, each a subtype of its own."""
-    count, one = np.repeat([9, 1], 50), np.repeat([1.0, 0.0], 50)
+    count = np.repeat([9, 1], 50)
+    one = np.repeat([1.0, 0.0], 50)
     given = one[None], np.zeros((1, 100)), count, np.arange(100)
-    found = [intervals.strict_difference(*given, whole, stream(1, "d"), 400) for whole in (False, True)]
-    found.append(intervals.bootstrap(np.repeat(np.arange(100), count), np.repeat(one, count), stream(1, "c"), 400))
+    found = [
+        intervals.strict_difference(*given, whole, stream(1, "d"), 400) for whole in (False, True)
+    ]
+    found.append(
+        intervals.bootstrap(
+            np.repeat(np.arange(100), count), np.repeat(one, count), stream(1, "c"), 400
+        )
+    )
     for value, low, high in found:
         assert value == pytest.approx(0.9) and 0.8 < low < 0.9 < high < 0.95
 
 
 def test_counts_have_rows_of_classes_without_samples_and_an_impossible_label_is_finite():
-    assert statistics.confusion(np.array([1]), np.array([0]), 3).tolist() == [[0, 0, 0], [1, 0, 0], [0, 0, 0]]
-    assert statistics.cross_entropy(np.array([[1.0, 0.0]]), np.array([1])) == pytest.approx(1022 * math.log(2))
+    assert statistics.confusion(np.array([1]), np.array([0]), 3).tolist() == [
+        [0, 0, 0],
+        [1, 0, 0],
+        [0, 0, 0],
+    ]
+    assert statistics.cross_entropy(np.array([[1.0, 0.0]]), np.array([1])) == pytest.approx(
+        1022 * math.log(2)
+    )

@@ -29,13 +29,20 @@ def test_alarm_rates_are_shares_of_each_class():
     assert detected == 0.5
     assert alarms.tolist() == [0.5, 1.0, 0.0]
     # No sample of the fifth class.
-    assert np.isnan(statistics.alarm_rates(scores, labels, 0.7, 5)[1]).tolist() == [False, False, False, True]
+    assert np.isnan(statistics.alarm_rates(scores, labels, 0.7, 5)[1]).tolist() == [
+        False,
+        False,
+        False,
+        True,
+    ]
 
 
 def alarm_part(rng, models, name, samples=3):
     """UAVs of score 0.5 to 1, birds of 0 to 0.6, in turn; vehicles and pedestrians of 0."""
     label = np.repeat(np.arange(models) % 4, samples)
-    score = np.select([label == 0, label == 1], [rng.uniform(0.5, 1, len(label)), rng.uniform(0, 0.6, len(label))])
+    score = np.select(
+        [label == 0, label == 1], [rng.uniform(0.5, 1, len(label)), rng.uniform(0, 0.6, len(label))]
+    )
     motion = np.repeat([f"{name}{number}" for number in range(models)], samples)
     return statistics.AlarmPart(score, label, motion, label)
 
@@ -43,7 +50,9 @@ def alarm_part(rng, models, name, samples=3):
 def test_alarm_intervals_hold_the_rates_and_narrow_with_the_samples():
     widths = []
     for models in (80, 800):
-        parts = [[alarm_part(stream(seed, name), models, name)] for seed, name in ((1, "v"), (2, "t"))]
+        parts = [
+            [alarm_part(stream(seed, name), models, name)] for seed, name in ((1, "v"), (2, "t"))
+        ]
         level = statistics.threshold(parts[0][0].scores, parts[0][0].labels, 0.9)
         detected, alarms = statistics.alarm_rates(parts[1][0].scores, parts[1][0].labels, level, 4)
         bounds = statistics.alarm_intervals(*parts, 0.9, False, stream(3, "a"), 4, 200)
@@ -55,35 +64,49 @@ def test_alarm_intervals_hold_the_rates_and_narrow_with_the_samples():
 
 
 def test_the_95_percent_interval_of_a_false_alarm_rate_is_196_standard_errors_wide_on_either_side():
-    """The threshold is certain and every second of 400 birds exceeds it, so the rate errs by sqrt(1 / 4 / 400)."""
+    """The threshold is certain and every second of 400 birds exceeds it, so the rate errs by sqrt(1
+    / 4 / 400).
+    """
     label = np.repeat([0, 1], 400)
     names = np.array([f"m{number}" for number in range(800)])
     validation = statistics.AlarmPart(np.full(800, 0.5), label, names, label)
     test = statistics.AlarmPart(np.where(np.arange(800) % 2, 0.9, 0.1), label, names, label)
-    _, (low, high) = statistics.alarm_intervals([validation], [test], 0.9, False, stream(3, "a"), 2, 2000)
+    _, (low, high) = statistics.alarm_intervals(
+        [validation], [test], 0.9, False, stream(3, "a"), 2, 2000
+    )
     assert (high - low) / 2 == pytest.approx(1.96 * np.sqrt(0.25 / 400), rel=0.08)
 
 
 def two_subtypes(first, second):
-    """Forty UAVs of two subtypes with these scores and a bird of score 0, each a motion model of its own."""
+    """Forty UAVs of two subtypes with these scores and a bird of score 0, each a motion model of
+    its own.
+    """
     score = np.repeat([first, second, 0.0], [20, 20, 1])
     names = np.array([f"m{number}" for number in range(41)])
-    return statistics.AlarmPart(score, np.repeat([0, 1], [40, 1]), names, np.repeat([0, 1, 2], [20, 20, 1]))
+    return statistics.AlarmPart(
+        score, np.repeat([0, 1], [40, 1]), names, np.repeat([0, 1, 2], [20, 20, 1])
+    )
 
 
 def test_alarm_intervals_draw_seeds_and_where_asked_subtypes_of_the_test_part():
-    good, bad, halves = two_subtypes(0.9, 0.9), two_subtypes(0.3, 0.3), two_subtypes(0.9, 0.3)
+    good = two_subtypes(0.9, 0.9)
+    bad = two_subtypes(0.3, 0.3)
+    halves = two_subtypes(0.9, 0.3)
 
     def bounds(validation, test, whole, classes=1, detection=0.9):
-        return statistics.alarm_intervals(validation, test, detection, whole, stream(1, "a"), classes, 300).tolist()
+        return statistics.alarm_intervals(
+            validation, test, detection, whole, stream(1, "a"), classes, 300
+        ).tolist()
 
-    # Scores of 0.9 are set on, so those of 0.3 are missed. Half the models are found, and which half is up to chance.
+    # Scores of 0.9 are set on, so those of 0.3 are missed. Half the models are found, and which
+    # half is up to chance.
     ((low, high),) = bounds([good], [halves], False)
     assert 0.3 < low < 0.5 < high < 0.7
     # Whole subtypes are found or missed; so are whole seeds.
     assert bounds([good], [halves], True) == [[0.0, 1.0]]
     assert bounds([good, good], [good, bad], False) == [[0.0, 1.0]]
-    # Subtypes of the validation part are never drawn: a tenth of it stays below the threshold, so 0.5 is found.
+    # Subtypes of the validation part are never drawn: a tenth of it stays below the threshold, so
+    # 0.5 is found.
     assert bounds([two_subtypes(0.9, 0.3)], [two_subtypes(0.5, 0.5)], True) == [[1.0, 1.0]]
     # Whether more than half of the drawn validation samples have the higher score is up to chance.
     assert bounds([halves], [two_subtypes(0.5, 0.5)], False, detection=0.5) == [[0.0, 1.0]]
@@ -91,6 +114,12 @@ def test_alarm_intervals_draw_seeds_and_where_asked_subtypes_of_the_test_part():
     assert np.isnan(bounds([good], [halves], False, 3)).all()
 
 
-@pytest.mark.parametrize(("uavs", "detection", "expected"), [(100, 0.9, True), (99, 0.9, False), (300, 0.99, False)])
-def test_a_detection_is_measurable_only_where_ten_uavs_may_lie_below_the_threshold(uavs, detection, expected):
-    assert statistics.measurable(np.r_[np.zeros(uavs, int), np.ones(500, int)], detection) == expected
+@pytest.mark.parametrize(
+    ("uavs", "detection", "expected"), [(100, 0.9, True), (99, 0.9, False), (300, 0.99, False)]
+)
+def test_a_detection_is_measurable_only_where_ten_uavs_may_lie_below_the_threshold(
+    uavs, detection, expected
+):
+    assert (
+        statistics.measurable(np.r_[np.zeros(uavs, int), np.ones(500, int)], detection) == expected
+    )

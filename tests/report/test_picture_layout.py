@@ -1,4 +1,6 @@
-"""Pictures whose layout a solver finds: their places are round numbers, so that every process draws the same bytes."""
+"""Pictures whose layout a solver finds: their places are round numbers, so that every process draws
+the same bytes.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ SHIFT = 1e-13
 
 
 def drawing() -> Figure:
-    """A figure with sub-figures, one in another, and axes of equal scales in each, as in the picture of all clouds."""
+    """A figure with sub-figures, one in another, and axes of equal scales in each, as in the
+    picture of all clouds.
+    """
     result = Figure(figsize=(5, 6), layout="constrained")
     top, bottom = result.subfigures(2, 1, height_ratios=[1, 2.3])
     for part in (top, bottom.subfigures(1, 2, width_ratios=[1, 1.7])[1]):
@@ -23,7 +27,9 @@ def drawing() -> Figure:
 
 
 def places(figure: Figure) -> np.ndarray:
-    """The extents of all axes, in shares of their sub-figure, and of all sub-figures, in shares of the one around."""
+    """The extents of all axes, in shares of their sub-figure, and of all sub-figures, in shares of
+    the one around.
+    """
     parts = list(figure.subfigs)
     for part in parts:
         parts += part.subfigs
@@ -32,7 +38,9 @@ def places(figure: Figure) -> np.ndarray:
 
 
 def test_an_answer_that_differs_in_its_last_bits_gives_the_same_places(monkeypatch):
-    """As another process's solver would find it: every place a little elsewhere before it is rounded."""
+    """As another process's solver would find it: every place a little elsewhere before it is
+    rounded.
+    """
     once = drawing()
     settle(once, 110)
     twice = drawing()
@@ -55,8 +63,11 @@ def test_an_answer_that_differs_in_its_last_bits_gives_the_same_places(monkeypat
 
 @pytest.mark.parametrize("dpi", [72, 110, 150])
 def test_laid_out_at_the_resolution_of_the_file(dpi):
-    """The width of letters depends on it: what was laid out for one resolution is not right for another."""
-    free, settled = drawing(), drawing()
+    """The width of letters depends on it: what was laid out for one resolution is not right for
+    another.
+    """
+    free = drawing()
+    settled = drawing()
     free.set_dpi(dpi)
     free.draw_without_rendering()
     settle(settled, dpi)

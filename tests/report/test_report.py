@@ -16,7 +16,13 @@ def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
     lines = [
         {"rule_name": "echo", "wildcards": {}, "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0},
         {"rule_name": "echo", "wildcards": {}, "s": 3.0, "cpu_time": "NA", "max_rss": None},
-        {"rule_name": "cloud", "wildcards": {"subtype": "crow"}, "s": 1.0, "cpu_time": 0.5, "max_rss": 50.0},
+        {
+            "rule_name": "cloud",
+            "wildcards": {"subtype": "crow"},
+            "s": 1.0,
+            "cpu_time": 0.5,
+            "max_rss": 50.0,
+        },
     ]
     paths = [tmp_path / f"{index}.jsonl" for index in range(3)]
     for path, line in zip(paths, lines, strict=True):
@@ -40,7 +46,11 @@ def test_a_manifest_names_each_file_once_and_a_wrong_one_is_refused(tmp_path, ba
     path = tmp_path / "report.json"
     path.write_text(json.dumps(bare | {"transfer": "t.csv"}))
     found = Inputs.read(path)
-    assert found.paths("clouds") == ["a.npz"] and "transfer" in found and found.paths("predictions") == []
+    assert (
+        found.paths("clouds") == ["a.npz"]
+        and "transfer" in found
+        and found.paths("predictions") == []
+    )
     with pytest.raises(InputError, match=r"accuracy: no file at .*accuracy\.csv"):
         found.path("accuracy")
     for wrong, words in (
@@ -70,9 +80,19 @@ def test_every_section_has_a_template_and_every_template_a_section():
 
 
 def test_the_first_words_are_the_best_scheme_beside_the_paper_s_and_what_one_seed_says():
-    rows = [{"protocol": "unseen", "scheme": name, "snr_db": "avg", "accuracy_percent": value, "seeds": "1"}
-            for name, value in (("A", "80.0"), ("ABC", "92.5"))]  # fmt: skip
-    published = [{"protocol": "unseen", "scheme": "ABC", "snr_db": "avg", "accuracy_percent": "97.8"}]
+    rows = [
+        {
+            "protocol": "unseen",
+            "scheme": name,
+            "snr_db": "avg",
+            "accuracy_percent": value,
+            "seeds": "1",
+        }
+        for name, value in (("A", "80.0"), ("ABC", "92.5"))
+    ]
+    published = [
+        {"protocol": "unseen", "scheme": "ABC", "snr_db": "avg", "accuracy_percent": "97.8"}
+    ]
     (told,) = overview.accuracies(rows, published, 4)
     assert (told["scheme"], told["percent"], told["paper"]) == ("ABC", 92.5, 97.8)
     assert told["words"].startswith("Chance level is 25 %. The paper reports 97.8 %")

@@ -1,4 +1,6 @@
-"""The gallery of runs: every run is linked, and two of them differ on the page as `lowalt compare` says."""
+"""The gallery of runs: every run is linked, and two of them differ on the page as `lowalt compare`
+says.
+"""
 
 import json
 import re
@@ -11,7 +13,8 @@ from run_folders import run_folder
 
 def made(folder):
     """Two runs, one with a report, and the gallery's text."""
-    one, other = run_folder(folder / "one", 80, 5.0), run_folder(folder / "other", 81, 2.5, seed=2)
+    one = run_folder(folder / "one", 80, 5.0)
+    other = run_folder(folder / "other", 81, 2.5, seed=2)
     with (one / "config.yaml").open("w") as file:
         file.write("{run: one, seed: 1, motion: {models: 3}, noise: {snr_db: [3.0, .inf]}}")
     (one / "report.html").write_text("page")
@@ -28,8 +31,9 @@ def test_every_run_stands_in_the_table_and_those_with_a_page_are_linked(tmp_path
     page = sound(text)
     assert [link for link in page.links if not link.startswith("#")] == ["one/report.html"]
     assert page.tables[0]["rows"] == [
-        ["one", "", "", "81.00 (A:VT)", "", "5"], ["other (no report)", "40", "0.003", "82.00 (A:VT)", "", "2"],
-    ]  # fmt: skip
+        ["one", "", "", "81.00 (A:VT)", "", "5"],
+        ["other (no report)", "40", "0.003", "82.00 (A:VT)", "", "2"],
+    ]
 
 
 def test_a_folder_without_runs_is_an_error_and_leaves_no_page(tmp_path, capsys):

@@ -1,4 +1,6 @@
-"""The page as a reader meets it: whole parts, links that lead somewhere, tables that sort, filter and can be kept."""
+"""The page as a reader meets it: whole parts, links that lead somewhere, tables that sort, filter
+and can be kept.
+"""
 
 import json
 import re
@@ -13,7 +15,12 @@ from lowalt.report.page import PARTS, assembled, rendered
 from lowalt.report.sections import recognition_cost, simulation_cost
 from pages import browsed, sound
 
-ROWS = (("b", "10.5"), ("c", ""), ('a, "x"', "-9 (1 to 2)"), *((f"d{number}", f"{20 + number}") for number in range(7)))
+ROWS = (
+    ("b", "10.5"),
+    ("c", ""),
+    ('a, "x"', "-9 (1 to 2)"),
+    *((f"d{number}", f"{20 + number}") for number in range(7)),
+)
 
 
 def table(rows):
@@ -33,7 +40,10 @@ def kept():
 
 def test_a_run_without_own_costs_shows_the_kept_ones_and_says_so(kept):
     parts = []
-    for name, section in {"simulation_cost": simulation_cost, "recognition_cost": recognition_cost}.items():
+    for name, section in {
+        "simulation_cost": simulation_cost,
+        "recognition_cost": recognition_cost,
+    }.items():
         text = rendered(name, section.values(kept))
         assert "This run did not measure it" in " ".join(text.split()) and "make " in text
         parts.append({"id": name, "title": name, "html": text})
@@ -44,8 +54,12 @@ def test_a_run_without_own_costs_shows_the_kept_ones_and_says_so(kept):
 def test_a_run_s_own_table_goes_before_the_kept_one(kept):
     own = Inputs(kept.inputs.files | {"accuracy_cost": kept.inputs.files["kept_accuracy_cost"]})
     assert kept.inputs.own_or_kept("accuracy_cost") == "kept_accuracy_cost"
-    assert own.own_or_kept("accuracy_cost") == "accuracy_cost" and own.own_or_kept("transfer") is None
-    text = " ".join(rendered("recognition_cost", recognition_cost.values(SimpleNamespace(inputs=own))).split())
+    assert (
+        own.own_or_kept("accuracy_cost") == "accuracy_cost" and own.own_or_kept("transfer") is None
+    )
+    text = " ".join(
+        rendered("recognition_cost", recognition_cost.values(SimpleNamespace(inputs=own))).split()
+    )
     assert "This run measured it on " in text and "did not" not in text
 
 
@@ -59,9 +73,16 @@ def test_a_run_on_a_benchmark_s_data_shows_the_table_of_baselines(kept):
     rows = read_csv(path, "method", "track", "percent", "low", "high", "group")
     assert sum(len(table["rows"]) for table in tables) == 2 * len({row["method"] for row in rows})
     for row in rows:
-        (cell,) = [line[table["head"].index(row["track"])] for table in tables if row["track"] in table["head"]
-                   for line in table["rows"] if line[0] == row["method"]]  # fmt: skip
-        interval = "{:.1f} ({:.1f} to {:.1f})".format(*(float(row[name]) for name in ("percent", "low", "high")))
+        (cell,) = [
+            line[table["head"].index(row["track"])]
+            for table in tables
+            if row["track"] in table["head"]
+            for line in table["rows"]
+            if line[0] == row["method"]
+        ]
+        interval = "{:.1f} ({:.1f} to {:.1f})".format(
+            *(float(row[name]) for name in ("percent", "low", "high"))
+        )
         assert cell.startswith(f"{interval} {'abcdefghijkl'[int(row['group']) - 1]}")
 
 
@@ -92,7 +113,9 @@ def test_tables_sort_by_value_filter_and_download_and_the_theme_turns(tmp_path):
     document.querySelector(".tools button").click();
     document.body.dataset.said = said.join(";");
     """
-    found = browsed(tmp_path, assembled("t", [{"id": "one", "title": "One", "html": table(ROWS)}]), script)
+    found = browsed(
+        tmp_path, assembled("t", [{"id": "one", "title": "One", "html": table(ROWS)}]), script
+    )
     assert (
         re.search('data-said="(.*?)"', found)[1]
         == "a, &quot;x&quot;|b|c;b|a, &quot;x&quot;|c;a, &quot;x&quot;|b|c;1 of 10 rows;light"
@@ -110,14 +133,21 @@ def test_a_table_below_ten_rows_sorts_and_scrolls_but_has_neither_filter_nor_dow
     const many = (name) => document.querySelectorAll(name).length;
     document.body.dataset.said = [first, many(".scroll > table"), many(".tools")].join(";");
     """
-    found = browsed(tmp_path, assembled("t", [{"id": "one", "title": "One", "html": table(ROWS[:9])}]), script)
+    found = browsed(
+        tmp_path, assembled("t", [{"id": "one", "title": "One", "html": table(ROWS[:9])}]), script
+    )
     assert re.search('data-said="(.*?)"', found)[1] == "a, &quot;x&quot;;1;0"
 
 
 def test_the_first_tiles_fill_a_telephone_and_the_sample_scrolls_within_its_figure(tmp_path):
     tile = '<figure><div class="tile"><div class="down"><span>A</span></div><img alt="a" src="data:,"></div></figure>'
-    sample = '<div class="viewer"><figure><svg id="viewer-tile" viewBox="0 0 4 3"></svg></figure></div>'
-    inner = assembled("t", [{"id": "one", "title": "One", "html": f'<div class="row tiles">{4 * tile}</div>{sample}'}])
+    sample = (
+        '<div class="viewer"><figure><svg id="viewer-tile" viewBox="0 0 4 3"></svg></figure></div>'
+    )
+    inner = assembled(
+        "t",
+        [{"id": "one", "title": "One", "html": f'<div class="row tiles">{4 * tile}</div>{sample}'}],
+    )
     script = """
     const frame = document.createElement("iframe");
     frame.style.width = "390px"; frame.style.height = "3000px";
@@ -130,5 +160,7 @@ def test_the_first_tiles_fill_a_telephone_and_the_sample_scrolls_within_its_figu
     };
     document.body.append(frame);
     """.replace("INNER", json.dumps(inner).replace("</", "<\\/"))
-    found = browsed(tmp_path, assembled("outer", [{"id": "two", "title": "Two", "html": "<p>x</p>"}]), script)
+    found = browsed(
+        tmp_path, assembled("outer", [{"id": "two", "title": "Two", "html": "<p>x</p>"}]), script
+    )
     assert re.search('data-said="(.*?)"', found)[1] == "true;true;true"

@@ -1,4 +1,6 @@
-"""Plots of the page: their rows are the tables' figures, their files repeat, and their SVG stands in a page."""
+"""Plots of the page: their rows are the tables' figures, their files repeat, and their SVG stands
+in a page.
+"""
 
 import csv
 import re
@@ -21,11 +23,23 @@ def table(name):
 
 
 def answers():
-    """Rows of confusion_by_snr.csv: of 10 samples of each class, one more is right per level; the others are birds."""
+    """Rows of confusion_by_snr.csv: of 10 samples of each class, one more is right per level; the
+    others are birds.
+    """
     levels = enumerate(("inf", "13", "3"))
-    return [{"protocol": "seen", "scheme": "A", "snr_db": snr, "category": true, "predicted": guess, "samples": samples}
-            for place, snr in levels for true in CLASSES
-            for guess, samples in ((true, 10 - place), ("Bird" if true != "Bird" else "UAV", place))]  # fmt: skip
+    return [
+        {
+            "protocol": "seen",
+            "scheme": "A",
+            "snr_db": snr,
+            "category": true,
+            "predicted": guess,
+            "samples": samples,
+        }
+        for place, snr in levels
+        for true in CLASSES
+        for guess, samples in ((true, 10 - place), ("Bird" if true != "Bird" else "UAV", place))
+    ]
 
 
 def one_of_each():
@@ -34,8 +48,9 @@ def one_of_each():
         accuracy_plots.over_snr(ours, by_scheme(read_csv("config/published_accuracy.csv"))),
         accuracy_plots.confusion(confusion(table("confusion")), CLASSES),
         accuracy_plots.confusion_by_snr(answers(), CLASSES),
-        cost_plots.recognition(table("accuracy_cost")), cost_plots.echo(table("cost")),
-    ]  # fmt: skip
+        cost_plots.recognition(table("accuracy_cost")),
+        cost_plots.echo(table("cost")),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +73,13 @@ def test_a_row_of_a_confusion_matrix_is_whole_and_a_class_without_samples_has_da
     shares = {}
     for row in plots["confusion"].rows:
         shares.setdefault((row["panel"], row["true"]), []).append(row["percent"])
-    assert all(sum(found) == pytest.approx(100, abs=0.03) and len(found) == 4 for found in shares.values())
+    assert all(
+        sum(found) == pytest.approx(100, abs=0.03) and len(found) == 4 for found in shares.values()
+    )
     names = tuple("abcdefghi")
-    crowded = accuracy_plots.confusion({("seen", "A"): {(name, name): 7 for name in names[:-1]}}, names)
+    crowded = accuracy_plots.confusion(
+        {("seen", "A"): {(name, name): 7 for name in names[:-1]}}, names
+    )
     assert [row["shown"] for row in crowded.rows][:2] == ["100.0", "0.0"]
     assert [row["shown"] for row in crowded.rows if row["true"] == "i"] == ["-"] * 9
     assert letters(crowded).count("100.0") == 8 and letters(crowded).count("-") == 9
@@ -68,11 +87,19 @@ def test_a_row_of_a_confusion_matrix_is_whole_and_a_class_without_samples_has_da
 
 def test_bars_of_answers_are_whole_and_stand_in_the_order_of_the_snrs(plots):
     plot = plots["confusion_by_snr"]
-    shares = {(row["true"], row["snr_db"], row["recognised_as"]): row["percent"] for row in plot.rows}
-    assert len(shares) == 4 * 3 * 4 and shares["UAV", "3", "Bird"] == 20 and shares["UAV", "inf", "UAV"] == 100
+    shares = {
+        (row["true"], row["snr_db"], row["recognised_as"]): row["percent"] for row in plot.rows
+    }
+    assert (
+        len(shares) == 4 * 3 * 4
+        and shares["UAV", "3", "Bird"] == 20
+        and shares["UAV", "inf", "UAV"] == 100
+    )
     assert sum(shares.values()) == pytest.approx(4 * 3 * 100)
     assert letters(plot)[:3] == ["3", "13", "∞"]
-    some = accuracy_plots.confusion_by_snr([row for row in answers() if row["category"] != "Bird"], CLASSES).rows
+    some = accuracy_plots.confusion_by_snr(
+        [row for row in answers() if row["category"] != "Bird"], CLASSES
+    ).rows
     assert {row["percent"] for row in some if row["true"] == "Bird"} == {0.0}
 
 
@@ -81,7 +108,10 @@ def test_files_of_plots_repeat_and_hold_their_rows(plots, tmp_path):
         write_plots(tmp_path / folder, made)
     names = sorted(path.name for path in (tmp_path / "one").iterdir())
     assert names == sorted(f"{name}.{kind}" for name in plots for kind in ("csv", "svg"))
-    assert all((tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes() for name in names)
+    assert all(
+        (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+        for name in names
+    )
     with (tmp_path / "one/confusion.csv").open() as file:
         assert len(list(csv.DictReader(file))) == len(plots["confusion"].rows)
 

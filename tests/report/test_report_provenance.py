@@ -1,4 +1,6 @@
-"""Provenance: the revision is git's own, the overlay makes the configuration again, and checksums are of the files."""
+"""Provenance: the revision is git's own, the overlay makes the configuration again, and checksums
+are of the files.
+"""
 
 import hashlib
 import json
@@ -11,17 +13,28 @@ from lowalt.config.layers import canonical, check, load, merge
 from lowalt.files.yaml_files import load_yaml
 from lowalt.report import provenance
 
-SCHEMA, BASE = "workflow/schemas/config.schema.yaml", "config/default.yaml"
+SCHEMA = "workflow/schemas/config.schema.yaml"
+BASE = "config/default.yaml"
 OTHERS = (
-    {"run": "other", "network": {"stations": {"C": None, "tower": {"position_m": [250, 400, 30], "normal_deg": 270}}}},
-    {"noise": {"snr_db": [3.0, float("inf")]}, "recognition": {"seeds": [0, 1], "network": {"backbone": "resnet18"}}},
+    {
+        "run": "other",
+        "network": {
+            "stations": {"C": None, "tower": {"position_m": [250, 400, 30], "normal_deg": 270}}
+        },
+    },
+    {
+        "noise": {"snr_db": [3.0, float("inf")]},
+        "recognition": {"seeds": [0, 1], "network": {"backbone": "resnet18"}},
+    },
     {"effects": {"clutter": {}, "phase_noise": {}}, "spectra": {"vt": None}},
 )
 
 
 def git(folder, *words):
     identity = ["-c", "user.name=a", "-c", "user.email=a@b"]
-    return subprocess.run(["git", "-C", folder, *identity, *words], capture_output=True, text=True, check=True).stdout
+    return subprocess.run(
+        ["git", "-C", folder, *identity, *words], capture_output=True, text=True, check=True
+    ).stdout
 
 
 def test_the_revision_is_git_s_own_and_says_what_changed_since(tmp_path):
@@ -62,8 +75,14 @@ def test_the_overlay_of_the_page_makes_the_same_configuration_again(overlay):
 
 def test_the_default_needs_no_overlay():
     assert provenance.changes(load_yaml(BASE), json.loads(canonical(load([BASE], SCHEMA)))) == {}
-    assert provenance.commands("abc, 1 tracked file changed since", {}) == ("git checkout abc\nmake", "")
-    assert provenance.commands("abc", {"run": "x"})[0].splitlines()[-1] == ".venv/bin/lowalt run again.yaml"
+    assert provenance.commands("abc, 1 tracked file changed since", {}) == (
+        "git checkout abc\nmake",
+        "",
+    )
+    assert (
+        provenance.commands("abc", {"run": "x"})[0].splitlines()[-1]
+        == ".venv/bin/lowalt run again.yaml"
+    )
 
 
 def test_checksums_are_those_of_the_files_and_leave_out_what_is_not_of_the_run(tmp_path):
@@ -78,6 +97,10 @@ def test_checksums_are_those_of_the_files_and_leave_out_what_is_not_of_the_run(t
         "benchmarks": [names["job"]],
     }
     assert provenance.checksums(files | {"again": names["index"]}) == [
-        {"path": names[name], "bytes": len(name), "sha256": hashlib.sha256(name.encode()).hexdigest()}
+        {
+            "path": names[name],
+            "bytes": len(name),
+            "sha256": hashlib.sha256(name.encode()).hexdigest(),
+        }
         for name in ("index", "cloud")
     ]

@@ -1,4 +1,6 @@
-"""Pictures of one target and of an inspected mesh: what is drawn where, read from the figure before it is a PNG."""
+"""Pictures of one target and of an inspected mesh: what is drawn where, read from the figure before
+it is a PNG.
+"""
 
 from pathlib import Path
 
@@ -34,20 +36,36 @@ def offsets(panel) -> np.ndarray:
 
 def test_an_inspection_shows_each_plane_at_one_scale_and_what_may_move_in_colours(drawn):
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.1], [2.0, 1.0, 0.2], [-2.0, 3.0, 0.4]])
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     parts = [
         Component(7, low, high, 9, True, ""),
         *(Component(i, low + i, high + i, 3, True, "", "wheel") for i in (2, 5)),
     ]
     found = Inspection(
-        Path("a$b.obj"), "in", "given", low, high, 4, "z", "y", [], parts, "Vehicle", points, np.array([7, 2, 5, 7])
+        Path("a$b.obj"),
+        "in",
+        "given",
+        low,
+        high,
+        4,
+        "z",
+        "y",
+        [],
+        parts,
+        "Vehicle",
+        points,
+        np.array([7, 2, 5, 7]),
     )
     figure = drawn(mesh_picture, "inspection_picture", found)
     assert figure.get_suptitle() == r"a\$b.obj: unit in (given); guessed: up z, front y"
     for panel, (across, up) in zip(figure.axes, [(0, 1), (1, 2), (0, 2)], strict=True):
         np.testing.assert_array_equal(offsets(panel), points[:, [across, up]])
         labels = panel.get_xlabel(), panel.get_ylabel()
-        assert labels == tuple(f"the file's {'xyz'[axis]} (m)" for axis in (across, up)) and panel.get_aspect() == 1
+        assert (
+            labels == tuple(f"the file's {'xyz'[axis]} (m)" for axis in (across, up))
+            and panel.get_aspect() == 1
+        )
         assert [(text.get_text(), *text.get_position()) for text in panel.texts] == [
             ("wheel", part.centre[across], part.centre[up]) for part in parts[1:]
         ]
@@ -57,12 +75,29 @@ def test_an_inspection_shows_each_plane_at_one_scale_and_what_may_move_in_colour
 
 
 def test_an_inspected_bird_has_its_shoulders_marked_on_both_sides(drawn):
-    body = np.stack(np.broadcast_arrays(np.linspace(-0.1, 0.1, 41), 0.0, [[-0.05], [0.05]]), -1).reshape(-1, 3)
-    wings = np.stack(np.broadcast_arrays([[-1.0], [1.0]] * np.linspace(0.11, 1, 41), 0.0, 0.0), -1).reshape(-1, 3)
+    body = np.stack(
+        np.broadcast_arrays(np.linspace(-0.1, 0.1, 41), 0.0, [[-0.05], [0.05]]), -1
+    ).reshape(-1, 3)
+    wings = np.stack(
+        np.broadcast_arrays([[-1.0], [1.0]] * np.linspace(0.11, 1, 41), 0.0, 0.0), -1
+    ).reshape(-1, 3)
     points = np.concatenate([body, wings]) + np.array([3.0, 0.0, 0.0])
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     found = Inspection(
-        Path("crow.stl"), "m", "given", low, high, 1, "z", "y", [], [], "Bird", points, np.zeros(len(points), int)
+        Path("crow.stl"),
+        "m",
+        "given",
+        low,
+        high,
+        1,
+        "z",
+        "y",
+        [],
+        [],
+        "Bird",
+        points,
+        np.zeros(len(points), int),
     )
     figure = drawn(mesh_picture, "inspection_picture", found)
     assert 0.1 < found.shoulder_m < 0.15
@@ -80,11 +115,15 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
     monkeypatch.setattr(target_picture, "_instants", lambda *given: None)
     cloud = craft()
     figure = drawn(target_picture, "target_picture", cloud)
-    middle, half = (cloud.points.min(0) + cloud.points.max(0)) / 2, 0.58 * np.ptp(cloud.points, axis=0).max()
+    middle = (cloud.points.min(0) + cloud.points.max(0)) / 2
+    half = 0.58 * np.ptp(cloud.points, axis=0).max()
     titles = {"from above": (0, 1), "from the right": (1, 2), "from behind": (0, 2)}
     for panel, (title, (across, up)) in zip(figure.axes[:3], titles.items(), strict=True):
         assert panel.get_title() == title and panel.get_aspect() == 1
-        assert (panel.get_xlabel(), panel.get_ylabel()) == (target_picture.AXES[across], target_picture.AXES[up])
+        assert (panel.get_xlabel(), panel.get_ylabel()) == (
+            target_picture.AXES[across],
+            target_picture.AXES[up],
+        )
         np.testing.assert_array_equal(offsets(panel), cloud.points[:, [across, up]])
         hinge = np.array(panel.lines[-1].get_xydata())
         np.testing.assert_allclose(hinge, [cloud.hinges[1, [across, up]]])
@@ -99,7 +138,9 @@ def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monke
     assert figure.get_suptitle().startswith("DJI Mini 2 (UAV, test): 20 points, 2 parts, ")
 
 
-def test_a_rotor_is_shown_at_four_instants_an_eighth_of_a_turn_apart_and_its_tip_draws_a_circle(drawn, monkeypatch):
+def test_a_rotor_is_shown_at_four_instants_an_eighth_of_a_turn_apart_and_its_tip_draws_a_circle(
+    drawn, monkeypatch
+):
     monkeypatch.setattr(target_picture, "_motion_row", lambda *given: row(0))
     monkeypatch.setattr(target_picture, "_spectra", lambda *given: None)
     cloud = craft()
@@ -114,4 +155,7 @@ def test_a_rotor_is_shown_at_four_instants_an_eighth_of_a_turn_apart_and_its_tip
         angles.append(np.arctan2(*(tip[0] - cloud.hinges[1, :2])[::-1]))
         assert len(offsets(panel)) == len(cloud.points)
     np.testing.assert_allclose(np.abs(np.diff(np.unwrap(angles))), 2 * np.pi / 8)
-    assert [panel.get_title().split(", ")[1] for panel in figure.axes[3:5]] == ["0 of 12.5 ms", "1.562 of 12.5 ms"]
+    assert [panel.get_title().split(", ")[1] for panel in figure.axes[3:5]] == [
+        "0 of 12.5 ms",
+        "1.562 of 12.5 ms",
+    ]

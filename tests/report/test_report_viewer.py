@@ -1,4 +1,6 @@
-"""The viewer of samples: which it holds, what its panels and points stand for, and its controls in a browser."""
+"""The viewer of samples: which it holds, what its panels and points stand for, and its controls in
+a browser.
+"""
 
 import base64
 import html
@@ -22,7 +24,10 @@ from lowalt.shards.sample_record import sample_key
 from lowalt.tiles.png import encode
 from pages import browsed, sound
 
-STATIONS = {"A": {"position_m": [0, 0, 25], "normal_deg": 0}, "B": {"position_m": [400, 0, 25], "normal_deg": 180}}
+STATIONS = {
+    "A": {"position_m": [0, 0, 25], "normal_deg": 0},
+    "B": {"position_m": [400, 0, 25], "normal_deg": 180},
+}
 NETWORK = WAVE | {"stations": STATIONS}
 IMAGES = {"size": 16, "scale": "decibel", "floor_db": 40.0, "gamma": 1.0, "colour_map": "viridis"}
 LEVELS = (3.0, 8.0, 13.0, float("inf"))
@@ -32,8 +37,11 @@ def shards(names):
     """Keys, labels and SNRs of three motion models of each subtype; names: subtypes by label."""
     found = [
         (sample_key(name, model, snr).encode(), label, snr)
-        for label, some in enumerate(names) for name in some for model in (7, 1, 4) for snr in LEVELS
-    ]  # fmt: skip
+        for label, some in enumerate(names)
+        for name in some
+        for model in (7, 1, 4)
+        for snr in LEVELS
+    ]
     keys, labels, snrs = (np.array(column) for column in zip(*found, strict=True))
     return SimpleNamespace(keys=keys, labels=labels, snrs_db=snrs)
 
@@ -55,9 +63,12 @@ def test_each_class_has_a_seen_and_an_unseen_subtype_and_predicted_samples_go_fi
 
 
 def test_points_of_the_motion_are_those_of_the_target_in_order():
-    cloud, moving = craft(), row(0)
+    cloud = craft()
+    moving = row(0)
     found = viewer.motion(cloud, moving)
-    kept = np.frombuffer(base64.b64decode(found["points"]), "<i2").reshape(viewer.FRAMES, found["count"], 3)
+    kept = np.frombuffer(base64.b64decode(found["points"]), "<i2").reshape(
+        viewer.FRAMES, found["count"], 3
+    )
     assert found["seconds"] == cycle_s(cloud, moving)
     times = np.arange(viewer.FRAMES) / viewer.FRAMES * found["seconds"]
     wanted = positions(cloud, still_row(moving), times)
@@ -73,36 +84,80 @@ def test_probabilities_are_those_of_the_first_seed_of_each_scheme(tmp_path):
         (tmp_path / f"{seed}.json").write_text('{"protocol": "seen", "scheme": "A:VRP"}')
     files = [tmp_path / "0.csv", tmp_path / "1.csv"]
     assert {"a", "b"} <= viewer.predicted_keys(files)
-    assert viewer.probabilities(files, {"a"}, ("UAV", "Bird")) == {"a": {"seen A:VRP": [0.75, 0.25]}}
+    assert viewer.probabilities(files, {"a"}, ("UAV", "Bird")) == {
+        "a": {"seen A:VRP": [0.75, 0.25]}
+    }
 
 
 @pytest.fixture
 def page():
     """A page of the viewer alone, with two subtypes whose tiles differ."""
-    renderer = viewer.Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    renderer = viewer.Renderer.from_settings(
+        {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
+    )
     panels = viewer.panels(renderer)
-    assert [(panel["row"], panel["column"]) for panel in panels] == [(r, c) for r in range(2) for c in range(3)]
+    assert [(panel["row"], panel["column"]) for panel in panels] == [
+        (r, c) for r in range(2) for c in range(3)
+    ]
     vt = panels[2]
     # Filters are matched at the lowest subcarrier, and echoes turn at the middle one.
-    assert vt["low"] == -vt["high"] == pytest.approx(-6.0, rel=2e-3) and set(vt["y"]) <= set(np.arange(-6.0, 6.5, 0.5))
+    assert vt["low"] == -vt["high"] == pytest.approx(-6.0, rel=2e-3) and set(vt["y"]) <= set(
+        np.arange(-6.0, 6.5, 0.5)
+    )
     # Fewer symbols than the signal has: a window of 4 of 24, 2.5 ms apart.
-    assert (vt["left"], vt["right"]) == pytest.approx((1.5 * 2.5e-3, 21.5 * 2.5e-3)) and max(vt["x"]) <= vt["right"]
+    assert (vt["left"], vt["right"]) == pytest.approx((1.5 * 2.5e-3, 21.5 * 2.5e-3)) and max(
+        vt["x"]
+    ) <= vt["right"]
     tile = [
-        embedded(encode(np.arange(32 * 48, dtype=np.uint8).reshape(32, 48) * step, renderer.images.palette))
+        embedded(
+            encode(
+                np.arange(32 * 48, dtype=np.uint8).reshape(32, 48) * step, renderer.images.palette
+            )
+        )
         for step in (0, 1)
     ]
     network, times = renderer.network, renderer.network.times_s
     signals = np.stack([np.exp(2j * np.pi * 30 * times), 0 * times])
-    speeds = {network.stations[0].name: {"radial_mps": 17.0}, network.stations[1].name: {"radial_mps": None}}
-    shared = {"category": "UAV", "group": "seen", "snr": "no noise", "network": tile[1],
-              "echoes": viewer_echoes.echoes(signals, speeds, network)}  # fmt: skip
-    one = {**shared, "subtype": "One", "model": 1, "tile": tile[0], "probabilities": {"seen A": [0.2, 0.8]}}
+    speeds = {
+        network.stations[0].name: {"radial_mps": 17.0},
+        network.stations[1].name: {"radial_mps": None},
+    }
+    shared = {
+        "category": "UAV",
+        "group": "seen",
+        "snr": "no noise",
+        "network": tile[1],
+        "echoes": viewer_echoes.echoes(signals, speeds, network),
+    }
+    one = {
+        **shared,
+        "subtype": "One",
+        "model": 1,
+        "tile": tile[0],
+        "probabilities": {"seen A": [0.2, 0.8]},
+    }
     two = {**shared, "subtype": "Two", "model": 5, "tile": tile[1], "probabilities": {}}
-    data = {"samples": [one, two], "motions": {"One 1": viewer.motion(craft(), row(0))}, "classes": ["UAV", "Bird"],
-            "stations": ["A", "B"]}  # fmt: skip
-    values = {"data": data, "panels": panels, "size": 16, "shown": 16, "rows": 2, "columns": 3, "pixels": 8,
-              "stations": ["A", "B"], "floor_db": 40.0, "look_s": 0.06}  # fmt: skip
-    text = assembled("viewer", [{"id": "samples", "title": "Samples", "html": rendered("sample_viewer", values)}])
+    data = {
+        "samples": [one, two],
+        "motions": {"One 1": viewer.motion(craft(), row(0))},
+        "classes": ["UAV", "Bird"],
+        "stations": ["A", "B"],
+    }
+    values = {
+        "data": data,
+        "panels": panels,
+        "size": 16,
+        "shown": 16,
+        "rows": 2,
+        "columns": 3,
+        "pixels": 8,
+        "stations": ["A", "B"],
+        "floor_db": 40.0,
+        "look_s": 0.06,
+    }
+    text = assembled(
+        "viewer", [{"id": "samples", "title": "Samples", "html": rendered("sample_viewer", values)}]
+    )
     sound(text)
     return text, tile
 
@@ -135,12 +190,19 @@ def test_every_control_of_the_viewer_works(page, tmp_path):
     assert said[3].endswith("ms.") and "of a cycle of" in said[3]
     none = "No network was asked about this sample."
     assert said[6] == f"UAV: Two (seen), motion model 5, no noise|{len(tiles[1])}|{none}"
-    spoken, power, phase, marks = json.loads(html.unescape(re.search('data-echo="(.*?)"', found, re.S)[1]))
-    network = viewer.Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}).network
+    spoken, power, phase, marks = json.loads(
+        html.unescape(re.search('data-echo="(.*?)"', found, re.S)[1])
+    )
+    network = viewer.Renderer.from_settings(
+        {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
+    ).network
     station = network.stations[0]
     shown = network.folded_mps(17.0, station)
     folds = round((17.0 - shown) / (2 * network.largest_mps(station)))
-    assert f"A 17 m/s (shown at {round(shown, 2)} m/s, folded {folds} time" in spoken and "B" not in spoken
+    assert (
+        f"A 17 m/s (shown at {round(shown, 2)} m/s, folded {folds} time" in spoken
+        and "B" not in spoken
+    )
     # The power of a line is flat at the top of its panel, that of a silent station at the bottom.
     assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", power[0])) == {"0.0"}
     assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", power[1])) == {"64.0"}
@@ -153,36 +215,52 @@ def test_every_control_of_the_viewer_works(page, tmp_path):
 
 
 def test_a_speed_is_shown_where_its_phase_repeats():
-    network = viewer.Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}).network
+    network = viewer.Renderer.from_settings(
+        {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
+    ).network
     station = network.stations[1]
     middle_hz = station.frequency_hz + (network.subcarriers - 1) / 2 * network.subcarrier_spacing_hz
     limit = 299_792_458 / (4 * middle_hz * network.symbol_interval_s)
     assert network.largest_mps(station) == pytest.approx(limit)
     shown = network.folded_mps(np.array([0.4 * limit, -3.2 * limit, limit, -limit]), station)
     assert shown == pytest.approx(np.array([0.4, 0.8, 1.0, 1.0]) * limit)
-    turns = 2 * middle_hz / 299_792_458 * network.symbol_interval_s * np.array([-3.2 * limit, shown[1]])
+    turns = (
+        2 * middle_hz / 299_792_458 * network.symbol_interval_s * np.array([-3.2 * limit, shown[1]])
+    )
     assert turns[0] % 1 == pytest.approx(turns[1] % 1)
     entries = viewer_echoes.echoes(
         np.ones((2, 4)), {"A": {"radial_mps": None}, "B": {"radial_mps": -3.2 * limit}}, network
     )
-    assert "speed" not in entries[0] and entries[1]["shown"] == round(0.8 * limit, 2) and entries[1]["folds"] == 2
+    assert (
+        "speed" not in entries[0]
+        and entries[1]["shown"] == round(0.8 * limit, 2)
+        and entries[1]["folds"] == 2
+    )
 
 
 def test_power_and_phase_come_back_from_their_bytes():
     signal = np.array([1.0, 0.1j, -0.5, 1e-9, 0])
     power = np.frombuffer(base64.b64decode(viewer_echoes.power(signal)), np.uint8)
-    assert ((power / 255.0 - 1) * viewer_echoes.FLOOR_DB)[:3] == pytest.approx([0, -20, -6.02], abs=0.1)
-    assert power[3:].tolist() == [0, 0] and set(base64.b64decode(viewer_echoes.power(0 * signal))) == {0}
+    assert ((power / 255.0 - 1) * viewer_echoes.FLOOR_DB)[:3] == pytest.approx(
+        [0, -20, -6.02], abs=0.1
+    )
+    assert power[3:].tolist() == [0, 0] and set(
+        base64.b64decode(viewer_echoes.power(0 * signal))
+    ) == {0}
     phase = np.frombuffer(base64.b64decode(viewer_echoes.phase(signal)), np.uint8)
     assert phase[:3].tolist() == [0, 64, 128]
 
 
-def test_the_clearest_sample_of_a_motion_model_stands_first_and_a_browser_can_read_all_of_them(tmp_path):
+def test_the_clearest_sample_of_a_motion_model_stands_first_and_a_browser_can_read_all_of_them(
+    tmp_path,
+):
     shards = ShardSet(build(tmp_path, "image") / "index.json")
     found = viewer.samples(shards, None, {}, [], {}, 16)
     levels = {}
     for sample in found["samples"]:
         levels.setdefault((sample["subtype"], sample["model"]), []).append(sample["snr"])
-    assert len(levels) > 3 and all(snrs[0] == "no noise" for snrs in levels.values() if "no noise" in snrs)
+    assert len(levels) > 3 and all(
+        snrs[0] == "no noise" for snrs in levels.values() if "no noise" in snrs
+    )
     assert max(map(len, levels.values())) > 1
     json.dumps(found, allow_nan=False)

@@ -1,4 +1,6 @@
-"""The chain as a whole: the slow truth of motion and prefix inside symbols, and laws of what a scene names."""
+"""The chain as a whole: the slow truth of motion and prefix inside symbols, and laws of what a
+scene names.
+"""
 
 from dataclasses import replace
 
@@ -20,7 +22,9 @@ from towns import BOXES, ply
 
 
 def data_of(name, radio):
-    return waveform.qpsk(stream(5, "effect", name, "Thing", 3, "A"), radio.symbols, radio.subcarriers)
+    return waveform.qpsk(
+        stream(5, "effect", name, "Thing", 3, "A"), radio.symbols, radio.subcarriers
+    )
 
 
 def sample_of(effects, cloud, row):
@@ -39,9 +43,14 @@ def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample():
     asked = scene({"symbol_motion": {}}, radio)
     view = observe(asked, A, cloud, row)
     truth = reference_effects.moving(
-        radio, A, lambda t: view.at(np.array([t])).places, cloud.rcs_m2, view.aim_m, radio.times_s,
+        radio,
+        A,
+        lambda t: view.at(np.array([t])).places,
+        cloud.rcs_m2,
+        view.aim_m,
+        radio.times_s,
         data_of("waveform", radio),
-    )  # fmt: skip
+    )
     found = received_signal(asked, A, cloud, row).signal
     assert abs(found - strongest(truth)).max() < 1e-10 * abs(truth).max()
     still = received_signal(scene({}, radio), A, cloud, row).signal
@@ -53,9 +62,12 @@ def test_a_late_echo_begins_with_the_previous_symbol(prefix_s):
     radio = network(symbols=3)
     cloud, row = target(np.random.default_rng(1), 3, 20.0, x_m=330.0, rate_hz=0.0)
     asked = scene({"cyclic_prefix": {"prefix_s": prefix_s}}, radio)
-    view, prefix_s = observe(asked, A, cloud, row), prefix_s or 144 / 2048 / 120e3
-    data, before = data_of("waveform", radio), data_of("previous waveform", radio)
-    count, baseband = radio.subcarriers, (np.arange(radio.subcarriers) - 16) * 120e3
+    view = observe(asked, A, cloud, row)
+    prefix_s = prefix_s or 144 / 2048 / 120e3
+    data = data_of("waveform", radio)
+    before = data_of("previous waveform", radio)
+    count = radio.subcarriers
+    baseband = (np.arange(radio.subcarriers) - 16) * 120e3
     truth = np.zeros((3, count), complex)
     for point in range(3):
         places = view.places[:, point : point + 1]
@@ -69,13 +81,20 @@ def test_a_late_echo_begins_with_the_previous_symbol(prefix_s):
             truth[n] += sample * np.exp(-2j * np.pi * baseband * t) / data[n]
     found = received_signal(asked, A, cloud, row).signal
     assert abs(found - strongest(truth)).max() < 1e-10 * abs(truth).max()
-    assert abs(found - received_signal(scene({}, radio), A, cloud, row).signal).max() > 0.1 * abs(found).max()
+    assert (
+        abs(found - received_signal(scene({}, radio), A, cloud, row).signal).max()
+        > 0.1 * abs(found).max()
+    )
 
 
 def test_an_early_signal_ends_with_the_prefix_of_the_next_symbol():
-    radio, rng = network(symbols=3), np.random.default_rng(4)
-    count, frequencies = radio.subcarriers, (np.arange(radio.subcarriers) - 16) * 120e3
-    whole, early, prefix_s = rng.normal(size=(3, count)) + 1j * rng.normal(size=(3, count)), 5, 0.6e-6
+    radio = network(symbols=3)
+    rng = np.random.default_rng(4)
+    count = radio.subcarriers
+    frequencies = (np.arange(radio.subcarriers) - 16) * 120e3
+    whole = rng.normal(size=(3, count)) + 1j * rng.normal(size=(3, count))
+    early = 5
+    prefix_s = 0.6e-6
     found = waveform.windowed(radio, prefix_s, whole, -early, lambda name: data_of(name, radio))
     for n, i in np.ndindex(3, count):
         t = i / (count * 120e3)
@@ -93,8 +112,13 @@ def test_other_stations_are_heard_from_mast_to_mast_and_leak_by_their_levels():
 
     def unknown(stations, **changes):
         """What station A hears of the others."""
-        asked = scene({"interference": {"sigma_ppm": 0.0, "sigma_s": 0.0, **changes}}, network(stations=stations))
-        return interference.heard(asked.effects[0].settings, SceneSample(asked, observe(asked, A, cloud, row)))
+        asked = scene(
+            {"interference": {"sigma_ppm": 0.0, "sigma_s": 0.0, **changes}},
+            network(stations=stations),
+        )
+        return interference.heard(
+            asked.effects[0].settings, SceneSample(asked, observe(asked, A, cloud, row))
+        )
 
     alone, weak, full = (unknown((A, shared), loss_db=loss) for loss in (400.0, 20.0, 0.0))
     assert abs(alone).max() > 0
@@ -108,31 +132,44 @@ def test_other_stations_are_heard_from_mast_to_mast_and_leak_by_their_levels():
 
 @pytest.mark.parametrize(("model", "beside"), [(3, "next waveform"), (9, "previous waveform")])
 def test_another_station_is_heard_by_its_own_clock_and_oscillator(model, beside):
-    """Every time sample from what its sender has on the air by then: the symbol, the one before or the one after."""
+    """Every time sample from what its sender has on the air by then: the symbol, the one before or
+    the one after.
+    """
     shared = replace(B, frequency_hz=A.frequency_hz)
-    radio, (cloud, row) = network(symbols=3, stations=(A, shared)), target(np.random.default_rng(5), model=model)
+    radio, (cloud, row) = (
+        network(symbols=3, stations=(A, shared)),
+        target(np.random.default_rng(5), model=model),
+    )
     asked = scene({"interference": {"sigma_ppm": 0.5, "sigma_s": 1e-6}}, radio)
-    settings, sample = asked.effects[0].settings, SceneSample(asked, observe(asked, A, cloud, row))
+    settings = asked.effects[0].settings
+    sample = SceneSample(asked, observe(asked, A, cloud, row))
     errors = of_stations(settings, radio, asked.stream("link_offset", row))
     ppm, shift_s = np.subtract(errors["B"], errors["A"])
-    data, frequencies = interference.sent(settings, sample, shared), (np.arange(32) - 16) * 120e3
-    truth, seen = np.zeros((3, 32), complex), set()
+    data = interference.sent(settings, sample, shared)
+    frequencies = (np.arange(32) - 16) * 120e3
+    truth = np.zeros((3, 32), complex)
+    seen = set()
     for whole, delay_s in interference.arrivals(settings, sample, shared):
         for n, i in np.ndindex(3, 32):
             t = i / (32 * 120e3)
             sent_s = t - delay_s - shift_s
-            name, after_s = "waveform", 0.0
+            name = "waveform"
+            after_s = 0.0
             if sent_s < -sample.prefix_s:
-                name, after_s = "previous waveform", sample.prefix_s
+                name = "previous waveform"
+                after_s = sample.prefix_s
             if sent_s >= 1 / 120e3:
-                name, after_s = "next waveform", -sample.prefix_s
+                name = "next waveform"
+                after_s = -sample.prefix_s
             seen.add(name)
             wave = np.exp(2j * np.pi * frequencies * (t - shift_s + after_s)) * data(name)[n]
             instant = n * radio.symbol_interval_s + t
             turn = np.exp(2j * np.pi * 1e-6 * ppm * (A.frequency_hz + 16 * 120e3) * instant)
             truth[n, i] += turn * (np.broadcast_to(whole, (3, 32))[n] * wave).sum() / 32
     assert seen == {"waveform", beside}
-    np.testing.assert_allclose(interference.heard(settings, sample), truth, atol=1e-9 * abs(truth).max())
+    np.testing.assert_allclose(
+        interference.heard(settings, sample), truth, atol=1e-9 * abs(truth).max()
+    )
 
 
 def link_of(effects):
@@ -146,21 +183,30 @@ def link_of(effects):
 def sum_of_all_routes(sample, paths_of):
     """The response (N, M) of a link as a sum over every path out from A and every path back to B."""
     view = sample.view
-    radio, sent_hz = view.network, A.frequency_hz
+    radio = view.network
+    sent_hz = A.frequency_hz
     elements = np.prod(radio.transmit) * np.prod(radio.receive)
     scale = np.sqrt(radio.power / elements) * SPEED_OF_LIGHT / sent_hz / (4 * np.pi) ** 1.5
     sender, receiver = view.ends()
-    ends = [(sender, A, radio.transmit), (receiver, replace(B, frequency_hz=sent_hz), radio.receive)]
+    ends = [
+        (sender, A, radio.transmit),
+        (receiver, replace(B, frequency_hz=sent_hz), radio.receive),
+    ]
     result = np.zeros((radio.symbols, radio.subcarriers), complex)
     for n, m in np.ndindex(result.shape):
         one_way = []
         for end, station, shape in ends:
             total = np.zeros(len(view.cloud.rcs_m2), complex)
             direct = [(end.places, np.ones(end.places.shape[:2]))]
-            further = [(path.places, np.broadcast_to(path.coefficient, end.places.shape[:2])) for path in paths_of(end)]
+            further = [
+                (path.places, np.broadcast_to(path.coefficient, end.places.shape[:2]))
+                for path in paths_of(end)
+            ]
             for places, coefficient in direct + further:
                 hz = sent_hz + m * radio.subcarrier_spacing_hz
-                wave = reference_effects.one_way(radio, station, shape, places[n], view.aim_m, hz, False, False)
+                wave = reference_effects.one_way(
+                    radio, station, shape, places[n], view.aim_m, hz, False, False
+                )
                 total += coefficient[n] * wave
             one_way.append(total)
         result[n, m] = (scale * np.sqrt(view.cloud.rcs_m2) * one_way[0] * one_way[1]).sum()
@@ -168,9 +214,15 @@ def sum_of_all_routes(sample, paths_of):
 
 
 def test_on_a_link_every_path_out_meets_every_path_back(tmp_path):
-    """Both ends see unlike numbers of paths: A sees all of three facades, B one; A sees a house, B does not."""
+    """Both ends see unlike numbers of paths: A sees all of three facades, B one; A sees a house, B
+    does not.
+    """
     facades = {
-        "facades": [[-30.0, 6.0, 0.0, 8.0, 40.0], [36.0, 80.0, 270.0, 20.0, 60.0], [50.0, -30.0, 90.0, 300.0, 60.0]]
+        "facades": [
+            [-30.0, 6.0, 0.0, 8.0, 40.0],
+            [36.0, 80.0, 270.0, 20.0, 60.0],
+            [50.0, -30.0, 90.0, 300.0, 60.0],
+        ]
     }
     buildings = {"buildings": str(ply(tmp_path / "town.ply", [(-40.0, 6.0, 20.0, 8.0, 40.0)]))}
     used = {}
@@ -181,7 +233,9 @@ def test_on_a_link_every_path_out_meets_every_path_back(tmp_path):
         def paths_of(end, effect=effect, complete=complete):
             return effect.paths(complete, end)
 
-        used[effect] = [sum(np.any(path.coefficient) for path in paths_of(end)) for end in sample.view.ends()]
+        used[effect] = [
+            sum(np.any(path.coefficient) for path in paths_of(end)) for end in sample.view.ends()
+        ]
         truth = sum_of_all_routes(sample, paths_of)
         assert abs(sample.echo(sample.view) - truth).max() < 1e-10 * abs(truth).max()
     assert used[walls] == [3, 1]
@@ -189,12 +243,16 @@ def test_on_a_link_every_path_out_meets_every_path_back(tmp_path):
 
 
 def test_on_a_link_the_change_of_the_direct_path_shows_the_direct_paths_side(tmp_path):
-    """What a building takes from the direct path is weighted as the direct path, so that a blocked one is silent."""
+    """What a building takes from the direct path is weighted as the direct path, so that a blocked
+    one is silent.
+    """
     sample = link_of({"town": {"buildings": str(ply(tmp_path / "town.ply", BOXES))}})
     view = sample.view
     change = ImagePath(view.places, -1.0, None, ImagePath(view.places, 0.0))
     mirror = np.array([120.0, 10.0, -12.0])
-    reflected = ImagePath(view.places, 0.5, None, ImagePath(view.places, 0.5, np.array([0.0, 0.0, -10.0])))
+    reflected = ImagePath(
+        view.places, 0.5, None, ImagePath(view.places, 0.5, np.array([0.0, 0.0, -10.0]))
+    )
     both = ImagePath(view.places, 0.5, mirror, ImagePath(view.places, 0.5))
 
     def weight(seen, names=None, but=()):
@@ -213,7 +271,8 @@ def test_on_a_link_the_change_of_the_direct_path_shows_the_direct_paths_side(tmp
 
 def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():
     cloud, row = target(np.random.default_rng(2))
-    found, view = received_signal(scene({}), A, cloud, row), observe(scene({}), A, cloud, row)
+    found = received_signal(scene({}), A, cloud, row)
+    view = observe(scene({}), A, cloud, row)
     engine = echo_signal(network(), A, view.motion, cloud.rcs_m2, view.aim_m)
     np.testing.assert_array_equal(found.signal, engine.signal)
 
@@ -221,34 +280,53 @@ def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():
 def test_effects_without_strength_change_no_bit():
     cloud, row = target(np.random.default_rng(3))
     idle = {
-        "gusts": {"wind_mps": 0.0}, "iq_imbalance": {"gain_db": 0.0, "phase_deg": 0.0}, "adc": {"bits": None},
-        "clutter": {"gamma": 0.0}, "canceller": {"kind": "none"}, "timing_offset": {"sigma_s": 0.0},
-    }  # fmt: skip
+        "gusts": {"wind_mps": 0.0},
+        "iq_imbalance": {"gain_db": 0.0, "phase_deg": 0.0},
+        "adc": {"bits": None},
+        "clutter": {"gamma": 0.0},
+        "canceller": {"kind": "none"},
+        "timing_offset": {"sigma_s": 0.0},
+    }
     np.testing.assert_array_equal(
-        received_signal(scene(idle), A, cloud, row).signal, received_signal(scene({}), A, cloud, row).signal
+        received_signal(scene(idle), A, cloud, row).signal,
+        received_signal(scene({}), A, cloud, row).signal,
     )
 
 
 def test_adding_an_effect_moves_no_other_draw():
     cloud, row = target(np.random.default_rng(4))
-    noise, land = {"receiver_noise": {"noise_figure_db": 60.0}}, {"clutter": {}}
-    noisy, cluttered, both = (sample_of(effects, cloud, row) for effects in (noise, land, noise | land))
+    noise = {"receiver_noise": {"noise_figure_db": 60.0}}
+    land = {"clutter": {}}
+    noisy, cluttered, both = (
+        sample_of(effects, cloud, row) for effects in (noise, land, noise | land)
+    )
     echo = np.fft.ifft(noisy.direct, axis=1)
-    assert abs((both.cells - cluttered.cells) - (noisy.cells - echo)).max() < 1e-9 * abs(noisy.cells).max()
+    assert (
+        abs((both.cells - cluttered.cells) - (noisy.cells - echo)).max()
+        < 1e-9 * abs(noisy.cells).max()
+    )
     assert abs(noisy.cells - echo).max() > 0.1 * abs(echo).max()
 
 
 def test_sampling_and_carrier_come_of_one_oscillator():
     row = target(np.random.default_rng(1))[1]
     asked = scene({"clock_offset": {}, "carrier_offset": {}, "timing_offset": {}})
-    drawn = [asked.drawn(row, A, name).random() for name in ("clock_offset", "carrier_offset", "timing_offset")]
-    assert drawn[0] == drawn[1] != drawn[2] and drawn[0] != asked.drawn(row, B, "clock_offset").random()
+    drawn = [
+        asked.drawn(row, A, name).random()
+        for name in ("clock_offset", "carrier_offset", "timing_offset")
+    ]
+    assert (
+        drawn[0] == drawn[1] != drawn[2]
+        and drawn[0] != asked.drawn(row, B, "clock_offset").random()
+    )
 
 
 @pytest.mark.parametrize("noise", [{"receiver_noise": {}}, {"cell_noise": {"snr_db": 3.0}}])
 def test_a_sample_without_its_target_keeps_its_noise_and_land(noise):
     cloud, row = target(np.random.default_rng(6))
-    whole, echo = (sample_of(effects, cloud, row) for effects in (noise | {"clutter": {}}, {"squint": {}}))
+    whole, echo = (
+        sample_of(effects, cloud, row) for effects in (noise | {"clutter": {}}, {"squint": {}})
+    )
     empty = whole.without_target()
     difference = whole.cells - empty.cells
     alone = np.fft.ifft(echo.direct, axis=1)
@@ -256,7 +334,9 @@ def test_a_sample_without_its_target_keeps_its_noise_and_land(noise):
 
 
 def test_noise_at_an_snr_of_zero_has_a_stream_of_its_own():
-    """A level of 0 dB is a level: its draws are those neither of 3 dB nor of an effect without a level."""
+    """A level of 0 dB is a level: its draws are those neither of 3 dB nor of an effect without a
+    level.
+    """
     row = {"subtype": "a", "model": 0}
     asked = scene({"cell_noise": {"snr_db": 0.0}}, network())
     zero = asked.stream("cell_noise", row).random()

@@ -1,4 +1,6 @@
-"""Cancellers and the detector: what they leave of land, of targets and of noise, and where a track goes."""
+"""Cancellers and the detector: what they leave of land, of targets and of noise, and where a track
+goes.
+"""
 
 import numpy as np
 import pytest
@@ -32,11 +34,15 @@ def filtered(changes, cells):
 def test_a_canceller_leaves_nothing_of_what_stands_still_and_keeps_the_level_of_noise(changes):
     still = np.broadcast_to(normals(1, 64), (200, 64))
     assert abs(filtered(changes, still)).max() < 1e-9
-    assert np.mean(abs(filtered(changes, normals(2, 200, 500))) ** 2) == pytest.approx(1.0, rel=0.02)
+    assert np.mean(abs(filtered(changes, normals(2, 200, 500))) ** 2) == pytest.approx(
+        1.0, rel=0.02
+    )
 
 
 def loss_db(changes, speed_mps):
-    """By how much a filter weakens a steady echo of this radial speed, the median over the look's symbols."""
+    """By how much a filter weakens a steady echo of this radial speed, the median over the look's
+    symbols.
+    """
     turns = 2 * speed_mps * 4.9e9 / 299_792_458.0 * 2.5e-3
     left = filtered(changes, np.exp(2j * np.pi * turns * np.arange(200))[:, None])
     return -10 * np.log10(np.median(abs(left) ** 2))
@@ -54,13 +60,17 @@ def test_a_pulse_canceller_weakens_a_steady_echo_as_its_response_says(order):
 
 
 def land(wind_mps, rng, radio=RADIO):
-    """Windblown land of unit power (N, 400): a still part, and lines of an exponential spectrum, drawn one by one."""
+    """Windblown land of unit power (N, 400): a still part, and lines of an exponential spectrum,
+    drawn one by one.
+    """
     still, beta = windblown(wind_mps, radio.carrier_hz)
     wavelength_m = 299_792_458.0 / radio.carrier_hz
     speeds = rng.laplace(0.0, 1 / beta, (300, 400))
     times_s = radio.symbol_interval_s * np.arange(radio.symbols)
     phase = 2j * np.pi * rng.random(speeds.shape)
-    lines = np.stack([np.exp(4j * np.pi / wavelength_m * time * speeds + phase).sum(axis=0) for time in times_s])
+    lines = np.stack(
+        [np.exp(4j * np.pi / wavelength_m * time * speeds + phase).sum(axis=0) for time in times_s]
+    )
     moving = lines / np.sqrt(300) / np.sqrt(1 + still)
     return moving + np.sqrt(still / (1 + still)) * np.exp(2j * np.pi * rng.random(400))
 
@@ -92,7 +102,9 @@ def test_the_clutter_filter_spares_targets_beyond_its_notch_which_grows_with_win
     assert loss(1.0, 50.0, 2 * SPEED_MPS) > 20
 
 
-@pytest.mark.parametrize(("symbols", "wind", "depth"), [(60, 1.0, 50.0), (61, 4.5, 50.0), (200, 4.5, 60.0)])
+@pytest.mark.parametrize(
+    ("symbols", "wind", "depth"), [(60, 1.0, 50.0), (61, 4.5, 50.0), (200, 4.5, 60.0)]
+)
 def test_the_land_s_components_span_what_numpy_s_eigenvectors_do(symbols, wind, depth):
     still, slope = windblown(wind, 4.9e9)
     decay_s = slope * SPEED_OF_LIGHT / 4.9e9 / (4 * np.pi)
@@ -111,7 +123,9 @@ def test_noise_behind_a_canceller_is_that_of_its_cell():
     for changes in KINDS:
         found = set_noise.behind(noise, {"canceller": changes})
         np.testing.assert_array_equal(found, filtered(changes, noise[:, None])[:, 0])
-    assert set_noise.in_all_cells({"cell_noise": None}) and not set_noise.in_all_cells({"cell_noise": {"snr_db": 3.0}})
+    assert set_noise.in_all_cells({"cell_noise": None}) and not set_noise.in_all_cells(
+        {"cell_noise": {"snr_db": 3.0}}
+    )
 
 
 def look_at(cell):
@@ -122,12 +136,18 @@ def look_at(cell):
 
 def chosen(changes, cells, cell=20.0, seed=1):
     return detector.choose(
-        detector.DEFAULTS | {"training": 8} | changes, None, cells, look_at(cell), stream(seed, "detector")
+        detector.DEFAULTS | {"training": 8} | changes,
+        None,
+        cells,
+        look_at(cell),
+        stream(seed, "detector"),
     )
 
 
 def crossing(cells_a_symbol=0.02, level=30.0):
-    """Range cells (200, 64) of noise, a target that moves from cell 20 on, and a louder echo that stands at 40."""
+    """Range cells (200, 64) of noise, a target that moves from cell 20 on, and a louder echo that
+    stands at 40.
+    """
     place = 20 + cells_a_symbol * np.arange(200)
     cells = normals(5, 200, 64)
     cells[np.arange(200), np.rint(place).astype(int) % 64] += level
@@ -136,11 +156,14 @@ def crossing(cells_a_symbol=0.02, level=30.0):
 
 
 @pytest.mark.parametrize("cells_a_symbol", [0.0, 0.04, -0.15])
-def test_a_track_from_the_aim_follows_its_target_past_louder_echoes_and_the_end_of_ranges(cells_a_symbol):
+def test_a_track_from_the_aim_follows_its_target_past_louder_echoes_and_the_end_of_ranges(
+    cells_a_symbol,
+):
     cells, place = crossing(cells_a_symbol)
     for seed in range(5):
         found = chosen({}, cells, seed=seed)
-        # A range error of a cell: the first symbols may lie outside the gate, and later ones do not.
+        # A range error of a cell: the first symbols may lie outside the gate, and later ones do
+        # not.
         assert (found == place)[20:].mean() > 0.97
 
 
@@ -161,12 +184,16 @@ def test_symbols_without_a_detection_take_the_predicted_cell():
 def test_the_mean_takes_one_part_of_n_of_the_noise_and_the_clutter_filter_without_wind_makes_up_for_it():
     noise = normals(12, 20, 4000)
     left = filtered({"kind": "mean"}, noise)
-    assert np.mean(abs(left) ** 2) / np.mean(abs(noise) ** 2) == pytest.approx(1 - 1 / 20, rel=0.005)
+    assert np.mean(abs(left) ** 2) / np.mean(abs(noise) ** 2) == pytest.approx(
+        1 - 1 / 20, rel=0.005
+    )
     still = filtered({"kind": "clutter", "wind_mps": 0.0}, noise)
     np.testing.assert_allclose(still, left * np.sqrt(20 / 19), atol=1e-12)
 
 
-THRESHOLDS = [(cfar, window) for cfar in detector.NAMES["cfar"] for window in detector.NAMES["range_window"]]
+THRESHOLDS = [
+    (cfar, window) for cfar in detector.NAMES["cfar"] for window in detector.NAMES["range_window"]
+]
 
 
 @pytest.mark.parametrize("cfar, window", THRESHOLDS)
@@ -179,17 +206,29 @@ def test_noise_exceeds_the_threshold_as_often_as_asked(cfar, window):
         assert found == pytest.approx(rate, rel=0.05 if rate == 0.03 else 0.15)
 
 
-@pytest.mark.parametrize("count, rank, rate", [(32, 24, 1e-4), (12, 9, 1e-6), (8, 8, 0.1), (5, 1, 0.01), (1, 1, 0.3)])
-def test_the_ordered_threshold_passes_noise_as_an_integral_over_the_order_statistic_says(count, rank, rate):
+@pytest.mark.parametrize(
+    "count, rank, rate", [(32, 24, 1e-4), (12, 9, 1e-6), (8, 8, 0.1), (5, 1, 0.01), (1, 1, 0.3)]
+)
+def test_the_ordered_threshold_passes_noise_as_an_integral_over_the_order_statistic_says(
+    count, rank, rate
+):
     factor = detector.ordered_factor(count, rank, rate)
-    ordered = beta(rank, count - rank + 1)  # of u = 1 - exp(-x), the rank-th smallest of `count` uniform numbers
+    ordered = beta(
+        rank, count - rank + 1
+    )  # of u = 1 - exp(-x), the rank-th smallest of `count` uniform numbers
     found, _ = quad(lambda u: ordered.pdf(u) * (1 - u) ** factor, 0, 1, epsabs=0, limit=200)
     assert found == pytest.approx(rate, rel=1e-6)
 
 
 @pytest.mark.parametrize("cfar, window", THRESHOLDS)
 def test_a_threshold_is_that_of_the_cells_about_it_one_by_one(cfar, window):
-    settings = detector.DEFAULTS | {"guard": 2, "training": 7, "false_alarm": 0.1, "cfar": cfar, "range_window": window}
+    settings = detector.DEFAULTS | {
+        "guard": 2,
+        "training": 7,
+        "false_alarm": 0.1,
+        "cfar": cfar,
+        "range_window": window,
+    }
     steps = range(3, 10) if window == "none" else (3, 6, 9)
     power = abs(normals(8, 6, 64)) ** 2
     found = detector.exceeds(settings, power)
@@ -220,7 +259,9 @@ def test_a_track_finds_its_target_beside_a_louder_one_only_with_an_ordered_thres
     # Without a detection the predicted cell, where the beam was pointed, is taken.
     assert (chosen(start, cells) == 20).mean() > 0.9
     for window in ("none", "hann"):
-        assert (chosen(start | {"cfar": "ordered_statistic", "range_window": window}, cells) == 21).mean() > 0.9
+        assert (
+            chosen(start | {"cfar": "ordered_statistic", "range_window": window}, cells) == 21
+        ).mean() > 0.9
 
 
 def test_wrong_cells_are_as_many_and_as_far_as_asked():

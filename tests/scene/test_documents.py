@@ -23,7 +23,8 @@ def run(picture: str, folder: Path) -> dict:
 def test_the_page_on_scenes_shows_a_drone_over_a_town(monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
     names = run("map.png", tmp_path)
-    cube, settings = names["cube"], names["settings"]
+    cube = names["cube"]
+    settings = names["settings"]
     found = names["range_doppler"].definition(cube, settings)
     row, column = np.unravel_index(found.argmax(), found.shape)
     fold = names["speeds"][1]
@@ -37,6 +38,7 @@ def test_elements_as_links_show_the_drone_at_its_angle_and_range(monkeypatch, tm
     names = run("angle.png", tmp_path)
     row, cell = np.unravel_index(names["power"].argmax(), names["power"].shape)
     truth = names["cubes"][0].truth.mean(0)
-    # Half the width of a beam of eight elements is 1/8; the target stays within two cells in a second.
+    # Half the width of a beam of eight elements is 1/8; the target stays within two cells in a
+    # second.
     assert abs(row / 32 - 1 - truth[TRUTH.index("psi")]) < 1 / 16
     assert abs(cell - truth[TRUTH.index("cell")]) <= 2

@@ -1,4 +1,6 @@
-"""What a scene does to a sample, as `lowalt explain` says it: whose samples they are, and laws of what is found."""
+"""What a scene does to a sample, as `lowalt explain` says it: whose samples they are, and laws of
+what is found.
+"""
 
 from dataclasses import replace
 
@@ -23,7 +25,9 @@ def test_samples_are_those_of_the_data_set_looks_of_a_track_included():
     config["motion"] |= {"looks": 2}
     dataset = Dataset(config)
     (sample,) = explanation.samples(config, None, [("DJI Mini 2", 3)])
-    row = next(dataset.row(place) for place in map(dataset.place, range(len(dataset))) if place.model == 3)
+    row = next(
+        dataset.row(place) for place in map(dataset.place, range(len(dataset))) if place.model == 3
+    )
     assert {name: sample.row[name] for name in row if row[name] == row[name]} == {
         name: value for name, value in row.items() if value == value
     }
@@ -43,7 +47,9 @@ def test_a_target_a_hundred_times_as_strong_stands_20_db_higher_over_the_land():
     assert np.isfinite(weak) and strong == pytest.approx(weak + 20)
 
 
-@pytest.mark.parametrize("ms, spread_ms, text", [(9.0, 2.0, "9.0"), (1.0, 2.0, "<2.0"), (-15.4, 2.0, "<15.4")])
+@pytest.mark.parametrize(
+    "ms, spread_ms, text", [(9.0, 2.0, "9.0"), (1.0, 2.0, "<2.0"), (-15.4, 2.0, "<15.4")]
+)
 def test_a_cost_below_its_spread_is_said_to_be_below_it(ms, spread_ms, text):
     change = explanation.Change("adc", "receiver", True, 0.1, 0.2, {}, ms, spread_ms)
     line = explanation.effects_table([change], False)[1]
@@ -54,7 +60,9 @@ def test_a_cost_below_its_spread_is_said_to_be_below_it(ms, spread_ms, text):
     "named, signal, text", [(True, 0.5, "50.0%"), (True, 1000.0, "-60 dB"), (False, 20.0, "+26 dB")]
 )
 def test_an_effect_that_hides_or_drowns_a_target_says_so_in_db(named, signal, text):
-    line = explanation.effects_table([explanation.Change("town", "channel", named, signal, 0.2)], False)[1]
+    line = explanation.effects_table(
+        [explanation.Change("town", "channel", named, signal, 0.2)], False
+    )[1]
     assert line.split()[2 : 2 + len(text.split())] == text.split()
 
 
@@ -71,12 +79,22 @@ def test_parts_of_an_effect_are_no_effects_of_a_suggested_scene():
 def test_a_finding_says_how_fast_the_range_grows():
     still = dict.fromkeys(("vx_mps", "vy_mps", "vz_mps"), 0.0)
     ahead = {"x_m": 300.0, "y_m": 0.0, "z_m": 25.0}
-    for velocity, expected in (({"vx_mps": 8.0}, 8.0), ({"vx_mps": -3.0}, -3.0), ({"vy_mps": 5.0}, 0.0)):
+    for velocity, expected in (
+        ({"vx_mps": 8.0}, 8.0),
+        ({"vx_mps": -3.0}, -3.0),
+        ({"vy_mps": 5.0}, 0.0),
+    ):
         assert found({}, **ahead | still | velocity).radial_mps == pytest.approx(expected, abs=0.1)
 
 
 def test_the_cell_beside_the_target_holds_it_at_the_end_of_ranges_too():
-    """An error of one cell to either side, where the target stands in cell 0: 32 cells of 39 m farther."""
+    """An error of one cell to either side, where the target stands in cell 0: 32 cells of 39 m
+    farther.
+    """
     always = {"cell_error": {"probability": 1.0, "spread_cells": 1}}
-    assert found(always).right == found(always, x_m=0.0, y_m=1249.0, z_m=10.0, vx_mps=0.0, vy_mps=0.0).right == 1.0
+    assert (
+        found(always).right
+        == found(always, x_m=0.0, y_m=1249.0, z_m=10.0, vx_mps=0.0, vy_mps=0.0).right
+        == 1.0
+    )
     assert found({"cell_error": {"probability": 1.0, "spread_cells": 15}}).right < 0.5

@@ -1,4 +1,6 @@
-"""Land: its power by closed forms and sums over a fine grid, its amplitude laws, its Doppler and its side lobes."""
+"""Land: its power by closed forms and sums over a fine grid, its amplitude laws, its Doppler and
+its side lobes.
+"""
 
 from dataclasses import replace
 
@@ -22,7 +24,8 @@ def settings_of(**changes) -> dict:
 
 
 def test_land_has_the_closed_power_of_its_rings():
-    radio, height = network(transmit=(1, 1), receive=(1, 1), subcarriers=256), 10.0
+    radio = network(transmit=(1, 1), receive=(1, 1), subcarriers=256)
+    height = 10.0
     power, slow = land.cell_power(settings_of(), radio, A, AIMS)
     edges = np.clip((np.arange(len(power))[:, None] + [-0.25, 0.75]) * radio.cell_m, height, 1000.0)
     # sigma0 r dr dphi / r^4 with sigma0 = gamma h / r, all around.
@@ -39,17 +42,27 @@ def test_cells_hold_the_land_of_a_fine_grid_under_both_beams(station, element):
     step = 0.4
     x, y = np.meshgrid(np.arange(-120, 240, step), np.arange(-130, 150, step))
     places = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
-    each, sums, toward = np.full(len(places), 0.03 * step**2 * radar(radio, station).scale ** 2), 0.0, []
-    for end, shape, aim in zip((station.transmitter or station, station), ((4, 2), (4, 2)), AIMS, strict=True):
-        away, ahead = places - end.position_m, (aim - end.position_m) / np.linalg.norm(aim - end.position_m)
+    each = np.full(len(places), 0.03 * step**2 * radar(radio, station).scale ** 2)
+    sums = 0.0
+    toward = []
+    for end, shape, aim in zip(
+        (station.transmitter or station, station), ((4, 2), (4, 2)), AIMS, strict=True
+    ):
+        away = places - end.position_m
+        ahead = (aim - end.position_m) / np.linalg.norm(aim - end.position_m)
         r = np.linalg.norm(away, axis=1)
-        unit, frequency = away / r[:, None], radar(radio, station).kappa
-        across, up = (unit - ahead) @ end.horizontal, (unit - ahead)[:, 2]
-        sum_of = [abs(np.exp(1j * np.pi * frequency * np.outer(np.arange(n), c)).sum(axis=0)) for n, c in
-                  zip(shape, (across, up), strict=True)]  # fmt: skip
+        unit = away / r[:, None]
+        frequency = radar(radio, station).kappa
+        across = (unit - ahead) @ end.horizontal
+        up = (unit - ahead)[:, 2]
+        sum_of = [
+            abs(np.exp(1j * np.pi * frequency * np.outer(np.arange(n), c)).sum(axis=0))
+            for n, c in zip(shape, (across, up), strict=True)
+        ]
         each *= (sum_of[0] * sum_of[1]) ** 2 * np.sqrt(end.position_m[2] / r) / r**2
         each *= 1.0 if element is None else gain(element, end, places)
-        sums, toward = sums + r / 2, [*toward, unit]
+        sums = sums + r / 2
+        toward = [*toward, unit]
     cell = np.floor(sums / radio.cell_m + 0.25).astype(int)
     held = (cell < len(power)) & (sums <= 110.0)
     expected = np.bincount(cell[held], each[held], len(power))
@@ -62,7 +75,8 @@ def test_cells_hold_the_land_of_a_fine_grid_under_both_beams(station, element):
 
 
 def test_a_link_back_to_its_own_place_has_the_stations_land():
-    radio, beside = network(subcarriers=256), replace(A, name="A'")
+    radio = network(subcarriers=256)
+    beside = replace(A, name="A'")
     own = land.cell_power(settings_of(reach_m=300.0), radio, A, AIMS)[0]
     there = land.cell_power(settings_of(reach_m=300.0), radio, link(beside, A), AIMS)
     np.testing.assert_allclose(there[0], own, rtol=1e-9, atol=1e-12 * own.max())
@@ -70,17 +84,22 @@ def test_a_link_back_to_its_own_place_has_the_stations_land():
 
 
 def test_land_is_the_same_in_both_directions_of_a_link():
-    radio, back = linked(subcarriers=256), replace(link(B, A), frequency_hz=A.frequency_hz)
+    radio = linked(subcarriers=256)
+    back = replace(link(B, A), frequency_hz=A.frequency_hz)
     out = land.cell_power(settings_of(reach_m=200.0), radio, link(), AIMS)[0]
     home = land.cell_power(settings_of(reach_m=200.0), radio, back, AIMS[::-1])[0]
     np.testing.assert_allclose(home, out, rtol=1e-3, atol=1e-6 * out.max())
 
 
-@pytest.mark.parametrize("law, shape", [("rayleigh", 1.0), ("weibull", 1.3), ("weibull", 2.0), ("k", 0.8)])
+@pytest.mark.parametrize(
+    "law, shape", [("rayleigh", 1.0), ("weibull", 1.3), ("weibull", 2.0), ("k", 0.8)]
+)
 def test_cells_have_the_amplitude_law_they_were_given(law, shape):
     rng = np.random.default_rng(8)
     texture = clutter.texture(law, shape, 1.0 - rng.random((2, 20_000)))
-    amplitude = np.sqrt(texture) * abs(windblown.speckle(rng, 20_000, 1, 2.5e-3, (3.0, 6.0), 0.06)[:, 0])
+    amplitude = np.sqrt(texture) * abs(
+        windblown.speckle(rng, 20_000, 1, 2.5e-3, (3.0, 6.0), 0.06)[:, 0]
+    )
 
     def k_law(x: np.ndarray) -> np.ndarray:
         """1 - 2 / Gamma(nu) (b x)^nu K_nu(2 b x), b = sqrt(nu)."""
@@ -88,7 +107,11 @@ def test_cells_have_the_amplitude_law_they_were_given(law, shape):
         return 1 - 2 / gamma(shape) * y**shape * kv(shape, 2 * y)
 
     weibull = stats.weibull_min(shape, scale=1 / np.sqrt(stats.weibull_min(shape).moment(2)))
-    below = {"rayleigh": stats.rayleigh(scale=np.sqrt(0.5)).cdf, "weibull": weibull.cdf, "k": k_law}[law]
+    below = {
+        "rayleigh": stats.rayleigh(scale=np.sqrt(0.5)).cdf,
+        "weibull": weibull.cdf,
+        "k": k_law,
+    }[law]
     assert stats.kstest(amplitude, below).pvalue > 0.01
 
 
@@ -102,27 +125,41 @@ def test_neighbours_textures_are_alike_and_keep_their_law():
 
 @pytest.mark.parametrize("slow", [1.0, np.full(3000, 0.5)])
 def test_windblown_land_has_billingsleys_spectrum_and_ratio(slow):
-    wavelength, step = 0.06, 2.5e-3
-    # At 10 statute miles an hour: a ratio of 489.8 / 10^1.55 / f^1.21 and 1 / beta = 0.1048 (1 + 0.4147) m/s.
+    wavelength = 0.06
+    step = 2.5e-3
+    # At 10 statute miles an hour: a ratio of 489.8 / 10^1.55 / f^1.21 and 1 / beta = 0.1048 (1 +
+    # 0.4147) m/s.
     still, beta = windblown.windblown(4.4704, 4.9e9)
     assert still == pytest.approx(489.8 / 10**1.55 / 4.9**1.21)
     assert 1 / beta == pytest.approx(0.1048 * 1.4147)
-    waves = windblown.speckle(np.random.default_rng(9), 3000, 400, step, (still, beta), wavelength, slow)
+    waves = windblown.speckle(
+        np.random.default_rng(9), 3000, 400, step, (still, beta), wavelength, slow
+    )
     lags = np.arange(0, 200, 7)
     found = [(waves[:, lag:] * waves[:, : 400 - lag].conj()).mean().real for lag in lags]
-    # The exponential spectrum's autocorrelation is a Lorentzian; the still part adds its share at all lags.
+    # The exponential spectrum's autocorrelation is a Lorentzian; the still part adds its share at
+    # all lags.
     moving = 1 / (1 + (4 * np.pi * lags * step * np.max(slow) / (beta * wavelength)) ** 2)
     np.testing.assert_allclose(found, (still + moving) / (1 + still), atol=0.06)
-    calm = windblown.speckle(np.random.default_rng(9), 3, 400, step, windblown.windblown(0.0, 4.9e9), wavelength)
+    calm = windblown.speckle(
+        np.random.default_rng(9), 3, 400, step, windblown.windblown(0.0, 4.9e9), wavelength
+    )
     assert (calm == calm[:, :1]).all()
 
 
 def test_drawn_land_has_its_mean_power_in_every_cell_side_lobes_and_folds_included():
-    radio, aim = network(subcarriers=16, symbols=2), AIMS[0]
+    radio = network(subcarriers=16, symbols=2)
+    aim = AIMS[0]
     view = view_of(radio, np.broadcast_to(aim, (2, 1, 3)), np.ones(1), aim)
-    for settings in (settings_of(law="rayleigh", reach_m=150.0), settings_of(law="rayleigh", reach_m=500.0)):
+    for settings in (
+        settings_of(law="rayleigh", reach_m=150.0),
+        settings_of(law="rayleigh", reach_m=500.0),
+    ):
         power, _ = clutter.mean_power(settings, view)
-        drawn = [clutter.scatter(settings, view, np.random.default_rng(seed)).response[0] for seed in range(1000)]
+        drawn = [
+            clutter.scatter(settings, view, np.random.default_rng(seed)).response[0]
+            for seed in range(1000)
+        ]
         found = (abs(np.fft.ifft(drawn, axis=1)) ** 2).mean(axis=0)
         np.testing.assert_allclose(found, land.with_side_lobes(power, 16), rtol=0.15)
         assert found.sum() == pytest.approx(power.sum(), rel=0.08)

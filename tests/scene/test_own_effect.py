@@ -1,4 +1,6 @@
-"""A user's own effect acts in its place with its settings, an overlay alone may name it, and edits re-run its jobs."""
+"""A user's own effect acts in its place with its settings, an overlay alone may name it, and edits
+re-run its jobs.
+"""
 
 import shutil
 from pathlib import Path
@@ -41,14 +43,21 @@ def test_it_acts_behind_the_shipped_effects_of_its_place_with_a_stream_of_its_fi
     named = {"half.py": {"share": "28e-2"}, "adc": {}, "clutter": {}, "fluctuation": {}}
     found = called(named)
     assert [effect.name for effect in found] == ["fluctuation", "clutter", "half.py", "adc"]
-    assert found[2].place == "channel" and found[2].settings == {"share": 0.28, "names": [], "on": True, "any": None}
+    assert found[2].place == "channel" and found[2].settings == {
+        "share": 0.28,
+        "names": [],
+        "on": True,
+        "any": None,
+    }
     assert not called({"half.py": {"share": 1}})
     shutil.copytree(half, half / "elsewhere", ignore=shutil.ignore_patterns("elsewhere"))
     cloud, row = target(np.random.default_rng(1))
     heard = []
     for effects in ({}, {"half.py": {}}, {"elsewhere/half.py": {}}):
         asked = scene(effects, network())
-        heard.append(SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived())
+        heard.append(
+            SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived()
+        )
     assert (heard[1] == heard[2]).all()
     drawn = asked.stream("half.py", row, "A").random()
     np.testing.assert_allclose(heard[1], 0.5 * drawn * heard[0], rtol=1e-9)
@@ -58,8 +67,14 @@ def test_it_acts_behind_the_shipped_effects_of_its_place_with_a_stream_of_its_fi
     ("block", "said"),
     [
         ({"gone.py": {}}, "no file 'gone.py'"),
-        ({"half.py": {"shares": 1}}, r"half.py: unknown parameter\(s\) \['shares'\], expected some of"),
-        ({"half.py": {"share": "much"}}, "half.py.share: 'much', expected a number as its default 0.5"),
+        (
+            {"half.py": {"shares": 1}},
+            r"half.py: unknown parameter\(s\) \['shares'\], expected some of",
+        ),
+        (
+            {"half.py": {"share": "much"}},
+            "half.py.share: 'much', expected a number as its default 0.5",
+        ),
         ({"half.py": {"share": True}}, "half.py.share: 'True', expected a number"),
         ({"half.py": {"share": float("nan")}}, "half.py.share: 'nan', expected a finite number"),
         ({"half.py": {"names": "x"}}, "half.py.names: 'x', expected a list"),
@@ -83,7 +98,11 @@ def test_settings_of_other_types_and_unknown_ones_are_refused_in_one_sentence(ha
         ("SOURCE =", "ORIGIN =", "no SOURCE, expected a text"),
         ("def visible", "def seen", r"offers \[\], expected functions of one place"),
         ("(settings, view, rng)", "(settings, view)", r"expected visible\(settings, view, rng\)"),
-        ("IDLE", "def receive(settings, samples, look, rng): pass\nIDLE", "expected functions of one place"),
+        (
+            "IDLE",
+            "def receive(settings, samples, look, rng): pass\nIDLE",
+            "expected functions of one place",
+        ),
         ("SOURCE =", "1 / 0\nSOURCE =", "half.py: ZeroDivisionError: division by zero"),
         ("SOURCE =", "SOURCE ==", "NameError"),
         ("SOURCE =", "SOURCE = =", "SyntaxError"),
@@ -98,7 +117,9 @@ def test_a_file_that_does_not_keep_the_contract_is_refused_in_one_sentence(half,
 
 @pytest.mark.parametrize("factor", ["view.places[0, :, 0]", "view.times_s", "0.5", "view.places"])
 def test_a_factor_of_another_shape_than_the_contract_s_is_refused_in_one_sentence(half, factor):
-    Path("half.py").write_text(HALF.replace('settings["share"] * rng.random() + 0 * view.places[..., 0]', factor))
+    Path("half.py").write_text(
+        HALF.replace('settings["share"] * rng.random() + 0 * view.places[..., 0]', factor)
+    )
     cloud, row = target(np.random.default_rng(1))
     asked = scene({"half.py": {}}, network())
     with pytest.raises(InputError, match=r"half\.py: visible gives an array of shape"):
@@ -106,49 +127,71 @@ def test_a_factor_of_another_shape_than_the_contract_s_is_refused_in_one_sentenc
 
 
 ACTING = {
-    "visible": "view, rng", "visible_one_way": "view, rng", "cross_sections": "cloud, wavelength_m",
-    "receive": "samples, look, rng", "filtered": "cells", "scatter": "view, rng", "heard": "sample",
-}  # fmt: skip
+    "visible": "view, rng",
+    "visible_one_way": "view, rng",
+    "cross_sections": "cloud, wavelength_m",
+    "receive": "samples, look, rng",
+    "filtered": "cells",
+    "scatter": "view, rng",
+    "heard": "sample",
+}
 WELL = {
-    "visible": "np.ones(view.places.shape[:2])", "visible_one_way": "np.ones(view.places.shape[:2])",
-    "cross_sections": "cloud.rcs_m2.copy()", "receive": "samples.copy()", "filtered": "cells.copy()",
+    "visible": "np.ones(view.places.shape[:2])",
+    "visible_one_way": "np.ones(view.places.shape[:2])",
+    "cross_sections": "cloud.rcs_m2.copy()",
+    "receive": "samples.copy()",
+    "filtered": "cells.copy()",
     "scatter": "Still(np.zeros((len(view.times_s), view.network.subcarriers), complex))",
     "heard": "np.zeros((len(sample.view.times_s), sample.view.network.subcarriers), complex)",
-}  # fmt: skip
+}
 """An effect's own function that changes nothing, by name."""
 
 
 def received_with(function: str, result: str):
     """The signal of a scene with an own effect whose function returns this."""
     Path("mine.py").write_text(
-        "import numpy as np\nfrom lowalt.scene.view import Still\nSOURCE = 'a test'\nDEFAULTS = {}\n"
+        "import numpy as np\nfrom lowalt.scene.view import Still\nSOURCE = 'a test'\nDEFAULTS = "
+        "{}\n"
         "def put(array, value):\n    array = array.astype(np.result_type(array, type(value)))\n"
         "    array.flat[0] = value\n    return array\n"
         f"def {function}(settings, {ACTING[function]}):\n    return {result}\n"
     )
     cloud, row = target(np.random.default_rng(1))
     asked = scene({"mine.py": {}}, network())
-    return SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).received().signal
+    return (
+        SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).received().signal
+    )
 
 
 @pytest.mark.parametrize("function", ACTING)
 @pytest.mark.parametrize("value", ["np.nan", "np.inf"])
 def test_a_result_that_is_not_finite_is_refused_in_one_sentence(half, function, value):
     well = WELL[function]
-    bad = f"Still(put({well}.response, {value}))" if function == "scatter" else f"put({well}, {value})"
+    bad = (
+        f"Still(put({well}.response, {value}))"
+        if function == "scatter"
+        else f"put({well}, {value})"
+    )
     assert np.isfinite(received_with(function, well)).all()
-    with pytest.raises(InputError, match=rf"mine\.py: {function} gives NaN or infinity, expected finite numbers"):
+    with pytest.raises(
+        InputError, match=rf"mine\.py: {function} gives NaN or infinity, expected finite numbers"
+    ):
         received_with(function, bad)
 
 
 @pytest.mark.parametrize("function", ["visible", "visible_one_way", "cross_sections"])
 def test_a_complex_factor_is_refused_in_one_sentence(half, function):
-    with pytest.raises(InputError, match=rf"mine\.py: {function} gives an array of complex128, expected real numbers"):
+    with pytest.raises(
+        InputError,
+        match=rf"mine\.py: {function} gives an array of complex128, expected real numbers",
+    ):
         received_with(function, f"put({WELL[function]}, 1j)")
 
 
 def test_a_cross_section_below_zero_is_refused(half):
-    with pytest.raises(InputError, match=r"mine\.py: cross_sections gives -1 m2, expected no number below 0"):
+    with pytest.raises(
+        InputError, match=r"mine\.py: cross_sections gives -1 m2, expected no number below 0"
+    ):
         received_with("cross_sections", "put(cloud.rcs_m2, -1.0)")
 
 
@@ -175,10 +218,14 @@ def test_an_overlay_names_it_and_no_folder_of_a_run_or_data_set_runs_it(half):
     Path("ran").unlink()
     Path("half.py").write_text(HALF + "# Of a stranger.\n")
     Path("config.yaml").write_text(yaml.safe_dump(config))
-    said = "its effect 'half.py' is code, which a file may not choose; expected an overlay of your own"
+    said = (
+        "its effect 'half.py' is code, which a file may not choose; expected an overlay of your own"
+    )
     with pytest.raises(InputError, match=f"config.yaml: {said}"):
         lowalt.Dataset("config.yaml")
-    held = SimpleNamespace(index={"echo": {"tolerance": None, "effects": config["effects"]}}, index_path="index.json")
+    held = SimpleNamespace(
+        index={"echo": {"tolerance": None, "effects": config["effects"]}}, index_path="index.json"
+    )
     with pytest.raises(InputError, match=f"index.json: {said}"):
         Remaker(held, {})
     assert not Path("ran").exists()
@@ -186,7 +233,11 @@ def test_an_overlay_names_it_and_no_folder_of_a_run_or_data_set_runs_it(half):
 
 def test_its_file_is_an_input_of_the_jobs_that_use_it_alone(half):
     Path("half.py").write_text(HALF + "\nfrom lowalt.measure import fifty_digits\n")
-    config = {"effects": {"half.py": {}, "canceller": {}}, "shards": {"kind": "cube"}, "spectra": {"vt": {}}}
+    config = {
+        "effects": {"half.py": {}, "canceller": {}},
+        "shards": {"kind": "cube"},
+        "spectra": {"vt": {}},
+    }
     echo = sources.code("lowalt.scene", *map(options.dotted, config["effects"]))
     assert "half.py" in echo and any(name.endswith("measure/fifty_digits.py") for name in echo)
     assert "half.py" in sources.code("lowalt.shards", *options.shard_modules(config))

@@ -43,7 +43,9 @@ def echo(look, delay_s, doppler_hz=0.0):
 def test_a_late_window_makes_echoes_nearer():
     look = look_of(network())
     late_s = 3 * look.sample_s
-    found = heard(timing_offset, {"fixed_s": late_s, "sigma_s": 0.0}, echo(look, 10 * look.sample_s), look)
+    found = heard(
+        timing_offset, {"fixed_s": late_s, "sigma_s": 0.0}, echo(look, 10 * look.sample_s), look
+    )
     np.testing.assert_allclose(found, echo(look, 7 * look.sample_s), atol=1e-12)
 
 
@@ -76,19 +78,24 @@ def test_links_have_opposite_offsets_and_a_station_none():
     one, other, own = (look_of(radio, station) for station in (link(), link(B, A), A))
     changes = {"sigma_ppm": 0.01, "sigma_s": 2e-8}
     there, back, here = (
-        heard(link_offset, changes, echo(look, 2e-6), look, stream(3, "look")) for look in (one, other, own)
+        heard(link_offset, changes, echo(look, 2e-6), look, stream(3, "look"))
+        for look in (one, other, own)
     )
     np.testing.assert_allclose(here, echo(own, 2e-6), atol=1e-12)
     assert abs(there - echo(one, 2e-6)).max() > 0.1
-    # Up to the leakage between subcarriers and the stations' sub-bands, one link undoes what the other does.
+    # Up to the leakage between subcarriers and the stations' sub-bands, one link undoes what the
+    # other does.
     np.testing.assert_allclose((there * back)[0], (echo(one, 2e-6) ** 2)[0], atol=1e-3)
 
 
 def test_a_sender_that_is_high_raises_lines_and_one_that_is_late_makes_echoes_late():
-    look, changes = look_of(linked(), link()), {"sigma_ppm": 0.01, "sigma_s": 2e-8}
+    look = look_of(linked(), link())
+    changes = {"sigma_ppm": 0.01, "sigma_s": 2e-8}
     errors = of_stations(changes, look.network, stream(3, "look"))
     ppm, late_s = np.subtract(errors["A"], errors["B"])
-    late = heard(link_offset, changes | {"sigma_ppm": 0.0}, echo(look, 2e-6), look, stream(3, "look"))
+    late = heard(
+        link_offset, changes | {"sigma_ppm": 0.0}, echo(look, 2e-6), look, stream(3, "look")
+    )
     np.testing.assert_allclose(late, echo(look, 2e-6 + late_s), atol=1e-12)
     high = heard(link_offset, changes | {"sigma_s": 0.0}, echo(look, 2e-6), look, stream(3, "look"))
     turns = np.angle(high[1:] / high[:-1]) / (2 * np.pi)
@@ -111,7 +118,9 @@ def test_noise_is_white_of_the_level_that_link_budget_and_snr_ask_for():
 
 def test_no_snr_adds_no_noise():
     look = look_of(network())
-    np.testing.assert_allclose(heard(cell_noise, {}, echo(look, 2e-6), look), echo(look, 2e-6), atol=1e-12)
+    np.testing.assert_allclose(
+        heard(cell_noise, {}, echo(look, 2e-6), look), echo(look, 2e-6), atol=1e-12
+    )
 
 
 def test_leakage_stands_still_at_its_delay_and_level():
@@ -130,12 +139,15 @@ def test_a_mixer_images_each_subcarrier_in_its_mirror():
     np.testing.assert_allclose(found[[5, -5]], [mu, nu], atol=1e-12)
     assert abs(np.delete(found, [5, 27])).max() < 1e-12
     # gain 0.5 dB and 2 degrees: image rejection of 10 lg |mu / nu|^2.
-    g, phi = 10 ** (0.5 / 20), np.radians(2.0)
+    g = 10 ** (0.5 / 20)
+    phi = np.radians(2.0)
     ratio = (1 + g * g + 2 * g * np.cos(phi)) / (1 + g * g - 2 * g * np.cos(phi))
     assert abs(mu / nu) ** 2 == pytest.approx(ratio)
     # The I branch sees the real part, the Q branch the imaginary part of what lags by phi, g times.
     r = np.exp(1j * np.linspace(0, 6, 7))
-    np.testing.assert_allclose(mu * r + nu * r.conj(), r.real + 1j * g * (r * np.exp(-1j * phi)).imag, atol=1e-14)
+    np.testing.assert_allclose(
+        mu * r + nu * r.conj(), r.real + 1j * g * (r * np.exp(-1j * phi)).imag, atol=1e-14
+    )
 
 
 def test_a_converter_errs_as_uniform_steps_do_and_clips():
@@ -152,15 +164,24 @@ def test_a_converter_errs_as_uniform_steps_do_and_clips():
 def test_only_clipping_costs_a_look_with_strong_symbols_more_than_quantisation():
     samples = np.random.default_rng(2).standard_normal((400, 256, 2)) @ [1, 1j]
     uneven = samples * np.where(np.arange(400) % 20 == 0, 10 ** (6 / 20), 1.0)[:, None]
-    for look, backoff_db, expected_db in ((samples, 12.0, 40.5), (uneven, 12.0, 29.2), (uneven, 18.0, 34.9)):
+    for look, backoff_db, expected_db in (
+        (samples, 12.0, 40.5),
+        (uneven, 12.0, 29.2),
+        (uneven, 18.0, 34.9),
+    ):
         error = adc.receive({"bits": 8, "backoff_db": backoff_db}, look, None, None) - look
         # Steps of full scale / 2^7: a component's error has a twelfth of a step's square.
         quantised_db = 10 * np.log10(12 * 2**14) - backoff_db
-        power, whole = np.mean(abs(look) ** 2), adc.full_scale(look, backoff_db)
+        power = np.mean(abs(look) ** 2)
+        whole = adc.full_scale(look, backoff_db)
         inside = np.maximum(abs(look.real), abs(look.imag)) < whole
-        assert 10 * np.log10(power / np.mean(abs(error) ** 2)) == pytest.approx(expected_db, abs=0.3)
+        assert 10 * np.log10(power / np.mean(abs(error) ** 2)) == pytest.approx(
+            expected_db, abs=0.3
+        )
         # Leaving out the samples that clip, and nothing else, gives what quantisation alone gives.
-        assert 10 * np.log10(power / np.mean(abs(error[inside]) ** 2)) == pytest.approx(quantised_db, abs=0.1)
+        assert 10 * np.log10(power / np.mean(abs(error[inside]) ** 2)) == pytest.approx(
+            quantised_db, abs=0.1
+        )
 
 
 def integral(settings, weight, low=1e-1, high=32 * 60e3):
@@ -170,12 +191,17 @@ def integral(settings, weight, low=1e-1, high=32 * 60e3):
     return 2 * np.trapezoid(values, np.log(f))
 
 
-@pytest.mark.parametrize("changes", [{"shared": False}, {"shared": True}, {"shared": False, "loop_hz": 0.0}])
+@pytest.mark.parametrize(
+    "changes", [{"shared": False}, {"shared": True}, {"shared": False, "loop_hz": 0.0}]
+)
 def test_phase_within_a_symbol_wanders_as_its_spectrum_says(changes):
     """Structure function D(t) = 2 int S (1 - cos 2 pi f t), of both parts of the split together."""
-    settings, delay_s = phase_noise.DEFAULTS | changes, 2e-6
+    settings = phase_noise.DEFAULTS | changes
+    delay_s = 2e-6
     look = look_of(network(symbols=400), delay_s=delay_s)
-    phases = np.concatenate([phase_noise.phase(settings, look, stream(4, "p", k)) for k in range(20)])
+    phases = np.concatenate(
+        [phase_noise.phase(settings, look, stream(4, "p", k)) for k in range(20)]
+    )
     for lag in (1, 5, 31):
 
         def weight(f, lag_s=lag * look.sample_s):
@@ -189,45 +215,63 @@ def test_phase_within_a_symbol_wanders_as_its_spectrum_says(changes):
 def test_phase_from_symbol_to_symbol_wanders_as_its_spectrum_says():
     settings = phase_noise.DEFAULTS | {"shared": False, "loop_hz": 300.0}
     look = look_of(network(symbols=400))
-    phases = np.stack([phase_noise.phase(settings, look, stream(4, "q", k))[:, 0] for k in range(60)])
+    phases = np.stack(
+        [phase_noise.phase(settings, look, stream(4, "q", k))[:, 0] for k in range(60)]
+    )
     for lag in (1, 3):
         truth = integral(settings, lambda f, lag=lag: 2 - 2 * np.cos(2 * np.pi * f * lag * 2.5e-3))
         assert np.mean((phases[:, lag:] - phases[:, :-lag]) ** 2) == pytest.approx(truth, rel=0.05)
 
 
 def test_the_slowest_lines_of_a_free_oscillator_wander_over_a_look_as_they_stand():
-    """Each line k of amplitude a turns by exp(2 pi j f_k t): D(t) = sum of a^2 (2 - 2 cos 2 pi f_k t)."""
-    settings, radio = phase_noise.DEFAULTS | {"shared": False, "loop_hz": 0.0}, network(symbols=400)
-    looks = [phase_noise.phase(settings, look_of(radio), stream(4, "s", k))[:, 0] for k in range(80)]
+    """Each line k of amplitude a turns by exp(2 pi j f_k t): D(t) = sum of a^2 (2 - 2 cos 2 pi f_k
+    t).
+    """
+    settings = phase_noise.DEFAULTS | {"shared": False, "loop_hz": 0.0}
+    radio = network(symbols=400)
+    looks = [
+        phase_noise.phase(settings, look_of(radio), stream(4, "s", k))[:, 0] for k in range(80)
+    ]
     line_hz = np.arange(1, 400) * 0.5
     power = 2 * phase_noise.density(settings, line_hz) * 0.5
     truth = np.sum(power * (2 - 2 * np.cos(2 * np.pi * line_hz * 40 * 2.5e-3)))
-    assert np.mean([(look[40:] - look[:-40]) ** 2 for look in looks]) == pytest.approx(truth, rel=0.2)
+    assert np.mean([(look[40:] - look[:-40]) ** 2 for look in looks]) == pytest.approx(
+        truth, rel=0.2
+    )
 
 
 def test_a_loop_gives_slow_noise_to_the_reference_and_fast_noise_to_the_oscillator():
     found = 10 * np.log10(phase_noise.density(phase_noise.DEFAULTS, np.array([1.0, 1e6])))
-    free = 10 * np.log10(phase_noise.density(phase_noise.DEFAULTS | {"loop_hz": 0.0}, np.array([1e6])))
+    free = 10 * np.log10(
+        phase_noise.density(phase_noise.DEFAULTS | {"loop_hz": 0.0}, np.array([1e6]))
+    )
     np.testing.assert_allclose(found, [-46.0, free[0]], atol=0.1)
 
 
 def test_a_link_has_the_noise_of_two_oscillators():
-    settings, looks = phase_noise.DEFAULTS | {"shared": False}, [look_of(linked(), at) for at in (A, link())]
-    own, both = (np.var(np.diff(phase_noise.phase(settings, look, stream(4, "l")))) for look in looks)
+    settings = phase_noise.DEFAULTS | {"shared": False}
+    looks = [look_of(linked(), at) for at in (A, link())]
+    own, both = (
+        np.var(np.diff(phase_noise.phase(settings, look, stream(4, "l")))) for look in looks
+    )
     assert both == pytest.approx(2 * own, rel=1e-6)
 
 
 def test_one_oscillator_leaves_little_noise_on_near_echoes():
     radio = network(symbols=64)
     near, far = (
-        np.var(phase_noise.phase(phase_noise.DEFAULTS, look_of(radio, delay_s=delay_s), stream(4, "d")))
+        np.var(
+            phase_noise.phase(phase_noise.DEFAULTS, look_of(radio, delay_s=delay_s), stream(4, "d"))
+        )
         for delay_s in (2e-8, 4e-8)
     )
     assert far == pytest.approx(4 * near, rel=0.2)
 
 
 def test_the_default_spectrum_is_that_of_the_3gpp_model():
-    """TR 38.803, Table 6.1.10-1 (29.55 GHz): level, zeros and poles (Hz) with their powers; 20 log10 to 4.9 GHz."""
+    """TR 38.803, Table 6.1.10-1 (29.55 GHz): level, zeros and poles (Hz) with their powers; 20
+    log10 to 4.9 GHz.
+    """
     f = np.geomspace(1, 15e6, 2000)
     level = 32 + 20 * np.log10(4.9 / 29.55)
     for hertz, power in ((3e3, 2.37), (550e3, 2.7), (280e6, 2.53)):

@@ -1,4 +1,6 @@
-"""Scenes that are refused before any job starts, each by the effect and what was expected; and the schema's keys."""
+"""Scenes that are refused before any job starts, each by the effect and what was expected; and the
+schema's keys.
+"""
 
 import importlib
 import sys
@@ -17,21 +19,43 @@ from lowalt.scene.observe import Scene, observe
 from lowalt.scene.view import Still
 from scenes import target
 
-STATIONS = {name: {"position_m": [x, 0.0, 10.0], "normal_deg": 0.0} for name, x in (("A", 0.0), ("B", 120.0))}
+STATIONS = {
+    name: {"position_m": [x, 0.0, 10.0], "normal_deg": 0.0}
+    for name, x in (("A", 0.0), ("B", 120.0))
+}
 ALONE = {
-    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 256, "guard_subcarriers": 10,
-    "symbol_interval_s": 2.5e-3, "symbols": 400, "transmit_array": [4, 2], "receive_array": [4, 2], "power_w": 1.0,
+    "carrier_hz": 4.9e9,
+    "subcarrier_spacing_hz": 120e3,
+    "subcarriers": 256,
+    "guard_subcarriers": 10,
+    "symbol_interval_s": 2.5e-3,
+    "symbols": 400,
+    "transmit_array": [4, 2],
+    "receive_array": [4, 2],
+    "power_w": 1.0,
     "stations": {"A": STATIONS["A"]},
-}  # fmt: skip
+}
 LINKED = ALONE | {"stations": STATIONS | {"AB": {"transmit": "A", "receive": "B"}}}
 FMCW = {key: ALONE[key] for key in ("transmit_array", "receive_array", "power_w", "stations")} | {
-    "carrier_hz": 24e9, "symbol_interval_s": 0.5e-3, "symbols": 400,
+    "carrier_hz": 24e9,
+    "symbol_interval_s": 0.5e-3,
+    "symbols": 400,
     "waveform": {"kind": "fmcw", "sweep_hz": 150e6, "sweep_s": 400e-6, "samples": 64},
-}  # fmt: skip
+}
 BELOW = ALONE | {"stations": {"A": STATIONS["A"] | {"position_m": [0.0, 0.0, -1.0]}}}
-QUIET, NOISY = [float("inf")], [3.0]
-OF_OFDM = ("data_symbols", "power_amplifier", "comb_pilots", "cyclic_prefix", "interference", "link_offset",
-           "timing_offset", "clock_offset", "carrier_offset")  # fmt: skip
+QUIET = [float("inf")]
+NOISY = [3.0]
+OF_OFDM = (
+    "data_symbols",
+    "power_amplifier",
+    "comb_pilots",
+    "cyclic_prefix",
+    "interference",
+    "link_offset",
+    "timing_offset",
+    "clock_offset",
+    "carrier_offset",
+)
 GAPS = {"slow_time": {"downlink": 0.75}}
 
 
@@ -40,51 +64,187 @@ GAPS = {"slow_time": {"downlink": 0.75}}
     [
         (ALONE, {"fog": {}}, QUIET, "unknown effect 'fog'"),
         (ALONE, {"adc": {"bit": 8}}, QUIET, r"effects.adc: unknown parameter\(s\) \['bit'\]"),
-        (ALONE, {"timing_offset": {"sigma_s": 1e-6}}, QUIET, "effects.timing_offset: .*prefix_slack_s"),
-        (ALONE, {"clock_offset": {"fixed_ppm": 1.0}}, QUIET, "effects.clock_offset: .*prefix_slack_s"),
-        (ALONE, {"clock_offset": {"sigma_ppm": 0.01}, "carrier_offset": {}}, QUIET, "sigma_ppm is 0.01 .*the same"),
+        (
+            ALONE,
+            {"timing_offset": {"sigma_s": 1e-6}},
+            QUIET,
+            "effects.timing_offset: .*prefix_slack_s",
+        ),
+        (
+            ALONE,
+            {"clock_offset": {"fixed_ppm": 1.0}},
+            QUIET,
+            "effects.clock_offset: .*prefix_slack_s",
+        ),
+        (
+            ALONE,
+            {"clock_offset": {"sigma_ppm": 0.01}, "carrier_offset": {}},
+            QUIET,
+            "sigma_ppm is 0.01 .*the same",
+        ),
         (ALONE, {"carrier_offset": {}, "phase_noise": {}}, QUIET, "shared: false"),
-        (ALONE, {"phase_noise": {"points": [[10.0, 0.0], [1.0, 0.0]]}}, QUIET, "phase_noise.points: .*rising"),
-        (ALONE | {"symbol_interval_s": 2e-5, "subcarriers": 16}, {"phase_noise": {}}, QUIET,
-         "phase_noise: network.symbol_interval_s"),
-        (ALONE, {"transmit_leakage": {}, "phase_noise": {"shared": False}}, QUIET, "phase_noise with shared: false"),
+        (
+            ALONE,
+            {"phase_noise": {"points": [[10.0, 0.0], [1.0, 0.0]]}},
+            QUIET,
+            "phase_noise.points: .*rising",
+        ),
+        (
+            ALONE | {"symbol_interval_s": 2e-5, "subcarriers": 16},
+            {"phase_noise": {}},
+            QUIET,
+            "phase_noise: network.symbol_interval_s",
+        ),
+        (
+            ALONE,
+            {"transmit_leakage": {}, "phase_noise": {"shared": False}},
+            QUIET,
+            "phase_noise with shared: false",
+        ),
         (ALONE, {"link_offset": {}}, QUIET, "effects.link_offset: no station .*is a link"),
         (ALONE, {"direct_path": {}}, QUIET, "effects.direct_path: no station .*is a link"),
-        (ALONE, {"cell_noise": {}, "receiver_noise": {}}, QUIET, "cell_noise: .*expected one of them"),
+        (
+            ALONE,
+            {"cell_noise": {}, "receiver_noise": {}},
+            QUIET,
+            "cell_noise: .*expected one of them",
+        ),
         (ALONE, {"cell_noise": {"snr_db": 3.0}}, NOISY, "cell_noise: snr_db is 3.0 .*expected"),
-        (ALONE, {"receiver_noise": {}}, NOISY, r"receiver_noise: noise.snr_db is \[3.0\], expected \[.inf\]"),
+        (
+            ALONE,
+            {"receiver_noise": {}},
+            NOISY,
+            r"receiver_noise: noise.snr_db is \[3.0\], expected \[.inf\]",
+        ),
         (ALONE, {"canceller": {}}, QUIET, "canceller: there is no clutter"),
-        (ALONE, {"clutter": {}, "canceller": {"kind": "clutter"}} | GAPS, QUIET, "slow_time leaves gaps"),
-        (ALONE, {"clutter": {}, "canceller": {"kind": "clutter", "carrier_hz": 28e9}}, QUIET, "canceller.carrier_hz"),
+        (
+            ALONE,
+            {"clutter": {}, "canceller": {"kind": "clutter"}} | GAPS,
+            QUIET,
+            "slow_time leaves gaps",
+        ),
+        (
+            ALONE,
+            {"clutter": {}, "canceller": {"kind": "clutter", "carrier_hz": 28e9}},
+            QUIET,
+            "canceller.carrier_hz",
+        ),
         (ALONE, {"clutter": {"shape": 2.5}}, QUIET, "clutter: shape is 2.5 for law weibull"),
         (BELOW, {"clutter": {}}, QUIET, "clutter: station A .*above the ground"),
-        (BELOW, {"background_channel": {}}, QUIET, "background_channel: station A .*above the ground"),
-        (ALONE | {"carrier_hz": 28e9}, {"ground_reflection": {}}, QUIET, "1 to 10 GHz, .*expected permittivity"),
-        (ALONE, {"walls": {"facades": [[0, 0, 0, 0, 9]]}}, QUIET, "walls.facades: .*expected positive"),
-        (ALONE, {"reflected_aspect": {}, "occlusion": {}}, QUIET, "reflected_aspect: there is no reflected route"),
-        (ALONE, {"reflected_aspect": {}, "ground_reflection": {}}, QUIET, "reflected_aspect: no side to follow"),
+        (
+            BELOW,
+            {"background_channel": {}},
+            QUIET,
+            "background_channel: station A .*above the ground",
+        ),
+        (
+            ALONE | {"carrier_hz": 28e9},
+            {"ground_reflection": {}},
+            QUIET,
+            "1 to 10 GHz, .*expected permittivity",
+        ),
+        (
+            ALONE,
+            {"walls": {"facades": [[0, 0, 0, 0, 9]]}},
+            QUIET,
+            "walls.facades: .*expected positive",
+        ),
+        (
+            ALONE,
+            {"reflected_aspect": {}, "occlusion": {}},
+            QUIET,
+            "reflected_aspect: there is no reflected route",
+        ),
+        (
+            ALONE,
+            {"reflected_aspect": {}, "ground_reflection": {}},
+            QUIET,
+            "reflected_aspect: no side to follow",
+        ),
         (ALONE, {"fluctuation": {}, "cross_sections": {}}, QUIET, "fluctuation: pattern is true"),
-        (ALONE, {"companions": {"count": [3, 1]}}, QUIET, "companions.count: .*smaller number first"),
-        (ALONE, {"companions": {"subtypes": ["Crow"]}, "occlusion": {}}, QUIET, "companions.subtypes: surfaces"),
+        (
+            ALONE,
+            {"companions": {"count": [3, 1]}},
+            QUIET,
+            "companions.count: .*smaller number first",
+        ),
+        (
+            ALONE,
+            {"companions": {"subtypes": ["Crow"]}, "occlusion": {}},
+            QUIET,
+            "companions.subtypes: surfaces",
+        ),
         (ALONE, {"interference": {}}, QUIET, "interference: the network has one station"),
-        (ALONE, {"pointing_error": {"update_s": 1e-3}}, QUIET, "pointing_error.update_s: 0.001, expected null or"),
-        (ALONE, {"comb_pilots": {"spacing": 3}}, QUIET, "comb_pilots.spacing: 3, expected a proper divisor"),
-        (ALONE, {"comb_pilots": {"offset": 4}}, QUIET, "comb_pilots.offset: 4, expected less than spacing"),
-        (ALONE, {"slow_time": {"jitter_s": 2.5e-3}}, QUIET, "slow_time.jitter_s: 0.0025, expected below"),
-        (ALONE, {"slow_time": {"downlink": 1e-6, "tdd_period_s": 1.0}}, QUIET, "slow_time: downlink 1e-06 .*more"),
+        (
+            ALONE,
+            {"pointing_error": {"update_s": 1e-3}},
+            QUIET,
+            "pointing_error.update_s: 0.001, expected null or",
+        ),
+        (
+            ALONE,
+            {"comb_pilots": {"spacing": 3}},
+            QUIET,
+            "comb_pilots.spacing: 3, expected a proper divisor",
+        ),
+        (
+            ALONE,
+            {"comb_pilots": {"offset": 4}},
+            QUIET,
+            "comb_pilots.offset: 4, expected less than spacing",
+        ),
+        (
+            ALONE,
+            {"slow_time": {"jitter_s": 2.5e-3}},
+            QUIET,
+            "slow_time.jitter_s: 0.0025, expected below",
+        ),
+        (
+            ALONE,
+            {"slow_time": {"downlink": 1e-6, "tdd_period_s": 1.0}},
+            QUIET,
+            "slow_time: downlink 1e-06 .*more",
+        ),
         (ALONE, GAPS, NOISY, "slow_time: gaps hold no signal"),
-        (ALONE, {"detector": {"gate_cells": 128}}, QUIET, "detector.gate_cells: 128, expected less than half"),
+        (
+            ALONE,
+            {"detector": {"gate_cells": 128}},
+            QUIET,
+            "detector.gate_cells: 128, expected less than half",
+        ),
         (ALONE, {"detector": {"training": 200}}, QUIET, r"detector.guard \+ training: 202"),
-        (ALONE, {"detector": {"range_window": "hann", "guard": 1}}, QUIET, "detector.guard: 1, expected at least 2"),
-        (ALONE, {"cell_error": {"spread_cells": 128}}, QUIET, "cell_error.spread_cells: 128, expected less than half"),
+        (
+            ALONE,
+            {"detector": {"range_window": "hann", "guard": 1}},
+            QUIET,
+            "detector.guard: 1, expected at least 2",
+        ),
+        (
+            ALONE,
+            {"cell_error": {"spread_cells": 128}},
+            QUIET,
+            "cell_error.spread_cells: 128, expected less than half",
+        ),
         (LINKED, {}, QUIET, r"network.stations: \['AB'\] are links .*expected effects.direct_path"),
-        (LINKED, {"direct_path": {}, "transmit_leakage": {}}, QUIET, "not modelled between two stations"),
-        (ALONE | {"stations": STATIONS, "guard_subcarriers": -9}, {}, QUIET, "guard_subcarriers: -9, .*interference"),
+        (
+            LINKED,
+            {"direct_path": {}, "transmit_leakage": {}},
+            QUIET,
+            "not modelled between two stations",
+        ),
+        (
+            ALONE | {"stations": STATIONS, "guard_subcarriers": -9},
+            {},
+            QUIET,
+            "guard_subcarriers: -9, .*interference",
+        ),
         *((FMCW, {name: {}}, QUIET, rf"effects: \['{name}'\] .*kind 'fmcw'") for name in OF_OFDM),
-        *((FMCW | {"waveform": {"kind": "cw"}}, {name: {}}, QUIET, rf"\['{name}'\] .*kind 'cw'")
-          for name in (*OF_OFDM, "symbol_motion", "clutter")),
+        *(
+            (FMCW | {"waveform": {"kind": "cw"}}, {name: {}}, QUIET, rf"\['{name}'\] .*kind 'cw'")
+            for name in (*OF_OFDM, "symbol_motion", "clutter")
+        ),
     ],
-)  # fmt: skip
+)
 def test_settings_that_contradict_each_other_are_refused_by_name(network, effects, snr_db, said):
     with pytest.raises(InputError, match=said) as refused:
         check({"network": network, "effects": effects, "noise": {"snr_db": snr_db}})
@@ -93,31 +253,55 @@ def test_settings_that_contradict_each_other_are_refused_by_name(network, effect
 
 @pytest.mark.parametrize(
     ("blocks", "said"),
-    [({"shards": {"kind": "recipe"}, "noise": {"snr_db": NOISY}}, "shards.kind: 'recipe' draws white noise"),
-     ({"spectra": {"times": "known"}, "noise": {"snr_db": QUIET}}, "slow_time.regrid: 'nudft' makes an even signal")],
-)  # fmt: skip
+    [
+        (
+            {"shards": {"kind": "recipe"}, "noise": {"snr_db": NOISY}},
+            "shards.kind: 'recipe' draws white noise",
+        ),
+        (
+            {"spectra": {"times": "known"}, "noise": {"snr_db": QUIET}},
+            "slow_time.regrid: 'nudft' makes an even signal",
+        ),
+    ],
+)
 def test_effects_that_later_stages_do_not_fit_are_refused(blocks, said):
-    effects = {"clutter": {}, "canceller": {}, "slow_time": {"downlink": 1, "jitter_s": 1e-4, "regrid": "nudft"}}
+    effects = {
+        "clutter": {},
+        "canceller": {},
+        "slow_time": {"downlink": 1, "jitter_s": 1e-4, "regrid": "nudft"},
+    }
     with pytest.raises(InputError, match=said):
         check({"network": ALONE, "effects": effects} | blocks)
 
 
 @pytest.mark.parametrize("function", ["data", "range_cells"])
-def test_two_effects_that_offer_the_same_function_are_refused_where_a_scene_has_one(function, monkeypatch):
+def test_two_effects_that_offer_the_same_function_are_refused_where_a_scene_has_one(
+    function, monkeypatch
+):
     own = ModuleType("lowalt.scene.effects.transmitter.own")
-    own.DEFAULTS, own.data, own.range_cells = {}, len, len
+    own.DEFAULTS = {}
+    own.data = len
+    own.range_cells = len
     monkeypatch.setitem(PLACES, "own", "transmitter")
     monkeypatch.setitem(sys.modules, own.__name__, own)
     other = {"data": "data_symbols", "range_cells": "comb_pilots"}[function]
-    with pytest.raises(InputError, match=f"{other} and own both offer {function}, expected one of them") as refused:
+    with pytest.raises(
+        InputError, match=f"{other} and own both offer {function}, expected one of them"
+    ) as refused:
         check({"network": ALONE, "noise": {"snr_db": QUIET}, "effects": {other: {}, "own": {}}})
     assert len(str(refused.value)) < 400
-    assert [effect.name for effect in called({other: {}, "phase_noise": {}})] == [other, "phase_noise"]
+    assert [effect.name for effect in called({other: {}, "phase_noise": {}})] == [
+        other,
+        "phase_noise",
+    ]
 
 
-def test_an_own_effect_that_offers_the_direct_path_of_a_link_takes_the_place_of_the_shipped_one(monkeypatch):
+def test_an_own_effect_that_offers_the_direct_path_of_a_link_takes_the_place_of_the_shipped_one(
+    monkeypatch,
+):
     own = ModuleType("lowalt.scene.effects.channel.own")
-    own.DEFAULTS, own.from_sender = {}, lambda settings, view: Still(np.full((400, 256), 3.0))
+    own.DEFAULTS = {}
+    own.from_sender = lambda settings, view: Still(np.full((400, 256), 3.0))
     monkeypatch.setitem(PLACES, "own", "channel")
     monkeypatch.setitem(sys.modules, own.__name__, own)
     effects = {"own": {}}
@@ -132,7 +316,11 @@ def test_an_own_effect_that_offers_the_direct_path_of_a_link_takes_the_place_of_
 def test_the_schema_knows_every_setting_and_each_effect_names_its_source(name):
     schema = yaml.safe_load(Path("workflow/schemas/config.schema.yaml").read_text())
     module = importlib.import_module(dotted(name))
-    assert set(schema["properties"]["effects"]["properties"][name].get("properties", {})) == set(module.DEFAULTS)
+    assert set(schema["properties"]["effects"]["properties"][name].get("properties", {})) == set(
+        module.DEFAULTS
+    )
     assert module.SOURCE and f".{PLACES[name]}." in module.__name__
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "IDLE", ()))
-    assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "PARTS", {}).values())
+    assert all(
+        set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "PARTS", {}).values()
+    )

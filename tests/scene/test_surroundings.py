@@ -1,4 +1,6 @@
-"""The surroundings' echoes: path losses by hand, the tables' moments, powers and delays of rays, and their sum."""
+"""The surroundings' echoes: path losses by hand, the tables' moments, powers and delays of rays,
+and their sum.
+"""
 
 from dataclasses import replace
 
@@ -14,7 +16,8 @@ from lowalt.scene.observe import observe
 from scenes import A, network, scene, target
 
 STATION = replace(A, position_m=(0.0, 0.0, 25.0))
-NEAR, USUAL = Link(100.0, 25.0, 5.0, 4.9), Large(1e-7, 12.0, 2.0, 0.0)
+NEAR = Link(100.0, 25.0, 5.0, 4.9)
+USUAL = Large(1e-7, 12.0, 2.0, 0.0)
 
 
 @pytest.mark.parametrize("environment", ["UMa", "UMi"])
@@ -30,7 +33,8 @@ def test_reference_points_have_the_tables_moments_and_are_a_third_of_a_turn_apar
 @pytest.mark.parametrize(
     ("environment", "link", "expected"),
     [
-        # Worked by hand from Table 7.4.1-1: 13.54 + 39.08 lg 150.65 + 13.804 - 0.6 x 9.5, and so on.
+        # Worked by hand from Table 7.4.1-1: 13.54 + 39.08 lg 150.65 + 13.804 - 0.6 x 9.5, and so
+        # on.
         ("UMa", Link(150.0, 25.0, 11.0, 4.9), 106.759),
         ("UMi", Link(55.0, 10.0, 5.2, 4.9), 97.484),
         # So near that the formula with line of sight is the larger one: 28 + 22 lg 15.13 + 13.804.
@@ -43,7 +47,9 @@ def test_path_losses_are_those_worked_by_hand(environment, link, expected):
 
 @pytest.mark.parametrize("environment", ["UMa", "UMi"])
 def test_spreads_have_the_tables_medians_and_correlations(environment):
-    rng, table, link = np.random.default_rng(2), fast_fading.ENVIRONMENTS[environment], NEAR._replace(ghz=6.5)
+    rng = np.random.default_rng(2)
+    table = fast_fading.ENVIRONMENTS[environment]
+    link = NEAR._replace(ghz=6.5)
     drawn = np.array([fast_fading.large_scale(environment, link, rng) for _ in range(6000)])
     logs = np.column_stack([drawn[:, 3], *np.log10(drawn[:, :3]).T])
     zenith = fast_fading.zenith_spread(environment, link)[0], table.zenith_deviation
@@ -58,76 +64,118 @@ def test_spreads_have_the_tables_medians_and_correlations(environment):
 
 @pytest.mark.parametrize("environment", ["UMa", "UMi"])
 def test_clusters_have_about_the_spreads_asked_for_about_the_link_s_direction(environment):
-    rng, moments = np.random.default_rng(3), []
+    rng = np.random.default_rng(3)
+    moments = []
     for _ in range(300):
         rays = fast_fading.rays(environment, NEAR, USUAL, rng)
         share = rays.power / rays.power.sum()
         assert 0.93 < rays.power.sum() <= 1 + 1e-12 and rays.delay_s.min() == 0
-        spreads = [np.sqrt(share @ part**2 - (share @ part) ** 2) for part in (rays.delay_s, rays.azimuth_deg)]
+        spreads = [
+            np.sqrt(share @ part**2 - (share @ part) ** 2)
+            for part in (rays.delay_s, rays.azimuth_deg)
+        ]
         moments.append([*spreads, share @ rays.zenith_deg])
     delay_s, azimuth_deg, zenith_deg = np.mean(moments, axis=0)
     # The rays' own spread adds to the clusters'.
     wide = np.hypot(USUAL.azimuth_deg, fast_fading.ENVIRONMENTS[environment].cluster_azimuth_deg)
     assert (delay_s, azimuth_deg) == pytest.approx((USUAL.delay_s, wide), rel=0.25)
     # The point lies 20 m below the station and 100 m away: 90 + atan(0.2) degrees from the zenith.
-    assert zenith_deg == pytest.approx(101.310 + fast_fading.zenith_spread(environment, NEAR)[1], abs=0.3)
+    assert zenith_deg == pytest.approx(
+        101.310 + fast_fading.zenith_spread(environment, NEAR)[1], abs=0.3
+    )
 
 
 def test_the_two_strongest_clusters_arrive_in_three_parts():
     rays = fast_fading.rays("UMi", NEAR, USUAL, np.random.default_rng(4))
-    delay, power = rays.delay_s.reshape(-1, 20), rays.power.reshape(-1, 20)
+    delay = rays.delay_s.reshape(-1, 20)
+    power = rays.power.reshape(-1, 20)
     order = np.argsort(-power[:, 0])
     assert [len(np.unique(row)) for row in delay[order]] == [3, 3] + [1] * (len(delay) - 2)
     late, size = np.unique(delay[order[0]] - delay[order[0]].min(), return_counts=True)
-    assert late == pytest.approx([0, 1.28 * 11e-9, 2.56 * 11e-9], abs=1e-15) and size.tolist() == [10, 6, 4]
+    assert late == pytest.approx([0, 1.28 * 11e-9, 2.56 * 11e-9], abs=1e-15) and size.tolist() == [
+        10,
+        6,
+        4,
+    ]
 
 
 def test_rays_carry_the_path_losses_power_and_come_after_the_distance_s_delay():
-    rng, twin = np.random.default_rng(5), np.random.default_rng(5)
-    delay, amplitude, direction = background_channel.drawn(background_channel.DEFAULTS, STATION, 4.9, rng)
-    powers, firsts, ways = [], [], []
+    rng = np.random.default_rng(5)
+    twin = np.random.default_rng(5)
+    delay, amplitude, direction = background_channel.drawn(
+        background_channel.DEFAULTS, STATION, 4.9, rng
+    )
+    powers = []
+    firsts = []
+    ways = []
     for flat, height, azimuth in background_channel.reference_points("UMa", twin):
         link = Link(flat, 25.0, height, 4.9)
         large = fast_fading.large_scale("UMa", link, twin)
-        firsts.append(np.hypot(flat, 25.0 - height) / SPEED_OF_LIGHT + fast_fading.later_s("UMa", twin))
+        firsts.append(
+            np.hypot(flat, 25.0 - height) / SPEED_OF_LIGHT + fast_fading.later_s("UMa", twin)
+        )
         rays = fast_fading.rays("UMa", link, large, twin)
         twin.random(len(rays.power))
-        turn, fall = azimuth + np.pi / 180 * rays.azimuth_deg, np.pi / 180 * rays.zenith_deg
-        ways.append(np.stack([np.sin(fall) * np.cos(turn), np.sin(fall) * np.sin(turn), np.cos(fall)], axis=1))
-        powers.append(rays.power.sum() * 10 ** ((large.shadow_db - fast_fading.path_loss_db("UMa", link)) / 10))
+        turn = azimuth + np.pi / 180 * rays.azimuth_deg
+        fall = np.pi / 180 * rays.zenith_deg
+        ways.append(
+            np.stack(
+                [np.sin(fall) * np.cos(turn), np.sin(fall) * np.sin(turn), np.cos(fall)], axis=1
+            )
+        )
+        powers.append(
+            rays.power.sum()
+            * 10 ** ((large.shadow_db - fast_fading.path_loss_db("UMa", link)) / 10)
+        )
     np.testing.assert_allclose(direction, np.concatenate(ways), atol=1e-12)
-    assert (abs(amplitude) ** 2).sum() == pytest.approx(sum(powers)) and delay.min() == pytest.approx(min(firsts))
+    assert (abs(amplitude) ** 2).sum() == pytest.approx(
+        sum(powers)
+    ) and delay.min() == pytest.approx(min(firsts))
 
 
 def test_the_response_is_the_sum_over_rays_and_elements():
     radio = network(transmit=(4, 2), receive=(3, 1), subcarriers=16, symbols=3)
     asked = scene({"element_pattern": {}}, radio)
     view = observe(asked, A, *target(np.random.default_rng(1)))
-    found = background_channel.scatter(background_channel.DEFAULTS, view, np.random.default_rng(7)).response
+    found = background_channel.scatter(
+        background_channel.DEFAULTS, view, np.random.default_rng(7)
+    ).response
     ghz = 4.9 + 7.5 * 120e3 / 1e9
     rays = background_channel.drawn(background_channel.DEFAULTS, A, ghz, np.random.default_rng(7))
-    across, up = np.array([-np.sin(0.3), np.cos(0.3), 0.0]), np.array([0.0, 0.0, 1.0])
+    across = np.array([-np.sin(0.3), np.cos(0.3), 0.0])
+    up = np.array([0.0, 0.0, 1.0])
     aim = view.aim_m - np.asarray(A.position_m)
     aim /= np.linalg.norm(aim)
-    spacing, wave = SPEED_OF_LIGHT / (2 * radio.carrier_hz), 2 * np.pi * A.frequency_hz / SPEED_OF_LIGHT
+    spacing = SPEED_OF_LIGHT / (2 * radio.carrier_hz)
+    wave = 2 * np.pi * A.frequency_hz / SPEED_OF_LIGHT
     truth = np.zeros(16, complex)
     for late_s, strength, way in zip(*rays, strict=True):
         total = strength * np.sqrt(radio.power / 24)
         for shape in ((4, 2), (3, 1)):
-            places = [spacing * (i * across + j * up) for i in range(shape[0]) for j in range(shape[1])]
+            places = [
+                spacing * (i * across + j * up) for i in range(shape[0]) for j in range(shape[1])
+            ]
             total *= sum(np.exp(1j * wave * (place @ (way - aim))) for place in places)
         total *= gain(view.element, A, np.asarray(A.position_m) + way)
         truth += total * np.exp(-2j * np.pi * late_s * np.arange(16) * 120e3)
-    np.testing.assert_allclose(found, np.broadcast_to(truth, (3, 16)), atol=1e-10 * abs(truth).max())
+    np.testing.assert_allclose(
+        found, np.broadcast_to(truth, (3, 16)), atol=1e-10 * abs(truth).max()
+    )
 
 
 def test_weak_clusters_have_their_share_of_the_strongest_cluster_s_power(monkeypatch):
     monkeypatch.setattr(background_channel, "POINTS", 1)
     plain, more = (
         background_channel.drawn(
-            background_channel.DEFAULTS | {"weak_clusters": weak}, STATION, 4.9, np.random.default_rng(6)
+            background_channel.DEFAULTS | {"weak_clusters": weak},
+            STATION,
+            4.9,
+            np.random.default_rng(6),
         )[1]
         for weak in (False, True)
     )
-    strongest, weak = 20 * (abs(plain) ** 2).max(), (abs(more[len(plain) :]) ** 2).sum()
-    assert (more[: len(plain)] == plain).all() and 10 * np.log10(weak / strongest) == pytest.approx(-25.0, abs=0.3)
+    strongest = 20 * (abs(plain) ** 2).max()
+    weak = (abs(more[len(plain) :]) ** 2).sum()
+    assert (more[: len(plain)] == plain).all() and 10 * np.log10(weak / strongest) == pytest.approx(
+        -25.0, abs=0.3
+    )

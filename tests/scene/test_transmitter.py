@@ -1,4 +1,6 @@
-"""What a station sends, and when: data, amplifier, combs of pilots, and symbols that are late or missing."""
+"""What a station sends, and when: data, amplifier, combs of pilots, and symbols that are late or
+missing.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +34,9 @@ def test_an_amplifier_leaves_a_smaller_copy_of_the_data_and_distortion_as_bussga
     aired = power_amplifier.aired({"backoff_db": 3.0}, sent)
 
     def mean(of):
-        """Mean over a Gaussian signal of a function of a sample's power and of the power that comes out."""
+        """Mean over a Gaussian signal of a function of a sample's power and of the power that comes
+        out.
+        """
         return quad(lambda u: of(u, u / np.sqrt(1 + (u / 10**0.3) ** 2)) * np.exp(-u), 0, 60)[0]
 
     gain = mean(lambda u, out: np.sqrt(u * out))
@@ -61,7 +65,9 @@ def test_symbols_are_sent_in_the_downlink_and_late_by_no_more_than_the_jitter():
     late = timing.times_s - radio.times_s
     assert late.min() >= 0 and 0.9e-4 < late.max() < 1e-4
     phase = np.arange(400) % 4
-    assert not timing.present[phase == 3].any() and timing.present[phase < 3].mean() == pytest.approx(0.9, abs=0.05)
+    assert not timing.present[phase == 3].any() and timing.present[
+        phase < 3
+    ].mean() == pytest.approx(0.9, abs=0.05)
     fewest = slow_time.sampling(settings | {"missing": 1.0}, radio, stream(1, "t"))
     assert np.flatnonzero(fewest.present).tolist() == [0, 1]
 
@@ -78,11 +84,14 @@ def test_regridding_restores_a_line_as_far_as_its_kind_can():
     zero = regridded("zero", 2.0)
     assert not zero[~timing.present].any() and abs(zero - truth)[timing.present].max() < 0.01
     line = np.fft.fft(regridded("nudft", 190.0))
-    assert abs(line).argmax() == 190 and abs(line[190]) == pytest.approx(timing.present.sum(), rel=1e-9)
+    assert abs(line).argmax() == 190 and abs(line[190]) == pytest.approx(
+        timing.present.sum(), rel=1e-9
+    )
 
 
 def test_lateness_is_drawn_again_from_the_name_of_a_sample():
-    radio, row = network(), {"subtype": "Thing", "model": 3}
+    radio = network()
+    row = {"subtype": "Thing", "model": 3}
     effects = {"slow_time": {"jitter_s": 1e-4}}
     again = lateness.lateness({"times": "known"}, effects, radio, 5, row)
     rng = stream(5, "effect", "slow_time", "Thing", 3, A.name)

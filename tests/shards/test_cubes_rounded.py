@@ -1,4 +1,6 @@
-"""Cubes of whole numbers: rounded by at most half a step, stored and made again alike, and as large as was said."""
+"""Cubes of whole numbers: rounded by at most half a step, stored and made again alike, and as large
+as was said.
+"""
 
 import json
 from types import SimpleNamespace
@@ -26,7 +28,9 @@ def values(parts) -> np.ndarray:
     return np.array(parts, np.float32).view(np.complex64)[None]
 
 
-@pytest.mark.parametrize("largest", [1.0, 0.75, 3.3e38, 2.0**-149, 1.7e-41, 5e-36, 32767.0, 32767.4, 32767.6, 65535.9])
+@pytest.mark.parametrize(
+    "largest", [1.0, 0.75, 3.3e38, 2.0**-149, 1.7e-41, 5e-36, 32767.0, 32767.4, 32767.6, 65535.9]
+)
 def test_a_part_comes_back_within_half_a_step_and_a_step_is_a_power_of_two(largest):
     rng = np.random.default_rng(3)
     parts = (largest * rng.uniform(-1, 1, 4000)).astype(np.float32)
@@ -70,7 +74,10 @@ def datasets():
 @pytest.fixture(scope="module")
 def written(datasets, tmp_path_factory):
     """Both data sets as their stages write them."""
-    return {name: ShardSet(run_stages(made, tmp_path_factory.mktemp(name), "cube")) for name, made in datasets.items()}
+    return {
+        name: ShardSet(run_stages(made, tmp_path_factory.mktemp(name), "cube"))
+        for name, made in datasets.items()
+    }
 
 
 def test_stored_cubes_are_the_exact_ones_within_half_a_step_and_take_half_the_disk(written):
@@ -91,8 +98,11 @@ def test_stored_cubes_are_the_exact_ones_within_half_a_step_and_take_half_the_di
     assert whole.index["bytes"] < 0.55 * exact.index["bytes"]
 
 
-def test_rounded_cubes_are_written_and_made_again_with_equal_bytes(written, datasets, tmp_path, capsys):
-    shards, dataset = written["int16"], datasets["int16"]
+def test_rounded_cubes_are_written_and_made_again_with_equal_bytes(
+    written, datasets, tmp_path, capsys
+):
+    shards = written["int16"]
+    dataset = datasets["int16"]
     assert write_run(dataset, tmp_path, "cube") == shards.index
     numbers = {dataset.key(number): number for number in range(len(dataset))}
     key = shards.keys[5].decode()
@@ -106,8 +116,11 @@ def test_rounded_cubes_are_written_and_made_again_with_equal_bytes(written, data
 
 
 @pytest.mark.parametrize("number", ["complex64", "int16"])
-def test_the_size_that_is_said_is_the_files_size(number, written, datasets, tmp_path, monkeypatch, capsys):
-    dataset, index = datasets[number], written[number].index
+def test_the_size_that_is_said_is_the_files_size(
+    number, written, datasets, tmp_path, monkeypatch, capsys
+):
+    dataset = datasets[number]
+    index = written[number].index
     stated = space.cubes_size(dataset.config, dataset.plan)
     assert stated["samples"] == dataset.plan.samples == index["samples"] == 8
     assert stated["bytes"] == 8 * stated["sample_bytes"] == 8 * sample_bytes(dataset.config)
@@ -117,21 +130,37 @@ def test_the_size_that_is_said_is_the_files_size(number, written, datasets, tmp_
     monkeypatch.setattr(space, "free_bytes", lambda folder: 0)
     (group,), rule = dataset.plan.groups, SimpleNamespace(name="shard")
     chunk = {"group": group, "part": "00000"}
-    jobs = [SimpleNamespace(rule=rule, output=[], wildcards_dict=chunk | {"fold": fold}) for fold in FOLDS]
+    jobs = [
+        SimpleNamespace(rule=rule, output=[], wildcards_dict=chunk | {"fold": fold})
+        for fold in FOLDS
+    ]
     workflow = SimpleNamespace(dag=SimpleNamespace(needrun_jobs=lambda: jobs))
     with pytest.raises(InputError, match=rf"the run will write {stated['bytes'] / 1e6:.1f} MB"):
         space.before(workflow, dataset.plan, dataset.config)
-    each, whole = stated["sample_bytes"] / 1e6, stated["bytes"] / 1e9
+    each = stated["sample_bytes"] / 1e6
+    whole = stated["bytes"] / 1e9
     said = capsys.readouterr().err
-    assert said == f"cube shards: {each:.2f} MB per sample, {whole:.3f} GB in all (8 samples, {number})\n"
+    assert (
+        said
+        == f"cube shards: {each:.2f} MB per sample, {whole:.3f} GB in all (8 samples, {number})\n"
+    )
 
 
 def test_explain_says_the_size_first(tmp_path, capsys):
     overlay = tmp_path / "cube.yaml"
-    overlay.write_text(json.dumps(plain({
-        "run": "cube", "shards": {"kind": "cube", "cells": "int16"}, "targets": {"select": ["DJI Mini 2"]},
-        "motion": {"models": 10, "models_per_chunk": 10}, "noise": {"snr_db": [3, 13]},
-    })))  # fmt: skip
+    overlay.write_text(
+        json.dumps(
+            plain(
+                {
+                    "run": "cube",
+                    "shards": {"kind": "cube", "cells": "int16"},
+                    "targets": {"select": ["DJI Mini 2"]},
+                    "motion": {"models": 10, "models_per_chunk": 10},
+                    "noise": {"snr_db": [3, 13]},
+                }
+            )
+        )
+    )
     assert main(["explain", str(overlay), "--no-table"]) == 0
     assert capsys.readouterr().out.startswith("cube shards: ")
     assert main(["explain", str(overlay), "--no-table", "--json"]) == 0
@@ -140,7 +169,9 @@ def test_explain_says_the_size_first(tmp_path, capsys):
 
 
 def test_cubes_with_companions_have_a_card_that_types_their_truth(tmp_path):
-    config = scene(None) | {"effects": {"companions": {"subtypes": ["DJI Mini 2"], "count": [0, 2], "spread_m": 9.0}}}
+    config = scene(None) | {
+        "effects": {"companions": {"subtypes": ["DJI Mini 2"], "count": [0, 2], "spread_m": 9.0}}
+    }
     dataset = Dataset(config)
     write_run(dataset, tmp_path, "cube")
     (tmp_path / "config.yaml").write_text(json.dumps({"run": "company"}))

@@ -1,4 +1,6 @@
-"""Samples made on the spot are those that the stages write: bytes, numbering, workers, samples without end."""
+"""Samples made on the spot are those that the stages write: bytes, numbering, workers, samples
+without end.
+"""
 
 import itertools
 import json
@@ -47,7 +49,8 @@ def dataset():
 
 def run_stages(dataset: Dataset, folder: Path, kind: str) -> Path:
     """Run the stages' own commands over a whole small data set; return the index."""
-    config, plan = dataset.config, dataset.plan
+    config = dataset.config
+    plan = dataset.plan
     stations = list(config["network"]["stations"])
     for name, cloud in dataset.clouds.items():
         write_cloud(folder / "clouds" / f"{slug(name)}.npz", cloud)
@@ -58,28 +61,77 @@ def run_stages(dataset: Dataset, folder: Path, kind: str) -> Path:
         places = [place["position_m"][:2] for place in config["network"]["stations"].values()]
         kept = {key: config["motion"][key] for key in ("region", "height_m", "tilt_deg", "cadence")}
         published = {name: dataset.published[name] for name in plan.groups[group]}
-        block = canonical({"seed": config["seed"], "masts_m": places, "motion": kept, "published": published})
+        block = canonical(
+            {"seed": config["seed"], "masts_m": places, "motion": kept, "published": published}
+        )
         table, noisy, drawn = (str(folder / f"{chunk}{end}") for end in (".csv", ".npy", ".npz"))
         first, count = plan.span(chunk)
-        motion(["--settings", block, "--clouds", *clouds, "--group", group, "--first", str(first), "--count",
-                str(count), "--out", table])  # fmt: skip
+        motion(
+            [
+                "--settings",
+                block,
+                "--clouds",
+                *clouds,
+                "--group",
+                group,
+                "--first",
+                str(first),
+                "--count",
+                str(count),
+                "--out",
+                table,
+            ]
+        )
         heard = [str(folder / f"{chunk}-{station}.npy") for station in stations]
         block = canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]})
-        echo(["--settings", block, "--motion", table, "--clouds", *clouds, "--station", *stations, "--out", *heard])
-        block = canonical({"seed": config["seed"], "stations": stations, "snr_db": config["noise"]["snr_db"]})
+        echo(
+            [
+                "--settings",
+                block,
+                "--motion",
+                table,
+                "--clouds",
+                *clouds,
+                "--station",
+                *stations,
+                "--out",
+                *heard,
+            ]
+        )
+        block = canonical(
+            {"seed": config["seed"], "stations": stations, "snr_db": config["noise"]["snr_db"]}
+        )
         noise(["--settings", block, "--motion", table, "--echoes", *heard, "--out", noisy])
         render = {key: config[key] for key in ("network", "spectra", "images")}
         tiles(["--settings", canonical(render), "--signals", noisy, "--out", drawn])
         block = {key: config[key] for key in ("seed", "network", "split")}
         block |= {"snr_db": config["noise"]["snr_db"], "shards": {**config["shards"], "kind": kind}}
         for name in plan.folds(chunk):
-            written.append(str(folder / "shards" / f"{group}-{name}-{chunk.rpartition('-')[2]}.tar"))
-            given = ["--echoes", *heard] if kind == "recipe" else ["--signals", noisy, "--tiles", drawn]
+            written.append(
+                str(folder / "shards" / f"{group}-{name}-{chunk.rpartition('-')[2]}.tar")
+            )
+            given = (
+                ["--echoes", *heard] if kind == "recipe" else ["--signals", noisy, "--tiles", drawn]
+            )
             if kind == "cube":
                 given += ["--clouds", *clouds]
-                block |= {"echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}}
-            shards(["write", "--settings", canonical(block), "--motion", table, *given, "--fold", name,
-                    "--out", written[-1]])  # fmt: skip
+                block |= {
+                    "echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
+                }
+            shards(
+                [
+                    "write",
+                    "--settings",
+                    canonical(block),
+                    "--motion",
+                    table,
+                    *given,
+                    "--fold",
+                    name,
+                    "--out",
+                    written[-1],
+                ]
+            )
     render |= {"echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}}
     index = folder / "shards" / "index.json"
     shards(["index", "--settings", canonical(render), "--shards", *written, "--out", str(index)])
@@ -98,7 +150,9 @@ def test_every_sample_has_the_bytes_of_its_shard(dataset, index):
     for number in range(len(dataset)):
         place = numbers[dataset.key(number)]
         assert dataset.members(number, stored.kind) == stored.members(place)
-        assert dataset.record(number) == {key: value for key, value in stored.record(place).items() if key != "cube"}
+        assert dataset.record(number) == {
+            key: value for key, value in stored.record(place).items() if key != "cube"
+        }
         assert dataset.labels[number] == stored.labels[place]
 
 
@@ -106,7 +160,9 @@ def test_a_whole_data_set_is_written_without_the_workflow(dataset, index, tmp_pa
     found = write_run(dataset, tmp_path, ShardSet(index).kind)
     assert found == json.loads(index.read_text())
     for path in sorted(tmp_path.rglob("*.tar")) + sorted(tmp_path.rglob("clouds/*.npz")):
-        assert path.read_bytes() == (index.parent.parent / path.relative_to(tmp_path)).read_bytes(), path.name
+        assert (
+            path.read_bytes() == (index.parent.parent / path.relative_to(tmp_path)).read_bytes()
+        ), path.name
 
 
 def test_a_stored_sample_is_made_again_and_another_is_told(index, tmp_path, capsys):
@@ -145,8 +201,12 @@ def test_samples_to_make_again_are_drawn_and_an_index_must_say_how(index):
 def test_folds_and_groups_choose_samples(dataset, index):
     chosen = Dataset(configuration(), dataset.clouds, groups=["seen"], folds=["train", "test"])
     stored = ShardSet(index, groups=["seen"], folds=["train", "test"])
-    assert sorted(chosen.key(number) for number in range(len(chosen))) == sorted(k.decode() for k in stored.keys)
-    with pytest.raises(IndexError, match=rf"sample {len(chosen)}: expected 0 to {len(chosen) - 1}$"):
+    assert sorted(chosen.key(number) for number in range(len(chosen))) == sorted(
+        k.decode() for k in stored.keys
+    )
+    with pytest.raises(
+        IndexError, match=rf"sample {len(chosen)}: expected 0 to {len(chosen) - 1}$"
+    ):
         chosen[len(chosen)]
     with pytest.raises(InputError, match="folds"):
         Dataset(configuration(), dataset.clouds, folds=["training"])
@@ -164,7 +224,10 @@ def test_image_signal_and_record_belong_together(dataset):
 def test_torch_loads_samples_in_workers(dataset):
     torch = pytest.importorskip("torch")
     loader = torch.utils.data.DataLoader(
-        torch.utils.data.Subset(dataset, range(4)), num_workers=2, batch_size=None, multiprocessing_context="fork"
+        torch.utils.data.Subset(dataset, range(4)),
+        num_workers=2,
+        batch_size=None,
+        multiprocessing_context="fork",
     )
     for number, sample in enumerate(loader):
         assert (np.asarray(sample.signal) == dataset.signal(number)).all()
@@ -173,8 +236,13 @@ def test_torch_loads_samples_in_workers(dataset):
 
 
 def test_samples_without_end_are_new_and_parts_share_them(dataset):
-    parts = [list(itertools.islice(Endless(dataset, part=part, parts=2).places(), 12)) for part in range(2)]
-    assert {place.model for place in parts[0]} == {4, 6} and {place.model for place in parts[1]} == {5, 7}
+    parts = [
+        list(itertools.islice(Endless(dataset, part=part, parts=2).places(), 12))
+        for part in range(2)
+    ]
+    assert {place.model for place in parts[0]} == {4, 6} and {
+        place.model for place in parts[1]
+    } == {5, 7}
     known = {dataset.key(number) for number in range(len(dataset))}
     sample = next(iter(Endless(dataset)))
     assert sample.record["key"] not in known and sample.record["model"] == 4
@@ -191,7 +259,9 @@ def test_samples_without_end_are_new_and_parts_share_them(dataset):
 def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
     from lowalt.scene.__main__ import main as effects
 
-    config = configuration(effects={"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}})
+    config = configuration(
+        effects={"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}}
+    )
     config["echo"] = {**config["echo"], "tolerance": 1e-3}
     scene = Dataset(config, dataset.clouds, groups=["unseen"])
     place = scene.place(0)
@@ -200,15 +270,48 @@ def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
     from lowalt.motion import write_table
 
     write_table(tmp_path / "motion.csv", [scene.row(place)])
-    block = {"seed": config["seed"], "network": config["network"], "tolerance": 1e-3, "effects": config["effects"]}
+    block = {
+        "seed": config["seed"],
+        "network": config["network"],
+        "tolerance": 1e-3,
+        "effects": config["effects"],
+    }
     stations = list(config["network"]["stations"])
-    out, power = ([str(tmp_path / f"{name}{end}.npy") for name in stations] for end in ("", "-power"))
-    effects(["--settings", canonical(block), "--motion", str(tmp_path / "motion.csv"), "--clouds", str(cloud),
-             "--station", *stations, "--out", *out, "--power", *power])  # fmt: skip
+    out, power = (
+        [str(tmp_path / f"{name}{end}.npy") for name in stations] for end in ("", "-power")
+    )
+    effects(
+        [
+            "--settings",
+            canonical(block),
+            "--motion",
+            str(tmp_path / "motion.csv"),
+            "--clouds",
+            str(cloud),
+            "--station",
+            *stations,
+            "--out",
+            *out,
+            "--power",
+            *power,
+        ]
+    )
     snrs = canonical({"seed": config["seed"], "stations": stations, "snr_db": [3, math.inf]})
     assert settings(snrs)
-    noise(["--settings", snrs, "--motion", str(tmp_path / "motion.csv"), "--echoes", *out, "--powers", *power,
-           "--out", str(tmp_path / "noisy.npy")])  # fmt: skip
+    noise(
+        [
+            "--settings",
+            snrs,
+            "--motion",
+            str(tmp_path / "motion.csv"),
+            "--echoes",
+            *out,
+            "--powers",
+            *power,
+            "--out",
+            str(tmp_path / "noisy.npy"),
+        ]
+    )
     expected = np.load(tmp_path / "noisy.npy")[0]
     assert (scene.signal(0) == expected[0]).all() and (scene.signal(1) == expected[1]).all()
 
@@ -220,21 +323,32 @@ def test_a_sample_with_noise_in_all_cells_is_the_same_whatever_was_made_before(d
     assert (first == again).all() and (first != scenes[0].signal(0)).any()
 
 
-def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(dataset, tmp_path, capsys):
+def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(
+    dataset, tmp_path, capsys
+):
     config = configuration(effects={"occlusion": {}})
     config["targets"]["select"] = ["DJI Mini 2"]
     config["motion"] |= {"models": 4, "models_per_chunk": 4}
     config["noise"] = {"snr_db": [13]}
     record = records_of(config["targets"], None)["DJI Mini 2"]
     surfaces = occluders.make(record, None, config["seed"])
-    scene = Dataset(config, dataset.clouds, occluders={"DJI Mini 2": surfaces | {"subtype": "DJI Mini 2"}})
+    scene = Dataset(
+        config, dataset.clouds, occluders={"DJI Mini 2": surfaces | {"subtype": "DJI Mini 2"}}
+    )
     write_run(scene, tmp_path, "signal")
-    index, key = str(tmp_path / "shards/index.json"), scene.key(0)
-    assert lowalt_command(["remake", index, key]) == 2 and "has no surfaces" in capsys.readouterr().err
+    index = str(tmp_path / "shards/index.json")
+    key = scene.key(0)
+    assert (
+        lowalt_command(["remake", index, key]) == 2 and "has no surfaces" in capsys.readouterr().err
+    )
     occluders.write(tmp_path / "occluders/dji-mini-2.npz", surfaces, "DJI Mini 2")
     (tmp_path / "config.yaml").write_text(json.dumps({"run": "hidden"}))
     card.write(index, tmp_path / "config.yaml")
-    assert lowalt_command(["remake", index, key]) == lowalt_command(["verify", index, "--remake", "1"]) == 0
+    assert (
+        lowalt_command(["remake", index, key])
+        == lowalt_command(["verify", index, "--remake", "1"])
+        == 0
+    )
     (tmp_path / "occluders").rename(tmp_path / "elsewhere")
     assert lowalt_command(["remake", index, key]) == 2
     capsys.readouterr()
@@ -247,8 +361,11 @@ def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(d
 
 
 def test_a_cloud_is_made_once_and_when_a_sample_of_its_target_is_asked_for(monkeypatch):
-    made, whole = [], make.make
-    monkeypatch.setattr(make, "make", lambda record, *rest: made.append(record["subtype"]) or whole(record, *rest))
+    made = []
+    whole = make.make
+    monkeypatch.setattr(
+        make, "make", lambda record, *rest: made.append(record["subtype"]) or whole(record, *rest)
+    )
     samples = Dataset(configuration())
     assert len(samples.clouds) == 3 and not made
     asked = [samples[0].record["subtype"] for _ in range(2)]

@@ -20,9 +20,12 @@ def test_a_scene_that_hides_points_is_made_with_the_surfaces_that_its_run_would_
     config = config_of("DJI Mini 2", "Walking Pedestrian 5", occlusion={})
     records = records_of(config["targets"], None)
     for number, name in enumerate(config["targets"]["select"]):
-        occluders.write(tmp_path / f"{number}.npz", occluders.make(records[name], None, config["seed"]), name)
+        occluders.write(
+            tmp_path / f"{number}.npz", occluders.make(records[name], None, config["seed"]), name
+        )
     given = Dataset(config, occluders=occluders.read_all(sorted(tmp_path.glob("*.npz"))))
-    made, open_sky = Dataset(config), Dataset(config_of("DJI Mini 2", "Walking Pedestrian 5"))
+    made = Dataset(config)
+    open_sky = Dataset(config_of("DJI Mini 2", "Walking Pedestrian 5"))
     for number in range(0, len(made), 3):
         np.testing.assert_array_equal(made.signal(number), given.signal(number))
         assert not np.array_equal(made.signal(number), open_sky.signal(number))

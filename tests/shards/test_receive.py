@@ -1,4 +1,6 @@
-"""The raw echo of a target: equal to the data set's, its axes read back out of the signal, its files, its refusals."""
+"""The raw echo of a target: equal to the data set's, its axes read back out of the signal, its
+files, its refusals.
+"""
 
 import warnings
 
@@ -12,7 +14,8 @@ from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.files.errors import InputError
 from lowalt.shards import receive as module
 
-CAR, DRONE = "AITO M9 2024", "DJI Mini 2"
+CAR = "AITO M9 2024"
+DRONE = "DJI Mini 2"
 SMALL = {"network": {"symbols": 64, "subcarriers": 64}, "targets": {"select": [CAR, DRONE]}}
 FMCW = {
     "subcarriers": None,
@@ -45,10 +48,16 @@ def test_the_places_of_the_chain_follow_from_one_another_and_end_in_the_data_set
     found = {at: lowalt.receive(scene, CAR, 4, "B", at) for at in module.AT}
     assert {echo.values.shape for at, echo in found.items() if at != "signal"} == {(64, 64)}
     cells = np.asarray(found["cells"])
-    assert abs(cells - np.fft.ifft(found["receiver"].values, axis=1)).max() < 1e-12 * abs(cells).max()
+    assert (
+        abs(cells - np.fft.ifft(found["receiver"].values, axis=1)).max() < 1e-12 * abs(cells).max()
+    )
     # A mean canceller takes the mean over the symbols out; the faults are the receiver's.
-    assert abs(found["canceller"].values - cells + cells.mean(axis=0)).max() < 1e-9 * abs(cells).max()
-    assert abs(found["receiver"].values - found["subcarriers"].values).max() > 0.01 * abs(cells).max()
+    assert (
+        abs(found["canceller"].values - cells + cells.mean(axis=0)).max() < 1e-9 * abs(cells).max()
+    )
+    assert (
+        abs(found["receiver"].values - found["subcarriers"].values).max() > 0.01 * abs(cells).max()
+    )
     signal = scene.maker.signal(scene.row(scene.place_of(CAR, 4, np.inf)), np.inf, [1])[1]
     assert (found["signal"].values.astype(np.complex64) == signal).all()
     there = abs(found["canceller"].values).argmax(axis=1)
@@ -58,10 +67,15 @@ def test_the_places_of_the_chain_follow_from_one_another_and_end_in_the_data_set
 def test_noise_of_a_set_snr_is_the_data_set_s_and_white_before_the_cells_are_chosen(plain):
     row = plain.row(plain.place_of(CAR, 1, 3.0))
     signal = plain.maker.signal(row, 3.0)
-    assert (lowalt.receive(plain, CAR, 1, at="signal", snr_db=3.0).values.astype(np.complex64) == signal[0]).all()
+    assert (
+        lowalt.receive(plain, CAR, 1, at="signal", snr_db=3.0).values.astype(np.complex64)
+        == signal[0]
+    ).all()
     cube = plain.maker.cubes(row, 3.0, signal)[0].cells
     assert (lowalt.receive(plain, CAR, 1, at="canceller", snr_db=3.0).values == cube).all()
-    clean, noisy = (lowalt.receive(plain, CAR, 1, at="receiver", snr_db=snr).values for snr in (np.inf, 3.0))
+    clean, noisy = (
+        lowalt.receive(plain, CAR, 1, at="receiver", snr_db=snr).values for snr in (np.inf, 3.0)
+    )
     chosen = lowalt.receive(plain, CAR, 1, at="signal").values
     # M subcarriers of M times the noise of a range cell.
     level = np.mean(abs(noisy - clean) ** 2) / 64
@@ -80,13 +94,18 @@ def test_a_range_doppler_map_on_the_echo_s_axes_peaks_at_the_observed_truth(netw
     assert abs(echo.speeds_mps[speed] - echo.truth["observed_mps"].mean()) < 1.5 * step
     apart = cell - echo.truth["observed_cell"].mean()
     assert abs(apart - 64 * np.rint(apart / 64)) < 2
-    assert echo.ranges_m[1] == pytest.approx(SPEED_OF_LIGHT / (2 * 64 * (120e3 if network is not FMCW else 100e6 / 64)))
+    assert echo.ranges_m[1] == pytest.approx(
+        SPEED_OF_LIGHT / (2 * 64 * (120e3 if network is not FMCW else 100e6 / 64))
+    )
 
 
 def test_phases_over_frequencies_and_symbols_are_those_of_the_stated_signs(plain):
     echo = lowalt.receive(plain, CAR, 2, at="subcarriers")
-    y, delay_s = echo.values, 2 * echo.truth["range_m"] / SPEED_OF_LIGHT
-    step = np.angle((y[:, 1:] * y[:, :-1].conj()).sum(axis=1) * np.exp(2j * np.pi * 120e3 * delay_s))
+    y = echo.values
+    delay_s = 2 * echo.truth["range_m"] / SPEED_OF_LIGHT
+    step = np.angle(
+        (y[:, 1:] * y[:, :-1].conj()).sum(axis=1) * np.exp(2j * np.pi * 120e3 * delay_s)
+    )
     # The car's points are up to 3 m from its middle, so within 3 m x 4 pi df / c.
     assert abs(step).max() < 4 * np.pi * 120e3 / SPEED_OF_LIGHT * 3
     middle_hz = echo.frequencies_hz.mean()
@@ -104,14 +123,19 @@ def test_a_continuous_wave_has_one_subcarrier(plain):
 
 def test_parts_move_with_the_target_and_rotors_no_faster_than_their_tips(plain):
     echo = lowalt.receive(plain, DRONE, 3)
-    row, truth = plain.row(plain.place_of(DRONE, 3, np.inf)), echo.truth
-    body, rotors = echo.parts.index("body"), [n for n, name in enumerate(echo.parts) if name != "body"]
-    low, high = truth["part_low_mps"], truth["part_high_mps"]
+    row = plain.row(plain.place_of(DRONE, 3, np.inf))
+    truth = echo.truth
+    body = echo.parts.index("body")
+    rotors = [n for n, name in enumerate(echo.parts) if name != "body"]
+    low = truth["part_low_mps"]
+    high = truth["part_high_mps"]
     # A rigid body flies straight, and its parts' ranges change by their speeds.
     moved = np.gradient(truth["part_range_m"][:, body], echo.times_s)
     assert ((low[:, body] - 1e-3 < moved) & (moved < high[:, body] + 1e-3)).all()
     np.testing.assert_allclose((low + high)[:, rotors].mean() / 2, moved.mean(), atol=0.5)
-    rates = np.array([value for name, value in row.items() if name.startswith("rate") and value > 0])
+    rates = np.array(
+        [value for name, value in row.items() if name.startswith("rate") and value > 0]
+    )
     tip_mps = np.pi * 0.109 * 0.2192 / 0.213 * rates.max()
     assert 0.3 * tip_mps < (high - low)[:, rotors].max() / 2 < 1.1 * tip_mps
 
@@ -120,7 +144,9 @@ def test_layers_may_be_dicts_and_a_bandwidth_stands_for_subcarriers():
     config = overlaid([{"network": {"bandwidth_hz": "9.6e6"}}])
     assert config["network"]["subcarriers"] == 80 and "bandwidth_hz" not in config["network"]
     assert overlaid([config])["network"]["subcarriers"] == 80
-    with pytest.raises(InputError, match=r"network.bandwidth_hz: 1 is 0 subcarriers, expected 1 to 100000"):
+    with pytest.raises(
+        InputError, match=r"network.bandwidth_hz: 1 is 0 subcarriers, expected 1 to 100000"
+    ):
         overlaid([{"network": {"bandwidth_hz": 1}}])
     with pytest.raises(InputError, match=r"network.bandwidth_hz.*of OFDM only"):
         overlaid(["config/scenes/fmcw.yaml", {"network": {"bandwidth_hz": 1e6}}])
@@ -138,22 +164,32 @@ def test_speeds_that_fold_are_named_with_an_interval_at_which_none_does():
 
 
 def test_ranges_that_fold_are_named_with_a_value_at_which_none_does():
-    overlay = {"network": {"waveform": {"kind": "fmcw", "sweep_hz": 150e6, "sweep_s": 2e-3, "samples": 128}}}
+    overlay = {
+        "network": {
+            "waveform": {"kind": "fmcw", "sweep_hz": 150e6, "sweep_s": 2e-3, "samples": 128}
+        }
+    }
     with pytest.warns(UserWarning) as caught:
         echo = lowalt.receive(overlay, "Crow", 0, "A", "cells")
     said = next(str(one.message) for one in caught if "ranges" in str(one.message))
-    # The warning points at the user's line, and holds: the crow's echo stands in a cell nearer than the crow is.
+    # The warning points at the user's line, and holds: the crow's echo stands in a cell nearer than
+    # the crow is.
     assert {one.filename for one in caught} == {__file__}
     assert said.startswith("ranges beyond 127.9 m fold, targets are up to 500 m from a station")
     assert echo.truth["range_m"][0] > 400 > 127.9 > echo.ranges_m[abs(echo.values[0]).argmax()]
     none = int(said.split(", at ")[1].split()[0])
     for samples, folds in ((none, False), (none - 1, True)):
         overlay["network"]["waveform"]["samples"] = samples
-        assert bool(Network.from_settings(overlaid([overlay])["network"]).range_folding(None)) == folds
+        assert (
+            bool(Network.from_settings(overlaid([overlay])["network"]).range_folding(None)) == folds
+        )
     ofdm = overlaid([{"network": {"subcarrier_spacing_hz": 400e3}}])["network"]
     spacing = float(Network.from_settings(ofdm).range_folding(None).split(", at ")[1].split()[0])
     for hertz, folds in ((spacing, False), (spacing + 1, True)):
-        assert bool(Network.from_settings(ofdm | {"subcarrier_spacing_hz": hertz}).range_folding(None)) == folds
+        assert (
+            bool(Network.from_settings(ofdm | {"subcarrier_spacing_hz": hertz}).range_folding(None))
+            == folds
+        )
     near = Network.from_settings(ofdm).range_folding([[200, 100], [300, 100], [250, 200]])
     assert near == "", "a region inside 375 m of every mast"
 
@@ -161,7 +197,19 @@ def test_ranges_that_fold_are_named_with_a_value_at_which_none_does():
 def test_the_command_writes_every_array_by_name(tmp_path, capsys):
     small = tmp_path / "small.yaml"
     small.write_text("network: {symbols: 64, subcarriers: 64}\n")
-    line = ["sample", CAR, "2", "--raw", "receiver", "--station", "C", "--overlay", str(small), "--out", str(tmp_path)]
+    line = [
+        "sample",
+        CAR,
+        "2",
+        "--raw",
+        "receiver",
+        "--station",
+        "C",
+        "--overlay",
+        str(small),
+        "--out",
+        str(tmp_path),
+    ]
     assert main(line) == 0
     files = [tmp_path / f"aito-m9-2024-000002-snrinf-C-receiver.{kind}" for kind in ("npz", "h5")]
     assert capsys.readouterr().out.split() == list(map(str, files))
@@ -177,13 +225,17 @@ def test_the_command_writes_every_array_by_name(tmp_path, capsys):
 
 
 def test_wrong_words_are_refused(plain):
-    with pytest.raises(InputError, match=r"at is 'range', expected one of \['subcarriers', 'receiver'"):
+    with pytest.raises(
+        InputError, match=r"at is 'range', expected one of \['subcarriers', 'receiver'"
+    ):
         lowalt.receive(plain, CAR, at="range")
     with pytest.raises(InputError, match="model is -1, expected a whole number from 0"):
         lowalt.receive(plain, CAR, -1)
     with pytest.raises(InputError, match="subtype is 'Crow', expected one of"):
         lowalt.receive(plain, "Crow")
-    with pytest.raises(InputError, match=r"station 'D': not in the network, which has \['A', 'B', 'C'\]"):
+    with pytest.raises(
+        InputError, match=r"station 'D': not in the network, which has \['A', 'B', 'C'\]"
+    ):
         lowalt.receive(plain, CAR, station="D")
     with pytest.raises(InputError, match=r"expected perhaps \['Crow'\]"):
         lowalt.receive({}, "Krow")

@@ -39,7 +39,9 @@ def test_tar_bytes_are_those_of_webdatasets_writer(images):
     buffer = io.BytesIO()
     writer = webdataset.TarWriter(buffer, encoder=False, mtime=0)
     for sample in webdataset.WebDataset(str(path), shardshuffle=False):
-        writer.write({name: value for name, value in sample.items() if name in ("__key__", "json", "png")})
+        writer.write(
+            {name: value for name, value in sample.items() if name in ("__key__", "json", "png")}
+        )
     writer.close()
     assert path.read_bytes() == buffer.getvalue()
 
@@ -56,13 +58,20 @@ def test_every_sample_stands_once_in_the_fold_that_is_its_own(images):
     found = []
     for group in TARGETS:
         for name in ("train", "val", "test"):
-            for sample in webdataset.WebDataset(str(images / f"{group}-{name}-00000.tar"), shardshuffle=False):
+            for sample in webdataset.WebDataset(
+                str(images / f"{group}-{name}-00000.tar"), shardshuffle=False
+            ):
                 entry = json.loads(sample["json"])
                 found.append((entry["subtype"], entry["model"], row_of(entry)[1]))
                 assert sample["__key__"] == entry["key"] and "." not in entry["key"]
                 assert entry["fold"] == name == fold(SPLIT, SEED, entry["subtype"], entry["model"])
                 assert entry["group"] == group
-    expected = [(row["subtype"], row["model"], float(snr)) for g in TARGETS for row in motion_rows(g) for snr in SNRS]
+    expected = [
+        (row["subtype"], row["model"], float(snr))
+        for g in TARGETS
+        for row in motion_rows(g)
+        for snr in SNRS
+    ]
     assert sorted(found) == sorted(expected)
 
 
@@ -73,8 +82,24 @@ def test_order_depends_on_names_alone(images, tmp_path):
     np.save(tmp_path / "seen.npy", noisy)
     write_table(tmp_path / "seen.csv", rows[::-1])
     block = {**json.loads(write_settings("signal")), "snr_db": ["inf", 8, 3]}
-    inputs = ["--motion", f"{tmp_path}/seen.csv", "--signals", f"{tmp_path}/seen.npy", "--fold", "train"]
-    main(["write", "--settings", json.dumps(block), *inputs, "--out", f"{tmp_path}/seen-train-00000.tar"])
+    inputs = [
+        "--motion",
+        f"{tmp_path}/seen.csv",
+        "--signals",
+        f"{tmp_path}/seen.npy",
+        "--fold",
+        "train",
+    ]
+    main(
+        [
+            "write",
+            "--settings",
+            json.dumps(block),
+            *inputs,
+            "--out",
+            f"{tmp_path}/seen-train-00000.tar",
+        ]
+    )
     before = map_samples(images / "seen-train-00000.npz")["key"].tolist()
     after = map_samples(tmp_path / "seen-train-00000.npz")["key"].tolist()
     assert [key for key in after if not key.endswith(b"snr008")] == before
@@ -125,7 +150,11 @@ def test_wrong_input_is_refused_by_name(images, tmp_path, tmp_path_factory):
         ({}, [*inputs, "--tiles", f"{images}/unseen.tiles.npz", *out], "unseen.tiles.npz"),
         ({}, [*inputs, *tiles, "--fold", "trial", "--out", f"{tmp_path}/x.tar"], "trial"),
         # The images of two SNRs for one.
-        ({"snr_db": [3]}, [*inputs[:2], "--signals", str(one), *tiles, *out], "16 images, expected 8"),
+        (
+            {"snr_db": [3]},
+            [*inputs[:2], "--signals", str(one), *tiles, *out],
+            "16 images, expected 8",
+        ),
     ]:
         with pytest.raises(InputError, match=named):
             main(["write", "--settings", json.dumps({**block, **change}), *given])
@@ -141,8 +170,12 @@ def test_stations_and_views_are_selected_alike_from_both_kinds(images, signals):
         shards = ShardSet(folder / "index.json")
         whole = shards.images(3)
         np.testing.assert_array_equal(shards.images(3, stations=["B"]), whole[3:6])
-        np.testing.assert_array_equal(shards.images(3, stations=["C", "A"], views=["vt"]), whole[[8, 2]])
-        np.testing.assert_array_equal(shards.images(3, size=64, views=["trp"]), resize(whole[[1, 4, 7]], 64))
+        np.testing.assert_array_equal(
+            shards.images(3, stations=["C", "A"], views=["vt"]), whole[[8, 2]]
+        )
+        np.testing.assert_array_equal(
+            shards.images(3, size=64, views=["trp"]), resize(whole[[1, 4, 7]], 64)
+        )
         assert shards.images(3, size=224).shape == (9, 224, 224)
         with pytest.raises(InputError, match="'D'"):
             shards.images(3, stations=["D"])
@@ -154,7 +187,8 @@ def test_a_sample_takes_the_promised_space(images, signals):
         promised = sample_bytes({**index["render"], "shards": {"kind": kind}})
         found = map_samples(folder / "seen-train-00000.npz")["size"].mean()
         assert found <= 1.3 * promised and promised <= 1.3 * found
-    # Two headers, a record, and 128 bytes before three stations' 401 numbers of 8 bytes, filled up to whole blocks.
+    # Two headers, a record, and 128 bytes before three stations' 401 numbers of 8 bytes, filled up
+    # to whole blocks.
     block = {"network": {**NETWORK, "symbols": 401}, "noise": {"snr_db": [3, 8, 13, math.inf]}}
     assert sample_bytes({**block, "shards": {"kind": "signal"}}) == 2 * 512 + 2048 + 20 * 512
     assert sample_bytes({**block, "shards": {"kind": "recipe"}}) == (2 * 512 + 2048 + 20 * 512) // 4
@@ -162,19 +196,28 @@ def test_a_sample_takes_the_promised_space(images, signals):
 
 @pytest.mark.parametrize("kind", ["signal", "recipe"])
 def test_a_fold_in_several_shards_holds_each_sample_once_and_every_class_in_each(kind, tmp_path):
-    rows, network = motion_rows("seen", 24), Network.from_settings(NETWORK)
-    samples = ChunkSamples(rows, [3.0, math.inf], {"by": "motion", "train": 1, "val": 0, "test": 0}, 7, network)
+    rows = motion_rows("seen", 24)
+    network = Network.from_settings(NETWORK)
+    samples = ChunkSamples(
+        rows, [3.0, math.inf], {"by": "motion", "train": 1, "val": 0, "test": 0}, 7, network
+    )
     data = npy(np.ones((3, 400), np.complex64))
-    whole = write_shard(tmp_path / "whole.tar", samples, "train", kind, lambda number, level: (data, {}))
+    whole = write_shard(
+        tmp_path / "whole.tar", samples, "train", kind, lambda number, level: (data, {})
+    )
     tables = []
     for number in range(3):
         path = tmp_path / f"part{number}.tar"
         write_shard(path, samples, "train", kind, lambda number, level: (data, {}), (number, 3))
         tables.append(map_samples(table_path(path)))
     keys = np.concatenate([table["key"] for table in tables])
-    assert len(keys) == whole["samples"] and set(keys) == set(map_samples(tmp_path / "whole.npz")["key"])
+    assert len(keys) == whole["samples"] and set(keys) == set(
+        map_samples(tmp_path / "whole.npz")["key"]
+    )
     assert {len(table) for table in tables} == {whole["samples"] // 3}
-    assert all(set(table["label"]) == set(map_samples(tmp_path / "whole.npz")["label"]) for table in tables)
+    assert all(
+        set(table["label"]) == set(map_samples(tmp_path / "whole.npz")["label"]) for table in tables
+    )
     # All SNRs of a motion model lie in one shard.
     models = [{key.rpartition(b"-")[0] for key in table["key"].tolist()} for table in tables]
     assert sum(map(len, models)) == len(set().union(*models))

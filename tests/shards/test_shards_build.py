@@ -1,8 +1,10 @@
-"""Configuration and clouds make a whole data set again elsewhere, byte for byte; what a path names is checked."""
+"""Configuration and clouds make a whole data set again elsewhere, byte for byte; what a path names
+is checked.
+"""
 
 import pytest
 import yaml
-from test_dataset import configuration, dataset  # noqa: F401
+from test_dataset import configuration
 
 from dataset import build as small
 from dataset import publish
@@ -14,7 +16,7 @@ from lowalt.shards.build import main, write_run
 from lowalt.shards.dataset import Dataset
 
 
-def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monkeypatch, capsys):  # noqa: F811
+def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monkeypatch, capsys):
     run = tmp_path / "run"
     write_run(dataset, run, "image")
     manifest.main(["write", "--run", str(run), "--manifest", str(tmp_path / "run.sha256")])
@@ -33,12 +35,18 @@ def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monk
 
 
 def test_a_run_s_data_set_opens_in_a_folder_without_its_tables(tmp_path, monkeypatch):
-    config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
+    config = load(
+        ["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml"
+    )
     assert config["targets"]["table"] == "config/targets.csv"
     here = Dataset(config, tmp_path)
     monkeypatch.chdir(tmp_path)
     there = Dataset(config, tmp_path)
-    assert there.config == config and there.published == here.published and len(there) == len(here) == 160
+    assert (
+        there.config == config
+        and there.published == here.published
+        and len(there) == len(here) == 160
+    )
 
 
 def test_a_configuration_that_a_path_names_is_checked_as_that_of_a_run(tmp_path):
@@ -46,7 +54,10 @@ def test_a_configuration_that_a_path_names_is_checked_as_that_of_a_run(tmp_path)
     path.write_text(yaml.safe_dump(configuration()))
     assert Dataset(path).config["seed"] == configuration()["seed"]
     path.write_text(yaml.safe_dump(configuration(seed="x")))
-    for opened in (lambda: Dataset(path), lambda: main(["--config", str(path), "--out", str(tmp_path / "none")])):
+    for opened in (
+        lambda: Dataset(path),
+        lambda: main(["--config", str(path), "--out", str(tmp_path / "none")]),
+    ):
         with pytest.raises(InputError, match="seed: value 'x', expected type integer"):
             opened()
 

@@ -1,4 +1,6 @@
-"""The data card: its counts are those of the shards, and its description of them can be loaded by others."""
+"""The data card: its counts are those of the shards, and its description of them can be loaded by
+others.
+"""
 
 import csv
 import hashlib
@@ -36,7 +38,12 @@ def test_card_has_counts_configuration_and_versions(published):
     text = (published / "README.md").read_text()
     front = yaml.safe_load(text.split("---")[1])
     assert front["pretty_name"] == "lowalt-trial" and front["license"] == "mit"
-    for row in ("| seen | train | 8 |", "| unseen | test | 2 |", "| Bird | Crow | seen | 8 |", "| inf | 12 |"):
+    for row in (
+        "| seen | train | 8 |",
+        "| unseen | test | 2 |",
+        "| Bird | Crow | seen | 8 |",
+        "| inf | 12 |",
+    ):
         assert row in text
     assert yaml.safe_load(text.split("```yaml")[1].split("```")[0]) == CONFIG
     versions = ShardSet(published / "index.json").record(0)["versions"]
@@ -47,18 +54,27 @@ def test_card_has_counts_configuration_and_versions(published):
         assert word in text
 
 
-@pytest.mark.parametrize(("run", "name", "version"), [
-    ("trial", "lowalt-trial", "0.2.0"), ("lowalt-40-v1", "lowalt-40-v1", "1.0.0"),
-    ("lowalt-40-v12", "lowalt-40-v12", "12.0.0"), ("trial-v2", "lowalt-trial-v2", "0.2.0"),
-])  # fmt: skip
-def test_only_a_frozen_run_gives_its_data_set_a_version_and_a_card_with_rules(published, tmp_path, run, name, version):
+@pytest.mark.parametrize(
+    ("run", "name", "version"),
+    [
+        ("trial", "lowalt-trial", "0.2.0"),
+        ("lowalt-40-v1", "lowalt-40-v1", "1.0.0"),
+        ("lowalt-40-v12", "lowalt-40-v12", "12.0.0"),
+        ("trial-v2", "lowalt-trial-v2", "0.2.0"),
+    ],
+)
+def test_only_a_frozen_run_gives_its_data_set_a_version_and_a_card_with_rules(
+    published, tmp_path, run, name, version
+):
     folder = shutil.copytree(published, tmp_path / "shards")
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(CONFIG | {"run": run}))
     main(["--index", str(folder / "index.json"), "--config", str(tmp_path / "config.yaml")])
     described = json.loads((folder / "croissant.json").read_text())
     assert (described["name"], described["version"]) == (name, version)
     card_text = (folder / "README.md").read_text()
-    assert f"# {name}\n" in card_text and f"lowalt\n{lowalt.__version__} wrote this page" in card_text
+    assert (
+        f"# {name}\n" in card_text and f"lowalt\n{lowalt.__version__} wrote this page" in card_text
+    )
     assert ("docs/benchmark-rules.md" in card_text) == (version != "0.2.0")
 
 
@@ -80,7 +96,9 @@ def test_samples_are_all_listed(published):
 
 def test_checksums_of_the_description_are_right(published):
     files = [
-        node for node in json.loads((published / "croissant.json").read_text())["distribution"] if "sha256" in node
+        node
+        for node in json.loads((published / "croissant.json").read_text())["distribution"]
+        if "sha256" in node
     ]
     assert len(files) == 7
     for node in files:
@@ -92,15 +110,29 @@ def test_checksums_of_the_description_are_right(published):
 def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):
     """Two stations and one spectrum: tiles of one column and two rows."""
     stations = {name: RENDER["network"]["stations"][name] for name in "AB"}
-    render = {"network": RENDER["network"] | {"stations": stations}, "spectra": {"trp": RENDER["spectra"]["trp"]},
-              "images": RENDER["images"]}  # fmt: skip
-    entry = {"name": "seen-train-0.tar", "path": "seen-train-0.tar", "sha256": "0", "bytes": 1, "samples": 1,
-             "group": "seen", "fold": "train"}  # fmt: skip
+    render = {
+        "network": RENDER["network"] | {"stations": stations},
+        "spectra": {"trp": RENDER["spectra"]["trp"]},
+        "images": RENDER["images"],
+    }
+    entry = {
+        "name": "seen-train-0.tar",
+        "path": "seen-train-0.tar",
+        "sha256": "0",
+        "bytes": 1,
+        "samples": 1,
+        "group": "seen",
+        "fold": "train",
+    }
     index = {"kind": "image", "shards": [entry], "render": render}
     found = metadata(index, {"path": "samples.csv", "bytes": 1, "sha256": "0"}, {})
     (images,) = [entry for entry in found["distribution"] if entry["name"] == "images"]
-    assert images["description"] == "256 x 512 palette PNG of every sample: rows are stations, columns TRP."
-    rows, network = [motion_rows("seen")[0] | {"fold": "train"}], Network.from_settings(render["network"])
+    assert (
+        images["description"]
+        == "256 x 512 palette PNG of every sample: rows are stations, columns TRP."
+    )
+    rows = [motion_rows("seen")[0] | {"fold": "train"}]
+    network = Network.from_settings(render["network"])
     chunk = ChunkSamples(rows, [3.0], SPLIT, SEED, network)
     write_shard(tmp_path / "seen-train-0.tar", chunk, "train", "image", lambda *_: (b"", {}))
     index_of([tmp_path / "seen-train-0.tar"], render, tmp_path / "index.json")
@@ -112,21 +144,40 @@ def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):
 
 def test_the_licence_asked_for_stands_in_every_file_and_another_is_refused(published, tmp_path):
     copy = shutil.copytree(published, tmp_path / "copy")
-    main(["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml"), "--license", "CC-BY-4.0"])
-    assert "CC-BY-4.0 (https://creativecommons.org/licenses/by/4.0/)" in (copy / "README.md").read_text()
-    assert yaml.safe_load((copy / "README.md").read_text().split("---")[1])["license"] == "cc-by-4.0"
+    main(
+        [
+            "--index",
+            str(copy / "index.json"),
+            "--config",
+            str(copy / "config.yaml"),
+            "--license",
+            "CC-BY-4.0",
+        ]
+    )
     assert (
-        json.loads((copy / "croissant.json").read_text())["license"] == "https://creativecommons.org/licenses/by/4.0/"
+        "CC-BY-4.0 (https://creativecommons.org/licenses/by/4.0/)"
+        in (copy / "README.md").read_text()
+    )
+    assert (
+        yaml.safe_load((copy / "README.md").read_text().split("---")[1])["license"] == "cc-by-4.0"
+    )
+    assert (
+        json.loads((copy / "croissant.json").read_text())["license"]
+        == "https://creativecommons.org/licenses/by/4.0/"
     )
     before = (copy / "README.md").read_bytes()
-    with pytest.raises(InputError, match=r"--license: 'WTFPL', expected one of \['CC-BY-4.0', 'MIT'\]"):
+    with pytest.raises(
+        InputError, match=r"--license: 'WTFPL', expected one of \['CC-BY-4.0', 'MIT'\]"
+    ):
         card.write(copy / "index.json", copy / "config.yaml", "WTFPL")
     assert (copy / "README.md").read_bytes() == before
 
 
 def test_equal_data_sets_have_equal_cards(published, tmp_path):
     copy = shutil.copytree(published, tmp_path / "copy")
-    before = {name: (copy / name).read_bytes() for name in ("README.md", "samples.csv", "croissant.json")}
+    before = {
+        name: (copy / name).read_bytes() for name in ("README.md", "samples.csv", "croissant.json")
+    }
     arguments = ["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml")]
     main([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
     assert before == {name: (copy / name).read_bytes() for name in before}

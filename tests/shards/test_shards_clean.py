@@ -1,4 +1,6 @@
-"""Recipe shards: clean echoes once a motion model, read as the signal shards whose samples they stand for."""
+"""Recipe shards: clean echoes once a motion model, read as the signal shards whose samples they
+stand for.
+"""
 
 import json
 import math
@@ -36,7 +38,12 @@ def recipes(tmp_path_factory):
 @pytest.fixture(scope="module")
 def published(recipes, tmp_path_factory):
     folder = build(tmp_path_factory.mktemp("published") / "shards", "recipe", inputs=False)
-    arguments = ["--index", str(folder / "index.json"), "--config", str(recipes.parent / "config.yaml")]
+    arguments = [
+        "--index",
+        str(folder / "index.json"),
+        "--config",
+        str(recipes.parent / "config.yaml"),
+    ]
     card([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
     return folder
 
@@ -55,18 +62,41 @@ def noised(recipes):
         np.save(folder / f"{group}.npy", noisy_signals(echoes, rows, STATIONS, [3.0, np.inf], SEED))
         for fold in ("train", "val", "test"):
             shards.append(str(folder / f"{group}-{fold}-00000.tar"))
-            settings = json.dumps({**{k: CONFIG[k] for k in ("seed", "network", "split")}, "snr_db": SNRS,
-                                   "shards": {"kind": "signal"}})  # fmt: skip
-            main(["write", "--settings", settings, "--motion", str(recipes / f"{group}.csv"), "--signals",
-                  str(folder / f"{group}.npy"), "--fold", fold, "--out", shards[-1]])  # fmt: skip
+            settings = json.dumps(
+                {
+                    **{k: CONFIG[k] for k in ("seed", "network", "split")},
+                    "snr_db": SNRS,
+                    "shards": {"kind": "signal"},
+                }
+            )
+            main(
+                [
+                    "write",
+                    "--settings",
+                    settings,
+                    "--motion",
+                    str(recipes / f"{group}.csv"),
+                    "--signals",
+                    str(folder / f"{group}.npy"),
+                    "--fold",
+                    fold,
+                    "--out",
+                    shards[-1],
+                ]
+            )
     render = json.dumps({name: CONFIG[name] for name in ("network", "spectra", "images")})
     main(["index", "--settings", render, "--shards", *shards, "--out", str(folder / "index.json")])
     return folder
 
 
 def test_every_sample_is_the_one_of_the_signal_shards_under_the_same_number(recipes, noised):
-    found, expected = ShardSet(recipes / "index.json"), ShardSet(noised / "index.json")
-    assert (found.keys == expected.keys).all() and (found.snrs_db == expected.snrs_db).all() and len(found) == 24
+    found = ShardSet(recipes / "index.json")
+    expected = ShardSet(noised / "index.json")
+    assert (
+        (found.keys == expected.keys).all()
+        and (found.snrs_db == expected.snrs_db).all()
+        and len(found) == 24
+    )
     for number in range(len(found)):
         assert found.members(number) == expected.members(number)
         assert found.record(number) == expected.record(number)
@@ -82,10 +112,15 @@ def test_each_motion_model_is_stored_once(recipes, noised):
         names = archive.getnames()
     rows = map_samples(recipes / "seen-train-00000.npz")
     models = {key.decode().rpartition("-snr")[0] for key in rows["key"].tolist()}
-    assert sorted(names) == sorted(f"{model}{end}" for model in models for end in (".clean.npy", ".json"))
+    assert sorted(names) == sorted(
+        f"{model}{end}" for model in models for end in (".clean.npy", ".json")
+    )
     # A quarter of a signal shard's bytes would be four SNRs; two SNRs share each echo here.
     sizes = [ShardSet(folder / "index.json").index["shards"] for folder in (recipes, noised)]
-    whole = [sum(rows["size"].astype(float)) for rows in (rows, map_samples(noised / "seen-train-00000.npz"))]
+    whole = [
+        sum(rows["size"].astype(float))
+        for rows in (rows, map_samples(noised / "seen-train-00000.npz"))
+    ]
     stored = sum({int(row["offset"]): int(row["size"]) for row in rows}.values())
     assert whole[0] == 2 * stored and stored == pytest.approx(whole[1] / 2, rel=0.02)
     assert sum(entry["samples"] for entry in sizes[0]) == 24
@@ -94,7 +129,8 @@ def test_each_motion_model_is_stored_once(recipes, noised):
 def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
     from dataset import motion_rows
 
-    rows, split = motion_rows("unseen"), {"by": "sample", "train": 2, "val": 1, "test": 1}
+    rows = motion_rows("unseen")
+    split = {"by": "sample", "train": 2, "val": 1, "test": 1}
     echoes = np.ones((3, 400), np.complex64)
     network = Network.from_settings(NETWORK)
     seen = []
@@ -114,18 +150,27 @@ def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
     from dataset import motion_rows
 
     rows = [row | {"fold": "train"} for row in motion_rows("unseen", 1)]
-    echoes, powers = np.full((3, 1, 400), 1 + 1j, np.complex64), np.array([[1e-3], [2.0], [0.0]])
-    split, network = {"by": "motion", "train": 1, "val": 1, "test": 1}, Network.from_settings(NETWORK)
+    echoes = np.full((3, 1, 400), 1 + 1j, np.complex64)
+    powers = np.array([[1e-3], [2.0], [0.0]])
+    split = {"by": "motion", "train": 1, "val": 1, "test": 1}
+    network = Network.from_settings(NETWORK)
     write_shard(
-        tmp_path / "unseen-train-00000.tar", ChunkSamples(rows, [3.0], split, 3, network, powers=powers), "train",
-        "recipe", lambda *_: (npy(echoes[:, 0]), {}),
-    )  # fmt: skip
+        tmp_path / "unseen-train-00000.tar",
+        ChunkSamples(rows, [3.0], split, 3, network, powers=powers),
+        "train",
+        "recipe",
+        lambda *_: (npy(echoes[:, 0]), {}),
+    )
     with tarfile.open(tmp_path / "unseen-train-00000.tar") as archive:
         name = next(name for name in archive.getnames() if name.endswith(".json"))
         entry = json.load(archive.extractfile(name))
     expected = noisy_signals(echoes, rows, STATIONS, [3.0], 3, powers)[0, 0]
     found = clean.noisy(entry, echoes[:, 0], STATIONS, 3.0)
-    assert (found == expected).all() and (found[2] == 1 + 1j).all() and found[1].std() > found[0].std() > 0
+    assert (
+        (found == expected).all()
+        and (found[2] == 1 + 1j).all()
+        and found[1].std() > found[0].std() > 0
+    )
     assert clean.POWER not in json.loads(clean.unpacked(entry, 3.0))
     with pytest.raises(InputError, match="expected 8"):
         clean.unpacked(entry, 8.0)
@@ -137,7 +182,10 @@ def test_a_scene_with_a_canceller_gives_the_samples_of_its_signal_shards(tmp_pat
     from lowalt.shards.build import write_run
     from lowalt.shards.dataset import Dataset
 
-    effects = {"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}, "canceller": {"kind": "mean"}}
+    effects = {
+        "ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16},
+        "canceller": {"kind": "mean"},
+    }
     config = configuration(effects=effects)
     config["echo"] = {**config["echo"], "tolerance": 1e-3}
     config["targets"] = {**config["targets"], "select": ["Owl"]}
@@ -145,8 +193,12 @@ def test_a_scene_with_a_canceller_gives_the_samples_of_its_signal_shards(tmp_pat
     scene = Dataset(config)
     for kind in ("signal", "recipe"):
         write_run(scene, tmp_path / kind, kind)
-    stored, packed = (ShardSet(tmp_path / kind / "shards" / "index.json") for kind in ("signal", "recipe"))
-    assert len(stored) == 8 and [stored.members(n) for n in range(8)] == [packed.members(n) for n in range(8)]
+    stored, packed = (
+        ShardSet(tmp_path / kind / "shards" / "index.json") for kind in ("signal", "recipe")
+    )
+    assert len(stored) == 8 and [stored.members(n) for n in range(8)] == [
+        packed.members(n) for n in range(8)
+    ]
     with pytest.raises(InputError, match="cell_noise"):
         clean.refuse({"cell_noise": {}})
     clean.refuse(effects)
@@ -158,17 +210,21 @@ def test_damage_is_named_with_every_sample_that_it_reaches(published, tmp_path):
     folder = shutil.copytree(published, tmp_path / "copy")
     assert list(faults(folder / "index.json")) == []
     rows = map_samples(folder / "seen-train-00000.npz")
-    path, row = folder / "seen-train-00000.tar", rows[-1]
+    path = folder / "seen-train-00000.tar"
+    row = rows[-1]
     # The table's last sample belongs to a model that is not the last in the archive.
     assert row["offset"] < rows["offset"].max()
     data = bytearray(path.read_bytes())
     data[int(row["data_offset"]) + 200] ^= 1
     path.write_bytes(data)
-    lines = [line for line in faults(folder / "index.json") if path.name in line and "sample" in line]
+    lines = [
+        line for line in faults(folder / "index.json") if path.name in line and "sample" in line
+    ]
     assert not [line for line in faults(folder / "index.json") if "archive" in line]
     model = row["key"].decode().rpartition("-snr")[0]
     assert sorted(lines) == [
-        f"{path.name}: sample {model}-{level} is damaged (SHA-256 differs)" for level in ("snr003", "snrinf")
+        f"{path.name}: sample {model}-{level} is damaged (SHA-256 differs)"
+        for level in ("snr003", "snrinf")
     ]
     with pytest.raises(InputError, match=model):
         shards = ShardSet(folder / "index.json", ["seen"], ["train"])
@@ -203,28 +259,51 @@ def test_the_hubs_library_reads_clean_echoes_by_the_card(published, tmp_path, mo
 
 def test_card_croissant_and_sigmf_tell_of_recipes(published, noised, tmp_path, mlcroissant):
     text = (published / "README.md").read_text()
-    assert "KEY.clean.npy" in text and "lowalt.shards.clean.samples" in text and "{" not in text.split("```")[0]
+    assert (
+        "KEY.clean.npy" in text
+        and "lowalt.shards.clean.samples" in text
+        and "{" not in text.split("```")[0]
+    )
     data = mlcroissant.Dataset(str(published / "croissant.json"))
     assert not data.metadata.issues.errors and not data.metadata.issues.warnings
     assert len(list(data.records("samples"))) == 24
     for folder in (published, noised):
         sigmf(["--index", str(folder / "index.json"), "--out", str(tmp_path / folder.name)])
     for name in STATIONS:
-        pair = [(tmp_path / folder.name / f"{name}.sigmf-data").read_bytes() for folder in (published, noised)]
+        pair = [
+            (tmp_path / folder.name / f"{name}.sigmf-data").read_bytes()
+            for folder in (published, noised)
+        ]
         assert pair[0] == pair[1]
 
 
 def test_a_missing_file_of_echoes_is_named(recipes, tmp_path):
-    settings = json.dumps({**{k: CONFIG[k] for k in ("seed", "network", "split")}, "snr_db": SNRS,
-                           "shards": {"kind": "recipe"}})  # fmt: skip
-    arguments = ["write", "--settings", settings, "--motion", str(recipes / "seen.csv"), "--fold", "train",
-                 "--out", str(tmp_path / "seen-train-00000.tar")]  # fmt: skip
+    settings = json.dumps(
+        {
+            **{k: CONFIG[k] for k in ("seed", "network", "split")},
+            "snr_db": SNRS,
+            "shards": {"kind": "recipe"},
+        }
+    )
+    arguments = [
+        "write",
+        "--settings",
+        settings,
+        "--motion",
+        str(recipes / "seen.csv"),
+        "--fold",
+        "train",
+        "--out",
+        str(tmp_path / "seen-train-00000.tar"),
+    ]
     paths = [str(recipes / f"seen.{name}.npy") for name in STATIONS]
     other = str(recipes / "unseen.A.npy")
     for given, message in (
-        ([], "--echoes: missing"), (["--echoes", *paths[:2]], "2 files"), (["--echoes", *paths[:2], other], "unseen"),
+        ([], "--echoes: missing"),
+        (["--echoes", *paths[:2]], "2 files"),
+        (["--echoes", *paths[:2], other], "unseen"),
         (["--echoes", *paths, "--powers", *paths], "--powers: shape"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InputError, match=message):
             main([*arguments, *given])
     assert not list(tmp_path.iterdir())

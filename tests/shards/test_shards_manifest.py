@@ -8,7 +8,13 @@ from lowalt.files.errors import InputError
 from lowalt.shards import manifest
 
 SUM = "0123456789abcdef" * 4
-FILES = ("clouds/a.npz", "motion/seen-00000.csv", "echo/A/seen-00000.npy", "noisy/seen-00000.npy", "shards/index.json")
+FILES = (
+    "clouds/a.npz",
+    "motion/seen-00000.csv",
+    "echo/A/seen-00000.npy",
+    "noisy/seen-00000.npy",
+    "shards/index.json",
+)
 
 
 @pytest.fixture
@@ -43,13 +49,17 @@ def test_a_line_without_a_whole_checksum_and_a_stage_s_file_is_named(tmp_path, l
     assert manifest.read(path) == {"clouds/b.npz": SUM}
 
 
-def test_stages_that_left_no_files_are_passed_over_where_they_are_named_alone(tmp_path, options, capsys):
+def test_stages_that_left_no_files_are_passed_over_where_they_are_named_alone(
+    tmp_path, options, capsys
+):
     for name in FILES[2:4]:
         (tmp_path / "run" / name).unlink()
     manifest.main(["check", *options, "--without", "echo", "noise"])
     assert "all 5 files are equal" in capsys.readouterr().out
-    for without, missing in ((["echo"], [f"noise: {FILES[3]} is missing"]), ([], [
-        f"echo: {FILES[2]} is missing", f"noise: {FILES[3]} is missing"])):  # fmt: skip
+    for without, missing in (
+        (["echo"], [f"noise: {FILES[3]} is missing"]),
+        ([], [f"echo: {FILES[2]} is missing", f"noise: {FILES[3]} is missing"]),
+    ):
         with pytest.raises(SystemExit, match="1"):
             manifest.main(["check", *options, "--without", *without])
         assert capsys.readouterr().out.splitlines() == missing
@@ -60,7 +70,9 @@ def test_stages_that_left_no_files_are_passed_over_where_they_are_named_alone(tm
     assert capsys.readouterr().out.splitlines() == [f"noise: {FILES[3]} differs"]
 
 
-def test_faults_are_told_in_the_order_of_the_stages_and_the_first_stage_by_its_name(tmp_path, options, capsys):
+def test_faults_are_told_in_the_order_of_the_stages_and_the_first_stage_by_its_name(
+    tmp_path, options, capsys
+):
     manifest.main(["check", *options])
     assert "all 5 files are equal" in capsys.readouterr().out
     (tmp_path / "run" / FILES[3]).write_text("other")
@@ -70,26 +82,35 @@ def test_faults_are_told_in_the_order_of_the_stages_and_the_first_stage_by_its_n
         manifest.main(["check", *options])
     said = capsys.readouterr()
     assert said.out.splitlines() == [
-        "motion: motion/unseen-00000.csv is not in the manifest", f"noise: {FILES[3]} differs",
-        f"shards: {FILES[4]} is missing"]  # fmt: skip
+        "motion: motion/unseen-00000.csv is not in the manifest",
+        f"noise: {FILES[3]} differs",
+        f"shards: {FILES[4]} is missing",
+    ]
     assert said.err.strip() == "first stage that differs: motion"
     with pytest.raises(InputError, match="folder of a run"):
         manifest.text(tmp_path / "nowhere")
 
 
-def test_a_manifest_by_groups_has_the_checksums_of_sha256sum_and_notices_each_change(tmp_path, options, capsys):
+def test_a_manifest_by_groups_has_the_checksums_of_sha256sum_and_notices_each_change(
+    tmp_path, options, capsys
+):
     run = tmp_path / "run"
-    for name in ("clouds/b.npz", "motion/seen-00001.csv", "shards/seen-train-00000.tar", "shards/seen-train-00001.tar"):
+    for name in (
+        "clouds/b.npz",
+        "motion/seen-00001.csv",
+        "shards/seen-train-00000.tar",
+        "shards/seen-train-00001.tar",
+    ):
         (run / name).parent.mkdir(exist_ok=True)
         (run / name).write_text(name)
     manifest.main(["write", *options, "--by-groups"])
-    groups = (
-        "clouds/*.npz motion/seen-*.csv echo/A/seen-*.npy noisy/seen-*.npy shards/seen-train-*.tar shards/index.json"
-    )
+    groups = "clouds/*.npz motion/seen-*.csv echo/A/seen-*.npy noisy/seen-*.npy shards/seen-train-*.tar shards/index.json"
     assert list(manifest.read(tmp_path / "run.sha256")) == groups.split()
     for pattern, digest in manifest.read(tmp_path / "run.sha256").items():
         again = "| sha256sum" if "*" in pattern else ""
-        told = subprocess.run(f"sha256sum {pattern} {again}", shell=True, cwd=run, capture_output=True, text=True)
+        told = subprocess.run(
+            f"sha256sum {pattern} {again}", shell=True, cwd=run, capture_output=True, text=True
+        )
         assert told.stdout.split()[0] == digest, pattern
     manifest.main(["check", *options])
     assert "all 6 groups are equal" in capsys.readouterr().out
@@ -99,5 +120,7 @@ def test_a_manifest_by_groups_has_the_checksums_of_sha256sum_and_notices_each_ch
     with pytest.raises(SystemExit):
         manifest.main(["check", *options])
     assert capsys.readouterr().out.splitlines() == [
-        "motion: motion/seen-*.csv differs", "noise: noisy/unseen-00000.npy is not in the manifest",
-        "shards: shards/seen-train-*.tar differs"]  # fmt: skip
+        "motion: motion/seen-*.csv differs",
+        "noise: noisy/unseen-00000.npy is not in the manifest",
+        "shards: shards/seen-train-*.tar differs",
+    ]

@@ -12,7 +12,14 @@ from dataset import SEED, motion_rows
 from forks import printed
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.shards.sample_record import DATA_VERSION, geometry, record, row_of, sample_key, snr_label
+from lowalt.shards.sample_record import (
+    DATA_VERSION,
+    geometry,
+    record,
+    row_of,
+    sample_key,
+    snr_label,
+)
 from lowalt.shards.tar import Writer
 from pictures import NETWORK
 
@@ -23,14 +30,21 @@ def test_record_tells_motion_geometry_and_versions():
     network = Network.from_settings(NETWORK)
     entry = json.loads(record(row, math.inf, "val", SEED, network))
     assert entry["key"] == "dji-mavic-3-000000-snrinf"
-    assert (entry["label"], entry["category"], entry["snr_db"], entry["noise"]) == (0, "UAV", math.inf, False)
+    assert (entry["label"], entry["category"], entry["snr_db"], entry["noise"]) == (
+        0,
+        "UAV",
+        math.inf,
+        False,
+    )
     assert entry["motion"]["rate_hz"] == row["rate_hz"] and entry["motion"]["phase_0_rad"] == 0.0
     assert entry["seed"] == SEED
     seen = entry["geometry"]["A"]
     # Station A stands at (0, 0, 25): range 50 m, level, receding at 5 m/s.
     assert seen["range_m"] == 50 and seen["omega"] == 0
     assert seen["radial_mps"] == pytest.approx(5)
-    assert seen["psi"] == pytest.approx(-math.sin(math.radians(30)) * 0.6 + math.cos(math.radians(30)) * 0.8)
+    assert seen["psi"] == pytest.approx(
+        -math.sin(math.radians(30)) * 0.6 + math.cos(math.radians(30)) * 0.8
+    )
     assert entry["versions"] == {"lowalt": DATA_VERSION}
 
 
@@ -51,13 +65,21 @@ print(record(motion_rows("seen")[0], 3.0, "val", 1, Network.from_settings(NETWOR
 
 def types(value):
     """The tree of a record's types, a leaf for each value."""
-    return {name: types(item) for name, item in value.items()} if isinstance(value, dict) else type(value)
+    return (
+        {name: types(item) for name, item in value.items()}
+        if isinstance(value, dict)
+        else type(value)
+    )
 
 
 def test_every_field_has_one_type_in_all_records():
     network = Network.from_settings(NETWORK)
     rows = [*motion_rows("seen"), *motion_rows("unseen")]
-    trees = [types(json.loads(record(row, snr, "val", SEED, network))) for row in rows for snr in (3, 3.5, math.inf)]
+    trees = [
+        types(json.loads(record(row, snr, "val", SEED, network)))
+        for row in rows
+        for snr in (3, 3.5, math.inf)
+    ]
     assert all(tree == trees[0] for tree in trees)
     assert type(None) not in trees[0]["motion"].values()
 
@@ -76,18 +98,30 @@ def test_a_record_tells_row_and_snr_back():
 def test_geometry_above_a_station_is_finite():
     row = {**motion_rows("seen")[0], "x_m": 0.0, "y_m": 0.0, "z_m": 25.0}
     assert geometry(row, Network.from_settings(NETWORK))["A"] == {
-        "range_m": 0.0, "psi": 0.0, "omega": 0.0, "radial_mps": 0.0,
-    }  # fmt: skip
+        "range_m": 0.0,
+        "psi": 0.0,
+        "omega": 0.0,
+        "radial_mps": 0.0,
+    }
 
 
 def test_a_link_sees_the_mean_range_and_speed_of_both_stations_and_its_receiver_s_direction():
-    """From 40 m above and 30 m before a station, seen by another one 90 m further off at the same height."""
-    seen = {"position_m": (0.0, 0.0, 0.0), "horizontal": (1.0, 0.0, 0.0), "transmitter": None, "name": "A"}
+    """From 40 m above and 30 m before a station, seen by another one 90 m further off at the same
+    height.
+    """
+    seen = {
+        "position_m": (0.0, 0.0, 0.0),
+        "horizontal": (1.0, 0.0, 0.0),
+        "transmitter": None,
+        "name": "A",
+    }
     sender = SimpleNamespace(**seen | {"position_m": (30.0, 0.0, -50.0)})
     receiver = SimpleNamespace(**seen | {"transmitter": sender})
     row = dict(x_m=30.0, y_m=0.0, z_m=40.0, vx_mps=0.0, vy_mps=0.0, vz_mps=5.0)
     found = geometry(row, SimpleNamespace(stations=[receiver]))["A"]
-    assert found == pytest.approx({"range_m": (50 + 90) / 2, "psi": 0.6, "omega": 0.8, "radial_mps": (4 + 5) / 2})
+    assert found == pytest.approx(
+        {"range_m": (50 + 90) / 2, "psi": 0.6, "omega": 0.8, "radial_mps": (4 + 5) / 2}
+    )
 
 
 def test_a_target_of_unknown_place_has_nulls_where_numbers_would_stand():
@@ -117,7 +151,8 @@ def test_keys_are_unique_and_without_dots():
 @pytest.mark.parametrize("samples", [0, 1, 2, 3])
 def test_an_archive_ends_with_two_empty_blocks_at_a_whole_record(samples):
     """As plain tarfile fills it up, whatever it holds."""
-    file, plain = io.BytesIO(), io.BytesIO()
+    file = io.BytesIO()
+    plain = io.BytesIO()
     writer = Writer(file)
     for number in range(samples):
         writer.add(f"k{number}", b"{}", "png", bytes(1000 * number))

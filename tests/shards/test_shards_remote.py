@@ -1,4 +1,6 @@
-"""A data set on a web server: the same samples by byte ranges alone, the same checks, and refusals in one sentence."""
+"""A data set on a web server: the same samples by byte ranges alone, the same checks, and refusals
+in one sentence.
+"""
 
 import contextlib
 import json
@@ -61,23 +63,40 @@ def test_workers_that_are_forked_after_the_first_sample_do_not_share_its_connect
                 return shards.signal(number).copy()
 
         loader = torch.utils.data.DataLoader(
-            Signals(), sampler=range(len(disk)), num_workers=2, batch_size=None, multiprocessing_context="fork"
+            Signals(),
+            sampler=range(len(disk)),
+            num_workers=2,
+            batch_size=None,
+            multiprocessing_context="fork",
         )
         for number, found in enumerate(loader):
             assert (np.asarray(found) == disk.signal(number)).all()
         assert server.connections == 3
 
 
-@pytest.mark.parametrize(("name", "answer", "words"), [
-    ("index.json", (404, {}), r"index\.json: the server answers 404 \(Not Found\)$"),
-    ("index.json", (200, {}), "sends whole files only, expected one that sends byte ranges$"),
-    ("index.json", (302, {"Location": "file:///etc/passwd"}), "cannot be read .*file:///etc/passwd"),
-    ("index.json", (302, {"Location": "/index.json"}), "cannot be read .*redirects"),
-    ("seen-test-00000.npz", (404, {}), r"/seen-test-00000\.npz: the server answers 404"),
-    ("seen-test-00000.tar", (416, {}), r"/seen-test-00000\.tar: the server answers 416"),
-    ("seen-test-00000.tar", (403, {}), r"/seen-test-00000\.tar: the server answers 403 \(Forbidden\)$"),
-])  # fmt: skip
-def test_a_server_that_cannot_give_the_bytes_is_refused_by_address_and_answer(folder, name, answer, words):
+@pytest.mark.parametrize(
+    ("name", "answer", "words"),
+    [
+        ("index.json", (404, {}), r"index\.json: the server answers 404 \(Not Found\)$"),
+        ("index.json", (200, {}), "sends whole files only, expected one that sends byte ranges$"),
+        (
+            "index.json",
+            (302, {"Location": "file:///etc/passwd"}),
+            "cannot be read .*file:///etc/passwd",
+        ),
+        ("index.json", (302, {"Location": "/index.json"}), "cannot be read .*redirects"),
+        ("seen-test-00000.npz", (404, {}), r"/seen-test-00000\.npz: the server answers 404"),
+        ("seen-test-00000.tar", (416, {}), r"/seen-test-00000\.tar: the server answers 416"),
+        (
+            "seen-test-00000.tar",
+            (403, {}),
+            r"/seen-test-00000\.tar: the server answers 403 \(Forbidden\)$",
+        ),
+    ],
+)
+def test_a_server_that_cannot_give_the_bytes_is_refused_by_address_and_answer(
+    folder, name, answer, words
+):
     with serving(folder, {name: answer}) as server, pytest.raises(InputError, match=words) as found:
         ShardSet(f"{server.address}/index.json", folds=["test"]).signal(0)
     assert str(found.value).startswith(f"{server.address}/{name}: ")
@@ -94,10 +113,15 @@ def test_a_server_of_https_may_not_lead_to_one_of_http(monkeypatch):
     class Answer(contextlib.nullcontext):
         """What a session returns after it has followed a redirect."""
 
-        url, status_code = "http://host/index.json", 206
+        url = "http://host/index.json"
+        status_code = 206
 
-    monkeypatch.setattr(remote, "_session", lambda process: SimpleNamespace(get=lambda *_, **__: Answer(Answer())))
-    with pytest.raises(InputError, match=r"^https://host/index\.json: the server leads to http://host/index\.json"):
+    monkeypatch.setattr(
+        remote, "_session", lambda process: SimpleNamespace(get=lambda *_, **__: Answer(Answer()))
+    )
+    with pytest.raises(
+        InputError, match=r"^https://host/index\.json: the server leads to http://host/index\.json"
+    ):
         ShardSet("https://host/index.json")
 
 
@@ -108,7 +132,9 @@ def test_damage_is_found_as_on_disk(folder, tmp_path):
     damaged(copy / "seen-test-00000.npz", -300)
     with serving(copy) as server:
         address = f"{server.address}/index.json"
-        with pytest.raises(InputError, match=rf"sample {row['key'].decode()} is damaged \(SHA-256 differs\)"):
+        with pytest.raises(
+            InputError, match=rf"sample {row['key'].decode()} is damaged \(SHA-256 differs\)"
+        ):
             ShardSet(address, ["seen"], ["val"]).signal(0)
         with pytest.raises(InputError, match=r"seen-test-00000\.npz: "):
             ShardSet(address, ["seen"], ["test"]).signal(0)
@@ -122,21 +148,30 @@ def test_damage_is_found_as_on_disk(folder, tmp_path):
             ShardSet(address)
 
 
-@pytest.mark.parametrize("name", ["http://{host}/other.tar", "//{host}/other.tar", "other.tar?a#b", "%2e%2e/other.tar"])
+@pytest.mark.parametrize(
+    "name", ["http://{host}/other.tar", "//{host}/other.tar", "other.tar?a#b", "%2e%2e/other.tar"]
+)
 def test_an_index_leads_to_no_file_but_those_below_its_folder(folder, tmp_path, name):
     """The name is a file's name, whatever it would mean as an address."""
     copy = shutil.copytree(folder, tmp_path / "site/inner")
     shutil.copy(copy / "seen-test-00000.npz", tmp_path / "site/other.npz")
     with serving(tmp_path / "site") as server:
         index = json.loads((copy / "index.json").read_text())
-        index["shards"] = [index["shards"][2] | {"path": name.format(host=server.address.removeprefix("http://"))}]
+        index["shards"] = [
+            index["shards"][2] | {"path": name.format(host=server.address.removeprefix("http://"))}
+        ]
         index["sha256"] = _checksum(index)
         (copy / "index.json").write_text(json.dumps(index))
         with pytest.raises(InputError, match=r"the server answers 404|lies outside"):
             ShardSet(f"{server.address}/inner/index.json").signal(0)
-        assert set(server.sent) <= {"index.json"} | {key for key, sent in server.sent.items() if not sent}
+        assert set(server.sent) <= {"index.json"} | {
+            key for key, sent in server.sent.items() if not sent
+        }
 
 
 def test_the_files_of_an_index_are_asked_for_with_its_query():
     """The query holds the signature of an address that a store has signed."""
-    assert remote.beside("https://host/a/index.json?key=1", "b c.tar") == "https://host/a/b%20c.tar?key=1"
+    assert (
+        remote.beside("https://host/a/index.json?key=1", "b c.tar")
+        == "https://host/a/b%20c.tar?key=1"
+    )

@@ -9,7 +9,8 @@ from dataset import build, publish
 from lowalt.shards import ShardSet
 
 torch = pytest.importorskip("torch")
-NODES, WORKERS = 2, 2
+NODES = 2
+WORKERS = 2
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,12 @@ def hub(tmp_path, monkeypatch):
 
 def loaded(data, **options):
     """Keys that the workers of one node give."""
-    return [str(key) for key in torch.utils.data.DataLoader(data, batch_size=None, num_workers=WORKERS, **options)]
+    return [
+        str(key)
+        for key in torch.utils.data.DataLoader(
+            data, batch_size=None, num_workers=WORKERS, **options
+        )
+    ]
 
 
 def keys_of(folder):
@@ -38,12 +44,15 @@ def keys_of(folder):
 def test_webdataset_gives_each_sample_once_over_nodes_and_workers(folder, monkeypatch):
     import webdataset
 
-    paths, found = sorted(map(str, folder.glob("*.tar"))), []
+    paths = sorted(map(str, folder.glob("*.tar")))
+    found = []
     assert len(paths) >= NODES * WORKERS
     monkeypatch.setenv("WORLD_SIZE", str(NODES))
     for rank in range(NODES):
         monkeypatch.setitem(os.environ, "RANK", str(rank))
-        stream = webdataset.WebDataset(paths, shardshuffle=100, nodesplitter=webdataset.split_by_node, seed=1)
+        stream = webdataset.WebDataset(
+            paths, shardshuffle=100, nodesplitter=webdataset.split_by_node, seed=1
+        )
         found.append(loaded(stream.shuffle(1000).map(lambda sample: sample["__key__"])))
     assert all(found) and sorted(chain(*found)) == keys_of(folder)
 
@@ -52,7 +61,9 @@ def test_the_hubs_library_gives_each_sample_once_over_nodes_and_workers(folder, 
     from datasets.distributed import split_dataset_by_node
 
     paths = sorted(map(str, folder.glob("*.tar")))
-    whole = hub.load_dataset("webdataset", data_files={"train": paths}, split="train", streaming=True)
+    whole = hub.load_dataset(
+        "webdataset", data_files={"train": paths}, split="train", streaming=True
+    )
     found = []
     for rank in range(NODES):
         part = split_dataset_by_node(whole.shuffle(seed=1, buffer_size=1000), rank, NODES)

@@ -1,4 +1,6 @@
-"""What the parts of a data set are held to: one group a shard, a sample once, tables and shards of one length."""
+"""What the parts of a data set are held to: one group a shard, a sample once, tables and shards of
+one length.
+"""
 
 import shutil
 from types import SimpleNamespace
@@ -19,14 +21,19 @@ from lowalt.shards.sample_table import write as write_table
 def folder(tmp_path):
     """Two shards of four samples each, and their index."""
     rows = motion_rows("seen")
-    shards = [pack(tmp_path / "seen-train-0.tar", rows[:4]), pack(tmp_path / "seen-val-0.tar", rows[4:], "val")]
+    shards = [
+        pack(tmp_path / "seen-train-0.tar", rows[:4]),
+        pack(tmp_path / "seen-val-0.tar", rows[4:], "val"),
+    ]
     build(shards, RENDER, tmp_path / "index.json")
     return tmp_path
 
 
 def test_a_chunk_of_two_groups_is_no_shard(tmp_path):
     rows = [motion_rows("seen")[0], motion_rows("unseen")[0]]
-    with pytest.raises(InputError, match=r"x\.tar: .*groups \['seen', 'unseen'\], expected exactly one"):
+    with pytest.raises(
+        InputError, match=r"x\.tar: .*groups \['seen', 'unseen'\], expected exactly one"
+    ):
         pack(tmp_path / "x.tar", rows)
     with pytest.raises(InputError, match=r"groups \[\], expected exactly one"):
         pack(tmp_path / "x.tar", [])
@@ -47,13 +54,16 @@ def test_an_index_refuses_a_shard_of_another_length_than_its_table_says(folder):
     size = path.stat().st_size
     for change in (1, -1):
         path.write_bytes((path.read_bytes() + b"\0")[: size + change])
-        with pytest.raises(InputError, match=rf"seen-val-0\.tar: {size + change} bytes, its table says {size}"):
+        with pytest.raises(
+            InputError, match=rf"seen-val-0\.tar: {size + change} bytes, its table says {size}"
+        ):
             build([path], RENDER, folder / "other.json")
     assert not (folder / "other.json").exists()
 
 
 def test_an_index_has_the_same_bytes_in_whatever_order_settings_and_shards_come(folder):
-    paths, before = [folder / "seen-val-0.tar", folder / "seen-train-0.tar"], (folder / "index.json").read_bytes()
+    paths = [folder / "seen-val-0.tar", folder / "seen-train-0.tar"]
+    before = (folder / "index.json").read_bytes()
     turned = {name: dict(reversed(block.items())) for name, block in reversed(RENDER.items())}
     build(paths, turned, folder / "index.json")
     assert (folder / "index.json").read_bytes() == before
@@ -67,7 +77,9 @@ def test_an_index_refuses_a_name_that_stands_twice(folder):
 
 
 @pytest.mark.parametrize("count", [3, 5])
-def test_a_table_of_another_length_than_the_index_says_is_refused_without_checksums_too(folder, count):
+def test_a_table_of_another_length_than_the_index_says_is_refused_without_checksums_too(
+    folder, count
+):
     path = folder / "seen-val-0.npz"
     rows = map_samples(path)[[0, 1, 2, 3, 3][:count]]
     write_table(path, read_header(path), rows)
@@ -81,26 +93,35 @@ def test_a_table_of_another_length_than_the_index_says_is_refused_without_checks
 def test_a_sample_that_a_cut_shard_ends_in_is_refused_without_checksums_too(folder):
     path = folder / "seen-val-0.tar"
     rows = map_samples(path.with_suffix(".npz"))
-    whole, last = ShardSet(folder / "index.json").signal(7), rows[3]
+    whole = ShardSet(folder / "index.json").signal(7)
+    last = rows[3]
     end = int(last["data_offset"] + last["data_size"])
     data = path.read_bytes()
     path.write_bytes(data[:end])
-    # All bytes of the signal are there, but not those that fill up its block: only a check reads them.
+    # All bytes of the signal are there, but not those that fill up its block: only a check reads
+    # them.
     np.testing.assert_array_equal(ShardSet(folder / "index.json", check=False).signal(7), whole)
     path.write_bytes(data[: end - 1])
     for check in (True, False):
         shards = ShardSet(folder / "index.json", check=check)
         assert shards.signal(6).shape == (3, 400)
-        with pytest.raises(InputError, match=rf"seen-val-0\.tar: sample {last['key'].decode()} is damaged"):
+        with pytest.raises(
+            InputError, match=rf"seen-val-0\.tar: sample {last['key'].decode()} is damaged"
+        ):
             shards.signal(7)
 
 
 def entries(*paths):
-    """What a card takes of shards whose group and fold are the first two words of their names' last parts."""
+    """What a card takes of shards whose group and fold are the first two words of their names' last
+    parts.
+    """
     words = [path.rpartition("/")[2].split("-") for path in paths]
-    return SimpleNamespace(shards=[
-        {"path": path, "group": group, "fold": fold} for path, (group, fold, *_) in zip(paths, words, strict=True)
-    ])  # fmt: skip
+    return SimpleNamespace(
+        shards=[
+            {"path": path, "group": group, "fold": fold}
+            for path, (group, fold, *_) in zip(paths, words, strict=True)
+        ]
+    )
 
 
 def test_a_hub_gets_a_pattern_where_it_matches_a_fold_s_shards_and_their_paths_elsewhere():
@@ -125,5 +146,6 @@ def test_a_data_set_without_unseen_subtypes_has_no_protocol_for_them():
     both = configs(entries("seen-train-0.tar", "seen-test-0.tar", "unseen-val-0.tar"))
     assert [config["config_name"] for config in both] == ["seen", "unseen"]
     assert both[1]["data_files"] == [
-        {"split": "train", "path": ["seen-train-*.tar"]}, {"split": "test", "path": ["unseen-val-*.tar"]}
-    ]  # fmt: skip
+        {"split": "train", "path": ["seen-train-*.tar"]},
+        {"split": "test", "path": ["unseen-val-*.tar"]},
+    ]

@@ -8,7 +8,19 @@ from hypothesis import strategies as st
 import reference_spectra as reference
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.files.errors import InputError
-from lowalt.spectra import NAMES, Fourier, Spectra, Transfer, magnitudes, spectrum, trp, vrp, vt, windows, zero_index
+from lowalt.spectra import (
+    NAMES,
+    Fourier,
+    Spectra,
+    Transfer,
+    magnitudes,
+    spectrum,
+    trp,
+    vrp,
+    vt,
+    windows,
+    zero_index,
+)
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
 
 INTERVAL = 2.5e-3
@@ -26,10 +38,15 @@ def assert_close(found, expected):
     assert np.abs(found - expected).max() <= 1e-10 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize(("symbols", "window", "hop", "points"), [(40, 16, 1, 16), (41, 8, 3, 32), (20, 2, 4, 2)])
+@pytest.mark.parametrize(
+    ("symbols", "window", "hop", "points"), [(40, 16, 1, 16), (41, 8, 3, 32), (20, 2, 4, 2)]
+)
 def test_magnitudes_are_the_definition(symbols, window, hop, points):
     signal = noise(symbols)
-    assert_close(magnitudes(signal, Fourier(window, hop, points)), reference.stft(signal, window, hop, points))
+    assert_close(
+        magnitudes(signal, Fourier(window, hop, points)),
+        reference.stft(signal, window, hop, points),
+    )
 
 
 def test_published_shapes_and_definition_at_published_settings():
@@ -105,15 +122,25 @@ def test_speed_of_a_receding_point_is_read_back(speed):
     station = Station("A", (0.0, 0.0, 10.0), 0.0, CARRIER)
     network = Network(CARRIER, 30e3, 1, 0, INTERVAL, 400, (1, 1), (1, 1), 1.0, (station,))
     first, last = spectrum("vrp").speeds(Spectra()["vrp"], network, station)
-    assert first + (last - first) * vrp(echo)[:, 70].argmax() / 255 == pytest.approx(speed, abs=(first - last) / 510)
+    assert first + (last - first) * vrp(echo)[:, 70].argmax() / 255 == pytest.approx(
+        speed, abs=(first - last) / 510
+    )
     first, last = spectrum("vt").speeds(Spectra()["vt"], network, station)
     assert first + (last - first) * transition.argmin() / 122 == pytest.approx(speed, abs=1e-9)
 
 
 def test_windows_are_one_fewer_than_usual_and_a_signal_without_one_is_refused_by_name():
-    assert [windows(400, 256, 1, "vrp"), windows(400, 8, 1, "trp"), windows(400, 8, 3, "vt")] == [144, 392, 130]
-    refused = ((lambda: vrp(noise(256)), "vrp.*256.*257"), (lambda: trp(noise(8)), "trp"), (
-        lambda: vt(noise(8), CARRIER, INTERVAL), "vt"), (lambda: Spectra().check(256), "vrp"))  # fmt: skip
+    assert [windows(400, 256, 1, "vrp"), windows(400, 8, 1, "trp"), windows(400, 8, 3, "vt")] == [
+        144,
+        392,
+        130,
+    ]
+    refused = (
+        (lambda: vrp(noise(256)), "vrp.*256.*257"),
+        (lambda: trp(noise(8)), "trp"),
+        (lambda: vt(noise(8), CARRIER, INTERVAL), "vt"),
+        (lambda: Spectra().check(256), "vrp"),
+    )
     steps = Spectra(vrp=Fourier(256, 5, 256))
     steps.check(261)
     for call, words in (*refused, (lambda: steps.check(260), "at least 261 symbols")):
@@ -135,13 +162,20 @@ def test_a_signal_that_is_not_finite_is_refused(value):
 BLOCK = {
     "vrp": {"window": 256, "hop": 1, "points": 256},
     "trp": {"window": 8, "hop": 1, "points": 1024},
-    "vt": {"window": 8, "hop": 1, "speed_min_mps": -6.1, "speed_max_mps": 6.1, "speed_step_mps": 0.1},
+    "vt": {
+        "window": 8,
+        "hop": 1,
+        "speed_min_mps": -6.1,
+        "speed_max_mps": 6.1,
+        "speed_step_mps": 0.1,
+    },
 }
 
 
 def test_spectra_stand_in_the_catalogue_s_order_with_their_settings():
     assert [zero_index(name) for name in NAMES] == [0, 0, 128, *[0] * (len(NAMES) - 3)]
-    short, long = Fourier(8, 3, 16), Fourier(64, 2, 128)
+    short = Fourier(8, 3, 16)
+    long = Fourier(64, 2, 128)
     two = Spectra(trp=short, vrp=long)
     assert list(two.items()) == [("vrp", long), ("trp", short)] and len(two) == 2
     assert vrp(noise(400), two).shape == (128, 168) and trp(noise(400), two).shape == (16, 130)

@@ -1,4 +1,6 @@
-"""Spectra at the instants of received symbols: fits by hand, exact lines, and today's bits where sampling is even."""
+"""Spectra at the instants of received symbols: fits by hand, exact lines, and today's bits where
+sampling is even.
+"""
 
 import numpy as np
 import pytest
@@ -10,8 +12,13 @@ from lowalt.tiles import Images, Renderer, join
 from lowalt.tiles.render import normalised
 from pictures import NETWORK, echoes
 
-INTERVAL, CARRIER = 2.5e-3, 4.93192e9
-SETTINGS = {"vrp": Fourier(16, 1, 16), "trp": Fourier(8, 1, 32), "vt": Transfer(8, 1, -6.1, 6.1, 0.7)}
+INTERVAL = 2.5e-3
+CARRIER = 4.93192e9
+SETTINGS = {
+    "vrp": Fourier(16, 1, 16),
+    "trp": Fourier(8, 1, 32),
+    "vt": Transfer(8, 1, -6.1, 6.1, 0.7),
+}
 
 
 def looks(symbols, seed):
@@ -28,7 +35,9 @@ def known(name, signal, late):
 
 
 def fitted(signal, present, times, turns, first, count):
-    """Amplitude of the line of one frequency that fits the received symbols of one window, by the normal equations."""
+    """Amplitude of the line of one frequency that fits the received symbols of one window, by the
+    normal equations.
+    """
     at = [n for n in range(first, first + count) if present[n]]
     if not at:
         return 0.0
@@ -38,19 +47,23 @@ def fitted(signal, present, times, turns, first, count):
 
 @pytest.mark.parametrize("name", ["vrp", "trp", "vt"])
 def test_every_window_holds_the_lines_that_fit_it(name):
-    symbols, setting = 24, SETTINGS[name]
+    symbols = 24
+    setting = SETTINGS[name]
     present, late = looks(symbols, 1)
     present[6:16] = False
     rng = np.random.default_rng(2)
     signal = np.where(present, rng.normal(size=symbols) + 1j * rng.normal(size=symbols), 0)
-    found, times, length = known(name, signal, late), np.arange(symbols) + late, setting.window
+    found = known(name, signal, late)
+    times = np.arange(symbols) + late
+    length = setting.window
     for row in range(len(found)):
         for first in range(found.shape[1]):
             if name == "vt":
                 speed = -6.1 + 0.7 * row
                 turns = -2 * CARRIER * INTERVAL * speed / SPEED_OF_LIGHT
                 short, longer = (
-                    fitted(signal, present, times, turns, first, count) * length for count in (length, length + 1)
+                    fitted(signal, present, times, turns, first, count) * length
+                    for count in (length, length + 1)
                 )
                 truth = longer**2 - short**2
             else:
@@ -62,7 +75,8 @@ def test_every_window_holds_the_lines_that_fit_it(name):
 @pytest.mark.parametrize("late_by", [0.0, 0.9])
 @pytest.mark.parametrize("name", ["vrp", "trp"])
 def test_a_line_is_exact_whatever_is_missing(name, late_by):
-    symbols, setting = 400, SETTINGS[name]
+    symbols = 400
+    setting = SETTINGS[name]
     present, late = looks(symbols, 3)
     turns = 3 / setting.points
     line = 2.5 * np.exp(2j * np.pi * turns * (np.arange(symbols) + late_by * late))
@@ -73,7 +87,8 @@ def test_a_line_is_exact_whatever_is_missing(name, late_by):
     assert found[3, reached] == pytest.approx(2.5 * setting.window, rel=1e-12)
     assert (found[:, reached] <= 2.5 * setting.window * (1 + 1e-12)).all()
     even = np.empty(found.shape, np.float32)
-    re, im = signal.real.astype(np.float32), signal.imag.astype(np.float32)
+    re = signal.real.astype(np.float32)
+    im = signal.imag.astype(np.float32)
     spectrum(name).fill(re, im, setting, spectrum(name).tables(setting, CARRIER, INTERVAL), even)
     assert abs(even[3] / (2.5 * setting.window) - 1).max() > 0.3
 
@@ -92,7 +107,9 @@ def test_noise_keeps_its_law():
 def test_even_sampling_gives_todays_tiles_to_the_last_bit():
     signals = echoes(seed=1)
     network = Network.from_settings(NETWORK)
-    tiles = [Renderer(network, Spectra(times=times), Images(size=32)) for times in ("even", "known")]
+    tiles = [
+        Renderer(network, Spectra(times=times), Images(size=32)) for times in ("even", "known")
+    ]
     plain, same = (one.tile(signals) for one in tiles)
     assert (plain == same).all()
     values = np.empty((2, 32, 32), np.float32)
@@ -114,5 +131,10 @@ def test_even_sampling_gives_todays_tiles_to_the_last_bit():
 def test_unknown_words_are_refused():
     with pytest.raises(InputError, match=r"spectra.times is 'late'"):
         Spectra.from_settings({"times": "late", "vrp": {"window": 16, "hop": 1, "points": 16}})
-    assert Spectra.from_settings({"times": "known", "vrp": {"window": 16, "hop": 1, "points": 16}}).times == "known"
+    assert (
+        Spectra.from_settings(
+            {"times": "known", "vrp": {"window": 16, "hop": 1, "points": 16}}
+        ).times
+        == "known"
+    )
     assert list(Spectra(times="known")) == ["vrp", "trp", "vt"]

@@ -1,4 +1,6 @@
-"""The instants of late symbols travel: all kinds of shards and the tiles stage give the tiles of the made sample."""
+"""The instants of late symbols travel: all kinds of shards and the tiles stage give the tiles of
+the made sample.
+"""
 
 import json
 
@@ -39,15 +41,21 @@ def dataset():
 
 
 def test_lateness_is_what_the_effect_drew(dataset):
-    network, row = Network.from_settings(dataset.config["network"]), dataset.row(dataset.place(0))
+    network = Network.from_settings(dataset.config["network"])
+    row = dataset.row(dataset.place(0))
     found = lateness({"times": "known"}, FRAMES, network, dataset.plan.seed, row)
     scene = Scene(network, dataset.plan.seed, None, tuple(called(FRAMES)))
     for station, late in zip(network.stations, found, strict=True):
         view = observe(scene, station, dataset.clouds[row["subtype"]], row)
         drawn = (view.times_s - network.times_s) / network.symbol_interval_s
         assert late == pytest.approx(drawn, abs=1e-12) and 0.3 < late.max() <= 0.4
-    assert lateness({}, FRAMES, network, 1, row) is None and lateness({"times": "known"}, {}, network, 1, row) is None
-    assert late_effects(dataset.config) == FRAMES and not late_effects(dataset.config | {"effects": {}})
+    assert (
+        lateness({}, FRAMES, network, 1, row) is None
+        and lateness({"times": "known"}, {}, network, 1, row) is None
+    )
+    assert late_effects(dataset.config) == FRAMES and not late_effects(
+        dataset.config | {"effects": {}}
+    )
 
 
 def test_every_kind_of_shards_gives_the_tiles_of_the_made_sample(dataset, tmp_path):
@@ -60,7 +68,10 @@ def test_every_kind_of_shards_gives_the_tiles_of_the_made_sample(dataset, tmp_pa
         if kind == "signal":
             on_time = shards.renderer.tile(shards.signal(0))
             assert (on_time != shards.tile(0)).mean() > 0.2
-            assert (np.abs(shards.images(0, views=["trp"])[0].astype(int) - shards.tile(0)[:32, 32:64]) == 0).all()
+            assert (
+                np.abs(shards.images(0, views=["trp"])[0].astype(int) - shards.tile(0)[:32, 32:64])
+                == 0
+            ).all()
 
 
 def test_the_tiles_stage_draws_the_instants_of_its_motion_table(dataset, tmp_path):
@@ -72,7 +83,9 @@ def test_the_tiles_stage_draws_the_instants_of_its_motion_table(dataset, tmp_pat
     block = {name: dataset.config[name] for name in ("network", "spectra", "images")}
     drawn = {"drawn": {"seed": dataset.plan.seed, "effects": FRAMES}}
     files = "--signals", str(tmp_path / "noisy.npy"), "--motion", str(tmp_path / "motion.csv")
-    tiles(["--settings", canonical({**block, **drawn}), *files, "--out", str(tmp_path / "tiles.npz")])
+    tiles(
+        ["--settings", canonical({**block, **drawn}), *files, "--out", str(tmp_path / "tiles.npz")]
+    )
     found = Tiles(tmp_path / "tiles.npz")
     assert [found[number] for number in range(len(rows))] == [
         dataset.maker.png(signal[0], row, np.inf) for signal, row in zip(signals, rows, strict=True)

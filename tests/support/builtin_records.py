@@ -1,4 +1,6 @@
-"""The published table of targets, and the records of all built-in craft, birds and cars as written and merged."""
+"""The published table of targets, and the records of all built-in craft, birds and cars as written
+and merged.
+"""
 
 from pathlib import Path
 
@@ -13,6 +15,7 @@ WRITTEN = {
 }
 RECORDS = {name: merge(TABLE[name], record, name) for name, record in WRITTEN.items()}
 UAVS, BIRDS, CARS = (
-    [name for name, row in TABLE.items() if row["category"] == category] for category in ("UAV", "Bird", "Vehicle")
+    [name for name, row in TABLE.items() if row["category"] == category]
+    for category in ("UAV", "Bird", "Vehicle")
 )
 NAMES = [*UAVS, *BIRDS, *CARS]

@@ -30,7 +30,13 @@ def motion_rows(group, models=4):
     for model in range(models):
         for subtype, category in TARGETS[group]:
             row = dict.fromkeys(COLUMNS, math.nan)
-            row.update(subtype=subtype, category=category, group=group, model=model, rate_hz=rng.uniform(1, 99))
+            row.update(
+                subtype=subtype,
+                category=category,
+                group=group,
+                model=model,
+                rate_hz=rng.uniform(1, 99),
+            )
             for name in ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"):
                 row[name] = rng.uniform(1, 90)
             rows.append(row)
@@ -39,7 +45,13 @@ def motion_rows(group, models=4):
 
 def write_settings(kind):
     """Settings of the command `shards write` for a kind of shards, as JSON."""
-    block = {"seed": SEED, "network": NETWORK, "snr_db": SNRS, "split": SPLIT, "shards": {"kind": kind}}
+    block = {
+        "seed": SEED,
+        "network": NETWORK,
+        "snr_db": SNRS,
+        "split": SPLIT,
+        "shards": {"kind": kind},
+    }
     return json.dumps(block)
 
 
@@ -65,16 +77,43 @@ def build(folder, kind, inputs=True):
     for group in TARGETS:
         rows = motion_rows(group)
         write_table(folder / f"{group}.csv", rows)
-        signals = np.stack([echoes(seed) for seed in range(2 * len(rows))]).reshape(len(rows), 2, 3, 400)
+        signals = np.stack([echoes(seed) for seed in range(2 * len(rows))]).reshape(
+            len(rows), 2, 3, 400
+        )
         np.save(folder / f"{group}.npy", signals)
         tiles = renderer()
-        pngs = [encode(tiles.tile(sample), tiles.images.palette) for model in signals for sample in model]
+        pngs = [
+            encode(tiles.tile(sample), tiles.images.palette)
+            for model in signals
+            for sample in model
+        ]
         tile_files.write(folder / f"{group}.tiles.npz", pngs)
         for name in ("train", "val", "test"):
             shards.append(str(folder / f"{group}-{name}-00000.tar"))
             given = ["--motion", f"{folder}/{group}.csv", *write_options(folder, group, kind)]
-            main(["write", "--settings", write_settings(kind), *given, "--fold", name, "--out", shards[-1]])
-    main(["index", "--settings", json.dumps(RENDER), "--shards", *shards, "--out", str(folder / "index.json")])
+            main(
+                [
+                    "write",
+                    "--settings",
+                    write_settings(kind),
+                    *given,
+                    "--fold",
+                    name,
+                    "--out",
+                    shards[-1],
+                ]
+            )
+    main(
+        [
+            "index",
+            "--settings",
+            json.dumps(RENDER),
+            "--shards",
+            *shards,
+            "--out",
+            str(folder / "index.json"),
+        ]
+    )
     for path in [] if inputs else [*folder.glob("seen.*"), *folder.glob("unseen.*")]:
         path.unlink()
     return folder
@@ -82,7 +121,9 @@ def build(folder, kind, inputs=True):
 
 def pack(path, rows, fold="train"):
     """A shard of these rows' signals at 3 dB, all dealt to one fold."""
-    chunk = ChunkSamples([row | {"fold": fold} for row in rows], [3.0], SPLIT, SEED, Network.from_settings(NETWORK))
+    chunk = ChunkSamples(
+        [row | {"fold": fold} for row in rows], [3.0], SPLIT, SEED, Network.from_settings(NETWORK)
+    )
     write_shard(path, chunk, fold, "signal", lambda number, _: (npy(echoes(number)), {}))
     return path
 

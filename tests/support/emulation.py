@@ -1,4 +1,6 @@
-"""Other processors on this one: environments in which NumPy, BLAS, numba and the C library leave out instructions."""
+"""Other processors on this one: environments in which NumPy, BLAS, numba and the C library leave
+out instructions.
+"""
 
 import os
 import platform
@@ -9,24 +11,30 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 _SSE = "+64bit,+cx16,+fxsr,+mmx,+popcnt,+sahf,+sse,+sse2,+sse3,+sse4.1,+sse4.2,+ssse3"
 _AVX2 = _SSE + ",+avx,+avx2,+bmi,+bmi2,+f16c,+fma,+fsgsbase,+lzcnt,+movbe,+xsave"
-# Both of NumPy's ways to name what it dispatches to: single features before version 2.4, levels since.
+# Both of NumPy's ways to name what it dispatches to: single features before version 2.4, levels
+# since.
 _AVX512 = "X86_V4 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"
 EMULATED = {
     "avx2": {
-        "NPY_DISABLE_CPU_FEATURES": _AVX512, "OPENBLAS_CORETYPE": "Haswell",
-        "NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": _AVX2,
+        "NPY_DISABLE_CPU_FEATURES": _AVX512,
+        "OPENBLAS_CORETYPE": "Haswell",
+        "NUMBA_CPU_NAME": "haswell",
+        "NUMBA_CPU_FEATURES": _AVX2,
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX512VL,-AVX512DQ",
     },
     "x86-64-v2": {
-        "NPY_DISABLE_CPU_FEATURES": f"X86_V3 AVX F16C FMA3 AVX2 {_AVX512}", "OPENBLAS_CORETYPE": "Nehalem",
-        "NUMBA_CPU_NAME": "nehalem", "NUMBA_CPU_FEATURES": _SSE,
+        "NPY_DISABLE_CPU_FEATURES": f"X86_V3 AVX F16C FMA3 AVX2 {_AVX512}",
+        "OPENBLAS_CORETYPE": "Nehalem",
+        "NUMBA_CPU_NAME": "nehalem",
+        "NUMBA_CPU_FEATURES": _SSE,
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX512VL,-AVX512DQ,-AVX2,-FMA,-FMA4,-AVX",
     },
     "avx512": {
-        "OPENBLAS_CORETYPE": "SkylakeX", "NUMBA_CPU_NAME": "skylake-avx512",
+        "OPENBLAS_CORETYPE": "SkylakeX",
+        "NUMBA_CPU_NAME": "skylake-avx512",
         "NUMBA_CPU_FEATURES": _AVX2 + ",+adx,+avx512f,+avx512cd,+avx512bw,+avx512dq,+avx512vl",
     },
-}  # fmt: skip
+}
 """Variables of each emulated processor: no AVX-512, nothing beyond x86-64-v2, an early AVX-512."""
 
 
@@ -40,10 +48,16 @@ def able(name: str) -> bool:
 
 def run(name: str, *arguments: str, threads: int = 1) -> str:
     """Run Python with these arguments as on the emulated processor and return what it prints."""
-    more = {f"{library}_NUM_THREADS": str(threads) for library in ("OPENBLAS", "OMP", "NUMBA", "MKL")}
+    more = {
+        f"{library}_NUM_THREADS": str(threads) for library in ("OPENBLAS", "OMP", "NUMBA", "MKL")
+    }
     environment = os.environ | EMULATED.get(name, {}) | more | {"PYTHONPATH": str(ROOT / "src")}
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", *arguments], env=environment, capture_output=True, text=True, cwd=ROOT
+        [sys.executable, "-W", "ignore", *arguments],
+        env=environment,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout

@@ -1,6 +1,8 @@
-"""Programs that begin without this package, each in a process of its own, at a fraction of the time of fresh ones.
+"""Programs that begin without this package, each in a process of its own, at a fraction of the time
+of fresh ones.
 
-A helper process imports the libraries that take long and nothing of this package. Each program is a fork of it.
+A helper process imports the libraries that take long and nothing of this package. Each program is a
+fork of it.
 """
 
 import json
@@ -8,7 +10,15 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
-LIBRARIES = ("numpy", "numba", "scipy.optimize", "scipy.spatial", "scipy.special", "yaml", "jsonschema")
+LIBRARIES = (
+    "numpy",
+    "numba",
+    "scipy.optimize",
+    "scipy.spatial",
+    "scipy.special",
+    "yaml",
+    "jsonschema",
+)
 _HELPER = """
 import importlib, json, os, sys, tempfile, traceback
 
@@ -40,7 +50,9 @@ print(json.dumps(ended))
 
 
 def ended(programs: Sequence[str], *libraries: str) -> list[tuple[int, str, str]]:
-    """Run each program; return its exit status and what it printed to both streams. libraries: imported beforehand."""
+    """Run each program; return its exit status and what it printed to both streams. libraries:
+    imported beforehand.
+    """
     call = [sys.executable, "-c", _HELPER, json.dumps([[*LIBRARIES, *libraries], programs])]
     run = subprocess.run(call, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr

@@ -1,4 +1,6 @@
-"""Commands that take the folder of a run, each with a good folder of which `fuzzing` damages one file."""
+"""Commands that take the folder of a run, each with a good folder of which `fuzzing` damages one
+file.
+"""
 
 import functools
 import math
@@ -24,16 +26,22 @@ from lowalt.shards.build import write_run
 from run_folders import run_folder
 
 CHANGES = {
-    "run": "good", "targets": {"select": ["DJI Mini 2", "Crow"]}, "motion": {"models": 3, "models_per_chunk": 3},
-    "split": {"train": 1, "val": 1, "test": 1}, "noise": {"snr_db": [math.inf]}, "images": {"size": 32},
-}  # fmt: skip
+    "run": "good",
+    "targets": {"select": ["DJI Mini 2", "Crow"]},
+    "motion": {"models": 3, "models_per_chunk": 3},
+    "split": {"train": 1, "val": 1, "test": 1},
+    "noise": {"snr_db": [math.inf]},
+    "images": {"size": 32},
+}
 GOOD = "LOWALT_FUZZED_RUN"
 """Variable of the environment that names the run's folder."""
 MODEL = Path("results/zoo/default-seen.safetensors").absolute()
 
 
 def good_run() -> Path:
-    """A finished run of six samples, without a trained model; the processes that fuzzing starts share it."""
+    """A finished run of six samples, without a trained model; the processes that fuzzing starts
+    share it.
+    """
     if GOOD in os.environ:
         return Path(os.environ[GOOD])
     folder = Path(tempfile.mkdtemp()) / "results" / "good"
@@ -66,7 +74,9 @@ def _page(run: Path) -> None:
     with (
         mock.patch("lowalt.commands.workflow.ended", return_value={"status": 0}),
         mock.patch.object(
-            Path, "resolve", lambda path: path.parent / path.name if path.is_absolute() else run.parents[1] / path
+            Path,
+            "resolve",
+            lambda path: path.parent / path.name if path.is_absolute() else run.parents[1] / path,
         ),
     ):
         _told("report", str(run))
@@ -104,15 +114,25 @@ def _on_folder(act: Callable[[Path], object], file: str, path: Path) -> object:
     return act(run)
 
 
-READ = {"verify": ["shards/index.json"], "page": ["config.yaml"],
-        **{name: ["config.yaml", "shards/index.json"] for name in ("train", "evaluate", "data set")}}  # fmt: skip
+READ = {
+    "verify": ["shards/index.json"],
+    "page": ["config.yaml"],
+    **{name: ["config.yaml", "shards/index.json"] for name in ("train", "evaluate", "data set")},
+}
 """The files of a run that a command reads, where it does not read all."""
 
 
 def folders() -> list[Reader]:
     """Return a reader for each command and each file of a run that it reads."""
     return [
-        Reader(f"{name} of a run: {file}", Path(file).name, (good_run() / file).read_bytes(),
-               functools.partial(_on_folder, act, file), share=0.1, seal=FILES[file])
-        for name, act in COMMANDS.items() for file in READ.get(name, FILES)
-    ]  # fmt: skip
+        Reader(
+            f"{name} of a run: {file}",
+            Path(file).name,
+            (good_run() / file).read_bytes(),
+            functools.partial(_on_folder, act, file),
+            share=0.1,
+            seal=FILES[file],
+        )
+        for name, act in COMMANDS.items()
+        for file in READ.get(name, FILES)
+    ]

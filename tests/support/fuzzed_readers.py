@@ -33,10 +33,12 @@ def _recording(kind: str) -> Callable[[Path], object]:
     from lowalt.extensions.recordings.record import record
 
     more = {
-        ".wav": {}, ".csv": {"columns": ["i", "q"], "rate_hz": 800.0}, ".sigmf-meta": {},
+        ".wav": {},
+        ".csv": {"columns": ["i", "q"], "rate_hz": 800.0},
+        ".sigmf-meta": {},
         ".txt": {"columns": ["i", "q"], "rate_hz": 800.0},
         ".iq": {"rate_hz": 800.0, "dtype": "float32", "layout": "iqiq"},
-    }.get(kind, {"rate_hz": 800.0})  # fmt: skip
+    }.get(kind, {"rate_hz": 800.0})
     base = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", **more}
     return lambda path: read(record({**base, "file": path.name}, path.parent, "record"))
 
@@ -57,15 +59,25 @@ def _recordings() -> list[Reader]:
         ".cfile": wave.astype("<c8").tobytes(),
     }
     special = {".mat": {"share": 0.1, "seal": MATLAB}}
-    cells = "iq;t\n" + "".join(f"{a:.6f}{b:+.6f}i;{t:.6f}\n" for (a, b), t in zip(pair, times, strict=True))
+    cells = "iq;t\n" + "".join(
+        f"{a:.6f}{b:+.6f}i;{t:.6f}\n" for (a, b), t in zip(pair, times, strict=True)
+    )
     about = {"core:datatype": "cf32_le", "core:sample_rate": 800, "core:version": "1.0.0"}
     captures = [{"core:sample_start": 0, "core:frequency": 24e9}]
     about = json.dumps({"global": about, "captures": captures, "annotations": []})
-    more = [("recording .sigmf-meta", "a.sigmf-meta", about.encode(), _metadata),
-            ("recording .csv, complex", "a.csv", cells.replace(".", ",").encode(), _semicolons)]  # fmt: skip
+    more = [
+        ("recording .sigmf-meta", "a.sigmf-meta", about.encode(), _metadata),
+        ("recording .csv, complex", "a.csv", cells.replace(".", ",").encode(), _semicolons),
+    ]
     if importlib.util.find_spec("h5py"):
         more.append(
-            ("recording .mat 7.3", "a.mat", _bytes(lambda path: _hdf5(path, wave), "a.mat"), _recording(".mat"), 0.1)
+            (
+                "recording .mat 7.3",
+                "a.mat",
+                _bytes(lambda path: _hdf5(path, wave), "a.mat"),
+                _recording(".mat"),
+                0.1,
+            )
         )
     return [
         Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), **special.get(kind, {}))
@@ -78,7 +90,13 @@ def _semicolons(path: Path) -> object:
     from lowalt.extensions.recordings.files import read
     from lowalt.extensions.recordings.record import record
 
-    block = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", "times": "t"}
+    block = {
+        "carrier_hz": 24e9,
+        "channel": "complex",
+        "source": "test",
+        "licence": "none",
+        "times": "t",
+    }
     return read(record({**block, "file": path.name}, path.parent, "record"))
 
 
@@ -111,11 +129,18 @@ def _meshes() -> list[Reader]:
     for kind in kinds:
         data = box.export(file_type=kind)
         data = data.encode() if isinstance(data, str) else bytes(data)
-        readers.append(Reader(f"mesh .{kind}", f"a.{kind}", data, lambda path: read_mesh(path, "m")))
-    more = {"skinned .glb": _bytes(skinned, "a.glb"), "mixed .ply": ply(*prism(), "little", [[0, 1, 2, 3]]),
-            "polygons .dae": dae(*prism()).encode()}  # fmt: skip
-    readers += [Reader(f"mesh {kind}", f"a{kind[-4:]}", data, lambda path: read_mesh(path, "m"))
-                for kind, data in more.items()]  # fmt: skip
+        readers.append(
+            Reader(f"mesh .{kind}", f"a.{kind}", data, lambda path: read_mesh(path, "m"))
+        )
+    more = {
+        "skinned .glb": _bytes(skinned, "a.glb"),
+        "mixed .ply": ply(*prism(), "little", [[0, 1, 2, 3]]),
+        "polygons .dae": dae(*prism()).encode(),
+    }
+    readers += [
+        Reader(f"mesh {kind}", f"a{kind[-4:]}", data, lambda path: read_mesh(path, "m"))
+        for kind, data in more.items()
+    ]
     return readers
 
 
@@ -131,7 +156,9 @@ def _towns() -> list[Reader]:
         return read(DEFAULTS | {"buildings": str(path), "origin": origin})
 
     kinds = {".geojson": towns.geojson, ".xml": towns.mitsuba}
-    good = {kind: _bytes(partial(write, boxes=towns.BOXES), f"a{kind}") for kind, write in kinds.items()}
+    good = {
+        kind: _bytes(partial(write, boxes=towns.BOXES), f"a{kind}") for kind, write in kinds.items()
+    }
     return [Reader(f"town {kind}", f"a{kind}", data, buildings) for kind, data in good.items()]
 
 
@@ -140,10 +167,19 @@ def _robots() -> list[Reader]:
     from lowalt.extensions.drafting.robot_files import read_robot
     from made_robots import MJCF, SDF, urdf
 
-    files = {".urdf": urdf(blade="").replace('<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'),
-             ".sdf": SDF, ".xml": MJCF.replace('type="mesh"', 'type="sphere" size="1"')}  # fmt: skip
-    return [Reader(f"robot {kind}", f"a{kind}", text.encode(), lambda path: read_robot(path, path.parent))
-            for kind, text in files.items()]  # fmt: skip
+    files = {
+        ".urdf": urdf(blade="").replace(
+            '<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'
+        ),
+        ".sdf": SDF,
+        ".xml": MJCF.replace('type="mesh"', 'type="sphere" size="1"'),
+    }
+    return [
+        Reader(
+            f"robot {kind}", f"a{kind}", text.encode(), lambda path: read_robot(path, path.parent)
+        )
+        for kind, text in files.items()
+    ]
 
 
 def _texts() -> list[Reader]:
@@ -160,7 +196,8 @@ def _texts() -> list[Reader]:
     from lowalt.targets.records import load_records, load_table
     from lowalt.workflow.run import Run
 
-    config, schema = load_yaml("config/default.yaml"), "workflow/schemas/config.schema.yaml"
+    config = load_yaml("config/default.yaml")
+    schema = "workflow/schemas/config.schema.yaml"
     table = Path("config/targets.csv").read_bytes()
 
     def run(path: Path) -> object:
@@ -176,30 +213,78 @@ def _texts() -> list[Reader]:
         """The twin and the scenes of the record of a radar."""
         return Library.read(path.parent)
 
-    record = yaml.safe_dump({"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"})
+    record = yaml.safe_dump(
+        {"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"}
+    )
     return [
-        Reader("configuration", "a.yaml", Path("config/default.yaml").read_bytes(),
-               lambda p: check(load_yaml(p), schema), seal=YAML),
+        Reader(
+            "configuration",
+            "a.yaml",
+            Path("config/default.yaml").read_bytes(),
+            lambda p: check(load_yaml(p), schema),
+            seal=YAML,
+        ),
         Reader("overlay", "a.yaml", Path("config/workstation.yaml").read_bytes(), run, seal=YAML),
         Reader("scene", "a.yaml", Path("config/scenes/worst.yaml").read_bytes(), run, seal=YAML),
-        Reader("whole configuration", "a.yaml", Path("config/default.yaml").read_bytes(), run, seal=YAML),
-        Reader("record of a target", "a.yaml", Path("config/targets/pedestrian.yaml").read_bytes(),
-               lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p]), seal=YAML),
-        Reader("record of a radar", "a.yaml", Path("config/measured/radars/cw_24ghz.yaml").read_bytes(), scenes,
-               seal=YAML),
+        Reader(
+            "whole configuration",
+            "a.yaml",
+            Path("config/default.yaml").read_bytes(),
+            run,
+            seal=YAML,
+        ),
+        Reader(
+            "record of a target",
+            "a.yaml",
+            Path("config/targets/pedestrian.yaml").read_bytes(),
+            lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p]),
+            seal=YAML,
+        ),
+        Reader(
+            "record of a radar",
+            "a.yaml",
+            Path("config/measured/radars/cw_24ghz.yaml").read_bytes(),
+            scenes,
+            seal=YAML,
+        ),
         Reader("table of targets", "a.csv", table, load_table),
-        Reader("schemes", "a.csv", Path("config/schemes.csv").read_bytes(), lambda p: schemes.read(p, "ABC")),
-        Reader("published accuracies", "a.csv", Path("config/published_accuracy.csv").read_bytes(),
-               paper_claims.read_published),
+        Reader(
+            "schemes",
+            "a.csv",
+            Path("config/schemes.csv").read_bytes(),
+            lambda p: schemes.read(p, "ABC"),
+        ),
+        Reader(
+            "published accuracies",
+            "a.csv",
+            Path("config/published_accuracy.csv").read_bytes(),
+            paper_claims.read_published,
+        ),
         Reader("table", "a.csv", Path("config/cost/accuracy.csv").read_bytes(), read_csv),
-        Reader("motion table", "a.csv", _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
-               read_table),
-        Reader("manifest", "a.sha256", Path("results/reference/tiny.sha256").read_bytes(), manifest.read),
-        Reader("checksums", "SHA256SUMS", (hashlib.sha256(b"").hexdigest() + "  a\n").encode(), sums),
+        Reader(
+            "motion table",
+            "a.csv",
+            _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
+            read_table,
+        ),
+        Reader(
+            "manifest",
+            "a.sha256",
+            Path("results/reference/tiny.sha256").read_bytes(),
+            manifest.read,
+        ),
+        Reader(
+            "checksums", "SHA256SUMS", (hashlib.sha256(b"").hexdigest() + "  a\n").encode(), sums
+        ),
         Reader("record of a recording", "a.yaml", record.encode(), read_record, seal=YAML),
-        Reader("settings", "a.json", json.dumps({"seed": 1, "network": config["network"]}).encode(),
-               lambda p: settings(f"@{p}"), seal=JSON),
-    ]  # fmt: skip
+        Reader(
+            "settings",
+            "a.json",
+            json.dumps({"seed": 1, "network": config["network"]}).encode(),
+            lambda p: settings(f"@{p}"),
+            seal=JSON,
+        ),
+    ]
 
 
 def _captures() -> list[Reader]:
@@ -244,41 +329,87 @@ def _arrays() -> list[Reader]:
     png = encode(image, np.stack([np.arange(256)] * 3, 1).astype(np.uint8))
     config = load_yaml("config/default.yaml")
     render = {key: config[key] for key in ("network", "spectra", "images")}
-    tile = encode(np.add.outer(np.arange(48), np.arange(48)).astype(np.uint8), np.zeros((256, 3), np.uint8))
+    tile = encode(
+        np.add.outer(np.arange(48), np.arange(48)).astype(np.uint8), np.zeros((256, 3), np.uint8)
+    )
     wave = np.exp(0.3j * np.arange(1200)).reshape(3, 400).astype(np.complex64)
     signals = _bytes(lambda p: np.save(p, wave), "a.npy")
     count = 6
     facts = samples.Facts(
-        *(np.array([f"{name}{n}" for n in range(count)]) for name in ("k", "s")), np.arange(count), np.full(count, 3.0),
-        np.full(count, "seen"), np.full(count, "train"), np.arange(count) % 4, np.ones((count, 3)), np.ones((count, 3)),
-    )  # fmt: skip
-    cache = _bytes(lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz")
+        *(np.array([f"{name}{n}" for n in range(count)]) for name in ("k", "s")),
+        np.arange(count),
+        np.full(count, 3.0),
+        np.full(count, "seen"),
+        np.full(count, "train"),
+        np.arange(count) % 4,
+        np.ones((count, 3)),
+        np.ones((count, 3)),
+    )
+    cache = _bytes(
+        lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz"
+    )
     rows = np.zeros(count, sample_table.SAMPLE)
     header = _bytes(lambda p: sample_table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
-    surfaces = _bytes(lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz")
+    surfaces = _bytes(
+        lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz"
+    )
     tiles = _bytes(lambda p: write_tiles(p, [png, png]), "a.npz")
     model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
     said = predictions.from_facts(facts, (0,), np.eye(4)[np.arange(count) % 4])
     return [
-        Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud, seal=ARCHIVE),
+        Reader(
+            "cloud",
+            "a.npz",
+            _bytes(lambda p: write_cloud(p, craft()), "a.npz"),
+            read_cloud,
+            seal=ARCHIVE,
+        ),
         Reader("occluders", "a.npz", surfaces, occluders.read, seal=ARCHIVE),
-        Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")}), seal=ARCHIVE),
-        Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p)), seal=ARCHIVE),
+        Reader(
+            "views",
+            "a.npz",
+            cache,
+            lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")}),
+            seal=ARCHIVE,
+        ),
+        Reader(
+            "shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p)), seal=ARCHIVE
+        ),
         Reader("index", "index.json", _index(render), load_index, seal=INDEX),
         Reader("tiles", "a.npz", tiles, lambda p: _all(Tiles(p)), seal=ARCHIVE),
         Reader("image", "a.png", png, lambda p: decode(p.read_bytes()), seal=PNG),
         Reader("tile to predict", "a.png", tile, lambda p: images_of(p, render), seal=PNG),
         Reader("signals to predict", "a.npy", signals, lambda p: images_of(p, render)),
         Reader("checkpoint", "a.pt", model, checkpoint.load),
-        Reader("predictions", "a.csv", _bytes(lambda p: predictions.write(p, said), "a.csv"), predictions.read),
+        Reader(
+            "predictions",
+            "a.csv",
+            _bytes(lambda p: predictions.write(p, said), "a.csv"),
+            predictions.read,
+        ),
     ]
 
 
 def _index(render: dict) -> bytes:
     """The bytes of an index of one shard."""
-    entry = {"name": "a", "path": "a.tar", "group": "seen", "fold": "train", "samples": 6, "bytes": 1,
-             "kind": "image", "table_sha256": "0" * 64, "sha256": "0" * 64}  # fmt: skip
-    index = {"format": "lowalt-shards-2", "shards": [entry], "kind": "image", "samples": 6, "render": render}
+    entry = {
+        "name": "a",
+        "path": "a.tar",
+        "group": "seen",
+        "fold": "train",
+        "samples": 6,
+        "bytes": 1,
+        "kind": "image",
+        "table_sha256": "0" * 64,
+        "sha256": "0" * 64,
+    }
+    index = {
+        "format": "lowalt-shards-2",
+        "shards": [entry],
+        "kind": "image",
+        "samples": 6,
+        "render": render,
+    }
     return INDEX.closed({"index": json.dumps(index).encode()})
 
 
@@ -288,7 +419,9 @@ def _models() -> list[Reader]:
 
     path = zoo_files.path_of("default-seen")
     return [
-        Reader("model file", "a.safetensors", path.read_bytes(), model_file.read, share=0.2, seal=MODEL),
+        Reader(
+            "model file", "a.safetensors", path.read_bytes(), model_file.read, share=0.2, seal=MODEL
+        ),
     ]
 
 

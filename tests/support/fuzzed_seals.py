@@ -1,5 +1,5 @@
-"""Seals of files: how a file is taken apart and put together again with right checksums, so that damage reaches the
-reader behind them."""
+"""Seals of files: how a file is taken apart and put together again with right checksums, so that
+damage reaches the reader behind them."""
 
 import contextlib
 import hashlib
@@ -23,7 +23,9 @@ Parts = dict[str, bytes]
 
 
 class Seal(NamedTuple):
-    """The parts of a file's bytes by name, and the bytes of such parts with lengths and checksums that fit them."""
+    """The parts of a file's bytes by name, and the bytes of such parts with lengths and checksums
+    that fit them.
+    """
 
     opened: Callable[[bytes], Parts]
     closed: Callable[[Parts], bytes]
@@ -46,7 +48,8 @@ def _archive(parts: Parts) -> bytes:
 
 def _chunks(data: bytes) -> Parts:
     """The chunks of a PNG by place and name, the image data expanded."""
-    parts, place = {}, len(SIGNATURE)
+    parts = {}
+    place = len(SIGNATURE)
     while place < len(data):
         length, name = struct.unpack_from(">I4s", data, place)
         body = data[place + 8 : place + 8 + length]
@@ -61,7 +64,9 @@ def _png(parts: Parts) -> bytes:
     for key, body in parts.items():
         name = key[-4:].encode()
         body = zlib.compress(body) if name == b"IDAT" else body
-        data += struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+        data += (
+            struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+        )
     return data
 
 
@@ -88,7 +93,9 @@ def _model(data: bytes) -> Parts:
 
 
 def _signed_model(parts: Parts) -> bytes:
-    """A model file that says this of itself, with the SHA-256 of its content; a damaged file stays as it is."""
+    """A model file that says this of itself, with the SHA-256 of its content; a damaged file stays
+    as it is.
+    """
     try:
         tensors = load_tensors(parts["file"])
     except Exception:
@@ -111,11 +118,21 @@ def _unsigned(data: bytes) -> Parts:
 def _plain_matlab(data: bytes) -> Parts:
     """A MATLAB file without compression."""
     out = io.BytesIO()
-    savemat(out, {name: array for name, array in loadmat(io.BytesIO(data)).items() if not name.startswith("__")})
+    savemat(
+        out,
+        {
+            name: array
+            for name, array in loadmat(io.BytesIO(data)).items()
+            if not name.startswith("__")
+        },
+    )
     return {"file": out.getvalue()}
 
 
-YAML = Seal(_json_of_yaml, lambda parts: parts["json"].replace(b"Infinity", b".inf").replace(b"NaN", b".nan"))
+YAML = Seal(
+    _json_of_yaml,
+    lambda parts: parts["json"].replace(b"Infinity", b".inf").replace(b"NaN", b".nan"),
+)
 JSON = Seal(lambda data: {"json": data}, lambda parts: parts["json"])
 MODEL = Seal(_model, _signed_model)
 ARCHIVE = Seal(_members, _archive)

@@ -1,11 +1,14 @@
-"""Damaged inputs for every reader of files (`fuzzed_readers`): seeded ways to break a good file, and the ends allowed.
+"""Damaged inputs for every reader of files (`fuzzed_readers`): seeded ways to break a good file,
+and the ends allowed.
 
     PYTHONPATH=src:tests/support python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
-A reader must accept its good file. A damaged one it may accept or refuse with one `InputError`. Every other end is a
-fault: another exception, a crash of the process, more than LIMIT_S seconds or more than LIMIT_MB of memory. Where a
-file has checksums, every second one is damaged behind them: its parts are changed and sealed again (`fuzzed_seals`).
-Of a part that is a JSON object, every second time one value is replaced by one of VALUES.
+A reader must accept its good file. A damaged one it may accept or refuse with one `InputError`.
+Every other end is a
+fault: another exception, a crash of the process, more than LIMIT_S seconds or more than LIMIT_MB of
+memory. Where a file has checksums, every second one is damaged behind them: its parts are changed
+and sealed again (`fuzzed_seals`). Of a part that is a JSON object, every second time one value is
+replaced by one of VALUES.
 """
 
 import argparse
@@ -31,25 +34,88 @@ from lowalt.files.errors import LONGEST, InputError
 
 LIMIT_S = 20.0
 LIMIT_MB = 2048
-COLUMNS = ("reader", "inputs", "accepted", "refused", "faults", "longest_s", "largest_mb", "first_fault")
+COLUMNS = (
+    "reader",
+    "inputs",
+    "accepted",
+    "refused",
+    "faults",
+    "longest_s",
+    "largest_mb",
+    "first_fault",
+)
 TOKENS = (
-    b"1e400", b"-1e400", b"nan", b"inf", b"-0", b"0", b"9" * 400, b"9" * 5000, b"\x00", b"\xff\xfe", b"\xc3\x28",
-    b"{", b"}", b"[", b"*a", b"&a ", b"!!python/object/apply:os.system ", b"../", b"/etc/passwd", b"$(id)", b"; rm",
-    b"\r\n", b"null", b"true", b"2001-99-99", b"\xc2\xb2", b"\xd9\xa1", b"1_000", b"0x10", b"?", b": ",
-)  # fmt: skip
+    b"1e400",
+    b"-1e400",
+    b"nan",
+    b"inf",
+    b"-0",
+    b"0",
+    b"9" * 400,
+    b"9" * 5000,
+    b"\x00",
+    b"\xff\xfe",
+    b"\xc3\x28",
+    b"{",
+    b"}",
+    b"[",
+    b"*a",
+    b"&a ",
+    b"!!python/object/apply:os.system ",
+    b"../",
+    b"/etc/passwd",
+    b"$(id)",
+    b"; rm",
+    b"\r\n",
+    b"null",
+    b"true",
+    b"2001-99-99",
+    b"\xc2\xb2",
+    b"\xd9\xa1",
+    b"1_000",
+    b"0x10",
+    b"?",
+    b": ",
+)
 """What is written over a number or word of a text."""
 NUMBERS = (
-    b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\x00" * 8, b"\xff" * 8, b"\xff" * 7 + b"\x7f",
-)  # fmt: skip
+    b"\xff\xff\xff\xff",
+    b"\xff\xff\xff\x7f",
+    b"\x00\x00\x00\x80",
+    b"\x00" * 8,
+    b"\xff" * 8,
+    b"\xff" * 7 + b"\x7f",
+)
 """What is written over a number of a binary file."""
 
 
 VALUES = (
-    b"NaN", b"Infinity", b"-Infinity", b".nan", b".inf", b"-.inf", b"1e400", b"-1", b"9" * 400, b"9" * 5000,
-    b"[" * 100_000 + b"]" * 100_000, b'{"a":' * 300 + b"1" + b"}" * 300, b'"' + b"x" * 100_000 + b'"', b"{}", b"[]",
-    b"null", b"true", b'""', b'"../x"', b'"/etc/passwd"', b'"a.py:f"', b'"\\u0000"',
-)  # fmt: skip
-"""What a value of a JSON object is replaced by: numbers that are none, huge and deeply nested values, other types."""
+    b"NaN",
+    b"Infinity",
+    b"-Infinity",
+    b".nan",
+    b".inf",
+    b"-.inf",
+    b"1e400",
+    b"-1",
+    b"9" * 400,
+    b"9" * 5000,
+    b"[" * 100_000 + b"]" * 100_000,
+    b'{"a":' * 300 + b"1" + b"}" * 300,
+    b'"' + b"x" * 100_000 + b'"',
+    b"{}",
+    b"[]",
+    b"null",
+    b"true",
+    b'""',
+    b'"../x"',
+    b'"/etc/passwd"',
+    b'"a.py:f"',
+    b'"\\u0000"',
+)
+"""What a value of a JSON object is replaced by: numbers that are none, huge and deeply nested
+values, other types.
+"""
 
 
 def revalued(data: bytes, rng: np.random.Generator) -> bytes:
@@ -58,12 +124,22 @@ def revalued(data: bytes, rng: np.random.Generator) -> bytes:
     places = [*_places(whole)]
     block, key = places[int(rng.integers(len(places)))]
     block[key] = "the value"
-    return json.dumps(whole).encode().replace(b'"the value"', VALUES[int(rng.integers(len(VALUES)))], 1)
+    return (
+        json.dumps(whole)
+        .encode()
+        .replace(b'"the value"', VALUES[int(rng.integers(len(VALUES)))], 1)
+    )
 
 
 def _places(value: Any) -> Iterator[tuple[Any, Any]]:
     """Every block of nested mappings and lists with each of its keys."""
-    for key, item in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
+    for key, item in (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    ):
         yield value, key
         yield from _places(item)
 
@@ -101,19 +177,33 @@ def _words(data: bytes) -> list[tuple[int, int]]:
 
 
 class Reader:
-    """One reader of files: its name, a good file's name and bytes, and the function that reads a path.
+    """One reader of files: its name, a good file's name and bytes, and the function that reads a
+    path.
 
-    share: of the damaged files of a run; a reader that starts a process for each file gets fewer. seal: how files with
-    checksums are taken apart and sealed again.
+    share: of the damaged files of a run; a reader that starts a process for each file gets fewer.
+    seal: how files with checksums are taken apart and sealed again.
     """
 
     def __init__(
-        self, name: str, file: str, data: bytes, read: Callable[[Path], object], share: float = 1.0, seal: Any = None
+        self,
+        name: str,
+        file: str,
+        data: bytes,
+        read: Callable[[Path], object],
+        share: float = 1.0,
+        seal: Any = None,
     ) -> None:
-        self.name, self.file, self.data, self.read, self.share, self.seal = name, file, data, read, share, seal
+        self.name = name
+        self.file = file
+        self.data = data
+        self.read = read
+        self.share = share
+        self.seal = seal
 
     def damaged(self, rng: np.random.Generator, sealed: bool) -> bytes:
-        """The good file with seeded damage: `sealed` in one of its parts, under right checksums, else anywhere."""
+        """The good file with seeded damage: `sealed` in one of its parts, under right checksums,
+        else anywhere.
+        """
         if not (sealed and self.seal):
             return mutated(self.data, rng)
         parts = self.seal.opened(self.data)
@@ -138,12 +228,19 @@ class Reader:
 
 
 def attack(reader: Reader, count: int, seed: int, folder: Path) -> dict:
-    """Return a row (keys COLUMNS) of what becomes of `count` damaged files; a good file that is refused is a fault."""
+    """Return a row (keys COLUMNS) of what becomes of `count` damaged files; a good file that is
+    refused is a fault.
+    """
     found = dict.fromkeys(COLUMNS, 0) | {"reader": reader.name, "inputs": count, "first_fault": ""}
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     digest = int.from_bytes(hashlib.sha256(reader.name.encode()).digest()[:4], "big")
-    good = [reader.data, *([reader.seal.closed(reader.seal.opened(reader.data))] if reader.seal else [])]
-    if controls := {outcome for data in good if (outcome := reader.outcome(data, folder)) != "accepted"}:
+    good = [
+        reader.data,
+        *([reader.seal.closed(reader.seal.opened(reader.data))] if reader.seal else []),
+    ]
+    if controls := {
+        outcome for data in good if (outcome := reader.outcome(data, folder)) != "accepted"
+    }:
         return found | {"faults": 1, "first_fault": f"the good file: {', '.join(sorted(controls))}"}
     for number in range(count):
         data = reader.damaged(np.random.default_rng([seed, digest, number]), number % 2 == 1)
@@ -166,8 +263,11 @@ def attack(reader: Reader, count: int, seed: int, folder: Path) -> dict:
 
 
 def _apart(name: str, count: int, seed: int, queue) -> None:
-    """Read damaged files in a process of its own, with limited memory, and put the faults into the queue."""
-    # Memory beyond the limit fails instead of filling the machine; the process itself needs some three gigabytes.
+    """Read damaged files in a process of its own, with limited memory, and put the faults into the
+    queue.
+    """
+    # Memory beyond the limit fails instead of filling the machine; the process itself needs some
+    # three gigabytes.
     resource.setrlimit(resource.RLIMIT_AS, ((LIMIT_MB + 6144) << 20,) * 2)
     with Path(os.devnull).open("w") as silent, tempfile.TemporaryDirectory() as folder:
         os.dup2(silent.fileno(), 2)
@@ -187,7 +287,8 @@ def main() -> None:
     given = line.parse_args()
     from fuzzed_readers import readers
 
-    context, rows = multiprocessing.get_context("spawn"), []
+    context = multiprocessing.get_context("spawn")
+    rows = []
     for reader in readers():
         if given.only and given.only not in reader.name:
             continue
@@ -198,7 +299,10 @@ def main() -> None:
             time.sleep(0.05)
         if queue.empty() and process.exitcode:
             fault = f"the process ended with {process.exitcode}"
-            rows.append(dict.fromkeys(COLUMNS, 0) | {"reader": reader.name, "faults": 1, "first_fault": fault})
+            rows.append(
+                dict.fromkeys(COLUMNS, 0)
+                | {"reader": reader.name, "faults": 1, "first_fault": fault}
+            )
         else:
             rows.append(queue.get())
         process.join()

@@ -21,7 +21,14 @@ def made(subtype: str, folder: Path, seed: int = 1, **record) -> clouds.Cloud:
 
 def plain(file: str, **changes) -> dict:
     """A record that takes a whole file as a UAV's body, any size."""
-    record = {"unit": "m", "up": "z", "front": "y", "size_is": "largest extent", "scale": "none", "scale_limit": 1e6}
+    record = {
+        "unit": "m",
+        "up": "z",
+        "front": "y",
+        "size_is": "largest extent",
+        "scale": "none",
+        "scale_limit": 1e6,
+    }
     return record | {"parts": {"body": {"kind": "body", "meshes": [{"file": file}]}}} | changes
 
 
@@ -34,7 +41,8 @@ def box(size, at=(0, 0, 0)) -> trimesh.Trimesh:
 
 def saved(path: Path, shapes: dict[str, trimesh.Trimesh], keyword: str = "o") -> Path:
     """Write named shapes as objects (o) or groups (g) of an OBJ file, and return its path."""
-    lines, first = [], 1
+    lines = []
+    first = 1
     for name, shape in shapes.items():
         lines += [f"{keyword} {name}", *(f"v {x} {y} {z}" for x, y, z in shape.vertices)]
         lines += ["f " + " ".join(str(first + corner) for corner in face) for face in shape.faces]
@@ -44,7 +52,9 @@ def saved(path: Path, shapes: dict[str, trimesh.Trimesh], keyword: str = "o") ->
 
 
 def write_quad(folder: Path) -> Path:
-    """Write a body with arms along its file's x (front), and a propeller with its hub at the origin."""
+    """Write a body with arms along its file's x (front), and a propeller with its hub at the
+    origin.
+    """
     box((0.2, 0.12, 0.06)).export(folder / "body.stl")
     box((0.2, 0.02, 0.004)).export(folder / "prop.stl")
     return folder
@@ -52,12 +62,26 @@ def write_quad(folder: Path) -> Path:
 
 def quad_record(**changes) -> dict:
     """Return the record of the meshes of `write_quad`."""
-    hubs = {"front right": (0.1, -0.1, "ccw"), "rear right": (-0.1, -0.1, "cw"), "rear left": (-0.1, 0.1, "ccw"),
-            "front left": (0.1, 0.1, "cw")}  # fmt: skip
+    hubs = {
+        "front right": (0.1, -0.1, "ccw"),
+        "rear right": (-0.1, -0.1, "cw"),
+        "rear left": (-0.1, 0.1, "ccw"),
+        "front left": (0.1, 0.1, "cw"),
+    }
     parts = {"body": {"kind": "body", "meshes": [{"file": "body.stl"}]}}
     for name, (x, y, sense) in hubs.items():
-        parts[name] = {"kind": "rotor", "meshes": [{"file": "prop.stl", "move": [x, y, 0.04]}], "sense": sense}
-    return {"unit": "m", "up": "z", "front": "x", "size_is": "motor diagonal", "parts": parts} | changes
+        parts[name] = {
+            "kind": "rotor",
+            "meshes": [{"file": "prop.stl", "move": [x, y, 0.04]}],
+            "sense": sense,
+        }
+    return {
+        "unit": "m",
+        "up": "z",
+        "front": "x",
+        "size_is": "motor diagonal",
+        "parts": parts,
+    } | changes
 
 
 def write_bird(folder: Path) -> tuple[Path, dict]:
@@ -68,16 +92,30 @@ def write_bird(folder: Path) -> tuple[Path, dict]:
     for side, sign in (("right", 1), ("left", -1)):
         edges = sorted([sign * 0.021, sign * 0.08])
         inner = [[edges[0], None, -0.01], [edges[1], None, 0.01]]
-        outer = [[0.08, None, None], [None, None, None]] if sign > 0 else [[None, None, None], [-0.08, None, None]]
-        parts[f"{side} inner"] = {"kind": "wing", "region": {"box": inner}, "hinge": [sign * 0.02, 0, 0]}
-        parts[f"{side} outer"] = {"kind": "wing", "region": {"box": outer}, "hinge": [sign * 0.08, 0, 0]}
+        outer = (
+            [[0.08, None, None], [None, None, None]]
+            if sign > 0
+            else [[None, None, None], [-0.08, None, None]]
+        )
+        parts[f"{side} inner"] = {
+            "kind": "wing",
+            "region": {"box": inner},
+            "hinge": [sign * 0.02, 0, 0],
+        }
+        parts[f"{side} outer"] = {
+            "kind": "wing",
+            "region": {"box": outer},
+            "hinge": [sign * 0.08, 0, 0],
+        }
         parts[f"{side} outer"]["parent"] = f"{side} inner"
     record = {"unit": "cm", "up": "z", "front": "y", "size_is": "length", "parts": parts}
     return folder, record | {"drop": [{"box": [[None, None, None], [None, None, -0.0205]]}]}
 
 
 def car_record(**wheel) -> dict:
-    """Return the record of a car.obj whose wheels are regions of the mesh, or made where `wheel` gives their size."""
+    """Return the record of a car.obj whose wheels are regions of the mesh, or made where `wheel`
+    gives their size.
+    """
     parts = {"body": {"kind": "body", "meshes": [{"file": "car.obj"}]}}
     for name, x, y in (("fl", -0.8, 1.4), ("fr", 0.8, 1.4), ("rl", -0.8, -1.4), ("rr", 0.8, -1.4)):
         region = {"box": [[x - 0.2, y - 0.4, -0.1], [x + 0.2, y + 0.4, 0.7]], "whole": True}
@@ -91,7 +129,9 @@ HUBS = [(0.12, 0.1), (0.12, -0.1), (-0.12, 0.1), (-0.12, -0.1)]
 
 
 def quadrotor(blades: bool, scale: float = 1.0) -> trimesh.Trimesh:
-    """A quadrotor as one mesh, front along x, its propellers whole or of two blades each that touch nothing."""
+    """A quadrotor as one mesh, front along x, its propellers whole or of two blades each that touch
+    nothing.
+    """
     shapes = [box((0.22, 0.12, 0.06))]
     for x, y in HUBS:
         halves = [(0.03, 0, 0.05), (-0.03, 0, 0.05)] if blades else [(0, 0, 0.05)]

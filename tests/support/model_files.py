@@ -1,4 +1,6 @@
-"""Model files as tests write and change them: the text of an identity, and a state with its weights."""
+"""Model files as tests write and change them: the text of an identity, and a state with its
+weights.
+"""
 
 import json
 
@@ -8,7 +10,10 @@ from lowalt.recognition import model_file
 def load(path):
     """The identity of a model file as text, and its settings with `weights`."""
     content = model_file.read(path)
-    return json.dumps(content.identity), {**content.model, "weights": model_file.restored(content.tensors)}
+    return json.dumps(content.identity), {
+        **content.model,
+        "weights": model_file.restored(content.tensors),
+    }
 
 
 def save(path, identity, state):

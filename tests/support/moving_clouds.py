@@ -23,14 +23,29 @@ def rigid_cloud(kind: str, category: str, extra: dict | None = None) -> Cloud:
         axes=np.array([nothing, axis]),
         normals=np.full((4, 3), np.nan),
         rcs_m2=np.ones(4),
-        record={"subtype": "test", "category": category, "source": "test", "checksum": "", **(extra or {})},
+        record={
+            "subtype": "test",
+            "category": category,
+            "source": "test",
+            "checksum": "",
+            **(extra or {}),
+        },
     )
 
 
 def recorded_cloud(**extra: float) -> Cloud:
-    """A recording of twelve frames of 31 nodes at 120 Hz, every node anywhere; `extra` facts of its record."""
+    """A recording of twelve frames of 31 nodes at 120 Hz, every node anywhere; `extra` facts of its
+    record.
+    """
     track = np.random.default_rng(3).normal(size=(12, 31, 3))
-    record = {"subtype": "t", "category": "Pedestrian", "source": "", "checksum": "", "track_rate_hz": 120.0, **extra}
+    record = {
+        "subtype": "t",
+        "category": "Pedestrian",
+        "source": "",
+        "checksum": "",
+        "track_rate_hz": 120.0,
+        **extra,
+    }
     return node_cloud(track, {"rcs_m2_per_point": 1.0, **record}, tuple(map(str, range(31))))
 
 

@@ -1,4 +1,6 @@
-"""A page read back: its addresses, links, headings and tables; and what a headless Chromium makes of it."""
+"""A page read back: its addresses, links, headings and tables; and what a headless Chromium makes
+of it.
+"""
 
 import re
 import shutil
@@ -16,7 +18,12 @@ class Page(HTMLParser):
 
     def __init__(self, text: str) -> None:
         super().__init__()
-        self.open, self.faults, self.ids, self.links, self.sources, self.tables = [], [], [], [], [], []
+        self.open = []
+        self.faults = []
+        self.ids = []
+        self.links = []
+        self.sources = []
+        self.tables = []
         self.pictures = []
         self._cell = None
         self.feed(text)
@@ -62,7 +69,8 @@ class Page(HTMLParser):
         if tag in self.open:
             del self.open[len(self.open) - 1 - self.open[::-1].index(tag) :]
         if tag in ("th", "td", "caption"):
-            text, self._cell = " ".join(self._cell.split()), None
+            text = " ".join(self._cell.split())
+            self._cell = None
             if tag == "caption":
                 self.tables[-1]["caption"] = text
             elif "thead" in self.open:
@@ -72,7 +80,9 @@ class Page(HTMLParser):
 
 
 def sound(text: str) -> Page:
-    """Return the page; assert that it parses, needs no network, and that links and tables are whole."""
+    """Return the page; assert that it parses, needs no network, and that links and tables are
+    whole.
+    """
     page = Page(text)
     assert not page.faults
     assert len(set(page.ids)) == len(page.ids)
@@ -80,7 +90,9 @@ def sound(text: str) -> Page:
     assert inside and inside <= set(page.ids)
     assert not [link for link in page.links if ":" in link or link.startswith("/")]
     assert all(source.startswith("data:") for source in page.sources)
-    assert all(page.pictures) and "http" not in re.sub(r"https?://www\.w3\.org/\S+", "", text.partition("<body>")[0])
+    assert all(page.pictures) and "http" not in re.sub(
+        r"https?://www\.w3\.org/\S+", "", text.partition("<body>")[0]
+    )
     for table in page.tables:
         assert table["caption"] and table["rows"]
         assert {len(row) for row in table["rows"]} == {len(table["head"])}
@@ -88,17 +100,32 @@ def sound(text: str) -> Page:
 
 
 def browsed(folder: Path, text: str, script: str = "") -> str:
-    """Return the page's HTML after its scripts, then `script`, ran in Chromium; skips the test where there is none.
+    """Return the page's HTML after its scripts, then `script`, ran in Chromium; skips the test
+    where there is none.
 
     Fails where the console shows an error.
     """
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    browser = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     if browser is None:
-        pytest.skip("no Chromium on this machine, expected the command chromium: the page's scripts were not run")
+        pytest.skip(
+            "no Chromium on this machine, expected the command chromium: the page's scripts were "
+            "not run"
+        )
     path = folder / "page.html"
     path.write_text(text.replace("</body>", f"<script>{script}</script></body>"))
-    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", f"--user-data-dir={folder}/user"]
-    # Virtual time that is idle passes at once. Plots are drawn only when they come into view, on a busy machine late.
+    flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--enable-logging=stderr",
+        f"--user-data-dir={folder}/user",
+    ]
+    # Virtual time that is idle passes at once. Plots are drawn only when they come into view, on a
+    # busy machine late.
     command = [browser, *flags, "--virtual-time-budget=20000", "--dump-dom", path.as_uri()]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ran.returncode == 0, ran.stderr

@@ -1,4 +1,6 @@
-"""The echo by its pointwise kernel alone, which has no polynomials: a reference for the fast one and for scenes."""
+"""The echo by its pointwise kernel alone, which has no polynomials: a reference for the fast one
+and for scenes.
+"""
 
 import numpy as np
 
@@ -22,12 +24,19 @@ def subcarriers(network, station, motion, rcs_m2, aim_m):
 
 
 def signal(network, station, motion, rcs_m2, aim_m):
-    """What `echo_signal` returns, with every symbol computed by the pointwise kernel and none rounded again."""
+    """What `echo_signal` returns, with every symbol computed by the pointwise kernel and none
+    rounded again.
+    """
     scene, radio, refs, aims = prepared(network, station, motion, rcs_m2, aim_m, "")
     _, _, method, _ = refine.compute(scene, radio, refs, aims, None)
     found = Found.empty(len(refs))
     symbols = np.arange(len(refs))
-    check_fault(results.bounded(scene, radio, refs, symbols, aims, method.pointwise_bound, found), scene, station, "")
+    check_fault(
+        results.bounded(scene, radio, refs, symbols, aims, method.pointwise_bound, found),
+        scene,
+        station,
+        "",
+    )
     bound = found.bounds.max() / abs(found.values).max()
     ties = int(found.ties.sum())
     return EchoResult(found.values, found.cells, ties, bound, method, found.gaps, found.totals)

@@ -1,4 +1,6 @@
-"""A web server of a folder that sends byte ranges, as object stores and nginx do, and Python's own does not."""
+"""A web server of a folder that sends byte ranges, as object stores and nginx do, and Python's own
+does not.
+"""
 
 import contextlib
 import functools
@@ -11,7 +13,9 @@ from pathlib import Path
 
 
 class Ranges(SimpleHTTPRequestHandler):
-    """Answers a request for a range with these bytes, and counts connections and the bytes it sends by file."""
+    """Answers a request for a range with these bytes, and counts connections and the bytes it sends
+    by file.
+    """
 
     protocol_version = "HTTP/1.1"
     # An answer would otherwise wait for the receipt of its headers.
@@ -23,12 +27,16 @@ class Ranges(SimpleHTTPRequestHandler):
         super().setup()
 
     def do_GET(self) -> None:
-        """Send a range of a file, or what the server's `answers` say for its name: headers and a status."""
+        """Send a range of a file, or what the server's `answers` say for its name: headers and a
+        status.
+        """
         path = Path(self.translate_path(self.path))
         status, headers = self.server.answers.get(path.name, (206 if path.is_file() else 404, {}))
         data = path.read_bytes() if status == 200 else b""
         if status == 206:
-            first, last = map(int, re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
+            first, last = map(
+                int, re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups()
+            )
             with path.open("rb") as file:
                 file.seek(first)
                 data = file.read(last - first + 1)
@@ -45,10 +53,14 @@ class Ranges(SimpleHTTPRequestHandler):
 
 @contextlib.contextmanager
 def serving(folder: Path, answers: dict | None = None) -> Iterator[ThreadingHTTPServer]:
-    """A running server of a folder; `.address` is that of the folder, `.sent` the bytes it has sent by file."""
+    """A running server of a folder; `.address` is that of the folder, `.sent` the bytes it has sent
+    by file.
+    """
     server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Ranges, directory=str(folder)))
     server.daemon_threads = True
-    server.answers, server.sent, server.connections = answers or {}, {}, 0
+    server.answers = answers or {}
+    server.sent = {}
+    server.connections = 0
     server.address = f"http://127.0.0.1:{server.server_port}"
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield server
@@ -57,7 +69,8 @@ def serving(folder: Path, answers: dict | None = None) -> Iterator[ThreadingHTTP
 
 
 if __name__ == "__main__":
-    # python range_server.py FOLDER: print the folder's address, and serve until this process is ended.
+    # python range_server.py FOLDER: print the folder's address, and serve until this process is
+    # ended.
     with serving(Path(sys.argv[1])) as running:
         print(running.address, flush=True)
         threading.Event().wait()

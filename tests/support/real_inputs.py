@@ -1,4 +1,6 @@
-"""Where the real meshes and recordings are, for the tests that need them: LOWALT_INPUTS or ../shared/data."""
+"""Where the real meshes and recordings are, for the tests that need them: LOWALT_INPUTS or
+../shared/data.
+"""
 
 import os
 from pathlib import Path

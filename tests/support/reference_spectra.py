@@ -1,4 +1,6 @@
-"""Slow truths of the spectra and images, straight from the definitions with plain loops; nothing from src/."""
+"""Slow truths of the spectra and images, straight from the definitions with plain loops; nothing
+from src/.
+"""
 
 import cmath
 import math
@@ -17,7 +19,9 @@ def stft(signal, window, hop, points):
             p = row - points // 2
             total = 0j
             for n in range(window):
-                total += complex(signal[g * hop + n]) * cmath.exp(-2j * math.pi * ((p * n) % points) / points)
+                total += complex(signal[g * hop + n]) * cmath.exp(
+                    -2j * math.pi * ((p * n) % points) / points
+                )
             out[row, g] = abs(total)
     return out
 
@@ -32,7 +36,9 @@ def velocity_transfer(signal, frequency_hz, interval_s, window, hop, speeds):
             for length in (window, window + 1):
                 total = 0j
                 for step in range(length):
-                    entry = cmath.exp(-1j * 4 * math.pi * frequency_hz * speed * interval_s * step / LIGHT)
+                    entry = cmath.exp(
+                        -1j * 4 * math.pi * frequency_hz * speed * interval_s * step / LIGHT
+                    )
                     total += entry.conjugate() * complex(signal[g * hop + step])
                 matches.append(abs(total))
             out[i, g] = (matches[1] / ((window + 1) / window)) ** 2 - matches[0] ** 2
@@ -60,7 +66,9 @@ def resampled(values, size):
 
 
 def index_image(values, signed, scale, floor_db=40.0, gamma=1.0):
-    """Index values of an image of values whose row 0 is the most negative: turned round, scaled, rounded."""
+    """Index values of an image of values whose row 0 is the most negative: turned round, scaled,
+    rounded.
+    """
     values = np.asarray(values)[::-1]
     largest = max(abs(float(value)) for value in values.ravel())
     out = np.zeros(values.shape, int)

@@ -1,5 +1,6 @@
 """Runs of Snakemake in one process, so that imports are paid for once: a plan of a workplace,
-the files that it names, and a plan after each of several changes. The process's folder is the workplace."""
+the files that it names, and a plan after each of several changes. The process's folder is the
+workplace."""
 
 import contextlib
 import io
@@ -36,7 +37,8 @@ def make_files(plan: str) -> None:
 @contextlib.contextmanager
 def edited(path: Path, old: str, new: str):
     """A file in which a text is replaced, or added at the end, for the length of a block."""
-    before, times = path.read_text(), path.stat()
+    before = path.read_text()
+    times = path.stat()
     path.write_text(before.replace(old, new, 1) if old else before + new)
     yield
     path.write_text(before)

@@ -1,8 +1,11 @@
-"""The jobs of a small run, which jobs follow from which, and changes of the run, without a word of the Snakefile."""
+"""The jobs of a small run, which jobs follow from which, and changes of the run, without a word of
+the Snakefile.
+"""
 
 from dataclasses import dataclass, field
 
-SEEN, UNSEEN = ("dji-mini-2", "crow"), ("nio-et5t-2023", "walking-pedestrian-5")
+SEEN = ("dji-mini-2", "crow")
+UNSEEN = ("nio-et5t-2023", "walking-pedestrian-5")
 OVERLAY = {
     "run": "test",
     "targets": {"select": ["Crow", "NIO ET5T 2023", "DJI Mini 2", "Walking Pedestrian 5"]},
@@ -10,15 +13,22 @@ OVERLAY = {
     "noise": {"snr_db": [8, float("inf")]},
 }
 # The region is given, so that it does not follow from the stations.
-OVERLAY["motion"]["region"] = {"polygon_m": [[100, 60], [400, 60], [250, 300]], "mast_clearance_m": 10.0}
+OVERLAY["motion"]["region"] = {
+    "polygon_m": [[100, 60], [400, 60], [250, 300]],
+    "mast_clearance_m": 10.0,
+}
 MESH = "meshes/uav/crazyflie_cf2_assembly.stl"
 
 # --- the model: which jobs follow from which ---
 
-PARTS, STATIONS, FOLDS = ("00000", "00001"), ("A", "B", "C"), ("train", "val", "test")
+PARTS = ("00000", "00001")
+STATIONS = ("A", "B", "C")
+FOLDS = ("train", "val", "test")
 GROUPS = {"seen": SEEN, "unseen": UNSEEN}
 CHUNKS = [(group, part) for group in GROUPS for part in PARTS]
-TRAININGS = [(protocol, scheme, "0") for protocol in GROUPS for scheme in ("a-vrp-trp-vt", "abc-vrp-trp-vt")]
+TRAININGS = [
+    (protocol, scheme, "0") for protocol in GROUPS for scheme in ("a-vrp-trp-vt", "abc-vrp-trp-vt")
+]
 CLOUD = {("cloud", name) for members in GROUPS.values() for name in members}
 MOTION = {("motion", *chunk) for chunk in CHUNKS}
 ECHO = {("echo", *chunk, station) for chunk in CHUNKS for station in STATIONS}
@@ -28,12 +38,35 @@ SHARD = {("shard", group, fold, part) for group, part in CHUNKS for fold in FOLD
 VIEWS = {("views", "24", group, fold, part) for group, part in CHUNKS for fold in FOLDS}
 TRAIN = {("train", *training) for training in TRAININGS}
 EVALUATE = {("evaluate", *training) for training in TRAININGS}
-INDEX, CARD, SETTINGS, REPORT, TABLES = {("index",)}, {("card",)}, {("configuration",)}, {("report",)}, {("tables",)}
-GALLERY, FREEZE, DISTANCES, MANIFEST = {("gallery",)}, {("freeze",)}, {("distances",)}, {("report_manifest",)}
+INDEX = {("index",)}
+CARD = {("card",)}
+SETTINGS = {("configuration",)}
+REPORT = {("report",)}
+TABLES = {("tables",)}
+GALLERY = {("gallery",)}
+FREEZE = {("freeze",)}
+DISTANCES = {("distances",)}
+MANIFEST = {("report_manifest",)}
 WHOLE = {
-    *CLOUD, *MOTION, *ECHO, *NOISE, *TILES, *SHARD, *VIEWS, *TRAIN, *EVALUATE, *INDEX, *CARD, *SETTINGS, *REPORT,
-    *TABLES, *GALLERY, *FREEZE, *DISTANCES, *MANIFEST,
-}  # fmt: skip
+    *CLOUD,
+    *MOTION,
+    *ECHO,
+    *NOISE,
+    *TILES,
+    *SHARD,
+    *VIEWS,
+    *TRAIN,
+    *EVALUATE,
+    *INDEX,
+    *CARD,
+    *SETTINGS,
+    *REPORT,
+    *TABLES,
+    *GALLERY,
+    *FREEZE,
+    *DISTANCES,
+    *MANIFEST,
+}
 
 
 def views_of(group, part):
@@ -61,16 +94,26 @@ def next_jobs(job):
     if rule == "shard":
         return {("views", "24", *names)} | INDEX
     after = {
-        "index": CARD | REPORT, "views": TRAIN | EVALUATE, "freeze": TRAIN | EVALUATE,
-        "train": {("evaluate", *names)}, "evaluate": TABLES, "tables": REPORT, "gallery": set(), "distances": REPORT,
-        "configuration": CARD | REPORT, "report_manifest": REPORT, "card": set(), "report": set(),
-    }  # fmt: skip
+        "index": CARD | REPORT,
+        "views": TRAIN | EVALUATE,
+        "freeze": TRAIN | EVALUATE,
+        "train": {("evaluate", *names)},
+        "evaluate": TABLES,
+        "tables": REPORT,
+        "gallery": set(),
+        "distances": REPORT,
+        "configuration": CARD | REPORT,
+        "report_manifest": REPORT,
+        "card": set(),
+        "report": set(),
+    }
     return after[rule]
 
 
 def with_what_follows(jobs, images=True):
     """The jobs, all that follow from them, and the temporary tiles that shards are packed from."""
-    found, todo = set(), list(jobs)
+    found = set()
+    todo = list(jobs)
     while todo:
         job = todo.pop()
         if job not in found:
@@ -85,19 +128,35 @@ def grown(part):
     """The jobs of one more chunk of each group, and those that read all chunks."""
     own = {(rule, group, part) for group in GROUPS for rule in ("motion", "noise", "tiles")}
     own |= {("echo", group, part, station) for group in GROUPS for station in STATIONS}
-    own |= {(*work, group, fold, part) for work in (("shard",), ("views", "24")) for group in GROUPS for fold in FOLDS}
+    own |= {
+        (*work, group, fold, part)
+        for work in (("shard",), ("views", "24"))
+        for group in GROUPS
+        for fold in FOLDS
+    }
     return own | INDEX | CARD | FREEZE | TRAIN | EVALUATE | TABLES | REPORT | MANIFEST | SETTINGS
 
 
 def added(part, groups, motion):
-    """The jobs of added chunks, with motion models of their own or without, and those that read all samples."""
+    """The jobs of added chunks, with motion models of their own or without, and those that read all
+    samples.
+    """
     rules = ("motion", "noise", "tiles") if motion else ("noise", "tiles")
-    own = {(rule, group, f"{number}{part}") for rule in rules for group in groups for number in PARTS}
+    own = {
+        (rule, group, f"{number}{part}") for rule in rules for group in groups for number in PARTS
+    }
     chunks = [(group, f"{number}{part}") for group in groups for number in PARTS]
     if motion:
-        own |= {("echo", *chunk, station) for chunk in chunks for station in STATIONS} | FREEZE | DISTANCES | GALLERY
+        own |= (
+            {("echo", *chunk, station) for chunk in chunks for station in STATIONS}
+            | FREEZE
+            | DISTANCES
+            | GALLERY
+        )
     for group, number in chunks:
-        own |= {(*work, group, fold, number) for work in (("shard",), ("views", "24")) for fold in FOLDS}
+        own |= {
+            (*work, group, fold, number) for work in (("shard",), ("views", "24")) for fold in FOLDS
+        }
     return own | INDEX | CARD | TRAIN | EVALUATE | TABLES | REPORT | MANIFEST | SETTINGS
 
 
@@ -106,7 +165,9 @@ def added(part, groups, motion):
 
 @dataclass
 class Change:
-    """One change of a finished run: an overlay, or a text replaced in a file; the jobs it touches; the reason named."""
+    """One change of a finished run: an overlay, or a text replaced in a file; the jobs it touches;
+    the reason named.
+    """
 
     first: set
     reasons: tuple[str, ...] = ("Params have changed",)

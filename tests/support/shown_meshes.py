@@ -1,4 +1,6 @@
-"""Small mesh files of kinds that readers get wrong: mixed polygons, strips, second numbers of corners, skins."""
+"""Small mesh files of kinds that readers get wrong: mixed polygons, strips, second numbers of
+corners, skins.
+"""
 
 import json
 import struct
@@ -14,7 +16,9 @@ L_SHAPE = [(2, 0), (2, 0.2), (0.2, 0.2), (0.2, 2), (0, 2), (0, 0)]
 
 
 def prism(height: float = 0.1) -> tuple[list, list]:
-    """Vertices and faces of an L of area 0.76, each end one polygon with a dent, between quadrilaterals."""
+    """Vertices and faces of an L of area 0.76, each end one polygon with a dent, between
+    quadrilaterals.
+    """
     vertices = [(*at, 0.0) for at in L_SHAPE] + [(*at, height) for at in L_SHAPE]
     sides = [[i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6] for i in range(6)]
     return vertices, [[5, 4, 3, 2, 1, 0], [6, 7, 8, 9, 10, 11], *sides]
@@ -22,9 +26,7 @@ def prism(height: float = 0.1) -> tuple[list, list]:
 
 def ply(vertices: list, faces: list, kind: str, strips: list = ()) -> bytes:
     """A PLY file of a kind (ascii, little, big) with faces of mixed sizes and triangle strips."""
-    head = (
-        f"ply\nformat {'ascii' if kind == 'ascii' else f'binary_{kind}_endian'} 1.0\nelement vertex {len(vertices)}\n"
-    )
+    head = f"ply\nformat {'ascii' if kind == 'ascii' else f'binary_{kind}_endian'} 1.0\nelement vertex {len(vertices)}\n"
     head += "property float x\nproperty float y\nproperty float z\nproperty uchar red\n"
     head += f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
     head += f"element tristrips {len(strips)}\nproperty list int int vertex_indices\nend_header\n"
@@ -34,7 +36,11 @@ def ply(vertices: list, faces: list, kind: str, strips: list = ()) -> bytes:
     order = {"little": "<", "big": ">"}[kind]
     data = b"".join(struct.pack(order + "3fB", *at, 7) for at in vertices)
     data += b"".join(struct.pack(f"{order}B{len(row)}i", len(row), *row) for row in faces)
-    return head.encode() + data + b"".join(struct.pack(f"{order}i{len(row)}i", len(row), *row) for row in strips)
+    return (
+        head.encode()
+        + data
+        + b"".join(struct.pack(f"{order}i{len(row)}i", len(row), *row) for row in strips)
+    )
 
 
 def dae(vertices: list, faces: list, more: str = "") -> str:
@@ -55,38 +61,71 @@ def dae(vertices: list, faces: list, more: str = "") -> str:
 
 
 def glb(path: Path, head: dict, **arrays: np.ndarray) -> Path:
-    """Write a GLB of one mesh, its arrays by attribute (`indices`, `bind` apart), and more of its JSON in `head`."""
+    """Write a GLB of one mesh, its arrays by attribute (`indices`, `bind` apart), and more of its
+    JSON in `head`.
+    """
     types = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
-    views, accessors, data = [], [], b""
+    views = []
+    accessors = []
+    data = b""
     for array in arrays.values():
         views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
-        shape = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}[array.shape[1] if array.ndim > 1 else 1]
-        accessors.append({"bufferView": len(views) - 1, "componentType": types[array.dtype.str[1:]],
-                          "count": len(array), "type": shape, "normalized": array.dtype.kind == "i"})  # fmt: skip
+        shape = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}[
+            array.shape[1] if array.ndim > 1 else 1
+        ]
+        accessors.append(
+            {
+                "bufferView": len(views) - 1,
+                "componentType": types[array.dtype.str[1:]],
+                "count": len(array),
+                "type": shape,
+                "normalized": array.dtype.kind == "i",
+            }
+        )
         data += array.tobytes() + bytes(-array.nbytes % 4)
     names = {name: index for index, name in enumerate(arrays)}
     surface = {"attributes": {name: at for name, at in names.items() if name.isupper()}}
     surface |= {"indices": names["indices"]} if "indices" in names else {}
     surface |= head.pop("surface", {})
     meshes = [{"name": "shape", "primitives": [surface]}]
-    scene = {"asset": {"version": "2.0"}, "meshes": meshes, "accessors": accessors, "bufferViews": views,
-             "buffers": [{"byteLength": len(data)}], "nodes": [{"mesh": 0}]} | head  # fmt: skip
+    scene = {
+        "asset": {"version": "2.0"},
+        "meshes": meshes,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+        "nodes": [{"mesh": 0}],
+    } | head
     text = json.dumps(scene).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+    chunks = (
+        struct.pack("<I4s", len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(data), b"BIN\0")
+        + data
+    )
     path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
     return path
 
 
 def skinned(path: Path) -> Path:
-    """A GLB of a tetrahedron that two joints hold: the second, with three quarters of the weight, stands 8 along y."""
-    joints, weights = np.zeros((4, 4), "u1"), np.zeros((4, 4), "<f4")
-    joints[:, 1], weights[:, :2] = 1, [0.25, 0.75]
+    """A GLB of a tetrahedron that two joints hold: the second, with three quarters of the weight,
+    stands 8 along y.
+    """
+    joints = np.zeros((4, 4), "u1")
+    weights = np.zeros((4, 4), "<f4")
+    joints[:, 1] = 1
+    weights[:, :2] = [0.25, 0.75]
     bind = np.tile(np.eye(4, dtype="<f4").reshape(16), (2, 1))
     bind[1, 12:15] = [0, 0, -3]  # column by column
     nodes = [{"mesh": 0, "skin": 0, "scale": [9, 9, 9]}, {"translation": [4, 0, 0], "children": [2]},
              {"translation": [0, 8, 0]}]  # fmt: skip
     head = {"nodes": nodes, "skins": [{"joints": [1, 2], "inverseBindMatrices": 4}]}
-    arrays = {"POSITION": TETRAHEDRON.astype("<f4"), "indices": FACES.ravel().astype("<u4"), "JOINTS_0": joints,
-              "WEIGHTS_0": weights, "bind": bind}  # fmt: skip
+    arrays = {
+        "POSITION": TETRAHEDRON.astype("<f4"),
+        "indices": FACES.ravel().astype("<u4"),
+        "JOINTS_0": joints,
+        "WEIGHTS_0": weights,
+        "bind": bind,
+    }
     return glb(path, head, **arrays)

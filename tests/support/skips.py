@@ -1,6 +1,8 @@
-"""Skipped tests are counted by reason, and `--strict-skips` fails a run that skips for a reason not listed here.
+"""Skipped tests are counted by reason, and `--strict-skips` fails a run that skips for a reason not
+listed here.
 
-A package that is missing is no such reason: the set-up of `make test` installs every extra that a test asks for.
+A package that is missing is no such reason: the set-up of `make test` installs every extra that a
+test asks for.
 """
 
 import re
@@ -9,9 +11,15 @@ from collections import Counter
 import pytest
 
 EXPECTED = (
-    "mounting a file system needs root", "no Slurm of two nodes", "zipfile wrote other headers before",
-    r"no [\w-]+ here", "no bash", "no Chromium on this machine", "no real inputs", "not a git checkout",
-)  # fmt: skip
+    "mounting a file system needs root",
+    "no Slurm of two nodes",
+    "zipfile wrote other headers before",
+    r"no [\w-]+ here",
+    "no bash",
+    "no Chromium on this machine",
+    "no real inputs",
+    "not a git checkout",
+)
 """Beginnings of reasons that the machine gives: it cannot do a thing, or lacks it."""
 
 
@@ -36,12 +44,20 @@ class Skips:
 
     def unexpected(self) -> dict[str, int]:
         """Reasons that are not listed, with their numbers of tests."""
-        return {reason: n for reason, n in self.reasons.items() if not any(re.match(e, reason) for e in EXPECTED)}
+        return {
+            reason: n
+            for reason, n in self.reasons.items()
+            if not any(re.match(e, reason) for e in EXPECTED)
+        }
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session):
         """A run that passed fails where a skip is not expected."""
-        if self.unexpected() and session.config.getoption("strict_skips") and not session.exitstatus:
+        if (
+            self.unexpected()
+            and session.config.getoption("strict_skips")
+            and not session.exitstatus
+        ):
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter):

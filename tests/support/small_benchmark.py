@@ -14,11 +14,21 @@ from lowalt.shards.dataset import Dataset
 from lowalt.tiles.render import split
 from lowalt.tiles.resample import resize
 
-SUBTYPES = ["DJI Mini 2", "DJI Mini 4 Pro", "Crow", "Owl", "AITO M9 2024", "NIO ET5T 2023", "Walking Pedestrian 1",
-            "Walking Pedestrian 5"]  # fmt: skip
+SUBTYPES = [
+    "DJI Mini 2",
+    "DJI Mini 4 Pro",
+    "Crow",
+    "Owl",
+    "AITO M9 2024",
+    "NIO ET5T 2023",
+    "Walking Pedestrian 1",
+    "Walking Pedestrian 5",
+]
 LESS = {
-    "targets": {"select": SUBTYPES}, "motion": {"models": 10, "models_per_chunk": 10}, "noise": {"snr_db": [3, 18]},
-}  # fmt: skip
+    "targets": {"select": SUBTYPES},
+    "motion": {"models": 10, "models_per_chunk": 10},
+    "noise": {"snr_db": [3, 18]},
+}
 
 
 def shrink(monkeypatch) -> None:
@@ -38,12 +48,18 @@ def resized(data: Dataset, number: int) -> np.ndarray:
 
 def write(folder: Path, part: str = definition.MAIN) -> Path:
     """Write the data of a part below a folder, as the workflow does; return its run's folder."""
-    config, run = definition.config_of(part), folder / definition.run_name(part)
+    config = definition.config_of(part)
+    run = folder / definition.run_name(part)
     data = Dataset(config)
     index = write_run(data, run, "signal" if config["effects"] else "recipe")
     (run / "config.yaml").write_text(yaml.safe_dump(config))
     for shard in index["shards"]:
-        cache_shard(run / "shards/index.json", shard["name"], 24, run / f"views/24/{Path(shard['path']).stem}.npz")
+        cache_shard(
+            run / "shards/index.json",
+            shard["name"],
+            24,
+            run / f"views/24/{Path(shard['path']).stem}.npz",
+        )
     (run / "noisy").mkdir()
     for chunk in data.plan.chunks:
         rows = rows_of(data, chunk)

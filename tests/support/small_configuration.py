@@ -1,4 +1,6 @@
-"""The configuration of a small data set: three subtypes of both groups, four motion models, two SNRs."""
+"""The configuration of a small data set: three subtypes of both groups, four motion models, two
+SNRs.
+"""
 
 from pathlib import Path
 
@@ -14,7 +16,9 @@ def configuration(**changes) -> dict:
     config = load(paths, ROOT / "workflow/schemas/config.schema.yaml")
     for name in ("table", "records"):
         value = config["targets"][name]
-        there = [str(ROOT / path) for path in value] if isinstance(value, list) else str(ROOT / value)
+        there = (
+            [str(ROOT / path) for path in value] if isinstance(value, list) else str(ROOT / value)
+        )
         config["targets"][name] = there
     config["targets"]["select"] = SUBTYPES
     config["motion"] |= {"models": 4, "models_per_chunk": 4}

@@ -1,7 +1,9 @@
-"""Snakemake runs of the tests, each a process of its own without the seconds that importing Snakemake takes.
+"""Snakemake runs of the tests, each a process of its own without the seconds that importing
+Snakemake takes.
 
-A helper process imports Snakemake and the libraries that its rules load, and nothing of this package. Each run is a
-fork of it, with the folder, the environment and the arguments of a fresh `python -m snakemake`.
+A helper process imports Snakemake and the libraries that its rules load, and nothing of this
+package. Each run is a fork of it, with the folder, the environment and the arguments of a fresh
+`python -m snakemake`.
 """
 
 import atexit
@@ -50,22 +52,35 @@ exec(order["program"])
 @cache
 def _helper() -> subprocess.Popen:
     """The process that runs are forked from, one for each process of pytest."""
-    started = subprocess.Popen([sys.executable, "-E", "-c", _HELPER], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                               text=True)  # fmt: skip
+    started = subprocess.Popen(
+        [sys.executable, "-E", "-c", _HELPER],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     atexit.register(started.stdin.close)
     return started
 
 
 def run(
-    folder: Path, arguments: Sequence[str], environment: Mapping[str, str], program: str = "snakemake.cli.main()"
+    folder: Path,
+    arguments: Sequence[str],
+    environment: Mapping[str, str],
+    program: str = "snakemake.cli.main()",
 ) -> tuple[int, str]:
-    """Exit status and text of `python -m snakemake ARGUMENTS` in `folder`, or of another Python program there.
+    """Exit status and text of `python -m snakemake ARGUMENTS` in `folder`, or of another Python
+    program there.
 
     Raises RuntimeError where the helper process has ended.
     """
     with tempfile.NamedTemporaryFile("r", errors="replace") as said:
-        order = {"folder": str(folder), "arguments": [*arguments], "environment": {**environment}, "said": said.name,
-                 "program": program}  # fmt: skip
+        order = {
+            "folder": str(folder),
+            "arguments": [*arguments],
+            "environment": {**environment},
+            "said": said.name,
+            "program": program,
+        }
         helper = _helper()
         helper.stdin.write(json.dumps(order) + "\n")
         helper.stdin.flush()

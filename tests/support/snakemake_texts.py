@@ -1,4 +1,6 @@
-"""Texts for tests of the real workflow: a spy on imports, another workflow's rules, and the code that rules declare."""
+"""Texts for tests of the real workflow: a spy on imports, another workflow's rules, and the code
+that rules declare.
+"""
 
 import re
 from pathlib import Path
@@ -6,8 +8,9 @@ from pathlib import Path
 from lowalt.workflow.sources import PACKAGE, sources
 
 ROOT = Path(__file__).parents[2]
-# Python imports this by itself at start: every job notes its command and the package's modules it ended up with, the
-# files that it opened, and the keys of its settings that it asked for; a job that asks for the network ends.
+# Python imports this by itself at start: every job notes its command and the package's modules it
+# ended up with, the files that it opened, and the keys of its settings that it asked for; a job
+# that asks for the network ends.
 SPY = """
 import atexit, json, os, pathlib, sys, uuid
 
@@ -66,10 +69,16 @@ if "LOWALT_TEST_IMPORTS" in os.environ:
     sys.addaudithook(refuse)
 """
 RULES = {
-    "targets/__main__.py": "cloud", "targets/gallery.py": "gallery", "motion/__main__.py": "motion",
-    "echo/__main__.py": "echo", "noise/__main__.py": "noise", "tiles/__main__.py": "tiles",
-    "shards/__main__.py write": "shard", "shards/__main__.py index": "index", "shards/card.py": "card",
-}  # fmt: skip
+    "targets/__main__.py": "cloud",
+    "targets/gallery.py": "gallery",
+    "motion/__main__.py": "motion",
+    "echo/__main__.py": "echo",
+    "noise/__main__.py": "noise",
+    "tiles/__main__.py": "tiles",
+    "shards/__main__.py write": "shard",
+    "shards/__main__.py index": "index",
+    "shards/card.py": "card",
+}
 MODULE = """
 configfile: "{root}/config/default.yaml"
 configfile: "{root}/overlay.yaml"
@@ -96,7 +105,11 @@ def body(rule: str) -> str:
 
 
 def declared(rule: str) -> set[str]:
-    """The source files a rule declares as its code, relative to the package, from the arguments in its rule file."""
+    """The source files a rule declares as its code, relative to the package, from the arguments in
+    its rule file.
+    """
     arguments = re.search(r"code=code\((.*?)\)", body(rule), re.DOTALL)[1]
     modules = re.findall(r'"([\w.]+)"', arguments)
-    return {str(path.relative_to(PACKAGE)) for path in sources(*modules, spectra=("vrp", "trp", "vt"))}
+    return {
+        str(path.relative_to(PACKAGE)) for path in sources(*modules, spectra=("vrp", "trp", "vt"))
+    }

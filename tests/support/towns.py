@@ -1,4 +1,6 @@
-"""Small towns of boxes (x, y, width, depth, height) m, as arrays and as files of each kind that is read."""
+"""Small towns of boxes (x, y, width, depth, height) m, as arrays and as files of each kind that is
+read.
+"""
 
 import json
 from pathlib import Path
@@ -17,13 +19,17 @@ SIDES = ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7))
 def corners_of(x, y, width, depth, height):
     """The eight corners (8, 3) of a box."""
     around = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-    return np.array([[x + a * width / 2, y + b * depth / 2, z] for z in (0.0, height) for a, b in around])
+    return np.array(
+        [[x + a * width / 2, y + b * depth / 2, z] for z in (0.0, height) for a, b in around]
+    )
 
 
 def block(x, y, width, depth, height):
     """The ten triangles (10, 3, 3) of a box without a floor."""
     corners = corners_of(x, y, width, depth, height)
-    return np.array([corners[list(three)] for a, b, c, d in SIDES for three in ((a, b, c), (a, c, d))])
+    return np.array(
+        [corners[list(three)] for a, b, c, d in SIDES for three in ((a, b, c), (a, c, d))]
+    )
 
 
 def ply(path: Path, boxes) -> Path:
@@ -35,15 +41,21 @@ def ply(path: Path, boxes) -> Path:
 
 
 def geojson(path: Path, boxes, heights: bool = True) -> Path:
-    """Write boxes as footprints around ORIGIN, by the radii of curvature of the ellipsoid WGS84 there."""
-    major, flat = 6378137.0, 1 / 298.257223563
-    square, sine = flat * (2 - flat), np.sin(np.radians(ORIGIN[1]))
+    """Write boxes as footprints around ORIGIN, by the radii of curvature of the ellipsoid WGS84
+    there.
+    """
+    major = 6378137.0
+    flat = 1 / 298.257223563
+    square = flat * (2 - flat)
+    sine = np.sin(np.radians(ORIGIN[1]))
     east = major / np.sqrt(1 - square * sine**2) * np.cos(np.radians(ORIGIN[1]))
     north = major * (1 - square) / (1 - square * sine**2) ** 1.5
     features = []
     for box in boxes:
-        ring = [[ORIGIN[0] + float(np.degrees(x / east)), ORIGIN[1] + float(np.degrees(y / north))]
-                for x, y, _ in corners_of(*box)[[0, 1, 2, 3, 0]]]  # fmt: skip
+        ring = [
+            [ORIGIN[0] + float(np.degrees(x / east)), ORIGIN[1] + float(np.degrees(y / north))]
+            for x, y, _ in corners_of(*box)[[0, 1, 2, 3, 0]]
+        ]
         properties = {"building": "yes", **({"height": f"{box[4]} m"} if heights else {})}
         geometry = {"type": "Polygon", "coordinates": [ring]}
         features.append({"type": "Feature", "properties": properties, "geometry": geometry})
@@ -53,7 +65,9 @@ def geojson(path: Path, boxes, heights: bool = True) -> Path:
 
 
 def mitsuba(path: Path, boxes, name: str = "") -> Path:
-    """Write boxes as a Mitsuba scene: unit cubes of one mesh, each scaled and moved; name: of the mesh instead."""
+    """Write boxes as a Mitsuba scene: unit cubes of one mesh, each scaled and moved; name: of the
+    mesh instead.
+    """
     ply(path.with_name("cube.ply"), [(0.0, 0.0, 1.0, 1.0, 1.0)])
     shapes = [
         f'<shape type="ply" id="b{k}"><string name="filename" value="{name or "cube.ply"}"/><transform name="to_world">'

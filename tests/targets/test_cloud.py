@@ -1,4 +1,6 @@
-"""The cloud file: what is written is read back bit by bit, and what breaks the contract is refused by name."""
+"""The cloud file: what is written is read back bit by bit, and what breaks the contract is refused
+by name.
+"""
 
 import dataclasses
 
@@ -33,13 +35,22 @@ def recording(frames: int, **record) -> Cloud:
     """Two nodes that swing to and fro."""
     track = np.random.default_rng(0).normal(size=(frames, 2, 3))
     return craft(
-        points=np.zeros((2, 3)), part=np.array([0, 1]), kinds=("node", "node"), names=("root", "head"),
-        hinges=np.full((2, 3), np.nan), axes=np.full((2, 3), np.nan), normals=np.full((2, 3), np.nan),
-        rcs_m2=np.ones(2), track=track, record=RECORD | {"category": "Pedestrian"} | record,
-    )  # fmt: skip
+        points=np.zeros((2, 3)),
+        part=np.array([0, 1]),
+        kinds=("node", "node"),
+        names=("root", "head"),
+        hinges=np.full((2, 3), np.nan),
+        axes=np.full((2, 3), np.nan),
+        normals=np.full((2, 3), np.nan),
+        rcs_m2=np.ones(2),
+        track=track,
+        record=RECORD | {"category": "Pedestrian"} | record,
+    )
 
 
-@pytest.mark.parametrize("cloud", [craft(), recording(5, track_rate_hz=120.0)], ids=["rigid", "nodes"])
+@pytest.mark.parametrize(
+    "cloud", [craft(), recording(5, track_rate_hz=120.0)], ids=["rigid", "nodes"]
+)
 def test_written_and_read_back_bit_by_bit(tmp_path, cloud):
     write(tmp_path / "a.npz", cloud)
     write(tmp_path / "b.npz", cloud)
@@ -48,7 +59,8 @@ def test_written_and_read_back_bit_by_bit(tmp_path, cloud):
         assert data["points"].dtype == np.float64 and data["part"].dtype == np.int64
     back = read(tmp_path / "a.npz")
     for field in dataclasses.fields(Cloud):
-        before, after = getattr(cloud, field.name), getattr(back, field.name)
+        before = getattr(cloud, field.name)
+        after = getattr(back, field.name)
         if isinstance(before, np.ndarray):
             np.testing.assert_array_equal(after, before)
             assert after.dtype == before.dtype
@@ -60,7 +72,9 @@ ROTOR = craft()
 WRONG = {
     "points is empty": craft(points=np.zeros((0, 3))),
     "points has shape": craft(points=np.zeros((5, 2))),
-    "points has a coordinate that is no number within 1000 m": craft(points=np.full((5, 3), np.inf)),
+    "points has a coordinate that is no number within 1000 m": craft(
+        points=np.full((5, 3), np.inf)
+    ),
     "rcs_m2 has a value that is no number from 0": craft(rcs_m2=-np.ones(5)),
     "unique names": craft(names=("body", "body")),
     "expected only": craft(kinds=("body", "tail")),
@@ -71,7 +85,9 @@ WRONG = {
     "length other than 1 or NaN": craft(normals=np.ones((5, 3))),
     "record lacks": craft(record={"subtype": "x", "category": "UAV"}),
     "expected a key `like` with one of": craft(record=RECORD | {"category": "Boat"}),
-    "'tail'] are no parts that turn, expected some of": craft(record=RECORD | {"rate_factors": {"tail": 5}}),
+    "'tail'] are no parts that turn, expected some of": craft(
+        record=RECORD | {"rate_factors": {"tail": 5}}
+    ),
     "expected numbers from 0 to 100": craft(record=RECORD | {"rate_factors": {"rotor 1": -1}}),
     "expected numbers by the parts' names": craft(record=RECORD | {"rate_factors": [1]}),
     "track has shape": recording(1, track_rate_hz=120.0),

@@ -29,27 +29,47 @@ def test_files_arrive_once_and_again_where_they_were_changed(served, tmp_path, c
     download.main([*arguments, "02/02.asf"])
     (tmp_path / "inputs/cmu/02/02.asf").write_bytes(b"changed")
     download.main([*arguments, "02/02.asf"])
-    told = ["02/02.asf fetched", "02/02_01.amc fetched", "02/02.asf already there", "02/02.asf fetched", ""]
+    told = [
+        "02/02.asf fetched",
+        "02/02_01.amc fetched",
+        "02/02.asf already there",
+        "02/02.asf fetched",
+        "",
+    ]
     assert capsys.readouterr().out.split("\n") == told
     assert (tmp_path / "inputs/cmu/02/02.asf").read_bytes() == b"skeleton"
 
 
 @pytest.mark.parametrize(
     ("name", "base", "message"),
-    [("99/99.asf", "subjects", r"99/99.asf: no pinned checksum"),
-     ("02/02.asf", "nowhere", r"nowhere/02/02.asf: download failed"),
-     ("02/02_01.amc", "subjects", r"02/02_01.amc: SHA-256 is \w{64}, expected \w{64}; nothing was kept")],
-)  # fmt: skip
-def test_unknown_missing_and_wrong_files_are_named_and_leave_nothing(name, base, message, served, tmp_path):
+    [
+        ("99/99.asf", "subjects", r"99/99.asf: no pinned checksum"),
+        ("02/02.asf", "nowhere", r"nowhere/02/02.asf: download failed"),
+        (
+            "02/02_01.amc",
+            "subjects",
+            r"02/02_01.amc: SHA-256 is \w{64}, expected \w{64}; nothing was kept",
+        ),
+    ],
+)
+def test_unknown_missing_and_wrong_files_are_named_and_leave_nothing(
+    name, base, message, served, tmp_path
+):
     (tmp_path / "subjects/02/02_01.amc").write_bytes(b"another motion")
     with pytest.raises(InputError, match=message):
         download.fetch(name, tmp_path / "inputs", served.replace("subjects", base))
     assert not any(path.is_file() for path in (tmp_path / "inputs").rglob("*"))
 
 
-def test_line_ends_do_not_matter_and_one_bad_file_does_not_stop_the_others(served, tmp_path, monkeypatch, capsys):
+def test_line_ends_do_not_matter_and_one_bad_file_does_not_stop_the_others(
+    served, tmp_path, monkeypatch, capsys
+):
     (tmp_path / "subjects/02/02.asf").write_bytes(b"two\r\nlines\r\n")
-    pinned = {"02/02_02.amc": "0" * 64, **download.SHA256, "02/02.asf": hashlib.sha256(b"two\nlines\n").hexdigest()}
+    pinned = {
+        "02/02_02.amc": "0" * 64,
+        **download.SHA256,
+        "02/02.asf": hashlib.sha256(b"two\nlines\n").hexdigest(),
+    }
     monkeypatch.setattr(download, "SHA256", pinned)
     with pytest.raises(InputError, match="1 of 3 files could not be fetched"):
         download.main(["--out", str(tmp_path / "inputs"), "--base", served])
@@ -70,4 +90,6 @@ def test_only_the_pinned_bytes_of_a_file_count(served, tmp_path, monkeypatch):
 
 @needs_inputs
 def test_the_recordings_that_the_project_was_made_with_have_the_pinned_checksums():
-    assert {name: download.checksum(name, FOLDER / "cmu" / name) for name in download.SHA256} == download.SHA256
+    assert {
+        name: download.checksum(name, FOLDER / "cmu" / name) for name in download.SHA256
+    } == download.SHA256

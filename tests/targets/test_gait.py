@@ -1,4 +1,6 @@
-"""The built-in pedestrians: what the published model says, rigid bones, a seamless cycle, people who differ."""
+"""The built-in pedestrians: what the published model says, rigid bones, a seamless cycle, people
+who differ.
+"""
 
 from pathlib import Path
 
@@ -14,7 +16,11 @@ from lowalt.targets.records import load_table, merge, read_records
 from lowalt.targets.skeleton import FEET, NODES, PARENTS, rotation, stature_m
 
 ROOT = Path(__file__).parents[2]
-TABLE = {name: row for name, row in load_table(ROOT / "config/targets.csv").items() if row["category"] == "Pedestrian"}
+TABLE = {
+    name: row
+    for name, row in load_table(ROOT / "config/targets.csv").items()
+    if row["category"] == "Pedestrian"
+}
 HEIGHTS = {name: row["hgt_m"] for name, row in TABLE.items()}
 RECORDS = read_records(ROOT / "config/targets/pedestrian.yaml")
 
@@ -37,12 +43,19 @@ def test_cycle_length_and_duration_are_the_published_ones():
 @pytest.mark.parametrize(
     ("rv", "phase", "degrees"),
     [
-        (1.0, 0.9, (25, None, None)), (1.0, 0.5, (-15, None, 8)), (1.0, 0.75, (None, 70, None)),
-        (0.25, 0.9, (12.5, None, None)), (0.25, 0.75, (None, 35, None)), (0.25, 0.08, (None, None, -10.5)),
-        (1.0, 0.17, (None, 3, None)), (1.0, 0.85, (None, None, -3)), (3.0, 0.70, (None, 65, None)),
-        (3.0, 0.1, (30, None, None)), (3.0, 0.4, (None, 3, 5)),
+        (1.0, 0.9, (25, None, None)),
+        (1.0, 0.5, (-15, None, 8)),
+        (1.0, 0.75, (None, 70, None)),
+        (0.25, 0.9, (12.5, None, None)),
+        (0.25, 0.75, (None, 35, None)),
+        (0.25, 0.08, (None, None, -10.5)),
+        (1.0, 0.17, (None, 3, None)),
+        (1.0, 0.85, (None, None, -3)),
+        (3.0, 0.70, (None, 65, None)),
+        (3.0, 0.1, (30, None, None)),
+        (3.0, 0.4, (None, 3, 5)),
     ],
-)  # fmt: skip
+)
 def test_leg_passes_through_the_published_control_points(rv, phase, degrees):
     for found, wanted in zip(gait_walk.leg(rv, np.array([phase])), degrees, strict=True):
         if wanted is not None:
@@ -52,11 +65,15 @@ def test_leg_passes_through_the_published_control_points(rv, phase, degrees):
 @pytest.mark.parametrize("rv", [0.5, 1.3])
 def test_the_three_speed_ranges_join_without_a_step(rv):
     phase = np.linspace(0, 1, 101)
-    below, above = rv - 1e-9, rv + 1e-9
+    below = rv - 1e-9
+    above = rv + 1e-9
     for curve in (gait_walk.leg, gait_walk.arm):
         for left, right in zip(curve(below, phase), curve(above, phase), strict=True):
-            # At 1.3 one control point of the hip becomes two, which bends the curve between points by 0.6 degrees.
-            assert np.abs(left - right).max() < (0.012 if rv == 1.3 and curve is gait_walk.leg else 1e-5)
+            # At 1.3 one control point of the hip becomes two, which bends the curve between points
+            # by 0.6 degrees.
+            assert np.abs(left - right).max() < (
+                0.012 if rv == 1.3 and curve is gait_walk.leg else 1e-5
+            )
     assert np.abs(gait_walk.shift(below, phase) - gait_walk.shift(above, phase)).max() < 1e-6
 
 
@@ -85,14 +102,22 @@ def test_cycle_closes_in_position_and_velocity(people):
 def test_left_side_is_the_right_side_half_a_cycle_later():
     track, _, _ = gait.cycle_m("walk", 1.7, 1.3, 200)
     mirrored = np.roll(track, 100, axis=0) * [-1, 1, 1]
-    paired = [name for name in NODES if name[0] in "lr" and name not in ("root", "lowerback", "lowerneck")]
-    swap = [NODES.index("lr"[name[0] == "l"] + name[1:]) if name in paired else NODES.index(name) for name in NODES]
+    paired = [
+        name for name in NODES if name[0] in "lr" and name not in ("root", "lowerback", "lowerneck")
+    ]
+    swap = [
+        NODES.index("lr"[name[0] == "l"] + name[1:]) if name in paired else NODES.index(name)
+        for name in NODES
+    ]
     assert np.abs(mirrored[:, swap] - track).max() < 1e-9
 
 
 def test_walkers_foot_stands_while_the_body_passes(people):
     for cloud in people.values():
-        fastest = np.linalg.norm(np.diff(cloud.track[:, FEET], axis=0), axis=2).max() * cloud.record["track_rate_hz"]
+        fastest = (
+            np.linalg.norm(np.diff(cloud.track[:, FEET], axis=0), axis=2).max()
+            * cloud.record["track_rate_hz"]
+        )
         assert cloud.record["stance_foot_speed_mps"] < 0.65 < 0.25 * fastest
 
 
@@ -125,10 +150,14 @@ def test_rotation_is_a_right_handed_rotation(axis, angle):
 @pytest.mark.parametrize(
     ("changes", "names"),
     [
-        ({"gait": "hop"}, "hop"), ({"speed_mps": "fast"}, "speed_mps"), ({"speed_mps": 5.0}, "relative speed"),
-        ({"stature_m": 176}, "stature_m"), ({"gait": None}, "walk, run"), ({"speed": 1.0}, "unknown key"),
+        ({"gait": "hop"}, "hop"),
+        ({"speed_mps": "fast"}, "speed_mps"),
+        ({"speed_mps": 5.0}, "relative speed"),
+        ({"stature_m": 176}, "stature_m"),
+        ({"gait": None}, "walk, run"),
+        ({"speed": 1.0}, "unknown key"),
     ],
-)  # fmt: skip
+)
 def test_bad_records_are_refused_by_name(changes, names):
     with pytest.raises(InputError, match=names) as error:
         built("Walking Pedestrian 1", **changes)

@@ -1,4 +1,6 @@
-"""Targets of drawn sizes, and other runs' samples in a training: laws of scaling, and what is refused."""
+"""Targets of drawn sizes, and other runs' samples in a training: laws of scaling, and what is
+refused.
+"""
 
 import json
 
@@ -30,19 +32,32 @@ def targets():
     """Cloud and published ranges of one subtype a category."""
     records = load_records(CONFIG["targets"]["table"], CONFIG["targets"]["records"])
     names = ("DJI Mini 2", "Crow", "Tesla Roadster 2020", "Walking Pedestrian 1")
-    return {name: (make(records[name], None, CONFIG["seed"]), records[name]["published"]) for name in names}
+    return {
+        name: (make(records[name], None, CONFIG["seed"]), records[name]["published"])
+        for name in names
+    }
 
 
 def drawn(targets, name, model, sizes=None):
     cloud, published = targets[name]
     more = {"sizes_m": sizes} if sizes else {}
-    row = draw(stream(3, "motion", name, model), cloud, published, MASTS, CORNERS, {**CONFIG["motion"], **more})
+    row = draw(
+        stream(3, "motion", name, model),
+        cloud,
+        published,
+        MASTS,
+        CORNERS,
+        {**CONFIG["motion"], **more},
+    )
     return {**row, "group": "seen", "model": model}
 
 
-@pytest.mark.parametrize("name", ["DJI Mini 2", "Crow", "Tesla Roadster 2020", "Walking Pedestrian 1"])
+@pytest.mark.parametrize(
+    "name", ["DJI Mini 2", "Crow", "Tesla Roadster 2020", "Walking Pedestrian 1"]
+)
 def test_only_size_rate_and_height_of_the_ground_change(targets, name):
-    plain_row, row = drawn(targets, name, 5), drawn(targets, name, 5, SIZES)
+    plain_row = drawn(targets, name, 5)
+    row = drawn(targets, name, 5, SIZES)
     scale = row.pop("scale")
     assert (scale == 1) == (name == "Walking Pedestrian 1")
     np.testing.assert_allclose(row["rate_hz"] * scale, plain_row["rate_hz"], rtol=1e-15)
@@ -54,10 +69,12 @@ def test_only_size_rate_and_height_of_the_ground_change(targets, name):
 
 @pytest.mark.parametrize("name", ["DJI Mini 2", "Crow", "Walking Pedestrian 1"])
 def test_every_point_of_a_scaled_target_lies_as_many_times_as_far_from_its_origin(targets, name):
-    row, times_s = drawn(targets, name, 7), np.arange(6) * 2.5e-3
+    row = drawn(targets, name, 7)
+    times_s = np.arange(6) * 2.5e-3
     cloud = targets[name][0]
     start, velocity = (
-        np.array([row[f"{kind}{axis}{unit}"] for axis in "xyz"]) for kind, unit in (("", "_m"), ("v", "_mps"))
+        np.array([row[f"{kind}{axis}{unit}"] for axis in "xyz"])
+        for kind, unit in (("", "_m"), ("v", "_mps"))
     )
     origin = start + times_s[:, None, None] * velocity
     small = positions(cloud, row, times_s) - origin
@@ -69,12 +86,18 @@ def test_every_point_of_a_scaled_target_lies_as_many_times_as_far_from_its_origi
 def test_table_and_record_carry_the_size_and_other_tables_have_no_such_column(targets, tmp_path):
     rows = [drawn(targets, name, 1, SIZES) for name in targets]
     write_table(tmp_path / "sized.csv", rows)
-    assert [row["scale"] for row in read_table(tmp_path / "sized.csv")] == [row["scale"] for row in rows]
+    assert [row["scale"] for row in read_table(tmp_path / "sized.csv")] == [
+        row["scale"] for row in rows
+    ]
     again, _ = row_of(json.loads(record(rows[0], 3.0, "train", 1, NETWORK)))
     assert again["scale"] == rows[0]["scale"]
     write_table(tmp_path / "plain.csv", [drawn(targets, "Crow", 1)])
     assert "scale" not in read_table(tmp_path / "plain.csv")[0]
     text = (tmp_path / "sized.csv").read_text().splitlines()
-    (tmp_path / "bad.csv").write_text("\n".join([text[0], text[1].rpartition(",")[0] + ",-1.0"]) + "\n")
-    with pytest.raises(InputError, match=r"bad.csv, line 2, column scale: -1.0, expected a positive number"):
+    (tmp_path / "bad.csv").write_text(
+        "\n".join([text[0], text[1].rpartition(",")[0] + ",-1.0"]) + "\n"
+    )
+    with pytest.raises(
+        InputError, match=r"bad.csv, line 2, column scale: -1.0, expected a positive number"
+    ):
         read_table(tmp_path / "bad.csv")

@@ -29,20 +29,40 @@ def test_a_motion_s_nodes_are_the_joints_of_an_independent_conversion_to_bvh():
     assert rate == pytest.approx(120, rel=1e-5)
     unit = 0.0254 / 0.45
     same = {
-        "root": "Hips", "lhipjoint": "LeftHip", "lfemur": "LeftKnee", "ltibia": "LeftAnkle", "lfoot": "LeftToe",
-        "ltoes": "LeftToe/end", "rhipjoint": "RightHip", "rfemur": "RightKnee", "rtibia": "RightAnkle",
-        "rfoot": "RightToe", "rtoes": "RightToe/end", "lowerback": "Chest", "upperback": "Chest2",
-    }  # fmt: skip
+        "root": "Hips",
+        "lhipjoint": "LeftHip",
+        "lfemur": "LeftKnee",
+        "ltibia": "LeftAnkle",
+        "lfoot": "LeftToe",
+        "ltoes": "LeftToe/end",
+        "rhipjoint": "RightHip",
+        "rfemur": "RightKnee",
+        "rtibia": "RightAnkle",
+        "rfoot": "RightToe",
+        "rtoes": "RightToe/end",
+        "lowerback": "Chest",
+        "upperback": "Chest2",
+    }
     above = {
-        "lowerneck": "Neck", "upperneck": "Head", "head": "Head/end",
-        "lclavicle": "LeftShoulder", "lhumerus": "LeftElbow", "lradius": "LeftWrist",
-        "rclavicle": "RightShoulder", "rhumerus": "RightElbow", "rradius": "RightWrist",
-    }  # fmt: skip
+        "lowerneck": "Neck",
+        "upperneck": "Head",
+        "head": "Head/end",
+        "lclavicle": "LeftShoulder",
+        "lhumerus": "LeftElbow",
+        "lradius": "LeftWrist",
+        "rclavicle": "RightShoulder",
+        "rhumerus": "RightElbow",
+        "rradius": "RightWrist",
+    }
     positions = nodes_m(posed(skeleton, channels, 120)) @ FROM_FILE
     assert positions.shape == (994, 31, 3)
     for node, joint in same.items():
         assert np.abs(positions[:, NODES.index(node)] - joints[joint] * unit).max() < 5e-5, node
-    legs = [NODES.index(side + name) for side in "lr" for name in ("hipjoint", "femur", "tibia", "foot", "toes")]
+    legs = [
+        NODES.index(side + name)
+        for side in "lr"
+        for name in ("hipjoint", "femur", "tibia", "foot", "toes")
+    ]
     assert np.abs((to_nodes(joints, "131_01.bvh") * unit - positions)[:, legs]).max() < 5e-5
     # The conversion leaves the bone `thorax` out: without its length what hangs on it agrees too.
     skeleton.bones[NODES.index("thorax")] = 0
@@ -59,14 +79,17 @@ def test_rest_pose_and_one_turned_joint_are_exact(files):
     channels["lfemur"][1] = [90, 0, 0]
     positions = nodes_m(posed(skeleton, channels, 120)) / (0.0254 / 0.45)
     # Rest: the sum of the bones; x left, y up, z front becomes -x, z, y.
-    hip, knee = NODES.index("lhipjoint"), NODES.index("lfemur")
+    hip = NODES.index("lhipjoint")
+    knee = NODES.index("lfemur")
     left, up, ahead = skeleton.bones[hip]
     assert np.allclose(positions[0, hip], [-left, ahead, up], atol=1e-12)
     assert np.allclose(positions[0, knee] - positions[0, hip], [0, 0, -7], atol=1e-12)
-    # Root at (1, 2, 3) turned by 90 degrees about up: file z goes to file x, so the hip's bone turns with it.
+    # Root at (1, 2, 3) turned by 90 degrees about up: file z goes to file x, so the hip's bone
+    # turns with it.
     assert np.allclose(positions[1, 0], [-1, 3, 2], atol=1e-12)
     assert np.allclose(positions[1, hip] - positions[1, 0], [-ahead, -left, up], atol=1e-12)
-    # The thigh turned by 90 degrees about x points along the file's -z, which the root has turned to -x.
+    # The thigh turned by 90 degrees about x points along the file's -z, which the root has turned
+    # to -x.
     assert np.allclose(positions[1, knee] - positions[1, hip], [7, 0, 0], atol=1e-12)
 
 
@@ -85,12 +108,20 @@ def frozen(text: str) -> str:
     ("change", "record", "words"),
     [
         (lambda text: text[: text.rindex("ltibia")], {}, r"frame 260 lacks \['ltibia', 'rtibia'\]"),
-        (lambda text: re.sub("root .*", "root 0 0 0 0 0 0", text, count=4), {}, "frame 1 has an all-zero root"),
+        (
+            lambda text: re.sub("root .*", "root 0 0 0 0 0 0", text, count=4),
+            {},
+            "frame 1 has an all-zero root",
+        ),
         (lambda text: text.replace("\n100\n", "\n100\nltibia nan\n"), {}, "frame 100.*nan"),
         (lambda text: text.replace("\n100\n", "\n100\nhello 1\n"), {}, "frame 100.*'hello 1'"),
         (lambda text: text.replace("\n100\n", "\n100\nltibia 1 2\n"), {}, "frame 100.*1 finite"),
         (lambda text: text.replace("\n101\n", "\n102\n"), {}, "frame 102 follows frame 100"),
-        (lambda text: text.replace("ltibia", "lfemur 1 2 3\nltibia", 1), {}, "frame 1 has lfemur twice, expected each"),
+        (
+            lambda text: text.replace("ltibia", "lfemur 1 2 3\nltibia", 1),
+            {},
+            "frame 1 has lfemur twice, expected each",
+        ),
         (frozen, {}, "frame 100 repeats frame 99"),
         (spiked, {}, "frame 100: l(foot|toes) accelerates"),
         (str, {"last_frame": 300}, "expected frames 1 to 300"),
@@ -116,15 +147,19 @@ def test_frames_with_faults_may_be_left_out(files):
 @pytest.mark.parametrize(
     ("old", "new", "names"),
     [
-        ("angle deg", "angle rad", "angle"), (":hierarchy", ":family", ":hierarchy"),
+        ("angle deg", "angle rad", "angle"),
+        (":hierarchy", ":family", ":hierarchy"),
         ("lfemur ltibia", "lfemur", "ltibia"),
-        ("length 0.45", "length x", "0.45|'x'"), ("order TX TY TZ RX RY RZ", "order RX RY RZ", "root order"),
-        ("name lfemur", "name thigh", "lfemur"), ("dof rx ry rz", "dof rx ry rq", "dof"),
-        ("axis 0 0 0 XYZ", "axis 0 0 0 ZYX", "ZYX"), ("axis XYZ", "axis ZYX", "axis order of root is 'ZYX'"),
+        ("length 0.45", "length x", "0.45|'x'"),
+        ("order TX TY TZ RX RY RZ", "order RX RY RZ", "root order"),
+        ("name lfemur", "name thigh", "lfemur"),
+        ("dof rx ry rz", "dof rx ry rq", "dof"),
+        ("axis 0 0 0 XYZ", "axis 0 0 0 ZYX", "ZYX"),
+        ("axis XYZ", "axis ZYX", "axis order of root is 'ZYX'"),
         ("length 7.0", "length -7.0", r"length of lfemur is -7.0, expected at least 0"),
         ("position 0 0 0", "position 0 1 0", "offset"),
     ],
-)  # fmt: skip
+)
 def test_bad_skeletons_are_refused_by_file(files, old, new, names):
     text = (files / "s.asf").read_text()
     assert old in text
@@ -141,10 +176,13 @@ def test_bad_skeletons_are_refused_by_file(files, old, new, names):
         ({"first_frame": 10, "last_frame": 11}, r"2 frames, 0.0167 s, expected at least 72"),
         ({"last_frame": 60}, "60 frames"),
         ({"first_frame": 0}, "first_frame"),
-        ({"rate_hz": "fast"}, "rate_hz"), ({"last_frame": 1}, "last_frame"), ({"scale": 2}, "scale"),
-        ({"units": "inch"}, "units"), ({"motion": "n.amc"}, "n.amc"),
+        ({"rate_hz": "fast"}, "rate_hz"),
+        ({"last_frame": 1}, "last_frame"),
+        ({"scale": 2}, "scale"),
+        ({"units": "inch"}, "units"),
+        ({"motion": "n.amc"}, "n.amc"),
     ],
-)  # fmt: skip
+)
 def test_bad_records_are_refused_by_name(files, changes, names):
     with pytest.raises(InputError, match=names):
         cloud_of(files, **changes)
@@ -166,7 +204,10 @@ def test_angles_in_radians_give_the_same_track(files):
 
 
 def test_height_is_the_published_one_unless_the_record_says_none(files):
-    scaled, plain = cloud_of(files), cloud_of(files, scale="none")
+    scaled = cloud_of(files)
+    plain = cloud_of(files, scale="none")
     factor = PUBLISHED["hgt_m"] / plain.record["recorded_stature_m"]
     assert np.allclose(scaled.track, plain.track * factor, atol=1e-12)
-    assert scaled.record["track_speed_mps"] == pytest.approx(plain.record["track_speed_mps"] * factor)
+    assert scaled.record["track_speed_mps"] == pytest.approx(
+        plain.record["track_speed_mps"] * factor
+    )

@@ -1,4 +1,6 @@
-"""Recordings as people have them: other rates, cuts and marks of AMC files, BVH, arrays of joints, CMU's clips."""
+"""Recordings as people have them: other rates, cuts and marks of AMC files, BVH, arrays of joints,
+CMU's clips.
+"""
 
 from itertools import pairwise
 
@@ -21,12 +23,18 @@ def files(tmp_path):
 
 def numbered(text: str, first: int) -> str:
     """The text of a motion whose frames are numbered from `first`."""
-    return "\n".join(str(int(line) + first - 1) if line.isdecimal() else line for line in text.splitlines())
+    return "\n".join(
+        str(int(line) + first - 1) if line.isdecimal() else line for line in text.splitlines()
+    )
 
 
 def test_a_cut_clip_with_a_byte_order_mark_and_comments_is_the_same_clip(files):
     plain = read_motion(files / "m.amc", read_skeleton(files / "s.asf"))[0]
-    text = numbered(walk(260), 40).replace("ltibia", "# a note\nltibia").replace(":DEGREES", ":DEGREES # of angle")
+    text = (
+        numbered(walk(260), 40)
+        .replace("ltibia", "# a note\nltibia")
+        .replace(":DEGREES", ":DEGREES # of angle")
+    )
     (files / "m.amc").write_text("\ufeff" + text.replace("5 0\n", "5 0 # tired\n"))
     (files / "s.asf").write_text("\ufeff" + (files / "s.asf").read_text())
     found = read_motion(files / "m.amc", read_skeleton(files / "s.asf"))[0]
@@ -43,10 +51,13 @@ def test_every_second_frame_of_a_walk_is_refused_with_the_rate_to_write(files):
     right = cloud_of(files, rate_hz=None).record
     (files / "m.amc").write_text(walk(400, period=65, speed=0.4))
     with pytest.raises(
-        InputError, match=r"m\.amc: at 120 frames per second .* `rate_hz: 60`, or to insist `rate_hz: 120`"
+        InputError,
+        match=r"m\.amc: at 120 frames per second .* `rate_hz: 60`, or to insist `rate_hz: 120`",
     ):
         cloud_of(files, rate_hz=None)
-    assert cloud_of(files, rate_hz=60).record["track_speed_mps"] == pytest.approx(right["track_speed_mps"], rel=0.02)
+    assert cloud_of(files, rate_hz=60).record["track_speed_mps"] == pytest.approx(
+        right["track_speed_mps"], rel=0.02
+    )
     (files / "m.amc").write_text(walk(800, period=260, speed=0.1))
     with pytest.raises(InputError, match="`rate_hz: 240`"):
         cloud_of(files, rate_hz=None)
@@ -59,7 +70,10 @@ def test_real_walks_and_runs_pass_at_their_rate_and_not_at_twice_it(clip, tmp_pa
     text = (FOLDER / f"cmu/{clip}.amc").read_text().splitlines()
     (tmp_path / "s.asf").write_text((FOLDER / f"cmu/{folder}/{folder}.asf").read_text())
     frames = [index for index, line in enumerate(text) if line.isdecimal()] + [len(text)]
-    half = [f"{n + 1}\n" + "\n".join(text[a + 1 : b]) for n, (a, b) in enumerate(list(pairwise(frames))[::2])]
+    half = [
+        f"{n + 1}\n" + "\n".join(text[a + 1 : b])
+        for n, (a, b) in enumerate(list(pairwise(frames))[::2])
+    ]
     (tmp_path / "m.amc").write_text("\n".join(text))
     cloud_of(tmp_path, rate_hz=None)
     (tmp_path / "m.amc").write_text("\n".join([":DEGREES", *half]))
@@ -69,12 +83,16 @@ def test_real_walks_and_runs_pass_at_their_rate_and_not_at_twice_it(clip, tmp_pa
 
 def test_a_long_recording_of_which_a_few_frames_are_used_says_which(files):
     (files / "m.amc").write_text(walk(1500, period=62, growth=1e-4))
-    with pytest.warns(InputWarning, match=r"of 1500 frames \d+ to \d+ are used.*first_frame and last_frame"):
+    with pytest.warns(
+        InputWarning, match=r"of 1500 frames \d+ to \d+ are used.*first_frame and last_frame"
+    ):
         cloud_of(files)
 
 
 def joints_of(track: np.ndarray, names: dict[str, str]) -> np.ndarray:
-    """Joint positions (F, J, 3) in SMPL's order from nodes (F, 31, 3), spine and collars on straight lines."""
+    """Joint positions (F, J, 3) in SMPL's order from nodes (F, 31, 3), spine and collars on
+    straight lines.
+    """
     at = {name: track[:, NODES.index(node)] for name, node in names.items()}
     spine = at["neck"] - at["pelvis"]
     at |= {f"spine{k}": at["pelvis"] + k / 4 * spine for k in (1, 2, 3)}
@@ -85,21 +103,34 @@ def joints_of(track: np.ndarray, names: dict[str, str]) -> np.ndarray:
 SAME = {"pelvis": "root", "neck": "thorax", "head": "upperneck"} | {
     f"{side}{joint}": side[0] + node
     for side in ("left", "right")
-    for joint, node in {"hip": "hipjoint", "knee": "femur", "ankle": "tibia", "toe": "foot", "shoulder": "clavicle",
-                        "elbow": "humerus", "wrist": "radius"}.items()
-}  # fmt: skip
+    for joint, node in {
+        "hip": "hipjoint",
+        "knee": "femur",
+        "ankle": "tibia",
+        "toe": "foot",
+        "shoulder": "clavicle",
+        "elbow": "humerus",
+        "wrist": "radius",
+    }.items()
+}
 
 
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0]])
 def test_joint_positions_of_a_walk_make_the_walk(order, files, tmp_path):
     skeleton = read_skeleton(files / "s.asf")
     track = nodes_m(posed(skeleton, read_motion(files / "m.amc", skeleton)[0], 120))
-    np.savez(tmp_path / "walk.npz", joints=joints_of(track, SAME)[..., order], mocap_framerate=120.0)
+    np.savez(
+        tmp_path / "walk.npz", joints=joints_of(track, SAME)[..., order], mocap_framerate=120.0
+    )
     cloud = cloud_of(tmp_path, skeleton=None, motion="walk.npz", scale="none")
     same = cloud_of(files, scale="none")
-    assert cloud.record["track_speed_mps"] == pytest.approx(same.record["track_speed_mps"], rel=0.02)
+    assert cloud.record["track_speed_mps"] == pytest.approx(
+        same.record["track_speed_mps"], rel=0.02
+    )
     assert len(cloud.track) == len(same.track)
-    legs = [NODES.index(side + name) for side in "lr" for name in ("hipjoint", "femur", "tibia", "foot")]
+    legs = [
+        NODES.index(side + name) for side in "lr" for name in ("hipjoint", "femur", "tibia", "foot")
+    ]
     # The cycles may begin a frame apart.
     away = [np.sort(found.track[:, legs] - found.track[:, :1], axis=0) for found in (cloud, same)]
     np.testing.assert_allclose(*away, atol=0.01)
@@ -108,7 +139,9 @@ def test_joint_positions_of_a_walk_make_the_walk(order, files, tmp_path):
 def test_a_motion_of_positions_puts_every_node_where_it_was():
     rng = np.random.default_rng(3)
     bones = rng.normal(loc=[0, 0, 0.3], size=(31, 3))
-    bones[:, 2] += 2.0 * np.array([1 if name in ("head", "thorax", "lowerneck") else 0 for name in NODES])
+    bones[:, 2] += 2.0 * np.array(
+        [1 if name in ("head", "thorax", "lowerneck") else 0 for name in NODES]
+    )
     turn = np.cumsum(rng.normal(scale=0.02, size=(20, 31, 3)), axis=0)
     steps = bones + np.cross(turn, bones)
     steps *= (np.linalg.norm(bones, axis=1) / np.linalg.norm(steps, axis=2))[..., None]
@@ -116,9 +149,15 @@ def test_a_motion_of_positions_puts_every_node_where_it_was():
     for node in range(1, 31):
         track[:, node] = track[:, PARENTS[node]] + steps[:, node]
     motion = moved(track, 100, None, "a")
-    axis = int(np.abs(np.mean(track[:, NODES.index("head")] - track[:, NODES.index("ltibia")], axis=0)).argmax())
+    axis = int(
+        np.abs(
+            np.mean(track[:, NODES.index("head")] - track[:, NODES.index("ltibia")], axis=0)
+        ).argmax()
+    )
     found = nodes_m(motion)
-    np.testing.assert_allclose(np.linalg.norm(found, axis=2), np.linalg.norm(track, axis=2), atol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.norm(found, axis=2), np.linalg.norm(track, axis=2), atol=1e-9
+    )
     np.testing.assert_allclose(np.abs(found[..., 2]), np.abs(track[..., axis]), atol=1e-9)
 
 
@@ -133,11 +172,14 @@ def test_a_bvh_s_channels_turn_in_their_order(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [(BVH.replace("0.02", "0"), "not a readable BVH"),
-     (BVH.replace("Frames: 2", "Frames: 3"), "expected 3 frames of 9"),
-     (BVH.replace("90 0\n0", "90 nan\n0"), "not a readable BVH"), ("", "not a readable BVH"),
-     (BVH, "no joint is called a left ankle, expected .'ankle', 'foot'.")],
-)  # fmt: skip
+    [
+        (BVH.replace("0.02", "0"), "not a readable BVH"),
+        (BVH.replace("Frames: 2", "Frames: 3"), "expected 3 frames of 9"),
+        (BVH.replace("90 0\n0", "90 nan\n0"), "not a readable BVH"),
+        ("", "not a readable BVH"),
+        (BVH, "no joint is called a left ankle, expected .'ankle', 'foot'."),
+    ],
+)
 def test_a_bvh_that_is_wrong_or_of_no_person_is_refused_by_name(text, words, tmp_path):
     (tmp_path / "a.bvh").write_text(text)
     with pytest.raises(InputError, match=rf"a\.bvh: .*{words}"):
@@ -146,10 +188,13 @@ def test_a_bvh_that_is_wrong_or_of_no_person_is_refused_by_name(text, words, tmp
 
 @pytest.mark.parametrize(
     ("arrays", "words"),
-    [({"poses": np.zeros((5, 156))}, "expected `joints`"), ({"joints": np.zeros((5, 9, 3))}, r"shape \(5, 9, 3\)"),
-     ({"joints": np.full((5, 22, 3), np.nan)}, "says no rate"),
-     ({"joints": np.full((5, 22, 3), np.nan), "fps": 30.0}, "not finite")],
-)  # fmt: skip
+    [
+        ({"poses": np.zeros((5, 156))}, "expected `joints`"),
+        ({"joints": np.zeros((5, 9, 3))}, r"shape \(5, 9, 3\)"),
+        ({"joints": np.full((5, 22, 3), np.nan)}, "says no rate"),
+        ({"joints": np.full((5, 22, 3), np.nan), "fps": 30.0}, "not finite"),
+    ],
+)
 def test_an_array_of_joints_that_is_wrong_is_refused_by_name(arrays, words, tmp_path):
     np.savez(tmp_path / "a.npz", **arrays)
     with pytest.raises(InputError, match=rf"a\.npz: .*{words}"):
@@ -171,7 +216,8 @@ def test_every_real_recording_that_walks_or_runs_becomes_a_cloud_where_its_known
     paths = sorted((FOLDER / "cmu").glob("*/*.amc"))
     assert len(paths) >= 15
     for path in paths:
-        subject, name = path.parent.name, f"{path.parent.name}/{path.stem}"
+        subject = path.parent.name
+        name = f"{path.parent.name}/{path.stem}"
         record = {"skeleton": f"cmu/{subject}/{subject}.asf", "motion": f"cmu/{name}.amc"}
         message, trim = FAULTS.get(name, ("", {}))
         if message:
@@ -181,16 +227,27 @@ def test_every_real_recording_that_walks_or_runs_becomes_a_cloud_where_its_known
         assert 0.7 < cloud.record["track_speed_mps"] < 4.5
         track = cloud.track
         ahead = track[:, NODES.index("ltoes"), 1] - track[:, NODES.index("ltibia"), 1]
-        assert ahead.mean() > 0 and track[:, NODES.index("lhipjoint"), 0].mean() < 0  # faces front, left is left
+        assert (
+            ahead.mean() > 0 and track[:, NODES.index("lhipjoint"), 0].mean() < 0
+        )  # faces front, left is left
         assert track[:, NODES.index("head"), 2].mean() > 0.5
-    bvh = cloud_of(FOLDER, skeleton=None, rate_hz=None, motion="cmu/131/131_01.bvh", max_mismatch_m=0.4)
+    bvh = cloud_of(
+        FOLDER, skeleton=None, rate_hz=None, motion="cmu/131/131_01.bvh", max_mismatch_m=0.4
+    )
     assert np.ptp(bvh.points[:, 2]) == pytest.approx(1.75, rel=0.1)
 
 
 def test_a_person_without_a_neck_or_toes_and_with_shins_is_the_same_person():
     rng = np.random.default_rng(3)
-    names = ("Hips", "Head", *(f"{side}{part}" for side in ("Left", "Right")
-             for part in ("Hip", "Knee", "Ankle", "Toe", "Shoulder", "Elbow", "Wrist")))  # fmt: skip
+    names = (
+        "Hips",
+        "Head",
+        *(
+            f"{side}{part}"
+            for side in ("Left", "Right")
+            for part in ("Hip", "Knee", "Ankle", "Toe", "Shoulder", "Elbow", "Wrist")
+        ),
+    )
     joints = {name: rng.normal(size=(4, 3)) for name in names}
     neck = (joints["LeftShoulder"] + joints["RightShoulder"]) / 2
     expected = to_nodes(joints | {"Neck": neck}, "a")

@@ -1,4 +1,6 @@
-"""Cycles of recordings: found, closed without a jump, turned to the front, and refused where they close badly."""
+"""Cycles of recordings: found, closed without a jump, turned to the front, and refused where they
+close badly.
+"""
 
 import tracemalloc
 
@@ -22,13 +24,16 @@ def files(tmp_path):
 
 def test_cycle_is_found_closed_and_rigid(files):
     cloud = cloud_of(files, scale="none")
-    record, track = cloud.record, cloud.track
+    record = cloud.record
+    track = cloud.track
     assert len(track) in (100, 200)  # whole periods of the made-up walk
     assert record["loop_mismatch_m"] < 1e-9
     assert record["track_speed_mps"] == pytest.approx(0.2 * 120 * 0.0254 / 0.45)
     skeleton = read_skeleton(files / "s.asf")
     lengths = np.linalg.norm(track[:, 1:] - track[:, list(PARENTS[1:])], axis=2)
-    assert np.abs(lengths - np.linalg.norm(skeleton.bones[1:], axis=1) * skeleton.unit_m).max() < 1e-12
+    assert (
+        np.abs(lengths - np.linalg.norm(skeleton.bones[1:], axis=1) * skeleton.unit_m).max() < 1e-12
+    )
     assert np.abs(track[:, 0].mean(axis=0)).max() < 1e-12
     assert record["origin_height_m"] == pytest.approx(-track[..., 2].min())
     assert np.ptp(track[:, 0, 2]) == pytest.approx(0.3 * 0.0254 / 0.45, rel=1e-3)  # the bob is kept
@@ -49,10 +54,13 @@ def test_turning_a_recording_about_the_vertical_changes_nothing(turn, first, tmp
 @given(frames=st.integers(8, 140), period=st.floats(60, 130), seed=st.integers(0, 99))
 @settings(max_examples=25, deadline=None)
 def test_any_recording_goes_round_without_a_jump(frames, period, seed):
-    # A smooth motion that does not repeat within the recording, down to 67 ms: the seam must still be smooth.
+    # A smooth motion that does not repeat within the recording, down to 67 ms: the seam must still
+    # be smooth.
     rng = np.random.default_rng(seed)
     time = np.arange(frames)
-    angle = 0.5 * np.sin(2 * np.pi * time / period + rng.uniform(0, 6)) + 0.1 * np.sin(2 * np.pi * time / 41)
+    angle = 0.5 * np.sin(2 * np.pi * time / period + rng.uniform(0, 6)) + 0.1 * np.sin(
+        2 * np.pi * time / 41
+    )
     turned = rotation("x", angle[:, None] * rng.uniform(-1, 1, len(NODES)))
     root = np.stack([0 * time, 0.012 * time, 0.03 * np.sin(time / 9)], axis=1)
     motion = Motion(root, turned, rng.normal(size=(31, 3)) * 0.1, 120.0)
@@ -60,10 +68,14 @@ def test_any_recording_goes_round_without_a_jump(frames, period, seed):
     cycle, drift = closed(motion, start, end, fade)
     track = nodes_m(cycle)
     assert drift[1] == pytest.approx(0.012 * 120)
-    # From the last frame to the first the cycle takes the very step that the recording takes at its end.
-    told = nodes_m(Motion(root - (time - start)[:, None] * [0, 0.012, 0], turned, motion.bones_m, 120.0))
+    # From the last frame to the first the cycle takes the very step that the recording takes at its
+    # end.
+    told = nodes_m(
+        Motion(root - (time - start)[:, None] * [0, 0.012, 0], turned, motion.bones_m, 120.0)
+    )
     assert np.abs((track[0] - track[-1]) - (told[end] - told[end - 1])).max() < 1e-12
-    # The fade's weights have slope zero at both ends, so the change of speed there stays within their curvature.
+    # The fade's weights have slope zero at both ends, so the change of speed there stays within
+    # their curvature.
     gap = np.abs(told[end : end + fade] - told[start : start + fade]).max()
     change = np.abs(np.diff(np.concatenate([track[-2:], track, track[:2]]), n=2, axis=0)).max()
     usual = np.abs(np.diff(told, n=2, axis=0)).max()
@@ -73,7 +85,9 @@ def test_any_recording_goes_round_without_a_jump(frames, period, seed):
 
 def test_a_cycle_that_closes_badly_is_refused_with_its_mismatch(files):
     (files / "m.amc").write_text(walk(260, growth=0.02))
-    with pytest.raises(InputError, match=r"frames \d+ to \d+, closes to 0\.\d+ m .* max_mismatch_m = 0.01 m"):
+    with pytest.raises(
+        InputError, match=r"frames \d+ to \d+, closes to 0\.\d+ m .* max_mismatch_m = 0.01 m"
+    ):
         cloud_of(files, max_mismatch_m=0.01)
     kept = cloud_of(files, max_mismatch_m=5)
     gap = kept.record["loop_mismatch_m"]

@@ -1,4 +1,6 @@
-"""The schema of records: it knows the keys that the code knows, describes each, and the page of keys shows them."""
+"""The schema of records: it knows the keys that the code knows, describes each, and the page of
+keys shows them.
+"""
 
 import pytest
 from key_pages import records_page
@@ -37,7 +39,9 @@ def test_the_page_of_keys_describes_every_key_and_every_figure():
             assert f"| `{name}`" in page and key["description"] in page
     for name in SCHEMA["models"]:
         assert f"| {name} |" in page
-        assert all(f"`{figure}` ({kind})" in page for figure, kind in record_schema.figures(name).items())
+        assert all(
+            f"`{figure}` ({kind})" in page for figure, kind in record_schema.figures(name).items()
+        )
     bare = SCHEMA | {"sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
     with pytest.raises(InputError, match="gait has no description"):
         records_page(bare)

@@ -1,4 +1,6 @@
-"""Records: what is merged and overrides what, rows of one's own, and faults refused by file, subtype, key and value."""
+"""Records: what is merged and overrides what, rows of one's own, and faults refused by file,
+subtype, key and value.
+"""
 
 import copy
 from pathlib import Path
@@ -46,7 +48,12 @@ def test_all_forty_in_the_tables_order_with_their_published_values():
     mini = records["DJI Mini 2"]
     assert mini["published"]["size_m"] == 0.2192 and mini["published"]["n_rotors_or_wings"] == 4
     assert mini["published"]["len_m"] is None and mini["published"]["freq_hi_hz"] == 256.0
-    assert (mini["category"], mini["group"], mini["points"], mini["rcs_m2_per_point"]) == ("UAV", "seen", 171, 1.0)
+    assert (mini["category"], mini["group"], mini["points"], mini["rcs_m2_per_point"]) == (
+        "UAV",
+        "seen",
+        171,
+        1.0,
+    )
     assert mini["figures"]["propeller_diameter"]["si"] == 0.109
     assert records["EH 216 S"]["group"] == "unseen"
     assert missing_inputs(records, None) == [] and source_files(mini, None) == []
@@ -57,7 +64,11 @@ def test_a_record_takes_numbers_in_any_writing(tmp_path, written):
     mine = copy.deepcopy(written["Crow"]) | {"points": "5e1", "rcs_m2_per_point": "1e-2"}
     mine["figures"]["length"] = ["46e0", "cm", "reference"]
     found = load(tmp_path, {"Crow": mine})["Crow"]
-    assert (found["points"], found["rcs_m2_per_point"], found["figures"]["length"]["value"]) == (50, 0.01, 46.0)
+    assert (found["points"], found["rcs_m2_per_point"], found["figures"]["length"]["value"]) == (
+        50,
+        0.01,
+        46.0,
+    )
 
 
 def test_a_later_file_replaces_whole_records(tmp_path, written):
@@ -84,7 +95,10 @@ def test_a_later_file_replaces_whole_records(tmp_path, written):
         ({"flap": {"speed": 3}}, r"Crow: flap: unknown key\(s\) \['speed'\]"),
         ({"flap": {"mean_deg": "up"}}, r"Crow: flap\.mean_deg: value 'up', expected type number"),
         ({"figures": {"length": [46, "cm", "reference"]}}, r"Crow: figures \[.*missing or unknown"),
-        ({"coaxial": True}, r"Crow: \['coaxial'\] are not for model bird, expected \['flap'\] at most"),
+        (
+            {"coaxial": True},
+            r"Crow: \['coaxial'\] are not for model bird, expected \['flap'\] at most",
+        ),
     ],
 )
 def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, message):
@@ -103,28 +117,65 @@ def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, m
             r"length: unit is 'furlong', expected one of \['mm', 'cm', 'm'",
         ),
         ("Crow", "length", [46, 1, "reference"], r"figures\.length: unit is '1'"),
-        ("Crow", "length", [-46, "cm", "reference"], r"length: value is -46, expected a positive number"),
-        ("Crow", "length", [float("nan"), "cm", "reference"], r"length\.0: value nan, expected type number"),
+        (
+            "Crow",
+            "length",
+            [-46, "cm", "reference"],
+            r"length: value is -46, expected a positive number",
+        ),
+        (
+            "Crow",
+            "length",
+            [float("nan"), "cm", "reference"],
+            r"length\.0: value nan, expected type number",
+        ),
         (
             "Crow",
             "length",
             [46, "cm", "hearsay"],
             r"length: source is 'hearsay', expected 'estimate' or one of \['auth",
         ),
-        ("Crow", "length", 46, r"length: value 46, expected type array \(\[value, unit, source\]\)"),
-        ("DJI Mini 4 Pro", "spacing_ratio", [1.6, 1, "estimate"], r"diameter is 0\.157 m, expected less than"),
-        ("DJI Avata", "motor_diagonal", [30, "cm", "maker"], r"motor diagonal is 0\.3 m in a craft of 0\.2048 m"),
-        ("EH 216 S", "propeller_diameter", [6, "m", "estimate"], r"propeller_diameter is 6 m, expected less than"),
+        (
+            "Crow",
+            "length",
+            46,
+            r"length: value 46, expected type array \(\[value, unit, source\]\)",
+        ),
+        (
+            "DJI Mini 4 Pro",
+            "spacing_ratio",
+            [1.6, 1, "estimate"],
+            r"diameter is 0\.157 m, expected less than",
+        ),
+        (
+            "DJI Avata",
+            "motor_diagonal",
+            [30, "cm", "maker"],
+            r"motor diagonal is 0\.3 m in a craft of 0\.2048 m",
+        ),
+        (
+            "EH 216 S",
+            "propeller_diameter",
+            [6, "m", "estimate"],
+            r"propeller_diameter is 6 m, expected less than",
+        ),
         ("Wild goose", "neck", [0.7, 1, "estimate"], r"add up to 1\.06 of the length"),
         ("Owl", "wrist", [1.2, 1, "estimate"], r"figures\.wrist is 1\.2, expected 0\.1 to 0\.9"),
         ("Owl", "span", [10, "cm", "reference"], r"figures\.span is 0\.1 m"),
-        ("Audi A6L 2019", "wheel_base", [4.5, "m", "maker"], r"are 5\.41 m, expected less than the 5\.0 m length"),
+        (
+            "Audi A6L 2019",
+            "wheel_base",
+            [4.5, "m", "maker"],
+            r"are 5\.41 m, expected less than the 5\.0 m length",
+        ),
         ("Audi A6L 2019", "track", [2, "m", "maker"], r"figures\.track is 2 m"),
         ("Audi A6L 2019", "roof_rear", [0.3, 1, "estimate"], r"expected rising from 0\.18 to 1"),
         ("Audi A6L 2019", "hood_height", [0.9, 1, "estimate"], r"expected rising and below 1"),
     ],
 )
-def test_wrong_figures_and_impossible_shapes_are_refused(tmp_path, written, name, figure, value, message):
+def test_wrong_figures_and_impossible_shapes_are_refused(
+    tmp_path, written, name, figure, value, message
+):
     record = copy.deepcopy(written[name])
     record["figures"][figure] = value
     with pytest.raises(InputError, match=rf"mine\.yaml: {name}: .*{message}"):
@@ -134,8 +185,16 @@ def test_wrong_figures_and_impossible_shapes_are_refused(tmp_path, written, name
 @pytest.mark.parametrize(
     ("name", "changes", "message"),
     [
-        ("DJI Matrice 600 Pro", {}, "model is tanker, expected n_rotors_or_wings 4 in its row, not 6"),
-        ("DJI Mini 2", {"coaxial": True}, r"\['coaxial'\] are not for model folding, expected \[\] at most"),
+        (
+            "DJI Matrice 600 Pro",
+            {},
+            "model is tanker, expected n_rotors_or_wings 4 in its row, not 6",
+        ),
+        (
+            "DJI Mini 2",
+            {"coaxial": True},
+            r"\['coaxial'\] are not for model folding, expected \[\] at most",
+        ),
         ("DJI Mini 2", {"points": 8}, "8 points for 5 parts leave none for the body"),
         ("Owl", {"points": 4}, "4 points for 5 parts leave none for the body"),
         (
@@ -152,7 +211,9 @@ def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written, name, 
 
 
 def test_unknown_and_missing_subtypes_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"mine\.yaml: unknown subtype 'Dodo', expected a key `row` or one of"):
+    with pytest.raises(
+        InputError, match=r"mine\.yaml: unknown subtype 'Dodo', expected a key `row` or one of"
+    ):
         load(tmp_path, {"Dodo": {"source": "builtin"}})
     with pytest.raises(InputError, match=r"no record for \['AITO M9 2024'"):
         load_records(TABLE, [file for file in FILES if file.stem != "vehicle"])
@@ -160,9 +221,15 @@ def test_unknown_and_missing_subtypes_are_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("", "expected a mapping"), ("Crow: 3", "Crow is 3, expected a mapping"),
-     ("Crow: {source: builtin}\nOwl: {source: gait}\nCrow: {source: gait}\n", r"key 'Crow' stands twice \(line 3\)")],
-)  # fmt: skip
+    [
+        ("", "expected a mapping"),
+        ("Crow: 3", "Crow is 3, expected a mapping"),
+        (
+            "Crow: {source: builtin}\nOwl: {source: gait}\nCrow: {source: gait}\n",
+            r"key 'Crow' stands twice \(line 3\)",
+        ),
+    ],
+)
 def test_files_that_hold_no_records_or_one_twice_are_refused(tmp_path, text, message):
     (tmp_path / "bad.yaml").write_text(text)
     with pytest.raises(InputError, match=message):
@@ -187,10 +254,17 @@ def test_wrong_tables_are_refused(tmp_path, old, new, message):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("/abs/m.amc", "inside the folder"), ("../m.amc", "inside the folder"), ("C:m.amc", "inside the folder"),
-     ("m{1}.amc", "expected a name without"), ("m\n.amc", "expected a name without")],
-)  # fmt: skip
-def test_a_file_outside_the_folder_or_of_a_name_that_the_workflow_cannot_pass_on_is_refused(name, words):
+    [
+        ("/abs/m.amc", "inside the folder"),
+        ("../m.amc", "inside the folder"),
+        ("C:m.amc", "inside the folder"),
+        ("m{1}.amc", "expected a name without"),
+        ("m\n.amc", "expected a name without"),
+    ],
+)
+def test_a_file_outside_the_folder_or_of_a_name_that_the_workflow_cannot_pass_on_is_refused(
+    name, words
+):
     row = load_table(TABLE)["Walking Pedestrian 1"]
     for files in ({"skeleton": "s.asf", "motion": name}, {"skeleton": name, "motion": "m.amc"}):
         with pytest.raises(InputError, match=rf"here: file is .*{words}"):
@@ -215,13 +289,22 @@ def test_one_record_with_its_row_adds_one_target(tmp_path):
     run = run_of(tmp_path, {"targets": {"own": {"bus": own}}})
     assert [group for group, names in run.plan.groups.items() if "My bus" in names] == ["seen"]
     assert len(run.records) == 41 and run.records["My bus"]["published"]["len_m"] == 11.95
-    assert run.classes == ("UAV", "Bird", "Vehicle", "Pedestrian") and run.sources == "targets: 41 built-in"
-    bus = records(tmp_path, {"My bus": {**BUS, "like": "Vehicle", "row": BUS["row"] | {"category": "Bus"}}}, "class")
+    assert (
+        run.classes == ("UAV", "Bird", "Vehicle", "Pedestrian")
+        and run.sources == "targets: 41 built-in"
+    )
+    bus = records(
+        tmp_path,
+        {"My bus": {**BUS, "like": "Vehicle", "row": BUS["row"] | {"category": "Bus"}}},
+        "class",
+    )
     assert run_of(tmp_path, {"targets": {"own": {"bus": bus}}}).classes[-1] == "Bus"
     # A null in a later layer takes the file out again.
     (tmp_path / "one.yaml").write_text(yaml.safe_dump({"targets": {"own": {"bus": own}}}))
     (tmp_path / "two.yaml").write_text(yaml.safe_dump({"targets": {"own": {"bus": None}}}))
-    config = layers.load([ROOT / "config/default.yaml", tmp_path / "one.yaml", tmp_path / "two.yaml"], SCHEMA)
+    config = layers.load(
+        [ROOT / "config/default.yaml", tmp_path / "one.yaml", tmp_path / "two.yaml"], SCHEMA
+    )
     assert len(records_of(config["targets"])) == 40
 
 
@@ -230,7 +313,9 @@ def test_a_single_record_replaces_that_of_its_subtype_alone_and_cells_of_its_row
     own = records(tmp_path, {"Crow": {**crow, "points": 77, "row": {"freq_hi_hz": 6}}})
     found = run_of(tmp_path, {"targets": {"own": {"crow": own}}}).records
     plain = run_of(tmp_path, {}).records
-    assert {name for name in plain if found[name] != plain[name]} == {"Crow"} and list(found) == list(plain)
+    assert {name for name in plain if found[name] != plain[name]} == {"Crow"} and list(
+        found
+    ) == list(plain)
     assert found["Crow"]["points"] == 77
     assert found["Crow"]["published"] == plain["Crow"]["published"] | {"freq_hi_hz": 6.0}
 
@@ -256,7 +341,9 @@ def test_wrong_rows_are_refused_and_a_target_may_stand_still(row, message):
 def test_one_file_is_enough_for_real_inputs_and_none_is_refused(tmp_path):
     inputs = tmp_path / "inputs"
     real = yaml.safe_load((ROOT / "config/targets/real.yaml").read_text())
-    names = [part["file"] for item in real["DJI Mini 2"]["parts"].values() for part in item["meshes"]]
+    names = [
+        part["file"] for item in real["DJI Mini 2"]["parts"].values() for part in item["meshes"]
+    ]
     with pytest.raises(InputError, match="expected a folder with the files of at least one of"):
         run_of(tmp_path, {}, str(inputs), "real")
     for name in names:
@@ -285,5 +372,7 @@ def test_the_command_makes_a_record_with_its_row(tmp_path, monkeypatch):
     own = records(tmp_path, {"My bus": BUS})
     assert main(["target", "make", own, "--out", str(out)]) == 0
     assert read(out).record["published"]["len_m"] == 11.95
-    bare = records(tmp_path, {"My bus": {key: value for key, value in BUS.items() if key != "row"}}, "bare")
+    bare = records(
+        tmp_path, {"My bus": {key: value for key, value in BUS.items() if key != "row"}}, "bare"
+    )
     assert main(["target", "make", bare, "--out", str(out)]) != 0

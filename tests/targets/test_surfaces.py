@@ -1,4 +1,6 @@
-"""Primitive surfaces: closed, outward, of the volume geometry says; and points on them: exact counts, areas, even."""
+"""Primitive surfaces: closed, outward, of the volume geometry says; and points on them: exact
+counts, areas, even.
+"""
 
 import itertools
 
@@ -74,7 +76,9 @@ def test_inside_agrees_with_the_ellipsoid_formula(a, b, c, seed):
 
 def test_volumes_tend_to_the_formulas():
     assert volume(ellipsoid((1, 2, 3), sides=128)) == pytest.approx(4 / 3 * np.pi * 6, rel=2e-3)
-    assert volume(cylinder(0.5, (0, 0, 0), (3, 4, 0), sides=200)) == pytest.approx(np.pi * 0.25 * 5, rel=1e-3)
+    assert volume(cylinder(0.5, (0, 0, 0), (3, 4, 0), sides=200)) == pytest.approx(
+        np.pi * 0.25 * 5, rel=1e-3
+    )
     # Pappus: area of the section times the way of its centroid.
     torus = ring(superellipse(0.1, 0.1, sides=200) + np.array([2, 0]), sides=200)
     assert volume(torus) == pytest.approx(np.pi * 0.01 * 2 * np.pi * 2, rel=1e-3)
@@ -90,10 +94,15 @@ def test_a_unit_cube_from_a_loft():
 
 
 def test_merging_keeps_volumes_and_hollows():
-    torus, ball = ring(superellipse(0.1, 0.1) + np.array([2, 0])), ellipsoid((1, 1, 1))
+    torus = ring(superellipse(0.1, 0.1) + np.array([2, 0]))
+    ball = ellipsoid((1, 1, 1))
     both = merged([torus, ball])
     assert volume(both) == pytest.approx(volume(torus) + volume(ball), rel=1e-12)
-    assert inside(both, np.array([[2.0, 0, 0], [0, 0, 0], [1.5, 0, 0]])).tolist() == [True, True, False]
+    assert inside(both, np.array([[2.0, 0, 0], [0, 0, 0], [1.5, 0, 0]])).tolist() == [
+        True,
+        True,
+        False,
+    ]
 
 
 def test_airfoil_is_as_thick_as_asked():
@@ -122,7 +131,8 @@ def test_samples_lie_on_their_triangles_in_number_by_area(seed, faces, count):
     for face in range(faces):
         a, b, c = vertices[index[face]]
         mine = points[owner == face]
-        # Barycentric coordinates of points on the triangle are within 0..1, and they rebuild the point.
+        # Barycentric coordinates of points on the triangle are within 0..1, and they rebuild the
+        # point.
         along, *_ = np.linalg.lstsq(np.stack([b - a, c - a], 1), (mine - a).T, rcond=None)
         assert along.min(initial=0) > -1e-9 and along.sum(0).max(initial=0) < 1 + 1e-9
         np.testing.assert_allclose(a + along.T @ np.stack([b - a, c - a]), mine, atol=1e-9)
@@ -130,9 +140,11 @@ def test_samples_lie_on_their_triangles_in_number_by_area(seed, faces, count):
 
 
 def test_uniform_inside_one_triangle():
-    vertices, faces = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    faces = np.array([[0, 1, 2]])
     points, _ = sample_faces(vertices, faces, 40_000, np.random.default_rng(1))
-    # The mean of a uniform triangle is its centroid, E[x^2] = 1/6; 5 sigma of 40 000 draws is 0.006.
+    # The mean of a uniform triangle is its centroid, E[x^2] = 1/6; 5 sigma of 40 000 draws is
+    # 0.006.
     np.testing.assert_allclose(points.mean(0), [1 / 3, 1 / 3, 0], atol=0.006)
     np.testing.assert_allclose((points[:, :2] ** 2).mean(0), 1 / 6, atol=0.006)
 
@@ -145,9 +157,14 @@ def test_degenerate_faces_get_no_points():
     assert points.sum(1).max() <= 1 + 1e-12
 
 
-@pytest.mark.parametrize("vertices", [np.zeros((3, 3)), np.full((3, 3), np.nan), np.full((3, 3), np.inf)])
+@pytest.mark.parametrize(
+    "vertices", [np.zeros((3, 3)), np.full((3, 3), np.nan), np.full((3, 3), np.inf)]
+)
 def test_surface_without_area_is_refused(vertices):
-    with pytest.raises(InputError, match=r"area .*, expected a positive finite one"), np.errstate(invalid="ignore"):
+    with (
+        pytest.raises(InputError, match=r"area .*, expected a positive finite one"),
+        np.errstate(invalid="ignore"),
+    ):
         sample_faces(vertices, np.array([[0, 1, 2]]), 10, np.random.default_rng(0))
     with pytest.raises(InputError, match="0 triangles"):
         sample_faces(np.zeros((0, 3)), np.zeros((0, 3), int), 10, np.random.default_rng(0))
@@ -165,7 +182,8 @@ def test_thinning_is_exact_unique_and_even(seed, size, data):
     assert chosen[: len(keep)].tolist() == keep
     assert thin(points, count, np.random.default_rng(seed), keep).tolist() == chosen.tolist()
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    # The law of farthest points: none left out is farther from the chosen than the chosen are from each other.
+    # The law of farthest points: none left out is farther from the chosen than the chosen are from
+    # each other.
     covered = distance[:, chosen].min(1).max()
     free = range(max(len(keep), 1), count)
     gaps = [distance[chosen[k], chosen[:k]].min() for k in free]

@@ -1,4 +1,6 @@
-"""The built-in models: published sizes, exact counts, closed surfaces, and parts that turn the right way."""
+"""The built-in models: published sizes, exact counts, closed surfaces, and parts that turn the
+right way.
+"""
 
 import hashlib
 import json
@@ -46,15 +48,21 @@ def variant(name, **changes):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_counts_are_the_published_ones_and_moving_parts_get_their_share_in_whole_blades(clouds, name):
-    cloud, record = check(clouds[name], name), RECORDS[name]
+def test_counts_are_the_published_ones_and_moving_parts_get_their_share_in_whole_blades(
+    clouds, name
+):
+    cloud = check(clouds[name], name)
+    record = RECORDS[name]
     counts = np.bincount(cloud.part)
     assert len(cloud.points) == TABLE[name]["points_in_published_cloud_approx"]
     assert cloud.record["points_by_part"] == dict(zip(cloud.names, counts, strict=True))
     parts, _ = MODULES[record["category"]].parts(record)
     blades = sum(part.copies for part in parts if part.kind != "body")
     assert abs(counts[1:].sum() - record["moving_share"] * record["points"]) <= blades / 2 + 4
-    assert all(count % part.copies == 0 and count >= part.copies for part, count in zip(parts, counts, strict=True))
+    assert all(
+        count % part.copies == 0 and count >= part.copies
+        for part, count in zip(parts, counts, strict=True)
+    )
 
 
 def test_any_count_that_leaves_the_body_a_point_is_met():
@@ -65,7 +73,8 @@ def test_any_count_that_leaves_the_body_a_point_is_met():
 
 @pytest.mark.parametrize("name", UAVS)
 def test_craft_have_their_published_size(clouds, name):
-    cloud, size = clouds[name], TABLE[name]["size_m"]
+    cloud = clouds[name]
+    size = TABLE[name]["size_m"]
     rotors = cloud.parts_of("rotor")
     places = cloud.hinges[rotors]
     across = np.linalg.norm(places[:, None] - places[None], axis=2).max()
@@ -73,7 +82,10 @@ def test_craft_have_their_published_size(clouds, name):
     if meaning == "body diagonal":
         assert across == pytest.approx(RECORDS[name]["figures"]["motor_diagonal"]["si"], rel=1e-12)
     elif meaning == "span over rotors":
-        reach = [np.linalg.norm(cloud.points[cloud.part == p] - cloud.hinges[p], axis=1).max() for p in rotors]
+        reach = [
+            np.linalg.norm(cloud.points[cloud.part == p] - cloud.hinges[p], axis=1).max()
+            for p in rotors
+        ]
         assert across + 2 * max(reach) == pytest.approx(size, rel=0.02)
     else:
         plan = cloud.points[:, :2]
@@ -83,7 +95,8 @@ def test_craft_have_their_published_size(clouds, name):
 
 @pytest.mark.parametrize("name", BIRDS)
 def test_birds_have_their_published_length_and_their_species_span(clouds, name):
-    cloud, figure = clouds[name], WRITTEN[name]["figures"]
+    cloud = clouds[name]
+    figure = WRITTEN[name]["figures"]
     width, length, _ = np.ptp(cloud.points, axis=0)
     body = np.ptp(cloud.points[cloud.part == 0], axis=0)[1]
     assert body == pytest.approx(TABLE[name]["size_m"], rel=0.02) and length < 1.25 * body
@@ -92,8 +105,11 @@ def test_birds_have_their_published_length_and_their_species_span(clouds, name):
 
 @pytest.mark.parametrize("name", CARS)
 def test_cars_have_their_published_sizes_and_stand_on_the_ground(clouds, name):
-    cloud, row = clouds[name], TABLE[name]
-    np.testing.assert_allclose(np.ptp(cloud.points, axis=0), [row["wid_m"], row["len_m"], row["hgt_m"]], rtol=0.02)
+    cloud = clouds[name]
+    row = TABLE[name]
+    np.testing.assert_allclose(
+        np.ptp(cloud.points, axis=0), [row["wid_m"], row["len_m"], row["hgt_m"]], rtol=0.02
+    )
     figure = RECORDS[name]["figures"]
     wheels = cloud.parts_of("wheel")
     assert len(wheels) == 4
@@ -130,7 +146,8 @@ def test_points_lie_on_the_outer_skin_and_normals_point_out(clouds, name):
     for index, part in enumerate(parts):
         # Of equal copies the first lies on the shells as modelled.
         mine = np.flatnonzero(cloud.part == index)[: (cloud.part == index).sum() // part.copies]
-        points, normals = cloud.points[mine], cloud.normals[mine]
+        points = cloud.points[mine]
+        normals = cloud.normals[mine]
         behind = np.zeros(len(mine), bool)
         for shell in part.shells:
             assert not inside(shell, points + step * normals).any()
@@ -143,12 +160,16 @@ def test_neighbouring_rotors_turn_against_each_other_and_clear_each_other(clouds
     cloud = clouds[name]
     rotors = cloud.parts_of("rotor")
     assert len(rotors) == TABLE[name]["n_rotors_or_wings"]
-    around = sorted(rotors, key=lambda part: np.arctan2(cloud.hinges[part, 1], cloud.hinges[part, 0]))
+    around = sorted(
+        rotors, key=lambda part: np.arctan2(cloud.hinges[part, 1], cloud.hinges[part, 0])
+    )
     diameter = RECORDS[name]["figures"]["propeller_diameter"]["si"]
     for part, following in zip(around, [*around[1:], around[0]], strict=True):
         assert cloud.axes[part] @ cloud.axes[following] == -1
         assert np.linalg.norm(cloud.hinges[part] - cloud.hinges[following]) > diameter
-        away = np.linalg.norm((cloud.points[cloud.part == part] - cloud.hinges[part])[:, :2], axis=1)
+        away = np.linalg.norm(
+            (cloud.points[cloud.part == part] - cloud.hinges[part])[:, :2], axis=1
+        )
         assert 2 * away.max() == pytest.approx(diameter, rel=0.02)
 
 
@@ -185,7 +206,9 @@ def test_a_positive_angle_raises_both_wing_tips(clouds, name):
         reach = abs(cloud.points[cloud.part == inner][:, 0]).max()
         assert reach == pytest.approx(abs(cloud.hinges[outer, 0]), rel=1e-3)
         assert abs(cloud.hinges[inner, 0]) < abs(cloud.hinges[outer, 0])
-        assert cloud.names[inner].startswith("right" if cloud.points[cloud.part == outer][:, 0].min() > 0 else "left")
+        assert cloud.names[inner].startswith(
+            "right" if cloud.points[cloud.part == outer][:, 0].min() > 0 else "left"
+        )
     assert cloud.record["flap"] == bird.FLAP | WRITTEN[name]["flap"]
 
 
@@ -196,16 +219,23 @@ def test_a_positive_angle_rolls_the_car_forward(clouds, name):
     for wheel in cloud.parts_of("wheel"):
         contact = cloud.hinges[wheel] - [0, 0, radius]
         angle = 1e-6
-        moved = turn(cloud.axes[wheel], angle) @ (contact - cloud.hinges[wheel]) + cloud.hinges[wheel]
+        moved = (
+            turn(cloud.axes[wheel], angle) @ (contact - cloud.hinges[wheel]) + cloud.hinges[wheel]
+        )
         # Rolling forward by radius * angle, the point on the ground stands still.
         assert moved[1] - contact[1] + radius * angle == pytest.approx(0, abs=1e-12)
 
 
 def test_clouds_are_the_default_s_to_the_byte_and_another_seed_gives_others(tmp_path, clouds):
     """Each length, angle, count, time and draw of a built-in model or gait is that of the kept run."""
-    kept = dict(line.split()[::-1] for line in (ROOT / "results/reference/default.sha256").read_text().splitlines())
+    kept = dict(
+        line.split()[::-1]
+        for line in (ROOT / "results/reference/default.sha256").read_text().splitlines()
+    )
     people = read_records(ROOT / "config/targets/pedestrian.yaml")
-    walkers = {name: make(merge(TABLE[name], record, name), None, SEED) for name, record in people.items()}
+    walkers = {
+        name: make(merge(TABLE[name], record, name), None, SEED) for name, record in people.items()
+    }
     for name, cloud in {**clouds, **walkers}.items():
         write(tmp_path / "cloud.npz", cloud)
         found = hashlib.sha256((tmp_path / "cloud.npz").read_bytes()).hexdigest()
@@ -223,18 +253,24 @@ def test_the_eh216_may_fly_sixteen_rotors_in_coaxial_pairs():
 
 
 @pytest.mark.parametrize(
-    ("name", "turn"), [("EH 216 S", 0.25), ("Type-A Firefighting UAV", 0), ("Type-B Firefighting UAV", 1 / 6)]
+    ("name", "turn"),
+    [("EH 216 S", 0.25), ("Type-A Firefighting UAV", 0), ("Type-B Firefighting UAV", 1 / 6)],
 )
 def test_a_rotor_of_two_layers_turns_as_one_with_its_lower_blades_ahead(name, turn):
-    cloud, figures = variant(name, points=3000), RECORDS[name]["figures"]
+    cloud = variant(name, points=3000)
+    figures = RECORDS[name]["figures"]
     for rotor in cloud.parts_of("rotor"):
         points = cloud.points[cloud.part == rotor] - cloud.hinges[rotor]
         gap = figures["layer_gap"]["si"]
         upper, lower = (points[abs(points[:, 2] + depth) < gap / 2] for depth in (0, gap))
-        assert len(upper) + len(lower) == len(points) and abs(len(upper) - len(lower)) < 0.2 * len(points)
+        assert len(upper) + len(lower) == len(points) and abs(len(upper) - len(lower)) < 0.2 * len(
+            points
+        )
         # The sums of (x + i y)^n over n equal blades have n times the angle of a blade.
         count = figures["blade_count"]["value"]
-        told = [np.angle(((layer[:, 0] + 1j * layer[:, 1]) ** count).sum()) for layer in (upper, lower)]
+        told = [
+            np.angle(((layer[:, 0] + 1j * layer[:, 1]) ** count).sum()) for layer in (upper, lower)
+        ]
         off = (told[1] - told[0]) / count / (2 * np.pi) - turn
         assert abs(off * count - round(off * count)) < 0.05 * count
 
@@ -249,8 +285,17 @@ def test_rolling_diameter_wing_beat_and_cross_section_may_be_set():
 
 
 def test_the_command_line_makes_the_same_cloud_and_refuses_an_unknown_source(tmp_path, clouds):
-    settings, out = tmp_path / "settings.json", tmp_path / "seagull.npz"
-    command = [sys.executable, "-m", "lowalt.targets", "--settings", f"@{settings}", "--out", str(out)]
+    settings = tmp_path / "settings.json"
+    out = tmp_path / "seagull.npz"
+    command = [
+        sys.executable,
+        "-m",
+        "lowalt.targets",
+        "--settings",
+        f"@{settings}",
+        "--out",
+        str(out),
+    ]
     settings.write_text(json.dumps({"seed": SEED, "record": RECORDS["Seagull"]}))
     subprocess.run(command, check=True, capture_output=True)
     np.testing.assert_array_equal(read(out).points, clouds["Seagull"].points)
@@ -260,9 +305,17 @@ def test_the_command_line_makes_the_same_cloud_and_refuses_an_unknown_source(tmp
 
 
 def test_the_gallery_draws_every_cloud(tmp_path, clouds):
-    files = [tmp_path / f"{slug(name)}.npz" for name in ("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024")]
-    for name, file in zip(("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024"), files, strict=True):
+    files = [
+        tmp_path / f"{slug(name)}.npz"
+        for name in ("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024")
+    ]
+    for name, file in zip(
+        ("DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024"), files, strict=True
+    ):
         write(file, clouds[name])
     gallery(["--clouds", *map(str, files), "--out", str(tmp_path / "gallery.png")])
     picture = np.asarray(Image.open(tmp_path / "gallery.png").convert("RGB"))
-    assert picture.shape[1] > 1000 and len({tuple(pixel) for pixel in picture[::7, ::7].reshape(-1, 3)}) > 20
+    assert (
+        picture.shape[1] > 1000
+        and len({tuple(pixel) for pixel in picture[::7, ::7].reshape(-1, 3)}) > 20
+    )

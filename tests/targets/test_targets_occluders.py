@@ -1,4 +1,6 @@
-"""Opaque surfaces of targets: divided triangles, pieces cut away, capsules along bones, and the files of them."""
+"""Opaque surfaces of targets: divided triangles, pieces cut away, capsules along bones, and the
+files of them.
+"""
 
 import json
 
@@ -15,7 +17,12 @@ from lowalt.targets.surfaces import Surface, box, longest_edge, quartered
 
 def areas(corners):
     """Areas (F,) of triangles (F, 3, 3)."""
-    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    return (
+        np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        / 2
+    )
 
 
 def test_a_quartered_triangle_is_four_like_it_of_half_its_size_and_together_it():
@@ -26,24 +33,40 @@ def test_a_quartered_triangle_is_four_like_it_of_half_its_size_and_together_it()
         np.testing.assert_allclose(longest_edge(piece), longest / 2)
         np.testing.assert_allclose(areas(piece), areas(corners) / 4)
         # Three keep a corner, the fourth lies in the middle.
-        kept = piece[:, place] == corners[:, place] if place < 3 else abs((piece - corners).mean(axis=1)) < 1e-15
+        kept = (
+            piece[:, place] == corners[:, place]
+            if place < 3
+            else abs((piece - corners).mean(axis=1)) < 1e-15
+        )
         assert kept.all()
 
 
 def test_a_cut_takes_the_area_inside_it_to_a_triangle_s_size():
-    square = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
+    square = Surface(
+        np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    )
     left = occluders.cut_away(square, (box((0.5, 0.5, 1.0), (0.5, 0.5, 0.0), exponent=200.0),))
     corners = left.vertices[left.faces]
     assert areas(corners).sum() == pytest.approx(0.75, abs=0.02)
     inner = corners.mean(1)
-    assert not (abs(inner[:, :2] - 0.5) < 0.22).all(1).any() and (abs(inner[:, :2] - 0.5) < 0.28).all(1).any()
+    assert (
+        not (abs(inner[:, :2] - 0.5) < 0.22).all(1).any()
+        and (abs(inner[:, :2] - 0.5) < 0.28).all(1).any()
+    )
 
 
 def test_every_bone_of_a_person_has_a_capsule_that_grows_with_the_stature():
     found = occluders.from_bones(1.756)
-    assert [tuple(pair) for pair in found["bones"]] == [(PARENTS[node], node) for node in range(1, len(NODES))]
+    assert [tuple(pair) for pair in found["bones"]] == [
+        (PARENTS[node], node) for node in range(1, len(NODES))
+    ]
     radius = dict(zip(NODES[1:], found["radius_m"], strict=True))
-    assert (radius["lfemur"], radius["rfemur"], radius["head"], radius["rthumb"]) == (0.09, 0.09, 0.09, 0.015)
+    assert (radius["lfemur"], radius["rfemur"], radius["head"], radius["rthumb"]) == (
+        0.09,
+        0.09,
+        0.09,
+        0.015,
+    )
     np.testing.assert_allclose(occluders.from_bones(3.512)["radius_m"], 2 * found["radius_m"])
     assert not found["closed"].any() and not found["offset_m"].any() and not len(found["faces"])
 
@@ -51,12 +74,15 @@ def test_every_bone_of_a_person_has_a_capsule_that_grows_with_the_stature():
 def test_a_craft_s_surfaces_move_with_their_parts_and_come_back_from_a_file(tmp_path):
     record = RECORDS["DJI Mini 2"]
     parts = MODULES["UAV"].parts(record)[0]
-    settings, out = {"seed": 1, "record": record}, tmp_path / "mini.npz"
+    settings = {"seed": 1, "record": record}
+    out = tmp_path / "mini.npz"
     occluders.main(["--settings", json.dumps(settings), "--out", str(out)])
     found = occluders.read_all([out])["DJI Mini 2"]
     made = occluders.make(record, None, 1)
     assert all((found[name] == made[name]).all() for name in occluders.ARRAYS)
-    assert (found["vertex_part"][found["faces"]] == found["vertex_part"][found["faces"][:, :1]]).all()
+    assert (
+        found["vertex_part"][found["faces"]] == found["vertex_part"][found["faces"][:, :1]]
+    ).all()
     assert sorted(set(found["vertex_part"].tolist())) == list(range(len(parts)))
     assert len(found["offset_m"]) == record["points"] and len(set(found["offset_m"].tolist())) == 1
     assert found["offset_m"][0] == pytest.approx(1e-9 * np.ptp(found["vertices"], axis=0).max())
@@ -67,9 +93,12 @@ def test_a_craft_s_surfaces_move_with_their_parts_and_come_back_from_a_file(tmp_
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"source": "mesh"}, "needs the folder of real inputs"), ({"source": "clay"}, "record.source is 'clay'"),
-     ({"source": "gait", "gait": "trot"}, "gait trot has no surfaces")],
-)  # fmt: skip
+    [
+        ({"source": "mesh"}, "needs the folder of real inputs"),
+        ({"source": "clay"}, "record.source is 'clay'"),
+        ({"source": "gait", "gait": "trot"}, "gait trot has no surfaces"),
+    ],
+)
 def test_a_target_without_surfaces_is_refused(change, words):
     with pytest.raises(InputError, match=words):
         occluders.make(RECORDS["DJI Mini 2"] | change, None, 1)

@@ -1,4 +1,6 @@
-"""Cubes: their range cells against the echo's definition, their noise, their truth, and the images made of them."""
+"""Cubes: their range cells against the echo's definition, their noise, their truth, and the images
+made of them.
+"""
 
 import io
 import pickle
@@ -50,7 +52,9 @@ def dataset():
 
 
 def without(config: dict) -> dict:
-    return config | {"spectra": {name: block for name, block in config["spectra"].items() if name not in SHOWN}}
+    return config | {
+        "spectra": {name: block for name, block in config["spectra"].items() if name not in SHOWN}
+    }
 
 
 def truth(cube: Cube, name: str) -> np.ndarray:
@@ -60,8 +64,10 @@ def truth(cube: Cube, name: str) -> np.ndarray:
 def test_images_of_cells_come_after_the_other_three_which_stay_as_without_them(dataset):
     three = Dataset(without(dataset.config), dataset.clouds)
     for number in (0, 3):
-        sample, plain = dataset[number], three[number]
-        found, old = split(sample.image, 5).reshape(3, 5, 32, 32), split(plain.image, 3).reshape(3, 3, 32, 32)
+        sample = dataset[number]
+        plain = three[number]
+        found = split(sample.image, 5).reshape(3, 5, 32, 32)
+        old = split(plain.image, 3).reshape(3, 3, 32, 32)
         assert (found[:, :3] == old).all() and (sample.signal == plain.signal).all()
         assert sample.record == plain.record
         # The chosen cell is the middle one, where the profile is brightest on average.
@@ -70,7 +76,8 @@ def test_images_of_cells_come_after_the_other_three_which_stay_as_without_them(d
 
 def test_the_tiles_stage_draws_what_a_data_set_draws_on_the_spot(dataset, tmp_path):
     chunk = next(iter(dataset.plan.chunks))
-    rows, block = rows_of(dataset, chunk)[:1], {name: dataset.config[name] for name in ("network", "spectra", "images")}
+    rows = rows_of(dataset, chunk)[:1]
+    block = {name: dataset.config[name] for name in ("network", "spectra", "images")}
     write_table(tmp_path / "motion.csv", rows)
     clouds = [tmp_path / f"{slug(name)}.npz" for name in dataset.clouds]
     for path, cloud in zip(clouds, dataset.clouds.values(), strict=True):
@@ -79,17 +86,28 @@ def test_the_tiles_stage_draws_what_a_data_set_draws_on_the_spot(dataset, tmp_pa
     signals = np.stack([[made.signal(row, snr) for snr in SNRS] for row in rows])
     np.save(tmp_path / "noisy.npy", signals)
     cubes = {"seed": dataset.plan.seed, "tolerance": None, "effects": LAND, "snr_db": [3.0, "inf"]}
-    files = "--signals", tmp_path / "noisy.npy", "--motion", tmp_path / "motion.csv", "--clouds", *clouds
+    files = (
+        "--signals",
+        tmp_path / "noisy.npy",
+        "--motion",
+        tmp_path / "motion.csv",
+        "--clouds",
+        *clouds,
+    )
     given = ["--settings", canonical({**block, "cubes": cubes}), *map(str, files)]
     tiles([*given, "--out", str(tmp_path / "tiles.npz")])
-    found, again = Tiles(tmp_path / "tiles.npz"), pickle.loads(pickle.dumps(made))
+    found = Tiles(tmp_path / "tiles.npz")
+    again = pickle.loads(pickle.dumps(made))
     for level in range(2):
         assert found[level] == again.png(signals[0, level], rows[0], SNRS[level])
     assert decode(found[0])[0].shape == (3 * 32, 5 * 32)
 
 
-def test_cells_without_noise_are_those_of_the_echo_s_definition_and_the_chosen_ones_are_the_signal(dataset):
-    row, network = dataset.row(dataset.place(1)), dataset.maker.network
+def test_cells_without_noise_are_those_of_the_echo_s_definition_and_the_chosen_ones_are_the_signal(
+    dataset,
+):
+    row = dataset.row(dataset.place(1))
+    network = dataset.maker.network
     cloud = dataset.clouds[row["subtype"]]
     motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
     aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
@@ -101,9 +119,11 @@ def test_cells_without_noise_are_those_of_the_echo_s_definition_and_the_chosen_o
 
 
 def test_noise_has_the_power_of_the_snr_in_every_cell_and_streams_of_its_own(dataset):
-    row, maker = dataset.row(dataset.place(1)), dataset.maker
+    row = dataset.row(dataset.place(1))
+    maker = dataset.maker
     signal, clean = maker.signal(row, 3.0), maker.signal(row, np.inf)
-    noisy, silent = maker.cubes(row, 3.0, signal), maker.cubes(row, np.inf, clean)
+    noisy = maker.cubes(row, 3.0, signal)
+    silent = maker.cubes(row, np.inf, clean)
     drawn = [cube.cells - still.cells for cube, still in zip(noisy, silent, strict=True)]
     for place, noise in enumerate(drawn):
         power = np.mean(abs(clean[place]) ** 2) / 10**0.3
@@ -114,7 +134,8 @@ def test_noise_has_the_power_of_the_snr_in_every_cell_and_streams_of_its_own(dat
     again = maker.cubes(row, 3.0, signal)
     assert all((cube.cells == other.cells).all() for cube, other in zip(noisy, again, strict=True))
     other = Cubes.from_settings(
-        {"seed": 6, "network": dataset.config["network"], "tolerance": None, "effects": {}}, dataset.clouds
+        {"seed": 6, "network": dataset.config["network"], "tolerance": None, "effects": {}},
+        dataset.clouds,
     ).of(row, 3.0, maker.network.stations[0], signal[0])
     same = abs(other.cells - noisy[0].cells).max(axis=0) == 0
     assert not same.any() and (other.signal == signal[0]).all()
@@ -134,7 +155,8 @@ def test_noise_of_cells_passes_the_canceller_as_the_signal_s_does(dataset):
 
 def test_truth_is_the_middle_of_the_target_as_each_station_sees_it(dataset):
     place = dataset.place(1)
-    row, record = dataset.row(place), dataset.record(1)
+    row = dataset.row(place)
+    record = dataset.record(1)
     network = dataset.maker.network
     for station, cube in zip(network.stations, dataset.cubes(1), strict=True):
         seen = record["geometry"][station.name]
@@ -149,20 +171,28 @@ def test_truth_is_the_middle_of_the_target_as_each_station_sees_it(dataset):
 
 
 def test_a_range_doppler_map_peaks_at_the_range_and_folded_speed_of_an_echo():
-    symbols, interval_s, cells, wavelength_m = 400, 2.5e-3, 64, SPEED_OF_LIGHT / 4.9e9
-    times, fold = np.arange(symbols) * interval_s, wavelength_m / (4 * interval_s)
+    symbols = 400
+    interval_s = 2.5e-3
+    cells = 64
+    wavelength_m = SPEED_OF_LIGHT / 4.9e9
+    times = np.arange(symbols) * interval_s
+    fold = wavelength_m / (4 * interval_s)
     settings = range_doppler.Settings(9, 512)
     for speed_mps in (-4.0, 0.0, 2.5, 9.0):
         held = np.zeros((symbols, cells), np.complex64)
         held[:, 22] = 3 * np.exp(-4j * np.pi * speed_mps * times / wavelength_m)
-        found = range_doppler.definition(Cube(held, np.full(symbols, 20), np.zeros((symbols, len(TRUTH)))), settings)
+        found = range_doppler.definition(
+            Cube(held, np.full(symbols, 20), np.zeros((symbols, len(TRUTH)))), settings
+        )
         row, column = np.unravel_index(found.argmax(), found.shape)
         folded = (speed_mps + fold) % (2 * fold) - fold
         speeds = -np.fft.fftshift(np.fft.fftfreq(512, interval_s))[::-1] * wavelength_m / 2
         assert row == 4 + 2 and abs(speeds[column] - folded) < 2 * fold / 512
         assert 2.7 < found.max() <= 3.001  # between two speeds a Hann window loses up to a tenth
     out = np.empty((9, 512), np.float32)
-    range_doppler.fill_cells(Cube(held, np.full(symbols, 20), np.zeros((symbols, len(TRUTH)))), settings, out)
+    range_doppler.fill_cells(
+        Cube(held, np.full(symbols, 20), np.zeros((symbols, len(TRUTH)))), settings, out
+    )
     np.testing.assert_allclose(out, found, rtol=1e-6)
 
 
@@ -185,8 +215,11 @@ def test_a_range_profile_is_the_mean_power_around_the_chosen_cells():
 
 def test_axes_are_metres_and_metres_a_second(dataset):
     network, station = dataset.maker.network, dataset.maker.network.stations[0]
-    (_, left, right), (_, low, high) = range_doppler.axes(range_doppler.Settings(9, 512), network, station)
-    # Bins begin one above the negative end, at which speeds fold; the carrier is that of the middle subcarrier.
+    (_, left, right), (_, low, high) = range_doppler.axes(
+        range_doppler.Settings(9, 512), network, station
+    )
+    # Bins begin one above the negative end, at which speeds fold; the carrier is that of the middle
+    # subcarrier.
     middle_hz = station.frequency_hz + 511 / 2 * 480e3
     assert right == pytest.approx(SPEED_OF_LIGHT / (4 * middle_hz * network.symbol_interval_s))
     assert left == pytest.approx(-right * 255 / 256)
@@ -195,7 +228,9 @@ def test_axes_are_metres_and_metres_a_second(dataset):
 
 
 def test_a_signal_alone_gives_no_image_of_cells(dataset):
-    renderer = Renderer.from_settings({name: dataset.config[name] for name in ("network", "spectra", "images")})
+    renderer = Renderer.from_settings(
+        {name: dataset.config[name] for name in ("network", "spectra", "images")}
+    )
     signals = np.ones((3, renderer.network.symbols), np.complex64)
     for ask in (lambda: renderer.tile(signals), lambda: renderer.some(signals, [3])):
         with pytest.raises(InputError, match="made of range cells, and a signal alone"):
@@ -226,15 +261,25 @@ def test_symbols_that_were_not_received_are_zeros(dataset):
     signal = maker.signal(row, np.inf)
     cube = maker.cubes(row, np.inf, signal)[0]
     lost = cube.chosen < 0
-    assert 0 < lost.sum() < len(lost) and not cube.cells[lost].any() and cube.cells[~lost].any(axis=1).all()
+    assert (
+        0 < lost.sum() < len(lost)
+        and not cube.cells[lost].any()
+        and cube.cells[~lost].any(axis=1).all()
+    )
     assert (cube.signal == signal[0]).all()
 
 
 @pytest.mark.parametrize("number", ["complex64", "int16"])
 def test_each_target_in_the_beam_has_a_truth_of_its_own_which_shards_keep(dataset, number):
     company = {"companions": {"subtypes": ["Owl"], "count": [2, 2], "spread_m": 8.0}}
-    settings = {"seed": 1, "network": dataset.config["network"], "tolerance": None, "effects": company}
-    row, network = dataset.row(dataset.place(1)), dataset.maker.network
+    settings = {
+        "seed": 1,
+        "network": dataset.config["network"],
+        "tolerance": None,
+        "effects": company,
+    }
+    row = dataset.row(dataset.place(1))
+    network = dataset.maker.network
     # The labelled target reflects nothing, so what is seen is a companion.
     makers = [Cubes.from_settings(settings, dataset.clouds, empty=dark) for dark in (True, False)]
     dark, whole = (maker.of(row, np.inf, network.stations[0]) for maker in makers)
@@ -242,7 +287,9 @@ def test_each_target_in_the_beam_has_a_truth_of_its_own_which_shards_keep(datase
     cell = TRUTH.index("cell")
     seen = abs(dark.cells).argmax(axis=1)
     assert min(np.median(abs(other[:, cell] - dark.truth[:, cell])) for other in dark.others) > 4
-    assert np.mean(np.min([abs(seen - other[:, cell]) for other in dark.others], axis=0) <= 2) > 0.95
+    assert (
+        np.mean(np.min([abs(seen - other[:, cell]) for other in dark.others], axis=0) <= 2) > 0.95
+    )
     stored, facts = of_cubes([whole], replace(network, stations=network.stations[:1]), number)
     (back,) = cubes_of({"cube": facts}, np.lib.format.read_array(io.BytesIO(stored)))
     for kept, other in zip((back.truth, *back.others), (whole.truth, *whole.others), strict=True):

@@ -1,4 +1,6 @@
-"""The observed truth: where echoes appear in range cells and speeds, in all scenes, read back out of the cubes."""
+"""The observed truth: where echoes appear in range cells and speeds, in all scenes, read back out
+of the cubes.
+"""
 
 import sys
 from pathlib import Path
@@ -16,7 +18,10 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import observed_truth  # noqa: E402
 
-SCENES = [*sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml")), *observed_truth.FURTHER]
+SCENES = [
+    *sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml")),
+    *observed_truth.FURTHER,
+]
 QUICK = {"worst", "fmcw", "frames", "links, 0.017 ppm", "continuous wave"}
 TIE = 0.505
 """Half a cell or speed, and what a tie between two needs."""
@@ -24,7 +29,8 @@ TIE = 0.505
 
 @pytest.mark.parametrize("symbols", [64, 65])
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
+    "name",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES],
 )
 def test_an_echo_peaks_within_half_a_cell_and_half_a_speed_of_the_observed_truth(name, symbols):
     config = observed_truth.block_of(ROOT, name)
@@ -38,11 +44,13 @@ def test_one_speed_axis_reads_a_sweep_of_speeds_in_maps_and_spectra(symbols):
     config = observed_truth.block_of(ROOT, "paper")
     network = Network.from_settings(config["network"] | {"symbols": symbols})
     cubes = Cubes(observed_truth.Scene(network, 1, None, ()), {"Point": observed_truth.point()})
-    # One point passes over the middle of each station's face at 4 km, where the radial speed stays what it is.
+    # One point passes over the middle of each station's face at 4 km, where the radial speed stays
+    # what it is.
     for station in network.stations:
         away = np.array([np.cos(station.normal_rad), np.sin(station.normal_rad), 0.0])
         for number, speed_mps in enumerate(np.linspace(-40, 40, 9)):
-            place, velocity = station.position_m + 4000 * away, speed_mps * away
+            place = station.position_m + 4000 * away
+            velocity = speed_mps * away
             row = observed_truth.course(network, "sweep", number) | {"model": number}
             row |= {f"{axis}_m": place[i] for i, axis in enumerate("xyz")}
             row |= {f"v{axis}_mps": velocity[i] for i, axis in enumerate("xyz")}
@@ -59,19 +67,24 @@ def test_one_speed_axis_reads_a_sweep_of_speeds_in_maps_and_spectra(symbols):
             image = spectrum("vrp").definition(held, settings, "vrp", 0.0, 0.0)
             first, last = spectrum("vrp").speeds(settings, network, station)
             seen_mps = np.linspace(first, last, 64)[image[:, 0].argmax()]
-            assert abs(network.folded_mps(seen_mps - shown_mps, station)) <= TIE * (first - last) / 63
+            assert (
+                abs(network.folded_mps(seen_mps - shown_mps, station)) <= TIE * (first - last) / 63
+            )
 
 
 def test_geometric_truth_stays_where_the_target_is_while_clocks_move_its_echo():
     config = observed_truth.block_of(ROOT, "links")
     network = Network.from_settings(config["network"] | {"symbols": 16})
-    row, point = observed_truth.course(network, "links", 0), {"Point": observed_truth.point()}
+    row = observed_truth.course(network, "links", 0)
+    point = {"Point": observed_truth.point()}
     scenes = {}, {"link_offset": {"sigma_ppm": 0.0, "sigma_s": 1e-6}}
     still, moved = (
         Cubes(observed_truth.Scene(network, 1, None, tuple(observed_truth.called(effects))), point)
-        .of(row, np.inf, network.station("A-B")).truth
+        .of(row, np.inf, network.station("A-B"))
+        .truth
         for effects in scenes
-    )  # fmt: skip
+    )
     assert (moved[:, :5] == still[:, :5]).all()
-    # Clocks of 1 us move echoes by several cells of 0.13 us, as strongest cells show in the law above.
+    # Clocks of 1 us move echoes by several cells of 0.13 us, as strongest cells show in the law
+    # above.
     assert abs(moved[:, 5] - still[:, 5]).min() > 3 and (moved[:, 6] == still[:, 6]).all()

@@ -1,4 +1,6 @@
-"""Images of spectra: the resampling kernel, the scales, the fused renderer, PNG and the command line."""
+"""Images of spectra: the resampling kernel, the scales, the fused renderer, PNG and the command
+line.
+"""
 
 import json
 import zipfile
@@ -24,16 +26,21 @@ from pictures import IMAGES, NETWORK, SCALES, SPECTRA, echoes, renderer
 
 def index(values, scale, signed):
     """Index images by counting the thresholds that each value over the largest one reaches."""
-    steps = np.searchsorted(scale.thresholds(127 if signed else 255), np.abs(values) / np.abs(values).max(), "right")
+    steps = np.searchsorted(
+        scale.thresholds(127 if signed else 255), np.abs(values) / np.abs(values).max(), "right"
+    )
     return np.where(values < 0, 128 - steps, 128 + steps) if signed else steps
 
 
 @pytest.mark.parametrize(
-    ("size", "out"), [(5, 5), (5, 8), (9, 4), (144, 256), (392, 256), (1024, 256), (256, 224), (1, 3)]
+    ("size", "out"),
+    [(5, 5), (5, 8), (9, 4), (144, 256), (392, 256), (1024, 256), (256, 224), (1, 3)],
 )
 def test_triangle_is_its_formula(size, out):
     values = np.random.default_rng(size).standard_normal(size)
-    np.testing.assert_allclose(triangle(size, out) @ values, reference.resampled_line(values, out), atol=1e-12)
+    np.testing.assert_allclose(
+        triangle(size, out) @ values, reference.resampled_line(values, out), atol=1e-12
+    )
 
 
 @settings(max_examples=40, deadline=None)
@@ -42,7 +49,8 @@ def test_laws_of_the_triangle(size, out):
     weights = triangle(size, out)
     np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-12)
     assert (weights >= 0).all()
-    # Turning the axis round before or after is the same: images turn rows round after the definition.
+    # Turning the axis round before or after is the same: images turn rows round after the
+    # definition.
     np.testing.assert_allclose(weights, weights[::-1, ::-1], atol=1e-12)
     if size == out:
         np.testing.assert_array_equal(weights, np.eye(size))
@@ -67,10 +75,19 @@ def test_index_is_the_formula(scale, signed):
 @pytest.mark.parametrize("scale", [*SCALES, Scale("power", gamma=2.0), Scale("decibel", 140.0)])
 @pytest.mark.parametrize("levels", [127, 255])
 def test_lookup_counts_thresholds_exactly(scale, levels):
-    """On both sides of every threshold and on many values between, the tables give the count itself."""
-    table, thresholds = lookup(scale, levels), scale.thresholds(levels).astype(np.float32)
-    edges = [thresholds, np.nextafter(thresholds, np.float32(0)), np.nextafter(thresholds, np.float32(2))]
-    x = np.minimum(np.concatenate([*edges, np.linspace(0, 1, 9999, dtype=np.float32)]), np.float32(1))
+    """On both sides of every threshold and on many values between, the tables give the count
+    itself.
+    """
+    table = lookup(scale, levels)
+    thresholds = scale.thresholds(levels).astype(np.float32)
+    edges = [
+        thresholds,
+        np.nextafter(thresholds, np.float32(0)),
+        np.nextafter(thresholds, np.float32(2)),
+    ]
+    x = np.minimum(
+        np.concatenate([*edges, np.linspace(0, 1, 9999, dtype=np.float32)]), np.float32(1)
+    )
     keys = np.maximum(x.view(np.int32) - table.lowest, 0) >> table.shift
     found = table.base[keys] + (x >= table.cut[keys])
     np.testing.assert_array_equal(found, np.searchsorted(thresholds, x, side="right"))
@@ -79,11 +96,16 @@ def test_lookup_counts_thresholds_exactly(scale, levels):
 @pytest.mark.parametrize("scale", SCALES, ids=lambda s: f"{s.name}{s.floor_db:g}")
 def test_renderer_agrees_with_the_definition(scale):
     """float32 against the float64 definition: at most one level off, and seldom."""
-    signals, tiles = echoes(), renderer(scale)
+    signals = echoes()
+    tiles = renderer(scale)
     found = split(tiles.tile(signals), 3).astype(int)
     for station in range(3):
         carrier = tiles.network.stations[station].frequency_hz
-        spectra = (vrp(signals[station]), trp(signals[station]), vt(signals[station], carrier, 2.5e-3))
+        spectra = (
+            vrp(signals[station]),
+            trp(signals[station]),
+            vt(signals[station], carrier, 2.5e-3),
+        )
         for view, values in enumerate(spectra):
             resampled = triangle(values.shape[0], 256) @ values @ triangle(values.shape[1], 256).T
             expected = index(resampled[::-1], scale, signed=view == 2)
@@ -95,7 +117,9 @@ def test_renderer_agrees_with_the_definition(scale):
 def test_renderer_against_the_loops():
     """A small sample, all the way from the definitions in loops."""
     block = {**NETWORK, "symbols": 40, "stations": {"A": NETWORK["stations"]["A"]}}
-    spectra = Spectra(vrp=Fourier(16, 1, 16), trp=Fourier(8, 2, 32), vt=Transfer(6, 1, -3.0, 3.0, 0.25))
+    spectra = Spectra(
+        vrp=Fourier(16, 1, 16), trp=Fourier(8, 2, 32), vt=Transfer(6, 1, -3.0, 3.0, 0.25)
+    )
     tiles = Renderer(Network.from_settings(block), spectra, Images(24, Scale("linear")))
     signal = echoes(3)[:1, :40]
     images = split(tiles.tile(signal), 3).astype(int)
@@ -117,12 +141,15 @@ def test_orientation_of_axes():
     times = np.arange(400)
     rising = np.exp(2j * np.pi * 100 * 2.5e-3 * times) * (times > 200)
     receding = np.exp(-4j * np.pi * 4.9e9 * 4.0 * 2.5e-3 * times / 299792458) * (times % 50 < 25)
-    tile = renderer(Scale("linear")).tile(np.stack([rising, receding, 0 * rising]).astype(np.complex64))
+    tile = renderer(Scale("linear")).tile(
+        np.stack([rising, receding, 0 * rising]).astype(np.complex64)
+    )
     images = split(tile, 3)
     # 100 Hz of the +-200 Hz stands a quarter from the top and only in the second half of the time.
     assert abs(int(images[1][:, 200].argmax()) - 64) <= 1
     assert images[1][:, :120].max() == 0
-    # A receding speed is a negative frequency, in the lower half of the Fourier images, but positive in the VT.
+    # A receding speed is a negative frequency, in the lower half of the Fourier images, but
+    # positive in the VT.
     assert images[3].sum(axis=1).argmax() > 128
     assert np.abs(images[5].astype(int) - 128).sum(axis=1).argmax() < 128
     assert (images[6] == 0).all() and (images[8] == 128).all()
@@ -161,12 +188,19 @@ def test_the_level_of_a_signal_changes_no_pixel(level):
     """A power of two between two signals is no difference, however small or large they are."""
     signals = echoes(4, level=1.0)
     power = 2.0 ** np.round(np.log2(level))
-    np.testing.assert_array_equal(renderer().tile((signals * power).astype(np.complex64)), renderer().tile(signals))
-    assert 0.5 <= np.abs(np.concatenate([normalised(signals[0]).real, normalised(signals[0]).imag])).max() < 1
+    np.testing.assert_array_equal(
+        renderer().tile((signals * power).astype(np.complex64)), renderer().tile(signals)
+    )
+    assert (
+        0.5
+        <= np.abs(np.concatenate([normalised(signals[0]).real, normalised(signals[0]).imag])).max()
+        < 1
+    )
 
 
 def test_pixels_depend_on_the_signal_alone():
-    first, second = echoes(5), echoes(6)
+    first = echoes(5)
+    second = echoes(6)
     tiles = renderer()
     alone = tiles.tile(first)
     tiles.tile(second)
@@ -184,15 +218,21 @@ def test_refusals_name_what_is_wrong():
     with pytest.raises(InputError, match="infinite"):
         renderer().tile(bad)
     for change, named in [
-        ({"scale": "log"}, "log"), ({"floor_db": 0}, "floor_db"), ({"gamma": 9}, "gamma"), ({"size": 0}, "size"),
-        ({"colour_map": "rainbows"}, "rainbows"), ({"sise": 3}, "sise"),
-    ]:  # fmt: skip
+        ({"scale": "log"}, "log"),
+        ({"floor_db": 0}, "floor_db"),
+        ({"gamma": 9}, "gamma"),
+        ({"size": 0}, "size"),
+        ({"colour_map": "rainbows"}, "rainbows"),
+        ({"sise": 3}, "sise"),
+    ]:
         with pytest.raises(InputError, match=named):
             Images.from_settings({**IMAGES, **change})
 
 
 def test_pixels_of_a_signal_are_fixed():
-    """The renderer's pixels are a promise: equal on every machine and with every version of every library."""
+    """The renderer's pixels are a promise: equal on every machine and with every version of every
+    library.
+    """
     steps = np.arange(1200, dtype=np.int64).reshape(3, 400)
     signals = ((steps**3 % 257 - 128) + 1j * (steps**2 % 251 - 125)).astype(np.complex64)
     assert zlib.crc32(renderer().tile(signals).tobytes()) == 4171406068
@@ -202,7 +242,9 @@ def test_pixels_of_a_signal_are_fixed():
 @given(st.integers(2, 80), st.integers(0, 2**32 - 1))
 def test_resize_is_pillows_on_index_values(size, seed):
     image = np.random.default_rng(seed).integers(0, 256, (64, 64), np.uint8)
-    pillow = np.asarray(Image.fromarray(image.astype(np.float32)).resize((size, size), Image.Resampling.BILINEAR))
+    pillow = np.asarray(
+        Image.fromarray(image.astype(np.float32)).resize((size, size), Image.Resampling.BILINEAR)
+    )
     off = np.abs(resize(image, size) - pillow)
     assert off.max() <= 0.5 + 1e-3
     np.testing.assert_array_equal(resize(np.stack([image] * 2), size)[1], resize(image, size))
@@ -240,6 +282,15 @@ def test_command_line_renders_a_chunk(tmp_path):
     np.testing.assert_array_equal(decode(tiles[2])[0], renderer().tile(signals[1, 0]))
     np.save(tmp_path / "noisy.npy", signals[..., :300])
     with pytest.raises(InputError, match=r"noisy\.npy"):
-        main(["--settings", block, "--signals", str(tmp_path / "noisy.npy"), "--out", str(tmp_path / "no.npz")])
+        main(
+            [
+                "--settings",
+                block,
+                "--signals",
+                str(tmp_path / "noisy.npy"),
+                "--out",
+                str(tmp_path / "no.npz"),
+            ]
+        )
     assert not (tmp_path / "no.npz").exists()
     assert read_settings(block)["images"] == IMAGES

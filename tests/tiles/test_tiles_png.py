@@ -31,13 +31,19 @@ def test_zlib_reads_what_we_write(data):
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(0, 4000), st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 30, 256]), st.floats(0, 1))
+@given(
+    st.integers(0, 4000),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([1, 2, 30, 256]),
+    st.floats(0, 1),
+)
 def test_zlib_reads_random_bytes_with_runs(size, seed, levels, zeros):
     rng = np.random.default_rng(seed)
     data = rng.integers(0, levels, size).astype(np.uint8)
     # Runs of zeros of many lengths, at any offset.
     for _ in range(int(4 * zeros)):
-        start, length = rng.integers(0, size + 1), rng.integers(0, 700)
+        start = rng.integers(0, size + 1)
+        length = rng.integers(0, 700)
         data[start : start + length] = 0
     assert zlib.decompress(zlib_compress(data)) == data.tobytes()
 
@@ -51,7 +57,8 @@ def test_code_lengths_are_a_code_as_short_as_can_be(counts, longest):
     assert ((lengths > 0) == used).all() and lengths.max() <= longest
     if used.sum() < 2:
         return
-    # A complete prefix code fills the Kraft sum, and Huffman's comes within one bit a symbol of the entropy.
+    # A complete prefix code fills the Kraft sum, and Huffman's comes within one bit a symbol of the
+    # entropy.
     assert sum(2.0 ** -lengths[used]) == 1
     share = counts[used] / counts.sum()
     entropy = -(share * np.log2(share)).sum()
@@ -61,7 +68,9 @@ def test_code_lengths_are_a_code_as_short_as_can_be(counts, longest):
 
 
 def test_match_lengths_are_those_of_the_format():
-    """RFC 1951's table by its corners: 257 is 3, 265 starts at 11 with one extra bit, 284 ends at 257, 285 is 258."""
+    """RFC 1951's table by its corners: 257 is 3, 265 starts at 11 with one extra bit, 284 ends at
+    257, 285 is 258.
+    """
     assert [MATCH_SYMBOL[n] for n in (3, 10, 11, 12, 13, 18, 19, 257, 258)] == [
         257, 264, 265, 265, 266, 268, 269, 284, 285,
     ]  # fmt: skip
@@ -98,7 +107,10 @@ def test_damaged_or_other_images_are_refused():
     data = encode(np.arange(256, dtype=np.uint8).reshape(16, 16), colour_map("gray"))
     gray = io.BytesIO()
     Image.new("L", (4, 4)).save(gray, "PNG")
-    flipped = [data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :] for place in range(0, len(data), 37)]
+    flipped = [
+        data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :]
+        for place in range(0, len(data), 37)
+    ]
     for bad in (b"", data[:60], data[:-12], b"GIF89a", gray.getvalue(), *flipped):
         with pytest.raises(InputError, match="image"):
             decode(bad)
@@ -107,7 +119,9 @@ def test_damaged_or_other_images_are_refused():
 
 
 def test_bytes_of_an_image_are_fixed():
-    """The encoder's bytes are a promise: equal on every machine and with every version of every library."""
+    """The encoder's bytes are a promise: equal on every machine and with every version of every
+    library.
+    """
     image = (np.add.outer(np.arange(64) ** 2, 3 * np.arange(96)) // 7 % 256).astype(np.uint8)
     image[20:40] = 9
     assert zlib.crc32(encode(image, colour_map("gray"))) == 4084249925

@@ -1,4 +1,6 @@
-"""The display of a run (`snakemake --logger lowalt`): what a log, a terminal, a full disk and a quiet run show."""
+"""The display of a run (`snakemake --logger lowalt`): what a log, a terminal, a full disk and a
+quiet run show.
+"""
 
 import contextlib
 import io
@@ -23,9 +25,15 @@ def handler_of(**given):
     pytest.importorskip("snakemake")
     plugin = pytest.importorskip("snakemake_logger_plugin_lowalt")
     usual = {
-        "printshellcmds": False, "nocolor": True, "quiet": set(), "debug_dag": False, "verbose": False,
-        "show_failed_logs": True, "stdout": False, "dryrun": False,
-    }  # fmt: skip
+        "printshellcmds": False,
+        "nocolor": True,
+        "quiet": set(),
+        "debug_dag": False,
+        "verbose": False,
+        "show_failed_logs": True,
+        "stdout": False,
+        "dryrun": False,
+    }
     handler = plugin.LogHandler(SimpleNamespace(**usual | given), None)
     handler._stream = io.StringIO()
     return handler
@@ -45,20 +53,39 @@ def test_a_log_has_a_line_when_a_stage_starts_and_ends_and_a_failure_its_log(tmp
     handler.emit(record("table", event="run_info", stats={"echo": 2, "all": 1, "total": 3}))
     for number in (1, 2):
         handler.emit(
-            record("rule", event="job_info", jobid=number, rule_name="echo", log=["job.log"], output=["x"],
-                   wildcards={"run": "default", "group": "seen", "part": str(number)})
-        )  # fmt: skip
+            record(
+                "rule",
+                event="job_info",
+                jobid=number,
+                rule_name="echo",
+                log=["job.log"],
+                output=["x"],
+                wildcards={"run": "default", "group": "seen", "part": str(number)},
+            )
+        )
     handler.emit(record("Finished", event="job_finished", job_id=1))
-    handler.emit(record("error", logging.ERROR, event="job_error", jobid=2, rule_name="echo", log=["job.log"]))
+    handler.emit(
+        record(
+            "error", logging.ERROR, event="job_error", jobid=2, rule_name="echo", log=["job.log"]
+        )
+    )
     for name, said in (("CalledProcessError", "C"), ("RuleException", "RuleException:\nC")):
-        handler.emit(record(f"{said}alledProcessError in file x", logging.ERROR, event="error", exception=name))
+        handler.emit(
+            record(
+                f"{said}alledProcessError in file x", logging.ERROR, event="error", exception=name
+            )
+        )
     handler.emit(record("took over a lock", logging.WARNING))
     handler.close()
     lines = handler._stream.getvalue().splitlines()
     assert lines[0] == "echo 0/2; seen/1"
     assert lines[1:3] == ["failed: echo, job 2", "  its log: job.log; the last lines:"]
     assert lines[3:18] == [f"    line {number}" for number in range(25, 40)]
-    assert lines[18] == "took over a lock" and lines[19].startswith("all  1/3 jobs") and len(lines) == 20
+    assert (
+        lines[18] == "took over a lock"
+        and lines[19].startswith("all  1/3 jobs")
+        and len(lines) == 20
+    )
     (kept,) = status.read()
     assert kept["state"] == "failed"
 
@@ -66,20 +93,35 @@ def test_a_log_has_a_line_when_a_stage_starts_and_ends_and_a_failure_its_log(tmp
 def test_a_full_disk_is_named_once_where_the_logs_of_jobs_have_no_room(monkeypatch, capsys):
     handler = handler_of()
     handler.emit(record("run", event="run_info", stats={"echo": 2, "total": 2}))
-    handler.emit(record("error", logging.ERROR, event="job_error", jobid=1, rule_name="echo", log=["1.log"]))
+    handler.emit(
+        record("error", logging.ERROR, event="job_error", jobid=1, rule_name="echo", log=["1.log"])
+    )
     assert "disk is full" not in handler._stream.getvalue()
     monkeypatch.setattr("snakemake_logger_plugin_lowalt.free_bytes", lambda path: 4096)
     for job in (1, 2):
-        handler.emit(record("error", logging.ERROR, event="job_error", jobid=job, rule_name="echo", log=["1.log"]))
+        handler.emit(
+            record(
+                "error",
+                logging.ERROR,
+                event="job_error",
+                jobid=job,
+                rule_name="echo",
+                log=["1.log"],
+            )
+        )
     assert handler._stream.getvalue().count("the disk is full: 0.0 MB are free") == 1
     own_log = logging.FileHandler("/dev/full")
     own_log.emit(record("a line of Snakemake's own log"))
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_a_full_disk_is_named_where_snakemake_meets_it_and_other_faults_of_a_log_keep_their_traceback(capsys):
+def test_a_full_disk_is_named_where_snakemake_meets_it_and_other_faults_of_a_log_keep_their_traceback(
+    capsys,
+):
     handler = handler_of()
-    handler.emit(record("Error recording metadata ([Errno 28] No space left on device)", logging.ERROR))
+    handler.emit(
+        record("Error recording metadata ([Errno 28] No space left on device)", logging.ERROR)
+    )
     assert "the disk is full" in handler._stream.getvalue()
     own_log = logging.FileHandler("/dev/full")
     own_log.emit(logging.LogRecord("log", logging.INFO, "", 0, "%d models", ("no number",), None))
@@ -88,20 +130,29 @@ def test_a_full_disk_is_named_where_snakemake_meets_it_and_other_faults_of_a_log
 
 def test_a_dry_run_shows_stages_jobs_and_reasons_and_on_demand_what_snakemake_shows():
     follows = "Input files updated by another job: results/a/echo/x.npy"
-    reasons = ["Missing output files: results/a/echo/x.npy", follows, f"Params have changed; {follows}", follows]
+    reasons = [
+        "Missing output files: results/a/echo/x.npy",
+        follows,
+        f"Params have changed; {follows}",
+        follows,
+    ]
     handler = handler_of(dryrun=True)
     handler.emit(record("Building DAG of jobs..."))
     for job, reason in enumerate(reasons):
         rule = "a rule of a long name" if job == 0 else "echo"
-        handler.emit(record("rule", event="job_info", jobid=job, rule_name=rule, output=["x"], reason=reason))
+        handler.emit(
+            record("rule", event="job_info", jobid=job, rule_name=rule, output=["x"], reason=reason)
+        )
     handler.emit(record("Nothing to be done."))
     handler.close()
     lines = handler._stream.getvalue().splitlines()
     assert lines[0] == "Nothing to be done."
     assert [" ".join(line.split()) for line in lines[1:-1]] == [
-        "stage jobs why", "a rule of a long name 1 missing output files",
-        "echo 2 input files updated by another job", "1 params have changed",
-    ]  # fmt: skip
+        "stage jobs why",
+        "a rule of a long name 1 missing output files",
+        "echo 2 input files updated by another job",
+        "1 params have changed",
+    ]
     assert lines[-1].split()[:2] == ["total", "4"] and "--printshellcmds" in lines[-1]
     handler = handler_of(dryrun=True, printshellcmds=True)
     handler._plain.stream = handler._stream
@@ -113,11 +164,21 @@ def test_a_dry_run_shows_stages_jobs_and_reasons_and_on_demand_what_snakemake_sh
 def test_a_quiet_run_shows_failures_alone(quiet, tmp_path, monkeypatch):
     """Snakemake names no finished jobs then, so counts of them would stay at zero."""
     monkeypatch.chdir(tmp_path)
-    handler = handler_of(quiet={pytest.importorskip("snakemake.settings.enums").Quietness.parse_choice(quiet)})
+    handler = handler_of(
+        quiet={pytest.importorskip("snakemake.settings.enums").Quietness.parse_choice(quiet)}
+    )
     handler.emit(record("table", event="run_info", stats={"echo": 2, "total": 2}))
-    handler.emit(record("rule", event="job_info", jobid=1, rule_name="echo", log=[], output=["x"], wildcards={}))
+    handler.emit(
+        record(
+            "rule", event="job_info", jobid=1, rule_name="echo", log=[], output=["x"], wildcards={}
+        )
+    )
     handler.emit(record("Nothing to be done"))
-    handler.emit(record("error", logging.ERROR, event="job_error", jobid=1, rule_name="echo", log=["none.log"]))
+    handler.emit(
+        record(
+            "error", logging.ERROR, event="job_error", jobid=1, rule_name="echo", log=["none.log"]
+        )
+    )
     handler.close()
     shown = ["failed: echo, job 1", "  its log: none.log, which is empty or not there"]
     assert handler._stream.getvalue().splitlines() == shown and not status.read()
@@ -137,7 +198,17 @@ rule short:
 def test_on_a_terminal_lines_are_drawn_in_place(tmp_path):
     pytest.importorskip("snakemake")
     (tmp_path / "Snakefile").write_text(SNAKEFILE)
-    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--logger", "lowalt", "--scheduler", "greedy"]
+    command = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--cores",
+        "1",
+        "--logger",
+        "lowalt",
+        "--scheduler",
+        "greedy",
+    ]
     environment = {**os.environ, "PYTHONPATH": str(SOURCE), "TERM": "xterm", "COLUMNS": "60"}
     ours, theirs = pty.openpty()
     run = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=theirs, stderr=theirs)

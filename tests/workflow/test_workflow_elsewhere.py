@@ -1,4 +1,6 @@
-"""A run from another folder than the checkout: source files by whole paths, the user's files before the package's."""
+"""A run from another folder than the checkout: source files by whole paths, the user's files before
+the package's.
+"""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +23,9 @@ def test_code_is_the_sources_relative_to_the_checkout_or_absolute_elsewhere(tmp_
     code.cache_clear()
 
 
-def test_files_of_the_checkout_are_found_from_elsewhere_and_own_ones_come_first(tmp_path, monkeypatch):
+def test_files_of_the_checkout_are_found_from_elsewhere_and_own_ones_come_first(
+    tmp_path, monkeypatch
+):
     config = load_yaml("config/default.yaml")
     assert located(config, ROOT) == config
     monkeypatch.chdir(tmp_path)
@@ -29,12 +33,19 @@ def test_files_of_the_checkout_are_found_from_elsewhere_and_own_ones_come_first(
     (tmp_path / "config/schemes.csv").touch()
     found = located(config, ROOT)
     assert found["targets"]["table"] == str(ROOT / "config/targets.csv")
-    assert found["targets"]["records"] == [str(ROOT / path) for path in config["targets"]["records"]]
-    assert found["recognition"]["table"] == "config/schemes.csv" and found["report"]["accuracy"] is None
+    assert found["targets"]["records"] == [
+        str(ROOT / path) for path in config["targets"]["records"]
+    ]
+    assert (
+        found["recognition"]["table"] == "config/schemes.csv"
+        and found["report"]["accuracy"] is None
+    )
     assert located(found, ROOT) == found
 
 
-def test_what_a_run_keeps_names_the_package_s_files_alike_wherever_it_is_installed(tmp_path, monkeypatch):
+def test_what_a_run_keeps_names_the_package_s_files_alike_wherever_it_is_installed(
+    tmp_path, monkeypatch
+):
     config = load_yaml("config/default.yaml") | {"run": "a folder/ä"}
     monkeypatch.chdir(tmp_path)
     elsewhere = located(config, ROOT)

@@ -1,4 +1,6 @@
-"""A run of all stages that is ended at random moments and started again has the bytes of an undisturbed run."""
+"""A run of all stages that is ended at random moments and started again has the bytes of an
+undisturbed run.
+"""
 
 import hashlib
 import os
@@ -18,9 +20,18 @@ pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
 ROOT = Path(__file__).parents[2]
 TIMINGS = {
-    "logs", "benchmarks", "report.html", "stages.csv", "seeds.csv", "run.json", "progress", "cost.csv",
-    "cost.svg", "echo_cost.csv", "echo_cost.svg",
-}  # fmt: skip
+    "logs",
+    "benchmarks",
+    "report.html",
+    "stages.csv",
+    "seeds.csv",
+    "run.json",
+    "progress",
+    "cost.csv",
+    "cost.svg",
+    "echo_cost.csv",
+    "echo_cost.svg",
+}
 """Names of files and folders of a run that hold times, which no run repeats."""
 
 
@@ -30,27 +41,44 @@ def checksums(folder: Path) -> dict[str, str]:
     return {
         str(name): hashlib.sha256(path.read_bytes()).hexdigest()
         for name, path in files.items()
-        if not set(name.parts) & TIMINGS and not (name.parts[0] == "predictions" and path.suffix == ".json")
+        if not set(name.parts) & TIMINGS
+        and not (name.parts[0] == "predictions" and path.suffix == ".json")
     }
 
 
 def project(folder: Path) -> Path:
     """A copy of the files that a run reads."""
     for name in ("workflow", "config", "profiles", "src", "envs"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("*.pyc", "*.egg-info"))
+        shutil.copytree(
+            ROOT / name, folder / name, ignore=shutil.ignore_patterns("*.pyc", "*.egg-info")
+        )
     shutil.copy(ROOT / "Snakefile", folder)
     return folder
 
 
 def start(folder: Path) -> psutil.Popen:
-    """Start the run as the leader of a process group of its own, which feels Ctrl-C as at a terminal."""
-    command = [sys.executable, "-m", "snakemake", "--cores", "2", "--configfile", "config/checks/kills.yaml"]
+    """Start the run as the leader of a process group of its own, which feels Ctrl-C as at a
+    terminal.
+    """
+    command = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--cores",
+        "2",
+        "--configfile",
+        "config/checks/kills.yaml",
+    ]
     with (folder / "said").open("w") as said:
         return psutil.Popen(
-            command, cwd=folder, env=os.environ | {"PYTHONPATH": str(folder / "src")}, stdout=said,
-            stderr=subprocess.STDOUT, start_new_session=True,
+            command,
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": str(folder / "src")},
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        )  # fmt: skip
+        )
 
 
 def end_all(main: psutil.Popen) -> None:
@@ -75,9 +103,11 @@ DISTURBANCES = {
 
 
 def test_a_run_that_was_ended_again_and_again_has_the_bytes_of_an_undisturbed_one(tmp_path):
-    whole, disturbed = project(tmp_path / "whole"), project(tmp_path / "disturbed")
+    whole = project(tmp_path / "whole")
+    disturbed = project(tmp_path / "disturbed")
     assert start(whole).wait() == 0, (whole / "said").read_text()[-3000:]
-    expected, choose = checksums(whole / "results/kills"), random.Random(7)
+    expected = checksums(whole / "results/kills")
+    choose = random.Random(7)
     assert len(expected) > 30
     kinds = [*DISTURBANCES, *DISTURBANCES]
     while True:

@@ -1,4 +1,6 @@
-"""Locks: a dead owner's is taken over, a living one's refused by name, and of many at once exactly one wins."""
+"""Locks: a dead owner's is taken over, a living one's refused by name, and of many at once exactly
+one wins.
+"""
 
 import errno
 import fcntl
@@ -72,7 +74,9 @@ def test_a_dead_owner_s_lock_is_taken_over_and_all_others_stay(tmp_path):
     assert f"process {os.getpid()} of {mine.host} is running" in text
     assert "host elsewhere, which cannot be seen from here" in text
     assert "7.output.lock: no record of its owner" in text and "--unlock" in text
-    assert holders(tmp_path, living=True) == [f"process {os.getpid()} of {mine.host} is running; wait for it or end it"]
+    assert holders(tmp_path, living=True) == [
+        f"process {os.getpid()} of {mine.host} is running; wait for it or end it"
+    ]
     holding.release()
     take_over(tmp_path, said.append)
     assert numbers(tmp_path) == [2, 7]
@@ -88,12 +92,22 @@ def test_a_lock_that_cannot_be_written_whole_leaves_nothing(tmp_path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
-def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_a_signal(tmp_path, monkeypatch):
+def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_a_signal(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(locks, "GRACE_S", 0.5)
     program = "import signal, time; signal.signal(signal.SIGTERM, signal.{}); print(1, flush=True); time.sleep(60)"
     heeding, stubborn, another = jobs = [
-        subprocess.Popen([sys.executable, "-c", program.format(answer)], env=os.environ | {TOKEN: token}, stdout=-1)
-        for answer, token in (("SIG_DFL", GONE.token), ("SIG_IGN", GONE.token), ("SIG_IGN", "another"))
+        subprocess.Popen(
+            [sys.executable, "-c", program.format(answer)],
+            env=os.environ | {TOKEN: token},
+            stdout=-1,
+        )
+        for answer, token in (
+            ("SIG_DFL", GONE.token),
+            ("SIG_IGN", GONE.token),
+            ("SIG_IGN", "another"),
+        )
     ]
     for job in jobs:
         job.stdout.readline()
@@ -102,7 +116,11 @@ def test_jobs_that_outlived_their_run_are_ended_by_force_where_they_do_not_heed_
     said = []
     take_over(tmp_path, said.append)
     assert str(heeding.pid) in said[0] and "ending its 2 processes" in said[0]
-    assert (heeding.wait(5), stubborn.wait(5), another.poll()) == (-signal.SIGTERM, -signal.SIGKILL, None)
+    assert (heeding.wait(5), stubborn.wait(5), another.poll()) == (
+        -signal.SIGTERM,
+        -signal.SIGKILL,
+        None,
+    )
     another.kill()
     another.wait()
 
@@ -139,7 +157,9 @@ sys.stdin.read()
 def test_of_many_that_find_a_dead_owner_at_the_same_moment_one_wins(tmp_path):
     leave(tmp_path / "locks")
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    racers = [subprocess.Popen([sys.executable, "-c", RACE, str(tmp_path)], **pipes) for _ in range(6)]
+    racers = [
+        subprocess.Popen([sys.executable, "-c", RACE, str(tmp_path)], **pipes) for _ in range(6)
+    ]
     assert [racer.stdout.readline() for racer in racers] == ["ready\n"] * 6
     (tmp_path / "go").touch()
     assert sorted(racer.stdout.readline() for racer in racers) == ["lost\n"] * 5 + ["won\n"]
@@ -165,7 +185,9 @@ def start(folder, *arguments):
 def ended(folder, *arguments):
     """Exit status and text of a run that ends by itself."""
     environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
-    return snakemake_runs.run(folder, ["--cores", "1", "--rerun-incomplete", *arguments], environment)
+    return snakemake_runs.run(
+        folder, ["--cores", "1", "--rerun-incomplete", *arguments], environment
+    )
 
 
 def wait_for(path):
@@ -185,7 +207,10 @@ def test_snakemake_refuses_a_living_owner_and_takes_over_a_killed_one(tmp_path):
     status, text = ended(tmp_path)
     (sentence,) = [line for line in text.splitlines() if "process" in line]
     assert status == 2 and text.endswith(f"{sentence}\n") and "  File" not in text
-    assert sentence.startswith("error: ") and f"process {first.pid} of {Owner().host} is running" in sentence
+    assert (
+        sentence.startswith("error: ")
+        and f"process {first.pid} of {Owner().host} is running" in sentence
+    )
     # A refused run takes nothing from the one that runs.
     assert takers(tmp_path / ".snakemake/locks")[0].pid == first.pid
     assert f"process {first.pid}" in ended(tmp_path, "--dry-run")[1]

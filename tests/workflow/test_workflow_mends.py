@@ -41,7 +41,8 @@ def kept(tmp_path, monkeypatch):
     monkeypatch.setenv(TOKEN, "before")
     mends.end_locks()
     found = Kept(path=tmp_path, _lockdir=tmp_path / "deep/locks", unlocked=[])
-    found.all_inputfiles, found.all_outputfiles = lambda: KEYS["input"], lambda: KEYS["output"]
+    found.all_inputfiles = lambda: KEYS["input"]
+    found.all_outputfiles = lambda: KEYS["output"]
     found.unlock = lambda: found.unlocked.append("all")
     return found
 
@@ -58,16 +59,21 @@ def test_the_lock_of_a_killed_run_stays_in_plain_snakemake(tmp_path):
 
 
 def test_the_mended_lock_has_an_owner_for_the_length_of_its_block(kept, monkeypatch, capsys):
-    said, folder = [], kept._lockdir
+    said = []
+    folder = kept._lockdir
     monkeypatch.setattr(logger, "info", said.append)
     with FilePersistence.lock_warn_only(kept):
         assert not said
     with FilePersistence.lock(kept):
-        assert (folder / "0.input.lock").read_text() == "a\nb\n" and (folder / "0.output.lock").read_text() == "c\n"
+        assert (folder / "0.input.lock").read_text() == "a\nb\n" and (
+            folder / "0.output.lock"
+        ).read_text() == "c\n"
         assert Owner.read(folder / "0.owner.json") == Owner(token=os.environ[TOKEN])
         with pytest.raises(SystemExit, match=r"^2$"), FilePersistence.lock(kept):
             pytest.fail("two runs at once")
-        assert re.fullmatch(rf"error: .*process {os.getpid()} of .* is running.*\n", capsys.readouterr().err)
+        assert re.fullmatch(
+            rf"error: .*process {os.getpid()} of .* is running.*\n", capsys.readouterr().err
+        )
         with FilePersistence.lock_warn_only(kept):
             assert f"process {os.getpid()}" in said[0]
     assert numbers(folder) == []
@@ -99,7 +105,10 @@ def interrupts():
 
 def test_plain_snakemake_takes_every_ctrl_c_as_an_interrupt(interrupts):
     program = "import signal, snakemake.cli; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
-    assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "True\n"
+    assert (
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout
+        == "True\n"
+    )
 
 
 def test_only_the_first_ctrl_c_interrupts_and_later_ones_are_answered(interrupts, capfd):
@@ -116,10 +125,12 @@ def test_only_the_first_ctrl_c_interrupts_and_later_ones_are_answered(interrupts
 
 def timers_of_rounds(start, rounds: int) -> tuple[int, int]:
     """(timers that wait after so many rounds, rounds that they start)."""
-    scheduler, before = SimpleNamespace(_open_jobs=threading.Semaphore(0)), threading.active_count()
+    scheduler = SimpleNamespace(_open_jobs=threading.Semaphore(0))
+    before = threading.active_count()
     for _ in range(rounds):
         start(scheduler, 0.2)
-    waiting, started = threading.active_count() - before, 0
+    waiting = threading.active_count() - before
+    started = 0
     while scheduler._open_jobs.acquire(timeout=0.5):
         started += 1
     return waiting, started
@@ -127,7 +138,9 @@ def timers_of_rounds(start, rounds: int) -> tuple[int, int]:
 
 def test_a_round_leaves_a_timer_each_in_plain_snakemake_and_one_in_the_mended_one(monkeypatch):
     assert timers_of_rounds(JobScheduler._schedule_reevalutation, 9) == (9, 9)
-    monkeypatch.setattr(JobScheduler, "_schedule_reevalutation", JobScheduler._schedule_reevalutation)
+    monkeypatch.setattr(
+        JobScheduler, "_schedule_reevalutation", JobScheduler._schedule_reevalutation
+    )
     mends.keep_one_timer()
     assert timers_of_rounds(JobScheduler._schedule_reevalutation, 9) == (1, 1)
 
@@ -146,14 +159,18 @@ FIRST_S = 3.0
 
 
 def asked(executor: type, seconds: float) -> list[float]:
-    """Times at which an executor asks for the state of a job that ends after so many seconds, as the plugin asks."""
+    """Times at which an executor asks for the state of a job that ends after so many seconds, as
+    the plugin asks.
+    """
     waiting = object.__new__(executor)
     waiting._next_seconds_between_status_checks = None
     waiting.next_seconds_between_status_checks = FIRST_S
     times = [0.0]
     while times[-1] < seconds:
         times.append(times[-1] + waiting.next_seconds_between_status_checks)
-        waiting.next_seconds_between_status_checks = min(waiting.next_seconds_between_status_checks + 10, 180)
+        waiting.next_seconds_between_status_checks = min(
+            waiting.next_seconds_between_status_checks + 10, 180
+        )
     # A job has ended: the plugin goes back to the first wait.
     waiting.next_seconds_between_status_checks = FIRST_S
     assert waiting.next_seconds_between_status_checks == FIRST_S
@@ -164,7 +181,8 @@ def asked(executor: type, seconds: float) -> list[float]:
 def executors(monkeypatch):
     """The plugin's executor as it is, and mended."""
     plugin = pytest.importorskip("snakemake_executor_plugin_slurm")
-    plain, mended = plugin.Executor, type("Executor", (plugin.Executor,), {})
+    plain = plugin.Executor
+    mended = type("Executor", (plugin.Executor,), {})
     monkeypatch.setattr(plugin, "Executor", mended)
     mends.ask_slurm_sooner()
     mends.ask_slurm_sooner()
@@ -186,7 +204,9 @@ def test_a_profile_that_asks_rarely_is_not_asked_more_often(executors):
     assert waiting.next_seconds_between_status_checks == 60.0
 
 
-def test_plain_logging_prints_tracebacks_on_a_full_disk_and_the_mended_one_nothing(monkeypatch, capsys):
+def test_plain_logging_prints_tracebacks_on_a_full_disk_and_the_mended_one_nothing(
+    monkeypatch, capsys
+):
     record = logging.makeLogRecord({"msg": "a line"})
     for plain in (True, False):
         monkeypatch.setattr(logging.FileHandler, "handleError", logging.Handler.handleError)

@@ -1,7 +1,8 @@
-"""A data set, and a training, over two Slurm nodes have the bytes of local ones, and a lost node costs its jobs only.
+"""A data set, and a training, over two Slurm nodes have the bytes of local ones, and a lost node
+costs its jobs only.
 
-Needs a Slurm of at least two nodes (`sinfo`) that this user may take down and up again; elsewhere tests are skipped.
-The tests of what is asked for need none.
+Needs a Slurm of at least two nodes (`sinfo`) that this user may take down and up again; elsewhere
+tests are skipped. The tests of what is asked for need none.
 """
 
 import os
@@ -29,7 +30,9 @@ def ask(*command):
 
 NODES = ask("sinfo", "-h", "-N", "-o", "%N").split() if shutil.which("sinfo") else []
 GPUS = ask("sinfo", "-h", "-o", "%G") if NODES else ""
-needs_gpu = pytest.mark.skipif("gpu:h100" not in GPUS, reason="no Slurm with a GPU named h100 (sinfo -o %G)")
+needs_gpu = pytest.mark.skipif(
+    "gpu:h100" not in GPUS, reason="no Slurm with a GPU named h100 (sinfo -o %G)"
+)
 needs_slurm = pytest.mark.skipif(len(set(NODES)) < 2, reason="no Slurm of two nodes (sinfo)")
 
 
@@ -46,17 +49,39 @@ def start(folder):
     workplace(folder)
     (folder / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY))
     (folder / "src/sitecustomize.py").unlink()
-    command = [sys.executable, "-m", "snakemake", "--profile", "profiles/slurm", "--configfile", "overlay.yaml"]
-    command += ["--cores", "1", "--slurm-status-command", "squeue", "--group-components", "clouds=50", "chunks=2", "--"]
+    command = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--profile",
+        "profiles/slurm",
+        "--configfile",
+        "overlay.yaml",
+    ]
+    command += [
+        "--cores",
+        "1",
+        "--slurm-status-command",
+        "squeue",
+        "--group-components",
+        "clouds=50",
+        "chunks=2",
+        "--",
+    ]
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
     with (folder / "said.txt").open("w") as said:
-        return subprocess.Popen([*command, "data"], cwd=folder, env=environment, stdout=said, stderr=subprocess.STDOUT)
+        return subprocess.Popen(
+            [*command, "data"], cwd=folder, env=environment, stdout=said, stderr=subprocess.STDOUT
+        )
 
 
 def submitted(folder):
     """Slurm's job numbers by the group that was submitted."""
     text = (folder / "said.txt").read_text()
-    return {number: path for number, path in re.findall(r"SLURM jobid (\d+) \(log: (\S+)/\d+\.log\)", text)}
+    return {
+        number: path
+        for number, path in re.findall(r"SLURM jobid (\d+) \(log: (\S+)/\d+\.log\)", text)
+    }
 
 
 def node_of(job):
@@ -65,8 +90,11 @@ def node_of(job):
 
 
 def watched(run, folder):
-    """Wait for the run's end; node and restarts of every chunk job, asked for now: Slurm forgets jobs in minutes."""
-    seen, stop = {}, time.monotonic() + 1800
+    """Wait for the run's end; node and restarts of every chunk job, asked for now: Slurm forgets
+    jobs in minutes.
+    """
+    seen = {}
+    stop = time.monotonic() + 1800
     while True:
         ended = run.poll() is not None
         for job in chunk_jobs(folder):
@@ -86,7 +114,8 @@ def chunk_jobs(folder):
     return [job for job, path in submitted(folder).items() if "chunks" in path]
 
 
-# A job named as a rule of the profile, so that the profile's own resources and groups are what is tested.
+# A job named as a rule of the profile, so that the profile's own resources and groups are what is
+# tested.
 GREEDY = """
 rule evaluate:
     output:
@@ -100,8 +129,22 @@ rule evaluate:
 def submit(folder, *arguments, snakefile=GREEDY):
     """Run a small workflow in the queue by the profile; return its exit status and its text."""
     (folder / "Snakefile").write_text(snakefile)
-    command = [sys.executable, "-m", "snakemake", "--profile", ROOT / "profiles/slurm", "--workflow-profile", "none"]
-    command += ["--slurm-status-command", "squeue", "--config", f"python={sys.executable}", *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--profile",
+        ROOT / "profiles/slurm",
+        "--workflow-profile",
+        "none",
+    ]
+    command += [
+        "--slurm-status-command",
+        "squeue",
+        "--config",
+        f"python={sys.executable}",
+        *arguments,
+    ]
     run = subprocess.run(list(map(str, command)), cwd=folder, capture_output=True, text=True)
     return run.returncode, run.stdout + run.stderr
 
@@ -133,9 +176,13 @@ rule train:
 
 
 def gpu_words():
-    """The command line by which the profile says that a GPU is asked for, with a GPU of the queue and less memory."""
+    """The command line by which the profile says that a GPU is asked for, with a GPU of the queue
+    and less memory.
+    """
     comment = " ".join(
-        line.removeprefix("#") for line in (ROOT / "profiles/slurm/config.yaml").open() if line[0] == "#"
+        line.removeprefix("#")
+        for line in (ROOT / "profiles/slurm/config.yaml").open()
+        if line[0] == "#"
     )
     words = re.search(r"--set-resources ((?:\w+:\w+=\w+\s+)*\w+:\w+=\w+)", comment)[1].split()
     assert len(words) == 6
@@ -144,7 +191,10 @@ def gpu_words():
 
 @needs_gpu
 def test_a_training_and_its_evaluation_get_the_gpu_that_is_named(tmp_path):
-    less = [word.replace("mem_mb=32000", "mem_mb=1000").replace("runtime=1440", "runtime=60") for word in gpu_words()]
+    less = [
+        word.replace("mem_mb=32000", "mem_mb=1000").replace("runtime=1440", "runtime=60")
+        for word in gpu_words()
+    ]
     status, said = submit(tmp_path, *less, "--retries", "0", snakefile=ON_A_GPU)
     assert status == 0, said[-3000:]
     device, *asked = (tmp_path / "model.txt").read_text().splitlines()
@@ -152,7 +202,12 @@ def test_a_training_and_its_evaluation_get_the_gpu_that_is_named(tmp_path):
     assert device.isdigit() and (tmp_path / "made.txt").read_text().split() == [device]
     assert any("gres:gpu:h100:1" in line for line in asked)
     status, said = submit(
-        tmp_path, *(word.replace("h100", "a100") for word in less), "--retries", "0", "--forceall", snakefile=ON_A_GPU
+        tmp_path,
+        *(word.replace("h100", "a100") for word in less),
+        "--retries",
+        "0",
+        "--forceall",
+        snakefile=ON_A_GPU,
     )
     assert status and "invalid" in said.lower()
 
@@ -165,10 +220,16 @@ def refusing(tmp_path, monkeypatch):
     for name in ("sbatch", "sinfo", "squeue", "scontrol", "sacct", "sacctmgr"):
         # The executor hangs where sinfo fails for a group of jobs.
         answer = "echo main*; exit 0" if name == "sinfo" else "exit 1"
-        (tools / name).write_text(f'#!/bin/sh\necho {name} "$@" >> {tmp_path}/asked.txt\n{answer}\n')
+        (tools / name).write_text(
+            f'#!/bin/sh\necho {name} "$@" >> {tmp_path}/asked.txt\n{answer}\n'
+        )
         (tools / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{tools}:{os.environ['PATH']}")
-    return lambda: [line for line in (tmp_path / "asked.txt").read_text().splitlines() if line.startswith("sbatch")]
+    return lambda: [
+        line
+        for line in (tmp_path / "asked.txt").read_text().splitlines()
+        if line.startswith("sbatch")
+    ]
 
 
 def test_a_gpu_is_asked_for_by_name(refusing, tmp_path):
@@ -192,12 +253,17 @@ def test_a_lost_node_costs_its_jobs_only(local, tmp_path):
     run = start(tmp_path)
     stop = time.monotonic() + 300
     while len({node_of(job) for job in chunk_jobs(tmp_path)} & set(NODES)) < 2:
-        assert run.poll() is None and time.monotonic() < stop, (tmp_path / "said.txt").read_text()[-3000:]
+        assert run.poll() is None and time.monotonic() < stop, (tmp_path / "said.txt").read_text()[
+            -3000:
+        ]
         time.sleep(0.5)
     # As many as the node has cores.
-    lost = set(ask("squeue", "-h", "-t", "R", "-w", NODES[-1], "-o", "%i").split()) & set(chunk_jobs(tmp_path))
+    lost = set(ask("squeue", "-h", "-t", "R", "-w", NODES[-1], "-o", "%i").split()) & set(
+        chunk_jobs(tmp_path)
+    )
     try:
-        # Its jobs end, as those of a node whose power fails; it must not come back before the run has ended.
+        # Its jobs end, as those of a node whose power fails; it must not come back before the run
+        # has ended.
         ask("scontrol", "update", f"nodename={NODES[-1]}", "state=down", "reason=lost")
         ask("scontrol", "update", f"nodename={NODES[-1]}", "state=drain", "reason=lost")
         seen = watched(run, tmp_path)

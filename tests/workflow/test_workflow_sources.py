@@ -1,4 +1,6 @@
-"""Source files of a stage: an import counts wherever it stands, except in the functions of a command."""
+"""Source files of a stage: an import counts wherever it stands, except in the functions of a
+command.
+"""
 
 import pytest
 
@@ -39,28 +41,36 @@ from . import nothing
 import lowalt_other.common, numpy
 """
 FOUND = {
-    "files": ["errors", "atomic", "shipped"], "numerics": ["streams", "portable"],
+    "files": ["errors", "atomic", "shipped"],
+    "numerics": ["streams", "portable"],
     "machine": ["hardware", "timing", "memory", "progress"],
     "config": ["plan", "splits", "network", "classes", "layers"],
-}  # fmt: skip
+}
 
 
 def test_imports_count_in_every_kind_of_block_and_in_a_command_only_at_its_top(tmp_path):
     for name in ("module.py", "__main__.py"):
         (tmp_path / name).write_text(LINES)
     found = [name for name in sources._imports(tmp_path / "module.py") if name.count(".") == 2]
-    assert sorted(found) == sorted(f"lowalt.{room}.{name}" for room, names in FOUND.items() for name in names)
-    assert [name for name in sources._imports(tmp_path / "__main__.py") if name.count(".") == 2] == [
-        "lowalt.files.errors"
-    ]
+    assert sorted(found) == sorted(
+        f"lowalt.{room}.{name}" for room, names in FOUND.items() for name in names
+    )
+    assert [
+        name for name in sources._imports(tmp_path / "__main__.py") if name.count(".") == 2
+    ] == ["lowalt.files.errors"]
 
 
 def test_files_of_a_module_are_its_own_its_packages_and_all_they_import_sorted():
     found = sources.sources("lowalt.noise")
     names = [str(path.relative_to(sources.ROOT)) for path in found]
-    own = {f"lowalt/{name}.py" for name in ("__init__", "noise/__init__", "noise/__main__", "noise/awgn")}
+    own = {
+        f"lowalt/{name}.py"
+        for name in ("__init__", "noise/__init__", "noise/__main__", "noise/awgn")
+    }
     assert names == sorted(set(names)) and own | {"lowalt/numerics/streams.py"} <= set(names)
-    assert not [name for name in names if name.startswith(("lowalt/recognition/", "lowalt/workflow/"))]
+    assert not [
+        name for name in names if name.startswith(("lowalt/recognition/", "lowalt/workflow/"))
+    ]
     with pytest.raises(ModuleNotFoundError, match=r"lowalt\.none"):
         sources.sources("lowalt.none")
     catalogue = sources.sources("lowalt.spectra.catalogue", spectra=("vt",))

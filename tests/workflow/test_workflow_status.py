@@ -1,4 +1,6 @@
-"""The state of a run, seen from another terminal: running, ended, failed, interrupted, killed, on another machine."""
+"""The state of a run, seen from another terminal: running, ended, failed, interrupted, killed, on
+another machine.
+"""
 
 import json
 import logging
@@ -20,7 +22,10 @@ def test_the_state_of_a_run_is_seen_from_elsewhere_and_a_killed_one_is_called_so
     (kept,) = status.read(folder)
     assert status.alive(kept)
     text = status.describe(kept, kept["written"])
-    assert text.startswith(f"process {os.getpid()}: running, 0:00 ago\necho  2/10") and "all   2/12 jobs" in text
+    assert (
+        text.startswith(f"process {os.getpid()}: running, 0:00 ago\necho  2/10")
+        and "all   2/12 jobs" in text
+    )
     dead = kept | {"pid": 2**22 + 1}
     assert "killed" in status.describe(dead, kept["written"])
     # The next run sweeps what dead ones left.
@@ -34,9 +39,13 @@ def test_the_state_of_a_run_is_seen_from_elsewhere_and_a_killed_one_is_called_so
     assert {found["pid"] for found in status.read(folder)} == {os.getpid(), dead["pid"]}
 
 
-def test_a_run_without_a_failed_job_is_told_apart_ended_failed_or_interrupted(tmp_path, monkeypatch):
+def test_a_run_without_a_failed_job_is_told_apart_ended_failed_or_interrupted(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    wrong = record("WorkflowError:\nno room", logging.ERROR, event="error", exception="WorkflowError")
+    wrong = record(
+        "WorkflowError:\nno room", logging.ERROR, event="error", exception="WorkflowError"
+    )
     ctrl_c = record("Terminating processes on user request, this might take some time.")
     for records, state in (([], "ended"), ([wrong], "failed"), ([ctrl_c, wrong], "interrupted")):
         handler = handler_of()
@@ -56,9 +65,14 @@ def test_a_run_on_another_machine_lives_while_its_file_is_fresh(tmp_path):
     assert status.alive(there | {"written": time.time() - 55})
     assert not status.alive(there | {"written": time.time() - 60.5})
     assert not status.alive(there | {"state": "ended"})
-    assert status.describe(there, kept["written"]).startswith(f"process {2**22 + 1} of login-2: running, 0:00 ago")
+    assert status.describe(there, kept["written"]).startswith(
+        f"process {2**22 + 1} of login-2: running, 0:00 ago"
+    )
     unnamed = {key: value for key, value in kept.items() if key != "host"}
-    assert status.elsewhere(there) == "login-2" and status.elsewhere(kept) == status.elsewhere(unnamed) == ""
+    assert (
+        status.elsewhere(there) == "login-2"
+        and status.elsewhere(kept) == status.elsewhere(unnamed) == ""
+    )
 
 
 def test_a_run_that_ended_says_so_and_its_times_stop_at_its_last_word(tmp_path, monkeypatch):
@@ -76,7 +90,9 @@ def test_a_run_that_ended_says_so_and_its_times_stop_at_its_last_word(tmp_path, 
     assert not status.alive(kept | {"process": None, "pid": 2**22 + 1})
 
 
-def test_the_command_shows_runs_that_live_or_else_the_one_that_ended_last(tmp_path, monkeypatch, capsys):
+def test_the_command_shows_runs_that_live_or_else_the_one_that_ended_last(
+    tmp_path, monkeypatch, capsys
+):
     folder = tmp_path / "status"
     folder.mkdir()
     status.write(board_of(), "running", folder)
@@ -87,9 +103,13 @@ def test_the_command_shows_runs_that_live_or_else_the_one_that_ended_last(tmp_pa
     for number in (1, 2, 3):
         status_of.append(lives | {"pid": 2**22 + number, "state": "ended"})
     assert main(["status"]) == 0
-    assert [line for line in capsys.readouterr().out.splitlines() if line.startswith("process")] == [
-        f"process {2**22 + 3}: ended, 0:00 ago"]  # fmt: skip
+    assert [
+        line for line in capsys.readouterr().out.splitlines() if line.startswith("process")
+    ] == [f"process {2**22 + 3}: ended, 0:00 ago"]
     status_of.insert(1, lives)
     assert main(["status"]) == 0
-    assert [line.partition(":")[0] for line in capsys.readouterr().out.splitlines() if line.startswith("process")] == [
-        f"process {os.getpid()}"]  # fmt: skip
+    assert [
+        line.partition(":")[0]
+        for line in capsys.readouterr().out.splitlines()
+        if line.startswith("process")
+    ] == [f"process {os.getpid()}"]

@@ -35,7 +35,11 @@ rule accuracy_cost_table:
         presets=str(shipped(PRESETS)),
         schemes=config["recognition"]["table"],
     output:
-        report("results/{run}/accuracy_cost.csv", caption="../report/accuracy_cost.rst", category="Cost"),
+        report(
+            "results/{run}/accuracy_cost.csv",
+            caption="../report/accuracy_cost.rst",
+            category="Cost",
+        ),
     log:
         "results/{run}/logs/accuracy_cost_table.log",
     benchmark:
@@ -55,7 +59,11 @@ rule accuracy_cost_figure:
         code=code("lowalt.report.figures.cost_plots"),
         table="results/{run}/accuracy_cost.csv",
     output:
-        report("results/{run}/accuracy_cost.svg", caption="../report/accuracy_cost.rst", category="Cost"),
+        report(
+            "results/{run}/accuracy_cost.svg",
+            caption="../report/accuracy_cost.rst",
+            category="Cost",
+        ),
     log:
         "results/{run}/logs/accuracy_cost_figure.log",
     benchmark:

@@ -14,7 +14,9 @@ rule echo_in_scene:
         town=products.town,
     output:
         signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),
-        power=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=LISTENING),
+        power=expand(
+            "results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=LISTENING
+        ),
     log:
         f"results/{{run}}/logs/echo/{{group}}-{{part}}{OF_STATION}.log",
     benchmark:

@@ -137,7 +137,14 @@ rule tables:
         published=config["report"]["published"],
     output:
         report(
-            multiext("results/{run}/", *TABLES, "seeds.csv", "seen_test.csv", "ranges.csv", "aspects.csv"),
+            multiext(
+                "results/{run}/",
+                *TABLES,
+                "seeds.csv",
+                "seen_test.csv",
+                "ranges.csv",
+                "aspects.csv",
+            ),
             caption="../report/tables.rst",
             category="Recognition",
         ),
@@ -204,7 +211,9 @@ rule transfer:
         configs=products.transferred,
         schemes=config["recognition"]["table"],
     output:
-        report("results/{run}/transfer.csv", caption="../report/transfer.rst", category="Recognition"),
+        report(
+            "results/{run}/transfer.csv", caption="../report/transfer.rst", category="Recognition"
+        ),
     log:
         "results/{run}/logs/transfer.log",
     benchmark:

@@ -53,7 +53,9 @@ rule card:
         index="results/{run}/shards/index.json",
         configuration="results/{run}/config.yaml",
     output:
-        multiext("results/{run}/shards/", "README.md", "samples.csv", "croissant.json", "SHA256SUMS"),
+        multiext(
+            "results/{run}/shards/", "README.md", "samples.csv", "croissant.json", "SHA256SUMS"
+        ),
     log:
         "results/{run}/logs/card.log",
     conda:

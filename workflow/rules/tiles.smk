@@ -12,7 +12,10 @@ rule tiles:
         signals="results/{run}/noisy/{group}-{part}.npy",
     output:
         tiles=temp("results/{run}/tiles/{group}-{part}.npz"),
-        reduced=expand("results/{{run}}/reduced/{size}/{{group}}-{{part}}.npy", size=config["tiles"]["reduced"]),
+        reduced=expand(
+            "results/{{run}}/reduced/{size}/{{group}}-{{part}}.npy",
+            size=config["tiles"]["reduced"],
+        ),
     log:
         "results/{run}/logs/tiles/{group}-{part}.log",
     benchmark:

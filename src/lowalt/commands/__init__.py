@@ -1,1 +1,3 @@
-"""The commands of `lowalt COMMAND`. They call the stages and print results; nothing is computed here."""
+"""The commands of `lowalt COMMAND`. They call the stages and print results; nothing is computed
+here.
+"""

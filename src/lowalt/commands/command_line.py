@@ -22,12 +22,16 @@ class Answer(NamedTuple):
 
 
 def add_command(
-    commands: argparse._SubParsersAction, name: str, act: Callable[[argparse.Namespace], Answer], meaning: str = "",
+    commands: argparse._SubParsersAction,
+    name: str,
+    act: Callable[[argparse.Namespace], Answer],
+    meaning: str = "",
     example: str = "",
-) -> argparse.ArgumentParser:  # fmt: skip
+) -> argparse.ArgumentParser:
     """Add a command to a parser and return its own parser, with the option `--json`.
 
-    act: function called with its options; meaning, example: its help, by default that of the table of commands.
+    act: function called with its options; meaning, example: its help, by default that of the table
+    of commands.
     """
     if not meaning:
         _, meaning, example = COMMANDS[name]
@@ -38,7 +42,9 @@ def add_command(
 
 
 def positive(limit: float, expected: str) -> Callable[[str], float]:
-    """Return the type of an option: a number between 0 and a limit; expected: what a refusal asks for."""
+    """Return the type of an option: a number between 0 and a limit; expected: what a refusal asks
+    for.
+    """
 
     def number(text: str) -> float:
         """The number. Raises: ArgumentTypeError for any other text."""
@@ -71,7 +77,8 @@ def _plain(value: object) -> object:
 def as_json(facts: object) -> str:
     """Return facts as one JSON text.
 
-    facts: nested mappings, sequences, dataclasses, arrays, paths, texts and numbers. NaN becomes null and an infinity
-    "inf" or "-inf", since JSON has neither. Raises: TypeError for a value of any other type.
+    facts: nested mappings, sequences, dataclasses, arrays, paths, texts and numbers. NaN becomes
+    null and an infinity "inf" or "-inf", since JSON has neither. Raises: TypeError for a value of
+    any other type.
     """
     return json.dumps(_plain(facts), indent=1, allow_nan=False)

@@ -1,4 +1,6 @@
-"""The command `lowalt compare`: two finished runs side by side, or two methods of the benchmark's table."""
+"""The command `lowalt compare`: two finished runs side by side, or two methods of the benchmark's
+table.
+"""
 
 import argparse
 from collections.abc import Iterator
@@ -24,7 +26,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
-    """Yield (dotted key, value) for all values in nested mappings that are not mappings or are empty."""
+    """Yield (dotted key, value) for all values in nested mappings that are not mappings or are
+    empty.
+    """
     for key, value in block.items():
         if isinstance(value, dict) and value:
             yield from leaves(value, f"{where}{key}.")
@@ -35,12 +39,15 @@ def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
 def facts(folder: Path) -> dict[str, dict]:
     """Return the facts of one run's folder, {part: {name: value}}.
 
-    Parts: configuration (dotted keys), accuracy_percent (averages over the SNRs by "protocol scheme"), processor_s (by
-    stage), data (samples and bytes); a part is empty where the run has no such table.
+    Parts: configuration (dotted keys), accuracy_percent (averages over the SNRs by "protocol
+    scheme"), processor_s (by stage), data (samples and bytes); a part is empty where the run has no
+    such table.
     Raises: InputError naming the folder that is no run's, or the file in it that is damaged.
     """
     config = of_run(folder)
-    accuracy, stages, index = (folder / name for name in ("accuracy.csv", "stages.csv", "shards/index.json"))
+    accuracy, stages, index = (
+        folder / name for name in ("accuracy.csv", "stages.csv", "shards/index.json")
+    )
     shares = averages(accuracy) if accuracy.exists() else {}
     times = read_csv(stages, "rule", "cpu_s") if stages.exists() else []
     data = read_object(index, "an index of shards") if index.exists() else {}
@@ -48,24 +55,31 @@ def facts(folder: Path) -> dict[str, dict]:
         check_brought("sizes", data, index)
     return {
         "configuration": dict(leaves(config)),
-        "accuracy_percent": {f"{protocol} {scheme}": share for (scheme, protocol), share in shares.items()},
+        "accuracy_percent": {
+            f"{protocol} {scheme}": share for (scheme, protocol), share in shares.items()
+        },
         "processor_s": {row["rule"]: number(row, "cpu_s", stages) for row in times},
         "data": {name: data[name] for name in ("samples", "bytes") if data},
     }
 
 
 def compared(*folders: Path) -> dict[str, dict[str, tuple]]:
-    """Return {part: {name: (value of the first run, value of the second)}}: only differences of the configuration, and
-    everything in the parts MEASURED. A missing value is None.
+    """Return {part: {name: (value of the first run, value of the second)}}: only differences of the
+    configuration, and everything in the parts MEASURED. A missing value is None.
 
     Raises: InputError naming the folder that is no run's.
     """
     first, second = map(facts, folders)
     pairs = {
-        part: {name: (first[part].get(name), second[part].get(name)) for name in {**first[part], **second[part]}}
+        part: {
+            name: (first[part].get(name), second[part].get(name))
+            for name in {**first[part], **second[part]}
+        }
         for part in ("configuration", *MEASURED)
     }
-    pairs["configuration"] = {name: pair for name, pair in pairs["configuration"].items() if pair[0] != pair[1]}
+    pairs["configuration"] = {
+        name: pair for name, pair in pairs["configuration"].items() if pair[0] != pair[1]
+    }
     return pairs
 
 
@@ -100,11 +114,14 @@ def run(options: argparse.Namespace) -> Answer:
     """Compare two runs, or what an extension compares. Raises: as `compared` and `others`."""
     if not any(map(Path.exists, options.runs)):
         return others(*map(str, options.runs))
-    pairs, blocks = compared(*options.runs), []
+    pairs = compared(*options.runs)
+    blocks = []
     for part, rows in pairs.items():
         wide = max(map(len, rows), default=0)
-        lines = [f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{_change(part, first, second)}"
-                 for name, (first, second) in rows.items()]  # fmt: skip
+        lines = [
+            f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{_change(part, first, second)}"
+            for name, (first, second) in rows.items()
+        ]
         head = f"{part.replace('_', ' ')}: {options.runs[0]} | {options.runs[1]}"
         blocks += ["\n".join([head, *lines])] if rows else []
     return Answer(pairs, "\n\n".join(blocks))

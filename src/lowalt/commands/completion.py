@@ -1,4 +1,6 @@
-"""The command `lowalt completion`: a shell script for tab completion of commands, options and files."""
+"""The command `lowalt completion`: a shell script for tab completion of commands, options and
+files.
+"""
 
 import argparse
 from collections.abc import Iterator
@@ -39,11 +41,23 @@ def run(_options: argparse.Namespace) -> Answer:
     return Answer({"script": text}, text)
 
 
-def parsers(line: argparse.ArgumentParser, path: str = "") -> Iterator[tuple[str, list[str], list[str]]]:
-    """Yield the words, such as " target make", the options and the names of commands of a parser and all below it."""
-    below = {name: parser for action in line._actions if isinstance(action, argparse._SubParsersAction)
-             for name, parser in action.choices.items()}  # fmt: skip
-    yield path, [word for action in line._actions for word in action.option_strings if word[:2] == "--"], [*below]
+def parsers(
+    line: argparse.ArgumentParser, path: str = ""
+) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Yield the words, such as " target make", the options and the names of commands of a parser
+    and all below it.
+    """
+    below = {
+        name: parser
+        for action in line._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for name, parser in action.choices.items()
+    }
+    yield (
+        path,
+        [word for action in line._actions for word in action.option_strings if word[:2] == "--"],
+        [*below],
+    )
     for name, parser in below.items():
         yield from parsers(parser, f"{path} {name}")
 
@@ -51,5 +65,7 @@ def parsers(line: argparse.ArgumentParser, path: str = "") -> Iterator[tuple[str
 def script(line: argparse.ArgumentParser) -> str:
     """Return the script that completes the commands of a parser."""
     rows = [(path, " ".join(options), " ".join(names)) for path, options, names in parsers(line)]
-    cases = "\n".join(f'    "{path}") options="{options}"; names="{names}";;' for path, options, names in rows)
+    cases = "\n".join(
+        f'    "{path}") options="{options}"; names="{names}";;' for path, options, names in rows
+    )
     return SCRIPT.format(paths=" | ".join(f'"{path}"' for path, _, _ in rows if path), cases=cases)

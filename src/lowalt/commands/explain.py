@@ -1,4 +1,6 @@
-"""The command `lowalt explain` says whether a scene's receiver finds its targets, and what each effect changes."""
+"""The command `lowalt explain` says whether a scene's receiver finds its targets, and what each
+effect changes.
+"""
 
 import argparse
 import dataclasses
@@ -31,14 +33,34 @@ def _sample(text: str) -> tuple[str, int]:
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `explain` to a parser's commands."""
     line = add_command(commands, name, run)
-    line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the default; more may follow it")
-    line.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
+    line.add_argument(
+        "scene",
+        type=Path,
+        nargs="+",
+        help="the scene, an overlay on the default; more may follow it",
+    )
+    line.add_argument(
+        "--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL"
+    )
     line.add_argument("--station", help="the station of the table of effects (default: the first)")
-    line.add_argument("--model", type=Path, help="a trained model: how many of its answers each effect changes")
+    line.add_argument(
+        "--model", type=Path, help="a trained model: how many of its answers each effect changes"
+    )
     line.add_argument("--no-table", action="store_true", help="the verdict alone")
-    line.add_argument("--levels", action="store_true", help="list the levels of every sample as a link budget does")
-    line.add_argument("--sources", action="store_true", help="list where the model of each effect comes from")
-    line.add_argument("--suggest", type=float, metavar="LEAST", help="write the effects that change a signal by more")
+    line.add_argument(
+        "--levels",
+        action="store_true",
+        help="list the levels of every sample as a link budget does",
+    )
+    line.add_argument(
+        "--sources", action="store_true", help="list where the model of each effect comes from"
+    )
+    line.add_argument(
+        "--suggest",
+        type=float,
+        metavar="LEAST",
+        help="write the effects that change a signal by more",
+    )
     line.add_argument("--out", type=Path, help="the scene to write with --suggest (.yaml)")
 
 
@@ -49,7 +71,9 @@ def run(options: argparse.Namespace) -> Answer:
     """
     if (options.suggest is None) != (options.out is None):
         raise InputError(
-            "--suggest: without --out, expected both" if options.out is None else "--out: expected --suggest"
+            "--suggest: without --out, expected both"
+            if options.out is None
+            else "--out: expected --suggest"
         )
     from lowalt.scene import explanation
 
@@ -60,11 +84,17 @@ def run(options: argparse.Namespace) -> Answer:
     stations = scene.network.stations
     first = options.station or stations[0].name
     scene.network.station(first)
-    print("lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True)
+    print(
+        "lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True
+    )
     chosen = explanation.samples(config, inputs, options.sample)
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
     listed = options.levels or options.json
-    findings = [explanation.finding(scene, end, sample, clouds, listed) for sample in chosen for end in stations]
+    findings = [
+        explanation.finding(scene, end, sample, clouds, listed)
+        for sample in chosen
+        for end in stations
+    ]
     changes = []
     if not options.no_table or options.suggest is not None:
         print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
@@ -80,8 +110,13 @@ def run(options: argparse.Namespace) -> Answer:
         lines += ["", *explanation.effects_table(changes, options.sources)]
     for finding in findings if options.levels else []:
         lines += ["", *explanation.level_lines(finding)]
-    facts = {"findings": [row._asdict() for row in findings], "changes": [row._asdict() for row in changes]}
-    return Answer({"run": config["run"], **({"shards": size} if size else {}), **facts}, "\n".join(lines))
+    facts = {
+        "findings": [row._asdict() for row in findings],
+        "changes": [row._asdict() for row in changes],
+    }
+    return Answer(
+        {"run": config["run"], **({"shards": size} if size else {}), **facts}, "\n".join(lines)
+    )
 
 
 def _size(config: dict, inputs: Path | None) -> dict:
@@ -89,16 +124,23 @@ def _size(config: dict, inputs: Path | None) -> dict:
     if config["shards"]["kind"] != "cube":
         return {}
     records = records_of(config["targets"], inputs)
-    return cubes_size(config, Plan.of(config, {name: record["published"] for name, record in records.items()}))
+    return cubes_size(
+        config, Plan.of(config, {name: record["published"] for name, record in records.items()})
+    )
 
 
-def _shown(config: dict, stations: list[str], model: Path | None) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
-    """The function that turns signals (K, stations, N) into pixels, and into the answers of a trained model."""
+def _shown(
+    config: dict, stations: list[str], model: Path | None
+) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
+    """The function that turns signals (K, stations, N) into pixels, and into the answers of a
+    trained model.
+    """
     from lowalt.config.network import Network
     from lowalt.tiles import Renderer
 
     blocks = {key: config[key] for key in ("network", "spectra", "images")}
-    whole, network = Renderer.from_settings(blocks), Network.from_settings(config["network"])
+    whole = Renderer.from_settings(blocks)
+    network = Network.from_settings(config["network"])
     seen = dataclasses.replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
     if model is not None:

@@ -17,17 +17,27 @@ from lowalt.recognition.zoo_files import path_of
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `predict` to a parser's commands."""
     line = add_command(commands, name, run)
-    line.add_argument("model", help="a .safetensors file, of a training or another, or the name of one in results/zoo")
-    line.add_argument("input", type=Path, help="tile (.png), signals (stations, symbols) complex (.npy), or a "
-                         "recording's record (.yaml)")  # fmt: skip
+    line.add_argument(
+        "model",
+        help="a .safetensors file, of a training or another, or the name of one in results/zoo",
+    )
+    line.add_argument(
+        "input",
+        type=Path,
+        help="tile (.png), signals (stations, symbols) complex (.npy), or a "
+        "recording's record (.yaml)",
+    )
     name_backbone(line)
-    line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
+    line.add_argument(
+        "--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it"
+    )
 
 
 def run(options: argparse.Namespace) -> Answer:
     """Ask a model for the probability of each class; the text names the most probable first.
 
-    A model file that knows how its images were made of signals is asked with that, unless overlays are given.
+    A model file that knows how its images were made of signals is asked with that, unless overlays
+    are given.
     Raises: InputError for a file that is no model, tile or signal.
     """
     readers = offered("readers")
@@ -50,12 +60,17 @@ def run(options: argparse.Namespace) -> Answer:
     if reader:
         return Answer(*reader.answer(model, settings, content, str(options.input)))
     if "radar" in settings and options.input.suffix == ".npy":
-        raise InputError(f"{options.input}: {options.model} knows recordings, expected the record of one (.yaml)")
+        raise InputError(
+            f"{options.input}: {options.model} knows recordings, expected the record of one (.yaml)"
+        )
     if config or not settings:
         config = config or overlaid([])
         settings = {key: config[key] for key in ("network", "spectra", "images")}
     shares = predict(model, options.input, settings)
-    lines = [f"{100 * share:6.2f} %  {name}" for name, share in sorted(shares.items(), key=lambda pair: -pair[1])]
+    lines = [
+        f"{100 * share:6.2f} %  {name}"
+        for name, share in sorted(shares.items(), key=lambda pair: -pair[1])
+    ]
     return Answer(shares, "\n".join(lines))
 
 

@@ -1,4 +1,6 @@
-"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two."""
+"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any
+two.
+"""
 
 import argparse
 import tempfile
@@ -25,9 +27,16 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     line = add_command(commands, name, run)
     line.add_argument("run", type=Path, nargs="?", help="folder of a run that was started here")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
-    line.add_argument("-n", "--dry-run", action="store_true", help="only name the files that would be made, and why")
+    line.add_argument(
+        "-n",
+        "--dry-run",
+        action="store_true",
+        help="only name the files that would be made, and why",
+    )
     line.add_argument("--gallery", action="store_true", help="write RESULTS/index.html")
-    line.add_argument("--results", type=Path, default=Path("results"), help="folder of runs (default: results)")
+    line.add_argument(
+        "--results", type=Path, default=Path("results"), help="folder of runs (default: results)"
+    )
 
 
 def run(options: argparse.Namespace) -> Answer:
@@ -36,7 +45,9 @@ def run(options: argparse.Namespace) -> Answer:
     Raises: InputError where neither or both are asked for, and as `page` and `gallery`.
     """
     if options.gallery == (options.run is not None):
-        raise InputError("report: expected the folder of a run, such as results/default, or --gallery")
+        raise InputError(
+            "report: expected the folder of a run, such as results/default, or --gallery"
+        )
     return gallery(options.results) if options.gallery else page(options)
 
 
@@ -51,10 +62,14 @@ def page(options: argparse.Namespace) -> Answer:
     name = config.get("run")
     written = f"results/{name}/report.html"
     if not isinstance(name, str) or options.run.resolve() != Path(written).parent.resolve():
-        raise InputError(f"{options.run}: its config.yaml is of the run {name!r}, expected to stand in results/{name}")
+        raise InputError(
+            f"{options.run}: its config.yaml is of the run {name!r}, expected to stand in results/{name}"
+        )
     _refuse_code(config, options.run)
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
-        yaml.safe_dump({"run": name, **changes(load_yaml(shipped(BASE)), as_named(config))}, overlay)
+        yaml.safe_dump(
+            {"run": name, **changes(load_yaml(shipped(BASE)), as_named(config))}, overlay
+        )
         overlay.flush()
         line = {
             "overlay": [Path(overlay.name)],
@@ -69,25 +84,43 @@ def page(options: argparse.Namespace) -> Answer:
 
 
 def _refuse_code(config: dict, folder: Path) -> None:
-    """Refuse a run whose configuration, or whose table of schemes, names code that the workflow would run."""
+    """Refuse a run whose configuration, or whose table of schemes, names code that the workflow
+    would run.
+    """
     refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
     block = located(config)["recognition"]
-    how = f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
-    for name in (block["network"]["backbone"], *(row["backbone"] for row in read_csv(block["table"], "backbone"))):
+    how = (
+        f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
+    )
+    for name in (
+        block["network"]["backbone"],
+        *(row["backbone"] for row in read_csv(block["table"], "backbone")),
+    ):
         allowed(name, "", folder, how)
 
 
 def gallery(results: Path) -> Answer:
     """Write index.html into the folder of runs.
 
-    Raises: InputError where the folder holds no run, or a run's tables or configuration cannot be read.
+    Raises: InputError where the folder holds no run, or a run's tables or configuration cannot be
+    read.
     """
     from lowalt.report.all_runs import all_runs
 
     folders = sorted(path.parent for path in results.glob("*/config.yaml"))
     if not folders:
-        raise InputError(f"{results}: no run, expected folders with a config.yaml such as results/default")
-    pages = {path.name: f"{path.name}/report.html" for path in folders if (path / "report.html").is_file()}
-    write_file(results / "index.html", all_runs({path.name: facts(path) for path in folders}, pages))
+        raise InputError(
+            f"{results}: no run, expected folders with a config.yaml such as results/default"
+        )
+    pages = {
+        path.name: f"{path.name}/report.html"
+        for path in folders
+        if (path / "report.html").is_file()
+    }
+    write_file(
+        results / "index.html", all_runs({path.name: facts(path) for path in folders}, pages)
+    )
     text = f"{results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"
-    return Answer({"files": [results / "index.html"], "runs": [path.name for path in folders]}, text)
+    return Answer(
+        {"files": [results / "index.html"], "runs": [path.name for path in folders]}, text
+    )

@@ -1,4 +1,6 @@
-"""The command `lowalt sample`: one sample of a configuration as files and as a picture with axes, or its raw echo."""
+"""The command `lowalt sample`: one sample of a configuration as files and as a picture with axes,
+or its raw echo.
+"""
 
 import argparse
 import math
@@ -20,24 +22,44 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `sample` to a parser's commands."""
     line = add_command(commands, name, run)
     line.add_argument("subtype", help="name of the subtype, as in the table of targets")
-    line.add_argument("model", type=int, help="number of the motion model; any number, also beyond the configuration's")
-    line.add_argument("--snr", type=float, default=math.inf, help="signal-to-noise ratio in dB (default: no noise)")
+    line.add_argument(
+        "model",
+        type=int,
+        help="number of the motion model; any number, also beyond the configuration's",
+    )
+    line.add_argument(
+        "--snr",
+        type=float,
+        default=math.inf,
+        help="signal-to-noise ratio in dB (default: no noise)",
+    )
     line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the default")
-    line.add_argument("--raw", nargs="?", const="cells", choices=AT, help="write the raw echo at this place of the "
-                      "chain instead (default: cells), as .npz and, where h5py is installed, .h5")  # fmt: skip
+    line.add_argument(
+        "--raw",
+        nargs="?",
+        const="cells",
+        choices=AT,
+        help="write the raw echo at this place of the "
+        "chain instead (default: cells), as .npz and, where h5py is installed, .h5",
+    )
     line.add_argument("--station", help="of a raw echo (default: each station)")
-    line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
+    line.add_argument(
+        "--out", type=Path, default=Path(), help="folder to write into (default: the current one)"
+    )
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Write {key}.png, .npy and .json as the shards hold them, and {key}-axes.png; answer with what was written.
+    """Write {key}.png, .npy and .json as the shards hold them, and {key}-axes.png; answer with what
+    was written.
 
     Raises: InputError for a wrong configuration, subtype or model.
     """
     config = overlaid(options.overlay)
     selected = config["targets"]["select"]
     if options.model < 0 or (selected and options.subtype not in selected):
-        raise InputError(f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number from 0")
+        raise InputError(
+            f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number from 0"
+        )
     dataset = alone(config, options.subtype)
     if options.raw:
         return _raw(options, dataset)
@@ -45,12 +67,15 @@ def run(options: argparse.Namespace) -> Answer:
 
     place = dataset.place_of(options.subtype, options.model, options.snr)
     image, signal, _ = dataset.made(place)
-    key, renderer = sample_key(options.subtype, options.model, options.snr), dataset.maker.renderer
+    key = sample_key(options.subtype, options.model, options.snr)
+    renderer = dataset.maker.renderer
     noise = "no noise" if math.isinf(options.snr) else f"SNR {options.snr:g} dB"
     written = {
         f"{key}.png": encode(image, renderer.images.palette),
         f"{key}.json": dataset.made_record(place),
-        f"{key}-axes.png": figure(image, renderer, f"{options.subtype}, motion model {options.model}, {noise}"),
+        f"{key}-axes.png": figure(
+            image, renderer, f"{options.subtype}, motion model {options.model}, {noise}"
+        ),
     }
     for name, data in written.items():
         write_file(options.out / name, data)
@@ -61,9 +86,16 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def _raw(options: argparse.Namespace, dataset: Dataset) -> Answer:
-    """Write {key}-{station}-{place}.npz, and .h5 where h5py is installed, of each station asked for."""
-    key, files = sample_key(options.subtype, options.model, options.snr), []
-    names = [options.station] if options.station else [station.name for station in dataset.maker.network.stations]
+    """Write {key}-{station}-{place}.npz, and .h5 where h5py is installed, of each station asked
+    for.
+    """
+    key = sample_key(options.subtype, options.model, options.snr)
+    files = []
+    names = (
+        [options.station]
+        if options.station
+        else [station.name for station in dataset.maker.network.stations]
+    )
     for name in names:
         echo = receive(dataset, options.subtype, options.model, name, options.raw, options.snr)
         files += write(echo, options.out / f"{key}-{name}-{options.raw}")

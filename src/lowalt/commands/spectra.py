@@ -1,4 +1,6 @@
-"""The command `lowalt spectra`: a configuration's spectra, their settings and sources, and the time per image."""
+"""The command `lowalt spectra`: a configuration's spectra, their settings and sources, and the time
+per image.
+"""
 
 import argparse
 import functools
@@ -26,34 +28,56 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 
 
 def facts(config: dict) -> list[dict]:
-    """Return the facts on each spectrum of a checked configuration: size, index of zero, time, settings, source."""
-    renderer = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
+    """Return the facts on each spectrum of a checked configuration: size, index of zero, time,
+    settings, source.
+    """
+    renderer = Renderer.from_settings(
+        {key: config[key] for key in ("network", "spectra", "images")}
+    )
     symbols = renderer.network.symbols
     signal = normalised(np.exp(0.1j * np.arange(symbols) ** 1.5).astype(np.complex64))
     if renderer.spectra.times == "known":
         # Use a look with gaps: without gaps the kernels for evenly spaced symbols would be timed.
         signal[3::4] = 0
     image = np.empty((renderer.images.size, renderer.images.size), np.uint8)
-    still, no_truth = np.zeros(symbols, np.int64), np.zeros((symbols, 0))
+    still = np.zeros(symbols, np.int64)
+    no_truth = np.zeros((symbols, 0))
     rows = []
     for name, settings in renderer.spectra.items():
         kind = spectrum(name)
         cells = isinstance(kind, OfCells)
-        count = kind.columns(settings, symbols) if cells else windows(symbols, settings.window, settings.hop, name)
-        heard = Cube(np.repeat(signal[:, None], settings.cells, axis=1), still, no_truth) if cells else signal
+        count = (
+            kind.columns(settings, symbols)
+            if cells
+            else windows(symbols, settings.window, settings.hop, name)
+        )
+        heard = (
+            Cube(np.repeat(signal[:, None], settings.cells, axis=1), still, no_truth)
+            if cells
+            else signal
+        )
         draw = functools.partial(renderer.image, heard, 0, name, image)
         draw()
-        rows.append({
-            "name": name, "title": kind.TITLE, "rows": kind.rows(settings), "windows": count,
-            "zero_index": zero_index(name), "image_ms": 1e3 * median_s(draw, REPEATS), "settings": asdict(settings),
-            "source": kind.SOURCE,
-        })  # fmt: skip
+        rows.append(
+            {
+                "name": name,
+                "title": kind.TITLE,
+                "rows": kind.rows(settings),
+                "windows": count,
+                "zero_index": zero_index(name),
+                "image_ms": 1e3 * median_s(draw, REPEATS),
+                "settings": asdict(settings),
+                "source": kind.SOURCE,
+            }
+        )
     return rows
 
 
 def run(options: argparse.Namespace) -> Answer:
     """Describe the spectra of a configuration. Raises: InputError where the configuration is wrong."""
-    rows, hardware, lines = facts(overlaid(options.overlay)), describe(), []
+    rows = facts(overlaid(options.overlay))
+    hardware = describe()
+    lines = []
     for row in rows:
         values = ", ".join(f"{key} {value}" for key, value in row["settings"].items())
         lines += [

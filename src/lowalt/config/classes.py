@@ -1,14 +1,15 @@
 """The classes of a data set: the words in the column `category` of its table of targets.
 
-The classes stand in the order in which the table names them first, and a class's place in that order is its label. The
-order travels with the data: in the settings of the stages, in the index of the shards, in a trained model and in the
-record next to a prediction file. Where one of these names no classes, it has the published four.
+The classes stand in the order in which the table names them first, and a class's place in that
+order is its label. The order travels with the data: in the settings of the stages, in the index of
+the shards, in a trained model and in the record next to a prediction file. Where one of these names
+no classes, it has the published four.
 
-The first class is the one that a detector looks for; false alarms are samples of other classes that the detector
-gives its name.
+The first class is the one that a detector looks for; false alarms are samples of other classes that
+the detector gives its name.
 
-A target is built, moves and reflects like one of the published four classes, which a record names in its key `like`.
-The key is needed for a user's own class only.
+A target is built, moves and reflects like one of the published four classes, which a record names
+in its key `like`. The key is needed for a user's own class only.
 """
 
 import re
@@ -29,7 +30,8 @@ _PLURALS = {"UAV": "UAVs", "Bird": "birds", "Vehicle": "vehicles", "Pedestrian":
 def classes_of(table: Mapping[str, dict]) -> tuple[str, ...]:
     """Return the classes of a table of targets by subtype, in the order of their first rows.
 
-    Raises: InputError for a name that is no word, or two names that differ only in capitals, spaces or hyphens.
+    Raises: InputError for a name that is no word, or two names that differ only in capitals, spaces
+    or hyphens.
     """
     names = tuple(dict.fromkeys(row["category"] for row in table.values()))
     for name in names:
@@ -38,12 +40,16 @@ def classes_of(table: Mapping[str, dict]) -> tuple[str, ...]:
                 f"table of targets: category {name!r}, expected a letter, then letters, digits, spaces or ()-_"
             )
     if len({word(name) for name in names}) < len(names):
-        raise InputError(f"table of targets: categories {list(names)}, expected names that differ in their letters")
+        raise InputError(
+            f"table of targets: categories {list(names)}, expected names that differ in their letters"
+        )
     return names
 
 
 def stated(content: Mapping) -> tuple[str, ...]:
-    """Return the classes that an index, a trained model or a run's record states, or the published four."""
+    """Return the classes that an index, a trained model or a run's record states, or the published
+    four.
+    """
     return tuple(content.get("classes", CATEGORIES))
 
 
@@ -53,22 +59,29 @@ def label(classes: tuple[str, ...], row: Mapping) -> int:
     Raises: InputError naming the subtype and the category that is no class.
     """
     if row["category"] not in classes:
-        raise InputError(f"{row['subtype']}: category {row['category']!r}, expected one of {list(classes)}")
+        raise InputError(
+            f"{row['subtype']}: category {row['category']!r}, expected one of {list(classes)}"
+        )
     return classes.index(row["category"])
 
 
 def word(name: str) -> str:
-    """Return a class's name as columns of tables have it: small letters, with _ for spaces and hyphens."""
+    """Return a class's name as columns of tables have it: small letters, with _ for spaces and
+    hyphens.
+    """
     return re.sub(r"[ -]", "_", name.lower())
 
 
 def plural(name: str) -> str:
-    """Return a class's name for several targets: the plural of a published class, any other name as it is written."""
+    """Return a class's name for several targets: the plural of a published class, any other name as
+    it is written.
+    """
     return _PLURALS.get(name, name)
 
 
 def like(record: Mapping) -> str:
-    """Return the published class that the target of a record or cloud is built, moves and reflects like.
+    """Return the published class that the target of a record or cloud is built, moves and reflects
+    like.
 
     Raises: InputError naming the subtype where neither its key `like` nor its category says it.
     """

@@ -1,7 +1,9 @@
-"""Common parts of the stages' command lines: the settings argument, one-line errors, and peak memory.
+"""Common parts of the stages' command lines: the settings argument, one-line errors, and peak
+memory.
 
-A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings @file.json`.
-The workflow passes the object itself, so that Snakemake notices every change; users usually pass a file.
+A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings
+@file.json`. The workflow passes the object itself, so that Snakemake notices every change; users
+usually pass a file.
 """
 
 import argparse
@@ -22,7 +24,8 @@ from lowalt.machine.memory import keep_freed_memory
 
 
 def exit_status(code: int) -> int:
-    """Return the exit status of a process as a shell reports it: 128 + signal number if a signal ended it.
+    """Return the exit status of a process as a shell reports it: 128 + signal number if a signal
+    ended it.
 
     code: return code of `subprocess`, negative for a signal.
     """
@@ -32,19 +35,28 @@ def exit_status(code: int) -> int:
 def parser(module: str, description: str) -> argparse.ArgumentParser:
     """Return an argument parser for `python -m {module}` that already has `--settings`."""
     result = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
-    result.add_argument("--settings", required=True, type=_argument, metavar="JSON|@FILE", help="settings object")
+    result.add_argument(
+        "--settings", required=True, type=_argument, metavar="JSON|@FILE", help="settings object"
+    )
     return result
 
 
 def name_backbone(line: argparse.ArgumentParser) -> None:
-    """Add the option with which a user names the code of a model's backbone, which the model's file may not choose."""
+    """Add the option with which a user names the code of a model's backbone, which the model's file
+    may not choose.
+    """
     line.add_argument(
-        "--backbone", default="", metavar="FILE.py:FUNCTION", help="for a model on code of its maker's own: that code"
+        "--backbone",
+        default="",
+        metavar="FILE.py:FUNCTION",
+        help="for a model on code of its maker's own: that code",
     )
 
 
 def _argument(text: str) -> dict:
-    """Return `settings` of the text but keep its error message, which argparse would replace for a ValueError."""
+    """Return `settings` of the text but keep its error message, which argparse would replace for a
+    ValueError.
+    """
     try:
         return settings(text)
     except InputError as error:
@@ -71,11 +83,15 @@ def pick(block: dict, *keys: str) -> list:
     missing = [key for key in keys if key not in block]
     unknown = [key for key in block if key not in keys]
     if missing or unknown:
-        raise InputError(f"settings: missing {missing}, unknown {unknown}, expected exactly {sorted(keys)}")
+        raise InputError(
+            f"settings: missing {missing}, unknown {unknown}, expected exactly {sorted(keys)}"
+        )
     return [block[key] for key in keys]
 
 
-def dispatch(module: str, commands: Mapping[str, Callable[[list[str]], None]], arguments: list[str]) -> None:
+def dispatch(
+    module: str, commands: Mapping[str, Callable[[list[str]], None]], arguments: list[str]
+) -> None:
     """Run the command that the first argument names, on the other arguments.
 
     Raises: InputError naming the module's commands where the first argument is none of them.
@@ -85,13 +101,21 @@ def dispatch(module: str, commands: Mapping[str, Callable[[list[str]], None]], a
     commands[arguments[0]](arguments[1:])
 
 
-REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
+REFUSED = (
+    errno.EROFS,
+    errno.EACCES,
+    errno.EPERM,
+    errno.ENOTDIR,
+    errno.EISDIR,
+    errno.EEXIST,
+    errno.ENAMETOOLONG,
+)
 """Operating system errors caused by a path of the user, such as a read-only folder."""
 
 
 def refusal(error: InputError | OSError | ImportError) -> str:
-    """Return the message of a refusal, of bounded length: that of an InputError, one about the path in an error of the
-    operating system, or one about a package that is not installed.
+    """Return the message of a refusal, of bounded length: that of an InputError, one about the path
+    in an error of the operating system, or one about a package that is not installed.
 
     Raises: any other error unchanged.
     """
@@ -101,12 +125,16 @@ def refusal(error: InputError | OSError | ImportError) -> str:
         return str(lacking(error))
     if error.errno not in REFUSED or error.filename is None:
         raise error
-    return shortened(f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write")
+    return shortened(
+        f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
+    )
 
 
 @contextlib.contextmanager
 def refusing() -> Iterator[None]:
-    """Turn an InputError, an operating system error about a path, or a missing package into one line and status 2."""
+    """Turn an InputError, an operating system error about a path, or a missing package into one
+    line and status 2.
+    """
     try:
         yield
     except (InputError, OSError, ImportError) as error:
@@ -115,7 +143,9 @@ def refusing() -> Iterator[None]:
 
 
 class Refusing:
-    """Wraps an object so that its methods handle errors as `refusing` does; Snakemake would print tracebacks."""
+    """Wraps an object so that its methods handle errors as `refusing` does; Snakemake would print
+    tracebacks.
+    """
 
     def __init__(self, held: object) -> None:
         """Take the object."""
@@ -148,7 +178,9 @@ def warn_in_one_line() -> None:
 
 
 def run(main: Callable[[list[str]], None]) -> None:
-    """Run a stage's `main` on the process's arguments, as `refusing` says; an InputWarning becomes one line."""
+    """Run a stage's `main` on the process's arguments, as `refusing` says; an InputWarning becomes
+    one line.
+    """
     keep_freed_memory()
     warn_in_one_line()
     with refusing():

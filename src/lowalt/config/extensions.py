@@ -1,8 +1,9 @@
 """The interface of extensions: what a package adds to lowalt, and how what is installed is found.
 
-An extension is a Python package with an entry point of the group `lowalt.extensions`, whose value is an `Extension`. It
-names modules as texts, so that finding it imports none of them; a module is imported when something of it is used.
-The core imports no extension, and the extensions that come with lowalt are found as any other is.
+An extension is a Python package with an entry point of the group `lowalt.extensions`, whose value
+is an `Extension`. It names modules as texts, so that finding it imports none of them; a module is
+imported when something of it is used. The core imports no extension, and the extensions that come
+with lowalt are found as any other is.
 """
 
 import functools
@@ -22,9 +23,11 @@ GROUP = "lowalt.extensions"
 
 
 class AddedEffect(NamedTuple):
-    """An effect: its module, which keeps `lowalt.scene.contract`, its place in the chain, and its order there.
+    """An effect: its module, which keeps `lowalt.scene.contract`, its place in the chain, and its
+    order there.
 
-    after: the effect of the same place behind which it acts; by default it acts behind all of its place.
+    after: the effect of the same place behind which it acts; by default it acts behind all of its
+    place.
     """
 
     module: str
@@ -36,11 +39,13 @@ class AddedEffect(NamedTuple):
 class Extension:
     """What an extension adds: mappings from names to modules, all of them empty by default.
 
-    commands: of `lowalt NAME`; effects: of the block `effects`; spectra: of the block `spectra`, modules that keep
-    `lowalt.spectra.interface`; readers: of inputs of `lowalt predict` by the suffix of the file, modules that offer
-    `read(path)` and `answer(model, settings, content, name)`; comparisons: what `lowalt compare` takes besides runs,
-    modules that offer `compared_named(first, second)`; sections: of the report by the name of the file in its manifest
-    without which the page has no such section, modules that offer `values(run)` beside a template of the same name.
+    commands: of `lowalt NAME`; effects: of the block `effects`; spectra: of the block `spectra`,
+    modules that keep `lowalt.spectra.interface`; readers: of inputs of `lowalt predict` by the
+    suffix of the file, modules that offer `read(path)` and `answer(model, settings, content,
+    name)`; comparisons: what `lowalt compare` takes besides runs, modules that offer
+    `compared_named(first, second)`; sections: of the report by the name of the file in its manifest
+    without which the page has no such section, modules that offer `values(run)` beside a template
+    of the same name.
     """
 
     commands: Mapping[str, Command] = field(default_factory=dict)
@@ -51,12 +56,17 @@ class Extension:
     sections: Mapping[str, str] = field(default_factory=dict)
 
 
-KINDS = {one.name: {"commands": Command, "effects": AddedEffect}.get(one.name, str) for one in fields(Extension)}
+KINDS = {
+    one.name: {"commands": Command, "effects": AddedEffect}.get(one.name, str)
+    for one in fields(Extension)
+}
 """Type of what an extension offers under a name, by the fields of `Extension`."""
 
 
 class Found(NamedTuple):
-    """The extensions of this installation by their names, their packages, and a sentence for each left out."""
+    """The extensions of this installation by their names, their packages, and a sentence for each
+    left out.
+    """
 
     extensions: dict[str, Extension]
     packages: dict[str, str]
@@ -70,32 +80,44 @@ def _label(point: EntryPoint) -> str:
 
 
 def _loaded(point: EntryPoint) -> Extension:
-    """The extension of an entry point. Raises: InputError naming it where it cannot be imported or is none."""
+    """The extension of an entry point. Raises: InputError naming it where it cannot be imported or
+    is none.
+    """
     try:
         extension = point.load()
     except Exception as error:
         raise InputError(f"{_label(point)}: {type(error).__name__}: {str(error)[:200]}") from error
     if not isinstance(extension, Extension):
-        raise InputError(f"{_label(point)}: {point.value} is {shown(extension)}, expected an Extension")
+        raise InputError(
+            f"{_label(point)}: {point.value} is {shown(extension)}, expected an Extension"
+        )
     for kind, wanted in KINDS.items():
         offered = getattr(extension, kind)
         if not isinstance(offered, Mapping):
-            raise InputError(f"{_label(point)}: {kind} is {shown(offered)}, expected names to modules")
+            raise InputError(
+                f"{_label(point)}: {kind} is {shown(offered)}, expected names to modules"
+            )
         for name, value in offered.items():
             if not isinstance(name, str) or not isinstance(value, wanted):
-                raise InputError(f"{_label(point)}: {kind} {name!r} is {shown(value)}, expected a {wanted.__name__}")
+                raise InputError(
+                    f"{_label(point)}: {kind} {name!r} is {shown(value)}, expected a {wanted.__name__}"
+                )
     return extension
 
 
 def _core_names() -> dict[str, set[str]]:
-    """The names that the core has, by the fields of `Extension` in which an extension could take one."""
+    """The names that the core has, by the fields of `Extension` in which an extension could take
+    one.
+    """
     effects = {path.stem for path in PACKAGE.glob("scene/effects/*/*.py")}
     spectra = {path.stem for path in PACKAGE.glob("spectra/kinds/*.py")}
     return {"commands": {*CORE_COMMANDS}, "effects": effects, "spectra": spectra}
 
 
 def _taken(extension: Extension, others: dict[str, Extension]) -> str:
-    """Say what an extension offers under a name that the core or another one has; "" where all its names are free."""
+    """Say what an extension offers under a name that the core or another one has; "" where all its
+    names are free.
+    """
     core = _core_names()
     for kind in KINDS:
         owners = {name: "lowalt's own" for name in core.get(kind, ())}
@@ -109,7 +131,8 @@ def _taken(extension: Extension, others: dict[str, Extension]) -> str:
 
 @functools.cache
 def found() -> Found:
-    """Return the extensions that are installed, read once per process; a faulty one is left out whole.
+    """Return the extensions that are installed, read once per process; a faulty one is left out
+    whole.
 
     Those of lowalt's own package come first, the others in the order of their packages and names.
     """
@@ -155,7 +178,8 @@ def owner(kind: str, name: str) -> str:
 def module_offered(kind: str, name: str, module: str) -> ModuleType:
     """Return the module of what an extension offers, imported.
 
-    Raises: InputError naming the extension where the import ends in an error other than a missing package.
+    Raises: InputError naming the extension where the import ends in an error other than a missing
+    package.
     """
     try:
         return importlib.import_module(module)
@@ -167,17 +191,27 @@ def module_offered(kind: str, name: str, module: str) -> ModuleType:
 
 
 def function_offered(kind: str, name: str, module: str, function: str) -> Callable[..., Any]:
-    """Return a function of a module of an extension. Raises: InputError where it has none of this name."""
+    """Return a function of a module of an extension. Raises: InputError where it has none of this
+    name.
+    """
     loaded = module_offered(kind, name, module)
     if not callable(getattr(loaded, function, None)):
-        raise InputError(f"extension {owner(kind, name)!r}: {module} has no function {function!r}, expected one")
+        raise InputError(
+            f"extension {owner(kind, name)!r}: {module} has no function {function!r}, expected one"
+        )
     return getattr(loaded, function)
 
 
 def extensions_in_words() -> str:
-    """Return a line for each extension: its name, its package, and what it adds; then a sentence for each fault."""
+    """Return a line for each extension: its name, its package, and what it adds; then a sentence
+    for each fault.
+    """
     lines = ["extensions:"] if found().extensions else []
     for name, extension in found().extensions.items():
-        added = [f"{kind} {', '.join(getattr(extension, kind))}" for kind in KINDS if getattr(extension, kind)]
+        added = [
+            f"{kind} {', '.join(getattr(extension, kind))}"
+            for kind in KINDS
+            if getattr(extension, kind)
+        ]
         lines.append(f"  {name} (package {found().packages[name]}): {'; '.join(added)}")
     return "\n".join([*lines, *(f"left out: {fault}" for fault in found().faults)])

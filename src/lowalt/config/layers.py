@@ -1,6 +1,7 @@
 """The configuration: merges files and checks the result against the schema.
 
-This module does not depend on any stage. Errors are found before any job starts and name key and value.
+This module does not depend on any stage. Errors are found before any job starts and name key and
+value.
 """
 
 import json
@@ -20,11 +21,14 @@ from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 
 MOST_SUBCARRIERS = 100_000
-DEFAULT, SCHEMA = "config/default.yaml", "workflow/schemas/config.schema.yaml"
+DEFAULT = "config/default.yaml"
+SCHEMA = "workflow/schemas/config.schema.yaml"
 
 
 def merge(base: dict, overlay: dict) -> dict:
-    """Return `base` with `overlay` laid over it: mappings merge key by key, anything else is replaced."""
+    """Return `base` with `overlay` laid over it: mappings merge key by key, anything else is
+    replaced.
+    """
     result = dict(base)
     for key, value in overlay.items():
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
@@ -33,7 +37,9 @@ def merge(base: dict, overlay: dict) -> dict:
 
 
 def canonical(value: object) -> str:
-    """Return the canonical JSON text of a settings block: keys are sorted, so equal settings give equal texts."""
+    """Return the canonical JSON text of a settings block: keys are sorted, so equal settings give
+    equal texts.
+    """
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
 
 
@@ -43,17 +49,27 @@ def _may_be_null(entry: dict) -> bool:
 
 
 def _without_nulls(block: object, schema: dict) -> None:
-    """Remove nulls from a block and its inner blocks, for optional keys whose schema does not allow null."""
+    """Remove nulls from a block and its inner blocks, for optional keys whose schema does not allow
+    null.
+    """
     if isinstance(block, list):
         for item in block:
             _without_nulls(item, schema.get("items", {}))
     if not isinstance(block, dict):
         return
-    needed, known, further = (schema.get(key, {}) for key in ("required", "properties", "additionalProperties"))
+    needed, known, further = (
+        schema.get(key, {}) for key in ("required", "properties", "additionalProperties")
+    )
     for key, value in list(block.items()):
         if not isinstance(key, str):
-            raise InputError(f"configuration: key {key!r} among {list(block)}, expected text: put it in quotes")
-        patterns = (entry for pattern, entry in schema.get("patternProperties", {}).items() if re.search(pattern, key))
+            raise InputError(
+                f"configuration: key {key!r} among {list(block)}, expected text: put it in quotes"
+            )
+        patterns = (
+            entry
+            for pattern, entry in schema.get("patternProperties", {}).items()
+            if re.search(pattern, key)
+        )
         entry = known.get(key, next(patterns, further))
         if not isinstance(entry, dict):
             continue
@@ -74,7 +90,9 @@ def _listed(lines: list[str]) -> str:
 
 
 def _without_ofdm(network: dict) -> None:
-    """Remove the default's subcarriers from a network whose waveform has none, and a waveform block that says OFDM."""
+    """Remove the default's subcarriers from a network whose waveform has none, and a waveform block
+    that says OFDM.
+    """
     if network.get("waveform") == {"kind": "ofdm"}:
         del network["waveform"]
     elif "waveform" in network:
@@ -102,11 +120,13 @@ def _with_subcarriers(network: dict) -> None:
 
 
 def check(config: dict, schema_path: str | Path) -> dict:
-    """Return the configuration if it fits the schema, without the nulls that remove keys of a lower layer.
+    """Return the configuration if it fits the schema, without the nulls that remove keys of a lower
+    layer.
 
-    A layer can only add keys to a mapping. A null therefore removes an optional key, such as a station, a spectrum or
-    an effect. A number may be written 28e9. If the waveform has no subcarriers, those of the embedded default are
-    removed; a bandwidth becomes a number of subcarriers. The configuration is changed in place.
+    A layer can only add keys to a mapping. A null therefore removes an optional key, such as a
+    station, a spectrum or an effect. A number may be written 28e9. If the waveform has no
+    subcarriers, those of the embedded default are removed; a bandwidth becomes a number of
+    subcarriers. The configuration is changed in place.
     Raises: InputError with one line per fault.
     """
     schema = with_extensions(schema_path)
@@ -122,12 +142,14 @@ def check(config: dict, schema_path: str | Path) -> dict:
 
 
 def load(layers: Iterable[str | Path | dict], schema_path: str | Path) -> dict:
-    """Return the checked configuration of a base file and its overlays, in order, each a path or a dict.
+    """Return the checked configuration of a base file and its overlays, in order, each a path or a
+    dict.
 
     A file that is not in the working directory is taken from the package.
     Raises: InputError naming file, key and value.
 
-        >>> config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
+        >>> config = load(["config/default.yaml", "config/tiny.yaml"],
+        "workflow/schemas/config.schema.yaml")
         >>> config["run"], config["noise"]["snr_db"]
         ('tiny', [3, inf])
     """

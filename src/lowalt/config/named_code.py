@@ -1,4 +1,5 @@
-"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py, and files that effects read.
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py, and files that effects
+read.
 
 Only the user may choose them.
 """
@@ -29,7 +30,8 @@ def buildings_of(effects: Mapping[str, dict | None]) -> str | None:
 
 
 def refuse_effects(effects: Mapping[str, dict | None], where: str | Path) -> None:
-    """Refuse effects of the user's own, and files that effects read, in what may be a stranger's file or folder.
+    """Refuse effects of the user's own, and files that effects read, in what may be a stranger's
+    file or folder.
 
     Raises: InputError naming the effect.
     """
@@ -46,7 +48,8 @@ def refuse_effects(effects: Mapping[str, dict | None], where: str | Path) -> Non
 
 
 def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME) -> str:
-    """Return the backbone of a file that names `name`; trusted: the FILE.py:FUNCTION that the user names, or "".
+    """Return the backbone of a file that names `name`; trusted: the FILE.py:FUNCTION that the user
+    names, or "".
 
     where: the file or the run's folder; how: what the user may do instead.
     Raises: InputError where the file names code and the user does not.
@@ -55,5 +58,7 @@ def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME)
         return name
     if file_of(trusted) is None:
         place = f"{where}: " if where else ""
-        raise InputError(f"{place}its backbone {name!r} is code, which a file may not choose; expected {how}")
+        raise InputError(
+            f"{place}its backbone {name!r} is code, which a file may not choose; expected {how}"
+        )
     return trusted

@@ -18,16 +18,22 @@ SPEED_OF_LIGHT = 299_792_458.0
 
 
 def _positive(name: str, value: float, *, whole: bool = False) -> None:
-    """Raise InputError unless the value is a positive finite number, an integer where `whole` is set."""
+    """Raise InputError unless the value is a positive finite number, an integer where `whole` is
+    set.
+    """
     good = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     good = good and math.isfinite(value) and value > 0 and (not whole or float(value).is_integer())
     if not good:
-        raise InputError(f"network: {name} is {value!r}, expected a positive {'integer' if whole else 'finite number'}")
+        raise InputError(
+            f"network: {name} is {value!r}, expected a positive {'integer' if whole else 'finite number'}"
+        )
 
 
 @dataclass(frozen=True)
 class Station:
-    """One base station: `position_m` (x, y, z) of its arrays, `normal_rad` Theta_k, lowest subcarrier f_k (Hz)."""
+    """One base station: `position_m` (x, y, z) of its arrays, `normal_rad` Theta_k, lowest
+    subcarrier f_k (Hz).
+    """
 
     name: str
     position_m: tuple[float, float, float]
@@ -35,7 +41,9 @@ class Station:
     frequency_hz: float
     transmitter: "Station | None" = None
     receiver: "Station | None" = None
-    """The two stations of a link, which has the receiver's place and the transmitter's frequency; else None."""
+    """The two stations of a link, which has the receiver's place and the transmitter's frequency;
+    else None.
+    """
 
     @property
     def horizontal(self) -> np.ndarray:
@@ -48,7 +56,9 @@ def _link(name: str, place: dict, known: dict[str, Station]) -> Station:
     """The station `place["receive"]` as the receiver of what `place["transmit"]` sends."""
     ends = [place["transmit"], place["receive"]]
     if not set(ends) <= set(known) or ends[0] == ends[1]:
-        raise InputError(f"network: stations.{name}: from {ends[0]!r} to {ends[1]!r}, expected two of {sorted(known)}")
+        raise InputError(
+            f"network: stations.{name}: from {ends[0]!r} to {ends[1]!r}, expected two of {sorted(known)}"
+        )
     sends, hears = (known[end] for end in ends)
     return Station(name, hears.position_m, hears.normal_rad, sends.frequency_hz, sends, hears)
 
@@ -62,9 +72,11 @@ def station_names(block: dict) -> list[str]:
 
 
 def as_far_as(block: dict, name: str) -> dict:
-    """Return a `network` block with only those stations on which the echo at the station `name` depends.
+    """Return a `network` block with only those stations on which the echo at the station `name`
+    depends.
 
-    Its sub-band depends on the number of stations before it; a link needs the two stations that it connects.
+    Its sub-band depends on the number of stations before it; a link needs the two stations that it
+    connects.
     """
     stations = block["stations"]
     last = max(name, *(stations[name].get(end, name) for end in ("transmit", "receive")))
@@ -77,8 +89,12 @@ def as_far_as(block: dict, name: str) -> dict:
 
 
 def masts_m(block: dict) -> list[list[float]]:
-    """Return the places [x, y] (m) of the stations of a `network` block, in its order; links have none."""
-    return [place["position_m"][:2] for place in block["stations"].values() if "position_m" in place]
+    """Return the places [x, y] (m) of the stations of a `network` block, in its order; links have
+    none.
+    """
+    return [
+        place["position_m"][:2] for place in block["stations"].values() if "position_m" in place
+    ]
 
 
 TERMS = {"ofdm": set(), "fmcw": {"sweep_hz", "sweep_s", "samples"}, "cw": set()}
@@ -88,22 +104,29 @@ OFDM = ("subcarriers", "subcarrier_spacing_hz", "guard_subcarriers")
 
 
 def band(block: dict) -> dict:
-    """Return the keys `OFDM` of a `network` block, whose waveform may state its band in other terms.
+    """Return the keys `OFDM` of a `network` block, whose waveform may state its band in other
+    terms.
 
-    Sample m of an FMCW sweep is measured at the frequency of subcarrier m; a continuous wave is one subcarrier whose
-    symbol lasts from one sample to the next.
-    Raises: InputError naming the key and value that is missing, unknown or contradicts the waveform.
+    Sample m of an FMCW sweep is measured at the frequency of subcarrier m; a continuous wave is one
+    subcarrier whose symbol lasts from one sample to the next.
+    Raises: InputError naming the key and value that is missing, unknown or contradicts the
+    waveform.
     """
     waveform = block.get("waveform", {"kind": "ofdm"})
-    kind, terms = waveform.get("kind"), set(waveform) - {"kind"}
+    kind = waveform.get("kind")
+    terms = set(waveform) - {"kind"}
     if kind not in TERMS or terms != TERMS[kind]:
-        expected = " or ".join(f"{{{', '.join([f'kind: {name}', *sorted(TERMS[name])])}}}" for name in TERMS)
+        expected = " or ".join(
+            f"{{{', '.join([f'kind: {name}', *sorted(TERMS[name])])}}}" for name in TERMS
+        )
         raise InputError(f"network.waveform: {waveform}, expected {expected}")
     given = {key: block[key] for key in OFDM if key in block}
     if kind == "ofdm":
         return given
     if given:
-        raise InputError(f"network: {given} together with a waveform of kind {kind!r}, expected none of {list(OFDM)}")
+        raise InputError(
+            f"network: {given} together with a waveform of kind {kind!r}, expected none of {list(OFDM)}"
+        )
     interval_s = block.get("symbol_interval_s", math.inf)
     if kind == "cw":
         return dict(zip(OFDM, (1, 1 / interval_s, 0), strict=True))
@@ -111,7 +134,9 @@ def band(block: dict) -> dict:
         raise InputError(
             f"network.waveform: sweep_s is {waveform['sweep_s']:g}, expected at most symbol_interval_s, {interval_s:g}"
         )
-    return dict(zip(OFDM, (waveform["samples"], waveform["sweep_hz"] / waveform["samples"], 0), strict=True))
+    return dict(
+        zip(OFDM, (waveform["samples"], waveform["sweep_hz"] / waveform["samples"], 0), strict=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -119,9 +144,10 @@ class Network:
     """The stations and the signal they share.
 
     `transmit` and `receive` are (horizontal, vertical) element counts; `power` is rho P, the power
-    that each subcarrier carries for sensing (W, 1 by default); a symbol carries `subcarriers` times as much, while an
-    FMCW sweep or a continuous wave has `power` at each instant. `waveform` is "ofdm", "fmcw" or "cw"; `sweep_s` is how
-    long the samples of an FMCW sweep take, which is a symbol then.
+    that each subcarrier carries for sensing (W, 1 by default); a symbol carries `subcarriers` times
+    as much, while an FMCW sweep or a continuous wave has `power` at each instant. `waveform` is
+    "ofdm", "fmcw" or "cw"; `sweep_s` is how long the samples of an FMCW sweep take, which is a
+    symbol then.
     Source: paper, section II-A and V-A.
     """
 
@@ -153,19 +179,28 @@ class Network:
     def from_settings(cls, block: dict) -> "Network":
         """Build the network from the configuration's `network` block.
 
-        Sub-bands follow each other in the alphabetical order of the stations: f_{k+1} = f_k + (M - 1 + guard) df.
-        A link {transmit, receive} between two stations has the sub-band of the one that sends.
+        Sub-bands follow each other in the alphabetical order of the stations: f_{k+1} = f_k + (M -
+        1 + guard) df. A link {transmit, receive} between two stations has the sub-band of the one
+        that sends.
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         keys = {
-            *OFDM, "carrier_hz", "symbol_interval_s", "symbols", "transmit_array", "receive_array", "power_w",
+            *OFDM,
+            "carrier_hz",
+            "symbol_interval_s",
+            "symbols",
+            "transmit_array",
+            "receive_array",
+            "power_w",
             "stations",
-        }  # fmt: skip
+        }
         waveform = block.get("waveform", {"kind": "ofdm"})
         block = {key: value for key, value in (block | band(block)).items() if key != "waveform"}
         if set(block) != keys:
             raise InputError(f"network: keys {sorted(set(block) ^ keys)} missing or unknown")
-        step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block["subcarrier_spacing_hz"]
+        step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block[
+            "subcarrier_spacing_hz"
+        ]
         if step < 0:
             raise InputError(
                 f"network: guard_subcarriers is {block['guard_subcarriers']}, expected at least "
@@ -173,15 +208,21 @@ class Network:
             )
         stations = []
         names = station_names(block)
-        for index, name in enumerate(name for name in names if "transmit" not in block["stations"][name]):
+        for index, name in enumerate(
+            name for name in names if "transmit" not in block["stations"][name]
+        ):
             place = block["stations"][name]
             position = tuple(float(value) for value in place["position_m"])
             if len(position) != 3 or not all(map(math.isfinite, position)):
-                raise InputError(f"network: stations.{name}.position_m is {position}, expected three finite metres")
+                raise InputError(
+                    f"network: stations.{name}.position_m is {position}, expected three finite metres"
+                )
             normal = math.radians(place["normal_deg"])
             stations.append(Station(name, position, normal, block["carrier_hz"] + index * step))
         known = {station.name: station for station in stations}
-        stations += [_link(name, block["stations"][name], known) for name in names if name not in known]
+        stations += [
+            _link(name, block["stations"][name], known) for name in names if name not in known
+        ]
         stations.sort(key=lambda station: station.name)
         return cls(
             carrier_hz=block["carrier_hz"],
@@ -206,7 +247,9 @@ class Network:
         for station in self.stations:
             if station.name == name:
                 return station
-        raise InputError(f"station {name!r}: not in the network, which has {[s.name for s in self.stations]}")
+        raise InputError(
+            f"station {name!r}: not in the network, which has {[s.name for s in self.stations]}"
+        )
 
     @property
     def times_s(self) -> np.ndarray:
@@ -215,37 +258,45 @@ class Network:
 
     @property
     def symbol_rate_hz(self) -> float:
-        """One over the time that the samples of a symbol or sweep take (Hz): of OFDM the subcarrier spacing."""
+        """One over the time that the samples of a symbol or sweep take (Hz): of OFDM the subcarrier
+        spacing.
+        """
         return self.subcarrier_spacing_hz if self.sweep_s is None else 1 / self.sweep_s
 
     @property
     def bin_name(self) -> str:
-        """What a value of Eq. 24 belongs to, in words: a subcarrier, or a sample of an FMCW sweep or of a carrier."""
+        """What a value of Eq. 24 belongs to, in words: a subcarrier, or a sample of an FMCW sweep
+        or of a carrier.
+        """
         return "one subcarrier" if self.waveform == "ofdm" else "one sample"
 
     @property
     def noise_bandwidth_hz(self) -> float:
-        """Noise bandwidth (Hz) of a value of Eq. 24: that of a subcarrier, or the sample rate of an FMCW sweep."""
+        """Noise bandwidth (Hz) of a value of Eq. 24: that of a subcarrier, or the sample rate of an
+        FMCW sweep.
+        """
         return self.symbol_rate_hz * (1 if self.sweep_s is None else self.subcarriers)
 
     def effective_hz(self, station: Station) -> float:
-        """Return the effective carrier f_k + (M - 1) df / 2 (Hz): it determines phase and Doppler in a range cell.
+        """Return the effective carrier f_k + (M - 1) df / 2 (Hz): it determines phase and Doppler
+        in a range cell.
 
         Source: paper, Eq. 7, the inverse transform over subcarriers.
         """
         return station.frequency_hz + (self.subcarriers - 1) * self.subcarrier_spacing_hz / 2
 
     def largest_mps(self, station: Station) -> float:
-        """Return c / (4 f T_r) (m/s), f the effective carrier: faster targets fold, because their phase turns by
-        more than half a circle per symbol."""
+        """Return c / (4 f T_r) (m/s), f the effective carrier: faster targets fold, because their
+        phase turns by more than half a circle per symbol."""
         return SPEED_OF_LIGHT / (4 * self.effective_hz(station) * self.symbol_interval_s)
 
     def folding(self, published: Iterable[dict]) -> str:
-        """Return a sentence where targets with these rows of the table of targets move faster than speeds that fold
-        here, with a symbol interval at which none does; else an empty text."""
+        """Return a sentence where targets with these rows of the table of targets move faster than
+        speeds that fold here, with a symbol interval at which none does; else an empty text."""
         columns = ("vx_abs_max", "vy_abs_max", "vz_abs_max", "speed_hi")
         fastest = max(math.hypot(*(row[column] or 0.0 for column in columns)) for row in published)
-        largest, interval_s = min(map(self.largest_mps, self.stations)), self.symbol_interval_s
+        largest = min(map(self.largest_mps, self.stations))
+        interval_s = self.symbol_interval_s
         if fastest <= largest:
             return ""
         none_s = 0.95 * interval_s * largest / fastest
@@ -255,32 +306,51 @@ class Network:
         )
 
     def range_folding(self, polygon_m: Iterable | None) -> str:
-        """Return a sentence where a range of the region of targets, of corners polygon_m (K, 2) or None for the masts',
-        is beyond the unambiguous one, c / (2 df), with a value at which none is; else an empty text."""
+        """Return a sentence where a range of the region of targets, of corners polygon_m (K, 2) or
+        None for the masts', is beyond the unambiguous one, c / (2 df), with a value at which none
+        is; else an empty text."""
         masts = [station.position_m[:2] for station in self.stations if station.transmitter is None]
         corners = np.array(masts if polygon_m is None else polygon_m, float)
-        ends = [(station.transmitter or station, station.receiver or station) for station in self.stations]
-        ways = [[np.linalg.norm(corners - end.position_m[:2], axis=1) for end in pair] for pair in ends]
-        farthest, reach = np.mean(ways, axis=1).max(), self.subcarriers * self.cell_m
+        ends = [
+            (station.transmitter or station, station.receiver or station)
+            for station in self.stations
+        ]
+        ways = [
+            [np.linalg.norm(corners - end.position_m[:2], axis=1) for end in pair] for pair in ends
+        ]
+        farthest = np.mean(ways, axis=1).max()
+        reach = self.subcarriers * self.cell_m
         if farthest <= reach:
             return ""
         of_sweep = self.waveform == "fmcw"
-        key, value = ("waveform.samples", self.subcarriers) if of_sweep else (OFDM[1], self.subcarrier_spacing_hz)
-        none = math.ceil(value * farthest / reach) if of_sweep else math.floor(value * reach / farthest)
+        key, value = (
+            ("waveform.samples", self.subcarriers)
+            if of_sweep
+            else (OFDM[1], self.subcarrier_spacing_hz)
+        )
+        none = (
+            math.ceil(value * farthest / reach)
+            if of_sweep
+            else math.floor(value * reach / farthest)
+        )
         return (
             f"ranges beyond {reach:.4g} m fold, targets are up to {farthest:.4g} m from a station: network.{key} is "
             f"{value:g}, at {none} none would fold, nor in a smaller motion.region or with stations closer together"
         )
 
     def folded_mps(self, speed_mps: np.ndarray, station: Station) -> np.ndarray:
-        """Return the speeds (m/s, any shape) at which a station sees radial speeds, above -largest to largest."""
+        """Return the speeds (m/s, any shape) at which a station sees radial speeds, above -largest
+        to largest.
+        """
         largest = self.largest_mps(station)
         return largest - (largest - speed_mps) % (2 * largest)
 
     def bin_speeds_mps(self, points: int, station: Station) -> np.ndarray:
-        """Return the radial speeds (points,) m/s, ascending, positive receding, of a Fourier transform over symbols.
+        """Return the radial speeds (points,) m/s, ascending, positive receding, of a Fourier
+        transform over symbols.
 
-        Bin k of `numpy.fft.fftfreq` is the speed -2 k / points times the largest: an echo that recedes turns backwards.
+        Bin k of `numpy.fft.fftfreq` is the speed -2 k / points times the largest: an echo that
+        recedes turns backwards.
         """
         return -2 * self.largest_mps(station) * np.fft.fftshift(np.fft.fftfreq(points))[::-1]
 

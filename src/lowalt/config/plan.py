@@ -1,8 +1,10 @@
-"""The plan of a run: its subtypes, chunks and shards, which follow from the configuration before any job starts.
+"""The plan of a run: its subtypes, chunks and shards, which follow from the configuration before
+any job starts.
 
-A data set can grow without remaking it: subtypes and SNRs under `added` in the configuration get their own chunks. If
-step t (1, 2, ...) of that list adds subtypes, their motion models are in chunks {group}-{part}t{t}. If it adds SNRs,
-there is a chunk {chunk}s{t} for every earlier chunk, with the same motion models and echoes.
+A data set can grow without remaking it: subtypes and SNRs under `added` in the configuration get
+their own chunks. If step t (1, 2, ...) of that list adds subtypes, their motion models are in
+chunks {group}-{part}t{t}. If it adds SNRs, there is a chunk {chunk}s{t} for every earlier chunk,
+with the same motion models and echoes.
 """
 
 import math
@@ -28,7 +30,9 @@ PIXEL_BYTES = 0.5
 CELL_BYTES = {"complex64": 8, "int16": 4}
 """Bytes of a range cell of a cube, by the type that it is stored as."""
 TRUTH_BYTES = 65
-"""Bytes of the record per symbol of a cube, for its ground truth: the chosen cell and the numbers `cube.TRUTH`."""
+"""Bytes of the record per symbol of a cube, for its ground truth: the chosen cell and the numbers
+`cube.TRUTH`.
+"""
 
 
 EVERY = 2**53
@@ -48,19 +52,30 @@ def snrs_of(config: dict) -> tuple[float, ...]:
 
 
 def motion_block(config: dict) -> dict:
-    """Return the block `motion` of a configuration; where it has `looks`, with look_s, the length of a look (s)."""
-    motion, network = config["motion"], config["network"]
-    return motion | ({"look_s": network["symbols"] * network["symbol_interval_s"]} if "looks" in motion else {})
+    """Return the block `motion` of a configuration; where it has `looks`, with look_s, the length
+    of a look (s).
+    """
+    motion = config["motion"]
+    network = config["network"]
+    return motion | (
+        {"look_s": network["symbols"] * network["symbol_interval_s"]} if "looks" in motion else {}
+    )
 
 
 def _refuse_tracks(config: dict) -> None:
-    """Refuse tracks that a split would divide, or whose targets would jump between looks in this scene."""
+    """Refuse tracks that a split would divide, or whose targets would jump between looks in this
+    scene.
+    """
     if "looks" not in config["motion"]:
         return
     if config["split"]["by"] != "motion":
-        raise InputError(f"split.by: {config['split']['by']!r} together with motion.looks, expected 'motion'")
+        raise InputError(
+            f"split.by: {config['split']['by']!r} together with motion.looks, expected 'motion'"
+        )
     if jumping := sorted(set(JUMPING) & set(config["effects"])):
-        raise InputError(f"effects: {jumping} together with motion.looks, expected none of {list(JUMPING)}")
+        raise InputError(
+            f"effects: {jumping} together with motion.looks, expected none of {list(JUMPING)}"
+        )
 
 
 def cell_type(config: dict) -> str:
@@ -69,15 +84,21 @@ def cell_type(config: dict) -> str:
 
 
 def sample_bytes(config: dict) -> int:
-    """Return the approximate bytes of a sample in a shard, padding included, by its kind; of recipes, its share."""
-    kind, stations = config["shards"]["kind"], len(config["network"]["stations"])
-    symbols, record = stations * config["network"]["symbols"], RECORD_BYTES
+    """Return the approximate bytes of a sample in a shard, padding included, by its kind; of
+    recipes, its share.
+    """
+    kind = config["shards"]["kind"]
+    stations = len(config["network"]["stations"])
+    symbols = stations * config["network"]["symbols"]
+    record = RECORD_BYTES
     if kind == "image":
         spectra = sum(isinstance(block, dict) for block in config["spectra"].values())
         data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
     elif kind == "cube":
         record += TRUTH_BYTES * symbols
-        data = 128 + CELL_BYTES[cell_type(config)] * symbols * band(config["network"])["subcarriers"]
+        data = (
+            128 + CELL_BYTES[cell_type(config)] * symbols * band(config["network"])["subcarriers"]
+        )
     else:
         data = 128 + 8 * symbols
     whole = 2 * BLOCKSIZE + sum(size + -size % BLOCKSIZE for size in (record, data))
@@ -86,7 +107,9 @@ def sample_bytes(config: dict) -> int:
 
 @dataclass(frozen=True)
 class Chunk:
-    """Motion models of some subtypes at some SNRs (dB); `source` is the chunk whose motion and echoes it shares."""
+    """Motion models of some subtypes at some SNRs (dB); `source` is the chunk whose motion and
+    echoes it shares.
+    """
 
     name: str
     source: str
@@ -100,9 +123,10 @@ class Chunk:
 class Plan:
     """Chunks and shards of a run; `groups` maps a group to its subtypes in the table's order.
 
-    groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each step added to them;
-    models: rows of the motion table per subtype, one per look; looks: number per motion model; largest: samples per
-    shard.
+    groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each
+    step added to them;
+    models: rows of the motion table per subtype, one per look; looks: number per motion model;
+    largest: samples per shard.
     """
 
     groups: dict[str, tuple[str, ...]]
@@ -117,46 +141,66 @@ class Plan:
 
     @classmethod
     def of(cls, config: dict, published: dict[str, dict]) -> "Plan":
-        """Return the plan of a checked configuration; `published` maps every subtype to its row of the table.
+        """Return the plan of a checked configuration; `published` maps every subtype to its row of
+        the table.
 
-        Raises: InputError for a selected subtype the table lacks, one that is selected and added, or a chunk that
-        breaks the blocks of the split.
+        Raises: InputError for a selected subtype the table lacks, one that is selected and added,
+        or a chunk that breaks the blocks of the split.
         """
-        select, motion, split = config["targets"]["select"], config["motion"], config["split"]
+        select = config["targets"]["select"]
+        motion = config["motion"]
+        split = config["split"]
         _refuse_tracks(config)
         later = [tuple(step.get("subtypes", [])) for step in config.get("added", [])]
         more = [name for step in later for name in step]
         unknown = [name for name in (*select, *more) if name not in published]
         if unknown:
             otherwise = f"names of the table, such as {next(iter(published))!r}"
-            raise InputError(f"targets.select: {unknown}, expected {instead(unknown, published, otherwise)}")
+            raise InputError(
+                f"targets.select: {unknown}, expected {instead(unknown, published, otherwise)}"
+            )
         twice = sorted({name for name in more if more.count(name) > 1 or name in select})
         if twice:
-            raise InputError(f"added: subtypes {twice}, expected each once, either selected or added")
+            raise InputError(
+                f"added: subtypes {twice}, expected each once, either selected or added"
+            )
         names = [name for name in published if not select or name in (*select, *more)]
         block = sum(split[name] for name in FOLDS)
         if motion["models_per_chunk"] % block:
             raise InputError(
                 f"motion.models_per_chunk: value {motion['models_per_chunk']}, expected a multiple of {block}, "
-                "the block of split (train + val + test), so that every chunk has its exact share of every fold"
+                "the block of split (train + val + test), so that every chunk has its exact share "
+                "of every fold"
             )
         groups = {
-            group: tuple(name for name in names if published[name]["unseen_protocol"] == group) for group in GROUPS
+            group: tuple(name for name in names if published[name]["unseen_protocol"] == group)
+            for group in GROUPS
         }
         groups = {group: members for group, members in groups.items() if members}
-        levels = [tuple(map(float, step.get("snr_db", []))) for step in (config["noise"], *config.get("added", []))]
+        levels = [
+            tuple(map(float, step.get("snr_db", [])))
+            for step in (config["noise"], *config.get("added", []))
+        ]
         subtypes = [tuple(name for name in names if name not in more), *later]
         steps = tuple(zip(subtypes, levels, strict=True))
         largest: float = EVERY
         if config.get("shards", {}).get("largest_mb"):
             largest = max(1, 1e6 * config["shards"]["largest_mb"] // sample_bytes(config))
         looks = motion.get("looks", 1)
-        numbers = looks * motion["models"], looks * motion["models_per_chunk"], snrs_of(config), split, config["seed"]
+        numbers = (
+            looks * motion["models"],
+            looks * motion["models_per_chunk"],
+            snrs_of(config),
+            split,
+            config["seed"],
+        )
         return cls(groups, *numbers, steps, largest, looks)
 
     @cached_property
     def _chunks(self) -> dict[str, Chunk]:
-        """All chunks by name, step by step: subtypes of a step at all SNRs so far, then its SNRs for all chunks."""
+        """All chunks by name, step by step: subtypes of a step at all SNRs so far, then its SNRs
+        for all chunks.
+        """
         chunks: dict[str, Chunk] = {}
         known: tuple[float, ...] = ()
         for step, (subtypes, snrs) in enumerate(self.steps):
@@ -164,11 +208,16 @@ class Plan:
             if snrs and step:
                 for chunk in earlier:
                     name = f"{chunk.name}s{step}"
-                    chunks[name] = Chunk(name, chunk.name, chunk.members, snrs, chunk.first, chunk.count)
+                    chunks[name] = Chunk(
+                        name, chunk.name, chunk.members, snrs, chunk.first, chunk.count
+                    )
             known += snrs
-            for group, part in ((group, part) for group in self.groups for part in range(self._parts)):
+            for group, part in (
+                (group, part) for group in self.groups for part in range(self._parts)
+            ):
                 members = tuple(name for name in self.groups[group] if name in subtypes)
-                name, first = f"{group}-{part:05d}{f't{step}' if step else ''}", part * self.models_per_chunk
+                name = f"{group}-{part:05d}{f't{step}' if step else ''}"
+                first = part * self.models_per_chunk
                 count = min(self.models_per_chunk, self.models - first)
                 if members:
                     chunks[name] = Chunk(name, name, members, known, first, count)
@@ -182,7 +231,9 @@ class Plan:
     @property
     def samples(self) -> int:
         """Number of all samples."""
-        return sum(chunk.count * len(chunk.members) * len(chunk.snrs) for chunk in self._chunks.values())
+        return sum(
+            chunk.count * len(chunk.members) * len(chunk.snrs) for chunk in self._chunks.values()
+        )
 
     @property
     def chunks(self) -> list[str]:
@@ -216,9 +267,16 @@ class Plan:
         return [name for name in FOLDS if name in dealt]
 
     def pieces(self, chunk: str, fold: str) -> list[str]:
-        """Return the suffixes of a chunk's shards of one fold: an empty one, or p0, p1, ... for several."""
+        """Return the suffixes of a chunk's shards of one fold: an empty one, or p0, p1, ... for
+        several.
+        """
         held = self._chunks[chunk]
-        models = held.count * len(held.members) * self.split[fold] / sum(self.split[name] for name in FOLDS)
+        models = (
+            held.count
+            * len(held.members)
+            * self.split[fold]
+            / sum(self.split[name] for name in FOLDS)
+        )
         # The samples of a motion model stay together.
         count = math.ceil(models / max(1, self.largest // len(held.snrs)))
         return [f"p{number}" for number in range(count)] if count > 1 else [""]

@@ -1,7 +1,9 @@
-"""Checks settings against a JSON schema, with one sentence per fault; also settings in untrusted files.
+"""Checks settings against a JSON schema, with one sentence per fault; also settings in untrusted
+files.
 
-Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; `const: inf` also accepts an infinity;
-text that a pattern describes has no control characters, so that it can be printed.
+Numbers are finite and integers are written as such (no 8.0) and fit 64 bits; `const: inf` also
+accepts an infinity; text that a pattern describes has no control characters, so that it can be
+printed.
 """
 
 import functools
@@ -34,17 +36,27 @@ def _number(checker: Any, value: object) -> bool:
     return _whole(checker, value) or (isinstance(value, float) and math.isfinite(value))
 
 
-def _pattern(validator: Any, pattern: str, value: object, schema: dict) -> Iterator[jsonschema.ValidationError]:
+def _pattern(
+    validator: Any, pattern: str, value: object, schema: dict
+) -> Iterator[jsonschema.ValidationError]:
     """Refuse text with control characters or that does not match the pattern."""
     if isinstance(value, str) and any(ord(sign) < 32 or ord(sign) == 127 for sign in value):
         yield jsonschema.ValidationError("control characters")
-    yield from jsonschema.Draft202012Validator.VALIDATORS["pattern"](validator, pattern, value, schema)
+    yield from jsonschema.Draft202012Validator.VALIDATORS["pattern"](
+        validator, pattern, value, schema
+    )
 
 
-def _const(validator: Any, wanted: object, value: object, schema: dict) -> Iterator[jsonschema.ValidationError]:
-    """Refuse what differs from the one value; the text inf stands for an infinity, which JSON has not."""
+def _const(
+    validator: Any, wanted: object, value: object, schema: dict
+) -> Iterator[jsonschema.ValidationError]:
+    """Refuse what differs from the one value; the text inf stands for an infinity, which JSON has
+    not.
+    """
     if wanted != "inf" or value != math.inf:
-        yield from jsonschema.Draft202012Validator.VALIDATORS["const"](validator, wanted, value, schema)
+        yield from jsonschema.Draft202012Validator.VALIDATORS["const"](
+            validator, wanted, value, schema
+        )
 
 
 def _array(checker: Any, value: object) -> bool:
@@ -81,21 +93,26 @@ def _innermost(errors: Iterable[Any]) -> Iterator[Any]:
 
 
 def with_numbers(settings: Any, schema: dict) -> Any:
-    """Return settings that people write in YAML, their numbers read as meant; nested values change in place.
+    """Return settings that people write in YAML, their numbers read as meant; nested values change
+    in place.
 
-    Where a schema expects a number and no text, a text such as 28e9 is one; where it expects an integer, so is 4.0e+2.
+    Where a schema expects a number and no text, a text such as 28e9 is one; where it expects an
+    integer, so is 4.0e+2.
     """
     held: Any = [settings]
     for error in _innermost([*Validator(schema).iter_errors(settings)]):
         if error.validator != "type":
             continue
-        value, wanted = error.instance, error.validator_value
+        value = error.instance
+        wanted = error.validator_value
         kinds = {wanted} if isinstance(wanted, str) else {*wanted}
         if isinstance(value, str) and NUMBER.fullmatch(value):
             value = float(value)
         if isinstance(value, float) and "integer" in kinds - {"number"} and value.is_integer():
             value = int(value)
-        if value is not error.instance and any(Validator.TYPE_CHECKER.is_type(value, kind) for kind in kinds):
+        if value is not error.instance and any(
+            Validator.TYPE_CHECKER.is_type(value, kind) for kind in kinds
+        ):
             way = [0, *error.absolute_path]
             functools.reduce(operator.getitem, way[:-1], held)[way[-1]] = value
     return held[0]
@@ -103,13 +120,20 @@ def with_numbers(settings: Any, schema: dict) -> Any:
 
 def _expected(error: Any) -> str:
     """Return the schema's expectation in words."""
-    rule, wanted = error.validator, error.validator_value
+    rule = error.validator
+    wanted = error.validator_value
     if rule == "oneOf":
         # For a number out of range state the range, otherwise the expected types.
         ranges = [choice for choice in error.context if choice.validator not in ("type", "const")]
-        return _expected(ranges[0]) if ranges else " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
+        return (
+            _expected(ranges[0])
+            if ranges
+            else " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
+        )
     if rule == "dependentRequired":
-        return " together with ".join(next([key, *others] for key, others in wanted.items() if key in error.instance))
+        return " together with ".join(
+            next([key, *others] for key, others in wanted.items() if key in error.instance)
+        )
     words = {
         "type": f"type {wanted}",
         "minimum": f"at least {wanted}",
@@ -137,17 +161,23 @@ def _fault(error: Any) -> str:
     if error.validator == "required":
         return f"missing key(s) {[name for name in error.validator_value if name not in error.instance]}"
     meaning = error.schema.get("description", "") if isinstance(error.schema, dict) else ""
-    return f"value {shown(error.instance)}, expected {_expected(error)}" + f" ({meaning})" * bool(meaning)
+    return f"value {shown(error.instance)}, expected {_expected(error)}" + f" ({meaning})" * bool(
+        meaning
+    )
 
 
 def faults(settings: object, schema: dict, whole: str = "configuration") -> list[str]:
-    """Return one line per fault of settings against a JSON schema: key, value and what was expected.
+    """Return one line per fault of settings against a JSON schema: key, value and what was
+    expected.
 
-    whole: name of the checked settings. If several items of a list have the same fault, the first is named.
+    whole: name of the checked settings. If several items of a list have the same fault, the first
+    is named.
     """
     lines: dict[tuple, str] = {}
     errors = Validator(schema).iter_errors(settings)
-    for error in sorted(errors, key=lambda error: ([*map(str, error.absolute_path)], error.validator in COUNTS)):
+    for error in sorted(
+        errors, key=lambda error: ([*map(str, error.absolute_path)], error.validator in COUNTS)
+    ):
         block = tuple(part for part in error.absolute_path if isinstance(part, str))
         # If a block has another fault, do not report its number of keys.
         if error.validator not in COUNTS or not any(other[:-1] == block for other in lines):
@@ -157,7 +187,8 @@ def faults(settings: object, schema: dict, whole: str = "configuration") -> list
 
 
 def with_extensions(path: str | Path) -> dict:
-    """Return the schema of the configuration in a file, with the effects and spectra of extensions as further keys.
+    """Return the schema of the configuration in a file, with the effects and spectra of extensions
+    as further keys.
 
     The modules of extensions check their own settings.
     """
@@ -171,8 +202,13 @@ def with_extensions(path: str | Path) -> dict:
 
 @functools.cache
 def _brought() -> dict:
-    """The schema of settings in files, together with the configuration's schema, with which it shares blocks."""
-    return {**load_yaml(BROUGHT)["$defs"], "config": with_extensions(SHIPPED / "workflow/schemas/config.schema.yaml")}
+    """The schema of settings in files, together with the configuration's schema, with which it
+    shares blocks.
+    """
+    return {
+        **load_yaml(BROUGHT)["$defs"],
+        "config": with_extensions(SHIPPED / "workflow/schemas/config.schema.yaml"),
+    }
 
 
 def of_brought(part: str) -> dict:
@@ -184,11 +220,14 @@ def check_brought(part: str, settings: object, where: str | Path) -> None:
     """Refuse wrong settings of a file before they are used.
 
     part: a definition of `brought.schema.yaml`; where: the file.
-    Raises: InputError naming the file, the first key that is wrong, its value and what was expected.
+    Raises: InputError naming the file, the first key that is wrong, its value and what was
+    expected.
     """
     try:
         lines = faults(settings, of_brought(part), part)
     except RecursionError:
-        raise InputError(f"{where}: values stand in each other too deeply, expected a few levels") from None
+        raise InputError(
+            f"{where}: values stand in each other too deeply, expected a few levels"
+        ) from None
     if lines:
         raise InputError(f"{where}: {lines[0]}")

@@ -1,8 +1,8 @@
 """The fold of a sample (train, val or test), which depends only on the sample's name.
 
-Models are assigned in blocks: every block of `train + val + test` consecutive model numbers of a subtype is
-shuffled by its own stream and divided into the three shares. Full blocks therefore have exact shares, and added
-models, subtypes or SNRs do not change existing folds.
+Models are assigned in blocks: every block of `train + val + test` consecutive model numbers of a
+subtype is shuffled by its own stream and divided into the three shares. Full blocks therefore have
+exact shares, and added models, subtypes or SNRs do not change existing folds.
 """
 
 import functools
@@ -25,14 +25,17 @@ def _block(shares: tuple[int, int, int], seed: int, keys: tuple, number: int) ->
 def fold(split: dict, seed: int, subtype: str, model: int, snr_db: float | None = None) -> str:
     """Return the fold ("train", "val" or "test") of one sample.
 
-    split: the configuration's block, `by` ("motion": all SNRs of a motion model share its fold, nothing leaks;
-    "sample": the paper's way, each SNR assigned separately) and the whole-number shares `train`, `val`, `test` of a
-    block. model: number of the motion model, which all looks of a track share. snr_db matters only for "sample".
+    split: the configuration's block, `by` ("motion": all SNRs of a motion model share its fold,
+    nothing leaks; "sample": the paper's way, each SNR assigned separately) and the whole-number
+    shares `train`, `val`, `test` of a block. model: number of the motion model, which all looks of
+    a track share. snr_db matters only for "sample".
     Raises: InputError naming the key that is wrong. Source: paper, section V-A.
     """
     shares = tuple(split[name] for name in FOLDS)
     if any(not isinstance(share, int) or share < 0 for share in shares) or shares[0] < 1:
-        raise InputError(f"split: shares {dict(zip(FOLDS, shares, strict=True))}, expected whole numbers, train >= 1")
+        raise InputError(
+            f"split: shares {dict(zip(FOLDS, shares, strict=True))}, expected whole numbers, train >= 1"
+        )
     if split["by"] == "motion":
         keys: tuple[str, ...] = (subtype,)
     elif split["by"] == "sample":

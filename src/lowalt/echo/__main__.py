@@ -1,4 +1,6 @@
-"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals, one file per station."""
+"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals, one file per
+station.
+"""
 
 import sys
 
@@ -17,14 +19,23 @@ def main(arguments: list[str]) -> None:
     """Compute one chunk's echoes and write one array file per station."""
     options = parser("lowalt.echo", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
-    options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
-    options.add_argument("--station", nargs="+", required=True, help="names of the stations that listen")
     options.add_argument(
-        "--out", nargs="+", required=True, help="clean signals to write (.npy), one per station: complex64 (models, N)"
+        "--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes"
+    )
+    options.add_argument(
+        "--station", nargs="+", required=True, help="names of the stations that listen"
+    )
+    options.add_argument(
+        "--out",
+        nargs="+",
+        required=True,
+        help="clean signals to write (.npy), one per station: complex64 (models, N)",
     )
     given = options.parse_args(arguments)
     if len(given.out) != len(given.station):
-        raise InputError(f"--out: {len(given.out)} files, expected one for each of the stations {given.station}")
+        raise InputError(
+            f"--out: {len(given.out)} files, expected one for each of the stations {given.station}"
+        )
     block, tolerance = pick(given.settings, "network", "tolerance")
     network = Network.from_settings(block)
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}

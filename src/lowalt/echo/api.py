@@ -19,12 +19,14 @@ from lowalt.files.errors import BelowFloor, InputError
 class EchoResult(NamedTuple):
     """Signal of one station.
 
-    signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in 0..M-1; near_ties: number
-    of symbols whose two strongest cells differ by less than a relative 1e-12, so that rounding decides; bound: proved
-    bound of the error relative to max |signal|, inf if none is proved; method: how it was computed, and why;
-    gap: (N,) float64, proved lower bound of |Y| at the strongest cell minus |Y| at any other, 0 if there is none;
-    totals: (N,) float64, sum of all points' |amplitudes|, array gains included. With a tolerance it is an
-    upper bound that exceeds the sum by at most the tolerance times the largest value.
+    signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in
+    0..M-1; near_ties: number of symbols whose two strongest cells differ by less than a relative
+    1e-12, so that rounding decides; bound: proved bound of the error relative to max |signal|, inf
+    if none is proved; method: how it was computed, and why;
+    gap: (N,) float64, proved lower bound of |Y| at the strongest cell minus |Y| at any other, 0 if
+    there is none;
+    totals: (N,) float64, sum of all points' |amplitudes|, array gains included. With a tolerance it
+    is an upper bound that exceeds the sum by at most the tolerance times the largest value.
     """
 
     signal: np.ndarray
@@ -45,21 +47,25 @@ def echo_signal(
     tolerance: float | None = None,
     sample: str = "",
 ) -> EchoResult:
-    """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M range cells.
+    """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M
+    range cells.
 
-    motion: `Rigid`, positions (N, L, 3) in metres, or an already checked `echo_input.Target`, with rcs_m2 None;
-    rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error allowed, relative to
-    the sample's max |Y_bin|, None for the exact closed form; sample: a name for error
-    messages.
-    Raises: InputError naming the argument, its value and the sample; BelowFloor (a subclass) for a tolerance below the
-    error bound that float64 can prove for this sample. Source: paper Eqs. 7 and 22 to 25.
+    motion: `Rigid`, positions (N, L, 3) in metres, or an already checked `echo_input.Target`, with
+    rcs_m2 None;
+    rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error
+    allowed, relative to the sample's max |Y_bin|, None for the exact closed form; sample: a name
+    for error messages.
+    Raises: InputError naming the argument, its value and the sample; BelowFloor (a subclass) for a
+    tolerance below the error bound that float64 can prove for this sample. Source: paper Eqs. 7 and
+    22 to 25.
 
     A point of 0.01 m2 that stands 226 m from station A, in cell 46 of 4.9 m each:
 
         >>> from lowalt.config.layers import overlaid
         >>> network = Network.from_settings(overlaid([])["network"])
         >>> point = np.array([200.0, 100.0, 60.0])
-        >>> result = echo_signal(network, network.stations[0], np.tile(point, (network.symbols, 1, 1)), 0.01, point)
+        >>> result = echo_signal(network, network.stations[0], np.tile(point, (network.symbols, 1,
+        1)), 0.01, point)
         >>> result.signal.shape, int(result.cell[0]), result.bound < 1e-12
         ((400,), 46, True)
     """
@@ -79,7 +85,9 @@ def echo_signal(
             f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 promises {bound:.1e} "
             f"of its largest value, expected a larger tolerance or null"
         )
-    return EchoResult(found.values, found.cells, int(found.ties.sum()), bound, method, found.gaps, found.totals)
+    return EchoResult(
+        found.values, found.cells, int(found.ties.sum()), bound, method, found.gaps, found.totals
+    )
 
 
 def echo_signals(
@@ -90,15 +98,18 @@ def echo_signals(
     tolerance: float | None = None,
     sample: str = "",
 ) -> np.ndarray:
-    """Return the symbol-domain signals of all the network's stations, complex128 (stations, symbols).
+    """Return the symbol-domain signals of all the network's stations, complex128 (stations,
+    symbols).
 
     Arguments, errors and source as for `echo_signal`; the motion is checked once.
     """
     seen = target(motion, rcs_m2, sample)
-    return np.stack([
-        echo_signal(network, station, seen, None, aim_m, tolerance, sample=sample).signal
-        for station in network.stations
-    ])  # fmt: skip
+    return np.stack(
+        [
+            echo_signal(network, station, seen, None, aim_m, tolerance, sample=sample).signal
+            for station in network.stations
+        ]
+    )
 
 
 def _named(sample: str) -> str:
@@ -110,11 +121,14 @@ def _check_tolerance(tolerance, sample: str) -> None:
     """Raise InputError unless the tolerance is None or a number between 0 and 1."""
     good = tolerance is None or (isinstance(tolerance, (int, float)) and 0 < tolerance < 1)
     if not good:
-        raise InputError(f"{_named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1")
+        raise InputError(
+            f"{_named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1"
+        )
 
 
 def prepared(network, station, motion, rcs_m2, aim_m, sample):
-    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams' cosines).
+    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams'
+    cosines).
 
     Arguments and errors as for `echo_signal`.
     """

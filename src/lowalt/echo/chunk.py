@@ -13,21 +13,32 @@ from lowalt.targets.cloud import Cloud, cloud_of
 
 
 def clean_signals(
-    network: Network, names: list[str], clouds: Mapping[str, Cloud], rows: list[dict], tolerance: float | None
+    network: Network,
+    names: list[str],
+    clouds: Mapping[str, Cloud],
+    rows: list[dict],
+    tolerance: float | None,
 ) -> np.ndarray:
-    """Return clean signals (stations, models, N) complex64 of the motion table `rows` at the stations `names`.
+    """Return clean signals (stations, models, N) complex64 of the motion table `rows` at the
+    stations `names`.
 
     The beams aim at each cloud's origin at the first symbol.
-    Raises: InputError naming the sample where a subtype has no cloud or a position cannot be computed with.
+    Raises: InputError naming the sample where a subtype has no cloud or a position cannot be
+    computed with.
     """
-    stations, times_s = [network.station(name) for name in names], network.times_s
+    stations = [network.station(name) for name in names]
+    times_s = network.times_s
     result = np.empty((len(stations), len(rows), network.symbols), np.complex64)
     for index, row in enumerate(reported(rows, len(rows), "models")):
         sample = f"{row['subtype']}, model {row['model']}"
         cloud = cloud_of(clouds, row)
-        seen = target(Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part), cloud.rcs_m2, sample)
+        seen = target(
+            Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part), cloud.rcs_m2, sample
+        )
         aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
         for place, station in enumerate(stations):
             where = f"{sample}, station {station.name}"
-            result[place, index] = echo_signal(network, station, seen, None, aim, tolerance, sample=where).signal
+            result[place, index] = echo_signal(
+                network, station, seen, None, aim, tolerance, sample=where
+            ).signal
     return result

@@ -1,4 +1,5 @@
-"""The input of the echo kernels and its checks: a motion, as rigid parts with poses or as plain positions.
+"""The input of the echo kernels and its checks: a motion, as rigid parts with poses or as plain
+positions.
 
 Rigid parts need less memory, because no array of symbols x points is made.
 """
@@ -13,9 +14,11 @@ from lowalt.files.errors import InputError
 
 
 class Rigid(NamedTuple):
-    """Points on rigid parts: point l of part p = part[l] stands at rotation[n, p] @ points[l] + translation[n, p].
+    """Points on rigid parts: point l of part p = part[l] stands at rotation[n, p] @ points[l] +
+    translation[n, p].
 
-    rotation: (N, P, 3, 3); translation: (N, P, 3) m, global frame; points: (L, 3) m; part: (L,) int.
+    rotation: (N, P, 3, 3); translation: (N, P, 3) m, global frame; points: (L, 3) m; part: (L,)
+    int.
     """
 
     rotation: np.ndarray
@@ -25,9 +28,11 @@ class Rigid(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A checked motion with the points' cross sections and their square roots, for use by all stations.
+    """A checked motion with the points' cross sections and their square roots, for use by all
+    stations.
 
-    For plain positions, `rotation` has shape (0, 0, 3, 3) and `translation` (N, L, 3) holds the positions.
+    For plain positions, `rotation` has shape (0, 0, 3, 3) and `translation` (N, L, 3) holds the
+    positions.
     """
 
     rotation: np.ndarray
@@ -39,7 +44,9 @@ class Target(NamedTuple):
 
 
 class EchoInput(NamedTuple):
-    """Checked input of the kernels: the fields of `Target`, repeated for type checkers, and the beams' aim point."""
+    """Checked input of the kernels: the fields of `Target`, repeated for type checkers, and the
+    beams' aim point.
+    """
 
     rotation: np.ndarray
     translation: np.ndarray
@@ -51,33 +58,39 @@ class EchoInput(NamedTuple):
 
 
 def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.ndarray:
-    """Return `value` as contiguous float64 of this shape; a letter in the shape stands for any size >= 1."""
+    """Return `value` as contiguous float64 of this shape; a letter in the shape stands for any size
+    >= 1.
+    """
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{sample}{name} is {value!r:.80}, expected real numbers") from error
     fits = array.ndim == len(shape) and all(
-        have == want or (isinstance(want, str) and have > 0) for have, want in zip(array.shape, shape, strict=True)
+        have == want or (isinstance(want, str) and have > 0)
+        for have, want in zip(array.shape, shape, strict=True)
     )
     if not fits:
         expected = str(shape).replace("'", "")
         raise InputError(f"{sample}{name} has shape {array.shape}, expected {expected}")
-    # Fast path: a finite sum means that all numbers are finite. Test each number only if the sum is not.
+    # Fast path: a finite sum means that all numbers are finite. Test each number only if the sum is
+    # not.
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number")
+        raise InputError(
+            f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number"
+        )
     # Copy a read-only array, because numba would compile the kernels a second time for it.
     return array if array.flags.writeable else array.copy()
 
 
 def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str = "") -> Target:
-    """Return the checked target of a motion, `Rigid` or positions (N, L, 3) m, and of its cross sections, (L,) m2 or
-    one number for all points.
+    """Return the checked target of a motion, `Rigid` or positions (N, L, 3) m, and of its cross
+    sections, (L,) m2 or one number for all points.
 
-    The check takes 5 % of the time of a signal, so a caller with several stations calls this once and passes the result
-    to each `echo_signal`.
-    Raises: InputError naming the argument, its value and the sample for NaN, infinite, empty or wrongly shaped input,
-    and for a negative cross section.
+    The check takes 5 % of the time of a signal, so a caller with several stations calls this once
+    and passes the result to each `echo_signal`.
+    Raises: InputError naming the argument, its value and the sample for NaN, infinite, empty or
+    wrongly shaped input, and for a negative cross section.
     """
     where = f"{sample}: " if sample else ""
     if isinstance(motion, Rigid):
@@ -91,7 +104,9 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
                 f"{where}motion.part has shape {part.shape} and type {part.dtype}, expected ({len(points)},) integers"
             )
         if part.min() < 0 or part.max() >= parts:
-            raise InputError(f"{where}motion.part spans {part.min()}..{part.max()}, expected 0..{parts - 1}")
+            raise InputError(
+                f"{where}motion.part spans {part.min()}..{part.max()}, expected 0..{parts - 1}"
+            )
         part = part.astype(np.int64)
         count = len(points)
         if count == parts and np.array_equal(part, np.arange(count)) and not rotation.any():
@@ -101,37 +116,54 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
         count = translation.shape[1]
         rotation, points, part = _no_rotation()
     rcs = _float(
-        "rcs_m2", np.broadcast_to(np.asarray(rcs_m2), (count,)) if np.ndim(rcs_m2) == 0 else rcs_m2, (count,), where
+        "rcs_m2",
+        np.broadcast_to(np.asarray(rcs_m2), (count,)) if np.ndim(rcs_m2) == 0 else rcs_m2,
+        (count,),
+        where,
     )
     if rcs.min() < 0:
-        raise InputError(f"{where}rcs_m2[{int(rcs.argmin())}] is {rcs.min()}, expected square metres >= 0")
+        raise InputError(
+            f"{where}rcs_m2[{int(rcs.argmin())}] is {rcs.min()}, expected square metres >= 0"
+        )
     return Target(rotation, translation, points, part, np.sqrt(rcs), rcs)
 
 
 def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoInput:
-    """Return the checked input for one motion and one station; rcs_m2 is None if `motion` is a `Target`.
+    """Return the checked input for one motion and one station; rcs_m2 is None if `motion` is a
+    `Target`.
 
-    Raises: as `target`, and InputError for cross sections given twice or an aim at the station itself.
+    Raises: as `target`, and InputError for cross sections given twice or an aim at the station
+    itself.
     """
     where = f"{sample}: " if sample else ""
     if isinstance(motion, Target):
         if rcs_m2 is not None:
-            raise InputError(f"{where}rcs_m2 is {rcs_m2!r:.80}, expected None: a Target holds its cross sections")
+            raise InputError(
+                f"{where}rcs_m2 is {rcs_m2!r:.80}, expected None: a Target holds its cross sections"
+            )
         seen = motion
     else:
         seen = target(motion, rcs_m2, sample)
     aim = _float("aim_m", aim_m, (3,), where)
     if aim.tolist() == list(station.position_m):
-        raise InputError(f"{where}aim_m is {aim_m}, the place of station {station.name}: no direction to aim at")
+        raise InputError(
+            f"{where}aim_m is {aim_m}, the place of station {station.name}: no direction to aim at"
+        )
     check_station(network, station)
     return EchoInput(*seen, aim)
 
 
 def check_station(network: Network, station: Station) -> None:
-    """Raise InputError where the station's numbers are not finite, or its frequency is not positive."""
+    """Raise InputError where the station's numbers are not finite, or its frequency is not
+    positive.
+    """
     if not (np.isfinite(station.frequency_hz) and station.frequency_hz > 0):
-        raise InputError(f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive number")
-    if np.shape(station.position_m) != (3,) or not all(map(math.isfinite, (*station.position_m, station.normal_rad))):
+        raise InputError(
+            f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive number"
+        )
+    if np.shape(station.position_m) != (3,) or not all(
+        map(math.isfinite, (*station.position_m, station.normal_rad))
+    ):
         raise InputError(
             f"station {station.name}: position_m {station.position_m} or normal_rad {station.normal_rad} is not finite"
         )

@@ -1,7 +1,8 @@
 """The constants of one station for the kernels, as floats and double-doubles.
 
-A double-double is the unevaluated sum of two doubles (about 32 digits). It is needed for turns of phase per metre: at
-100 km and 4.9 GHz the phase is 2e7 rad, so a single double would leave only eight digits for the fraction of a turn.
+A double-double is the unevaluated sum of two doubles (about 32 digits). It is needed for turns of
+phase per metre: at 100 km and 4.9 GHz the phase is 2e7 rad, so a single double would leave only
+eight digits for the fraction of a turn.
 """
 
 from decimal import Decimal, localcontext
@@ -30,7 +31,9 @@ class Exact(NamedTuple):
     """kappa / 2: half turns of array phase per element and unit of direction cosine."""
     phase_h: Pair
     phase_v: Pair
-    """Turns of phase of both arrays' middles per unit of the horizontal and vertical direction cosine."""
+    """Turns of phase of both arrays' middles per unit of the horizontal and vertical direction
+    cosine.
+    """
     scale: Pair
     """a0 lambda / (4 pi)^(3/2)."""
 
@@ -71,8 +74,8 @@ class Radar(NamedTuple):
     bandwidth_hz: float
     """M df (Hz): range cells per second of delay."""
     exact: np.ndarray
-    """(8, 2), the constants as double-doubles in the order of `Exact`. Compiled code takes one array faster than eight
-    pairs; `constants` unpacks it."""
+    """(8, 2), the constants as double-doubles in the order of `Exact`. Compiled code takes one
+    array faster than eight pairs; `constants` unpacks it."""
 
 
 @lru_cache(maxsize=64)
@@ -81,21 +84,46 @@ def radar(network: Network, station: Station) -> Radar:
 
     Source: paper, Eqs. 4, 7 and 24.
     """
-    low, spacing, carrier = map(Fraction, (station.frequency_hz, network.subcarrier_spacing_hz, network.carrier_hz))
+    low, spacing, carrier = map(
+        Fraction, (station.frequency_hz, network.subcarrier_spacing_hz, network.carrier_hz)
+    )
     (transmit_h, transmit_v), (receive_h, receive_v) = network.transmit, network.receive
-    kappa, centre = low / carrier, low + (network.subcarriers - 1) * spacing / 2
-    bandwidth, elements = network.subcarriers * spacing, transmit_h * transmit_v * receive_h * receive_v
+    kappa = low / carrier
+    centre = low + (network.subcarriers - 1) * spacing / 2
+    bandwidth = network.subcarriers * spacing
+    elements = transmit_h * transmit_v * receive_h * receive_v
     with localcontext() as context:
         context.prec = DIGITS
         four_pi = 4 * PI
-        scale = (decimal_of(network.power) / elements).sqrt() * decimal_of(LIGHT / carrier) / (four_pi * four_pi.sqrt())
+        scale = (
+            (decimal_of(network.power) / elements).sqrt()
+            * decimal_of(LIGHT / carrier)
+            / (four_pi * four_pi.sqrt())
+        )
     numbers: tuple[Fraction | Decimal, ...] = (
-        *sine_cosine(station.normal_rad), 2 * centre / LIGHT, 2 * bandwidth / LIGHT, kappa / 2,
-        kappa / 4 * (transmit_h + receive_h - 2), kappa / 4 * (transmit_v + receive_v - 2), scale,
-    )  # fmt: skip
+        *sine_cosine(station.normal_rad),
+        2 * centre / LIGHT,
+        2 * bandwidth / LIGHT,
+        kappa / 2,
+        kappa / 4 * (transmit_h + receive_h - 2),
+        kappa / 4 * (transmit_v + receive_v - 2),
+        scale,
+    )
     exact = Exact(*map(pair, numbers))
     return Radar(
-        np.array(station.position_m, dtype=np.float64), exact.sine[0], exact.cosine[0], *exact.turns, *exact.cells,
-        station.frequency_hz / network.carrier_hz, int(transmit_h), int(transmit_v), int(receive_h), int(receive_v),
-        int(network.subcarriers), exact.scale[0], float(centre), float(bandwidth), np.array(exact),
-    )  # fmt: skip
+        np.array(station.position_m, dtype=np.float64),
+        exact.sine[0],
+        exact.cosine[0],
+        *exact.turns,
+        *exact.cells,
+        station.frequency_hz / network.carrier_hz,
+        int(transmit_h),
+        int(transmit_v),
+        int(receive_h),
+        int(receive_v),
+        int(network.subcarriers),
+        exact.scale[0],
+        float(centre),
+        float(bandwidth),
+        np.array(exact),
+    )

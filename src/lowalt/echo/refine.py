@@ -1,4 +1,6 @@
-"""Keeps a tolerance: bound the error, compute, compare, and recompute more precisely where terms cancel."""
+"""Keeps a tolerance: bound the error, compute, compare, and recompute more precisely where terms
+cancel.
+"""
 
 from typing import NamedTuple
 
@@ -18,20 +20,27 @@ from lowalt.echo.radar import Radar
 LONGEST = 100
 """Largest number of symbols in a segment."""
 PROBES = 8
-"""Number of symbols computed exactly first; their largest value is a lower bound of the sample's largest value."""
+"""Number of symbols computed exactly first; their largest value is a lower bound of the sample's
+largest value.
+"""
 PROBE_COST = 20_000
-"""Cost of the probes and of a second pass, in points x symbols of the exact plan. A cheaper plan must save more."""
-SAVED_SINGLE, SAVED = 0.4, 0.1
+"""Cost of the probes and of a second pass, in points x symbols of the exact plan. A cheaper plan
+must save more.
+"""
+SAVED_SINGLE = 0.4
+SAVED = 0.1
 """Measured share of the exact plan's cost that a cheaper plan saves, in float32 and in float64."""
 
 
 class Method(NamedTuple):
     """Record of how a sample was computed and which error bounds were proved.
 
-    single: float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel; cheap, exact,
-    general: symbols by the cheap plan, by the exact plan and by the pointwise kernel; pointwise_bound: error bound of
-    the pointwise kernel relative to its sums of amplitudes and of risks; again: number of symbols recomputed
-    for correct rounding to complex64, and how many of them remain undecided.
+    single: float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel;
+    cheap, exact,
+    general: symbols by the cheap plan, by the exact plan and by the pointwise kernel;
+    pointwise_bound: error bound of the pointwise kernel relative to its sums of amplitudes and of
+    risks; again: number of symbols recomputed for correct rounding to complex64, and how many of
+    them remain undecided.
     """
 
     single: bool
@@ -44,12 +53,17 @@ class Method(NamedTuple):
 
 
 def compute(
-    scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
+    scene: EchoInput,
+    radar: Radar,
+    refs: np.ndarray,
+    aims: tuple[float, float],
+    tolerance: float | None,
 ) -> tuple[Found, np.ndarray, Method, EchoSample]:
-    """Run the cheap plan, then the exact one; return (found, symbols left for the pointwise kernel, method, sample).
+    """Run the cheap plan, then the exact one; return (found, symbols left for the pointwise kernel,
+    method, sample).
 
-    The exact plan recomputes a symbol if its error bound exceeds the tolerance times the largest value, if the bound
-    leaves its strongest cell undecided, or if far cells could not be excluded.
+    The exact plan recomputes a symbol if its error bound exceeds the tolerance times the largest
+    value, if the bound leaves its strongest cell undecided, or if far cells could not be excluded.
     """
     run = _Run(scene, radar, refs, aims)
     found = Found.empty(len(refs))
@@ -57,11 +71,14 @@ def compute(
     exact = run.plan(0.0)
     if not run.spread < error_model.SPREAD_LIMIT or run.cells(exact) is None:
         return found, symbols, run.method(exact, 0, 0, len(refs)), run.sample
-    chosen, cheap = exact, 0
+    chosen = exact
+    cheap = 0
     if tolerance is not None and len(refs) > PROBES and run.saving(tolerance) > PROBE_COST:
         probes = np.arange(0, len(refs), -(-len(refs) // PROBES))
         run.compute(probes, exact, True, found)
-        share = abs(found.values[probes]).max() / (found.totals[probes].max() + run.peaks(probes).max())
+        share = abs(found.values[probes]).max() / (
+            found.totals[probes].max() + run.peaks(probes).max()
+        )
         chosen = run.plan(0.5 * tolerance * share)
         if chosen.cosine.size < exact.cosine.size and run.cells(chosen) is not None:
             run.compute(symbols, chosen, False, found)
@@ -85,11 +102,17 @@ def _least_largest(found: Found) -> float:
 class _Run:
     """Calls of the fast kernel for one sample, with the table of extents."""
 
-    def __init__(self, scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float]) -> None:
+    def __init__(
+        self, scene: EchoInput, radar: Radar, refs: np.ndarray, aims: tuple[float, float]
+    ) -> None:
         peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
         first = int(scene.part[0]) if len(scene.part) else 0
         self.sample = EchoSample(scene, layout(scene, peak), radar, first, aims)
-        self.refs, self.points, self.extents = refs, len(self.sample.lay.amplitude), np.empty((len(refs), 5))
+        self.refs, self.points, self.extents = (
+            refs,
+            len(self.sample.lay.amplitude),
+            np.empty((len(refs), 5)),
+        )
         self.spread = fill_extents(self.sample, refs, self.extents)
         self.size_m = float(self.extents[:, SIZE].max())
 
@@ -99,35 +122,58 @@ class _Run:
 
     def peaks(self, symbols: np.ndarray) -> np.ndarray:
         """Return for each symbol an upper bound: the sum of amplitudes at the arrays' peak gain."""
-        return self.sample.lay.total / (self.refs[symbols, RANGE] * (1 - self.extents[symbols, SPREAD])) ** 2
+        return (
+            self.sample.lay.total
+            / (self.refs[symbols, RANGE] * (1 - self.extents[symbols, SPREAD])) ** 2
+        )
 
     def saving(self, tolerance: float) -> float:
         """Return the cost that a tolerance may save, in points x symbols of the exact plan."""
-        return (SAVED_SINGLE if 0.5 * tolerance > error_model.SINGLE_ERROR else SAVED) * len(self.refs) * self.points
+        return (
+            (SAVED_SINGLE if 0.5 * tolerance > error_model.SINGLE_ERROR else SAVED)
+            * len(self.refs)
+            * self.points
+        )
 
     def cells(self, chosen: error_model.EchoPlan) -> CellPolynomials | None:
         """Return the cell kernels of a plan; None if the target extends over too many cells."""
         radar = self.sample.radar
-        return cell_polynomials(radar.subcarriers, error_model.round_up(self.size_m * radar.cells, 6), chosen.fit)
+        return cell_polynomials(
+            radar.subcarriers, error_model.round_up(self.size_m * radar.cells, 6), chosen.fit
+        )
 
-    def compute(self, symbols: np.ndarray, chosen: error_model.EchoPlan, final: bool, found: Found) -> None:
-        """Compute `symbols` into `found` by the plan `chosen`; `final`: accept unproved strongest cells."""
-        refs, extents = self.refs, self.extents
+    def compute(
+        self, symbols: np.ndarray, chosen: error_model.EchoPlan, final: bool, found: Found
+    ) -> None:
+        """Compute `symbols` into `found` by the plan `chosen`; `final`: accept unproved strongest
+        cells.
+        """
+        refs = self.refs
+        extents = self.extents
         if len(symbols) < len(refs):
-            refs, extents = refs[symbols], extents[symbols]
-        gains, cells = error_model.array_gains(self.sample.radar), self.cells(chosen)
+            refs = refs[symbols]
+            extents = extents[symbols]
+        gains = error_model.array_gains(self.sample.radar)
+        cells = self.cells(chosen)
         assert cells is not None  # `compute` checked the plan's cell kernels before
         segments = np.empty((len(symbols), 6))
-        count = cut_segments(extents, gains.horizontal.rates[0], gains.vertical.rates[0], LONGEST, segments)
+        count = cut_segments(
+            extents, gains.horizontal.rates[0], gains.vertical.rates[0], LONGEST, segments
+        )
         approximation = Approximation(chosen, gains, cells, folding())
         driver.run(
-            self.sample, Symbols(symbols, refs, extents, segments[:count]), approximation, final,
-            workspace(approximation, self.sample.lay.amplitude), found,
-        )  # fmt: skip
+            self.sample,
+            Symbols(symbols, refs, extents, segments[:count]),
+            approximation,
+            final,
+            workspace(approximation, self.sample.lay.amplitude),
+            found,
+        )
 
     def method(self, chosen: error_model.EchoPlan, cheap: int, exact: int, general: int) -> Method:
         """Return the record of how the sample was computed."""
-        cells, degree = self.cells(chosen), len(chosen.cosine) - 1
+        cells = self.cells(chosen)
+        degree = len(chosen.cosine) - 1
         orders = degree, degree, cells.kernels.shape[2] - 1 if cells else 0
         bound = error_model.pointwise_bound(self.sample.radar, self.size_m, self.points)
         return Method(chosen.single, orders, cheap, exact, general, bound)

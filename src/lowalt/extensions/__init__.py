@@ -1,4 +1,5 @@
-"""The extensions that come with lowalt, as its entry points of the group `lowalt.extensions` declare them.
+"""The extensions that come with lowalt, as its entry points of the group `lowalt.extensions`
+declare them.
 
 The core imports none of them: a folder here can leave together with its declaration.
 """

@@ -1,7 +1,8 @@
 """Archives of arrays (.npz) whose bytes depend only on the arrays.
 
-Since Python 3.11.4 zipfile writes another version number and length into a member's header, so the bytes of `np.savez`
-depend on the Python version. This module writes every byte itself; members are uncompressed and dated 1980.
+Since Python 3.11.4 zipfile writes another version number and length into a member's header, so the
+bytes of `np.savez` depend on the Python version. This module writes every byte itself; members are
+uncompressed and dated 1980.
 Source: PKWARE, "APPNOTE: .ZIP File Format Specification" 6.3.10, sections 4.3 and 4.5.3.
 """
 
@@ -39,14 +40,54 @@ def write_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
     with Path(path).open("wb") as file:
         listed = []
         for name, array in arrays.items():
-            data, inner, place = _member(array), f"{name}.npy".encode("ascii"), file.tell()
+            data = _member(array)
+            inner = f"{name}.npy".encode("ascii")
+            place = file.tell()
             if place + len(data) > _LARGEST:
-                raise InputError(f"{path}: {name} would make the file longer than {_LARGEST} bytes, expected less")
-            crc, long = zlib.crc32(data), 2**32 - 1
-            file.write(struct.pack("<4s5H3I2H", b"PK\3\4", _VERSION, 0, 0, 0, _DATE, crc, long, long, len(inner), 20))
+                raise InputError(
+                    f"{path}: {name} would make the file longer than {_LARGEST} bytes, expected less"
+                )
+            crc = zlib.crc32(data)
+            long = 2**32 - 1
+            file.write(
+                struct.pack(
+                    "<4s5H3I2H",
+                    b"PK\3\4",
+                    _VERSION,
+                    0,
+                    0,
+                    0,
+                    _DATE,
+                    crc,
+                    long,
+                    long,
+                    len(inner),
+                    20,
+                )
+            )
             file.write(inner + struct.pack("<2H2Q", 1, 16, len(data), len(data)) + data)
-            entry = (_VERSION, _UNIX, _VERSION, 0, 0, 0, 0, _DATE, crc, len(data), len(data), len(inner), 0, 0, 0, 0)
+            entry = (
+                _VERSION,
+                _UNIX,
+                _VERSION,
+                0,
+                0,
+                0,
+                0,
+                _DATE,
+                crc,
+                len(data),
+                len(data),
+                len(inner),
+                0,
+                0,
+                0,
+                0,
+            )
             listed.append(struct.pack("<4s4B4H3I5H2I", b"PK\1\2", *entry, _MODE, place) + inner)
-        start, size = file.tell(), sum(map(len, listed))
+        start = file.tell()
+        size = sum(map(len, listed))
         file.write(b"".join(listed))
-        file.write(struct.pack("<4s4H2IH", b"PK\5\6", 0, 0, len(listed), len(listed), size, start, 0))
+        file.write(
+            struct.pack("<4s4H2IH", b"PK\5\6", 0, 0, len(listed), len(listed), size, start, 0)
+        )

@@ -1,4 +1,6 @@
-"""Files of arrays (.npy, .npz) from users: the errors that damaged files raise, and limits of their stated size."""
+"""Files of arrays (.npy, .npz) from users: the errors that damaged files raise, and limits of their
+stated size.
+"""
 
 import struct
 import sys
@@ -14,15 +16,29 @@ from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 
 UNREADABLE = (
-    OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, MemoryError, OverflowError, RuntimeError,
-    SyntaxError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    NotImplementedError,
+    MemoryError,
+    OverflowError,
+    RuntimeError,
+    SyntaxError,
+    struct.error,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 """Errors that numpy and zipfile raise on a file that is damaged or no array file."""
 
 FREE_BYTES = 64 << 20
 """Members of an archive up to this size (bytes) may have any compression ratio."""
 MOST_EXPANSION = 16
-"""Larger members may be this many times their compressed size; the project's own files are not compressed."""
+"""Larger members may be this many times their compressed size; the project's own files are not
+compressed.
+"""
 
 
 def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
@@ -41,10 +57,12 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
 
 
 def checked_archive(path: str | Path, what: str) -> Path:
-    """Return the path of a .npz whose members are arrays of plausible sizes, and whose texts are texts.
+    """Return the path of a .npz whose members are arrays of plausible sizes, and whose texts are
+    texts.
 
-    Raises: InputError naming the file where it is missing, is no archive, or has a member that would fill the memory,
-    is not an array (NumPy would return bytes), or holds invalid characters (which would fail later).
+    Raises: InputError naming the file where it is missing, is no archive, or has a member that
+    would fill the memory, is not an array (NumPy would return bytes), or holds invalid characters
+    (which would fail later).
     """
     path = existing(path, what)
     try:
@@ -69,9 +87,15 @@ def _expands(member: zipfile.ZipInfo) -> bool:
 
 
 def _check_array(file: IO[bytes]) -> None:
-    """Read the header of a .npy file, and its characters where it holds text. Raises: errors of UNREADABLE."""
+    """Read the header of a .npy file, and its characters where it holds text. Raises: errors of
+    UNREADABLE.
+    """
     version = np.lib.format.read_magic(file)
-    header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    header = (
+        np.lib.format.read_array_header_1_0
+        if version == (1, 0)
+        else np.lib.format.read_array_header_2_0
+    )
     dtype = header(file)[2]
     if dtype.kind == "U":
         codes = np.frombuffer(file.read(), np.dtype("u4").newbyteorder(dtype.byteorder))

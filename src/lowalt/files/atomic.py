@@ -16,15 +16,19 @@ from lowalt.files.processes import lives
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 NEARLY_FULL_BYTES = 1 << 20
-"""NumPy and torch raise write errors without a number; with less than this free (bytes) they mean a full disk."""
+"""NumPy and torch raise write errors without a number; with less than this free (bytes) they mean a
+full disk.
+"""
 
 
 @contextlib.contextmanager
 def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
-    """Yield a temporary path next to `path` that replaces it only if the block ends without an error.
+    """Yield a temporary path next to `path` that replaces it only if the block ends without an
+    error.
 
     size: minimum size of the file (bytes), if known before it is written.
-    Raises: SpaceError naming the file, the size and the free space where the disk is too small or becomes full.
+    Raises: SpaceError naming the file, the size and the free space where the disk is too small or
+    becomes full.
     """
     path = Path(path)
     # Keep the suffix: many writers choose the format by it.
@@ -43,9 +47,15 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
         if not _is_full(error, path):
             raise
         written = temporary.stat().st_size if temporary.exists() else 0
-        needed = f"{_megabytes(size)}" if size is not None else f"more than the {_megabytes(written)} written so far"
+        needed = (
+            f"{_megabytes(size)}"
+            if size is not None
+            else f"more than the {_megabytes(written)} written so far"
+        )
         free = _megabytes(free_bytes(path) + written)
-        raise SpaceError(f"{path}: the disk is full; the file needs {needed}, {free} are free without it") from error
+        raise SpaceError(
+            f"{path}: the disk is full; the file needs {needed}, {free} are free without it"
+        ) from error
     finally:
         # A folder that could not be made holds no file either.
         with contextlib.suppress(OSError):
@@ -60,7 +70,8 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
 def _sweep(path: Path) -> None:
     """Remove temporary files of `path` left by killed processes, to free disk space."""
-    begin, end = f".{path.stem}.", f".part{path.suffix}"
+    begin = f".{path.stem}."
+    end = f".part{path.suffix}"
     for entry in os.scandir(path.parent):
         number = entry.name.removeprefix(begin).removesuffix(end)
         if entry.name == f"{begin}{number}{end}" and number.isdigit() and not lives(int(number)):
@@ -68,7 +79,9 @@ def _sweep(path: Path) -> None:
 
 
 def free_bytes(path: str | Path) -> int:
-    """Return the bytes that this user may still write on the disk of `path`, which itself need not exist."""
+    """Return the bytes that this user may still write on the disk of `path`, which itself need not
+    exist.
+    """
     path = Path(path).absolute()
     while not path.exists():
         path = path.parent
@@ -79,7 +92,8 @@ def _is_full(error: Exception, path: Path) -> bool:
     """Whether an error of a writer means that the disk is full."""
     if isinstance(error, OSError) and error.errno is not None:
         return error.errno in FULL
-    # numpy's "N requested and M written" has no number of its own, torch's writer raises a RuntimeError.
+    # numpy's "N requested and M written" has no number of its own, torch's writer raises a
+    # RuntimeError.
     return free_bytes(path) < NEARLY_FULL_BYTES
 
 
@@ -97,7 +111,8 @@ def sha256(path: str | Path) -> str:
 def existing(path: str | Path, what: str) -> Path:
     """Return `path` as a Path.
 
-    Raises: InputError naming `what` and the path where there is no such file, or the name is not valid.
+    Raises: InputError naming `what` and the path where there is no such file, or the name is not
+    valid.
     """
     path = Path(path)
     try:
@@ -111,10 +126,11 @@ def existing(path: str | Path, what: str) -> Path:
 
 @contextlib.contextmanager
 def text_file(path: str | Path, what: str) -> Iterator[TextIO]:
-    """Yield a file opened as UTF-8 text, with or without a byte order mark; line ends are left as they are.
+    """Yield a file opened as UTF-8 text, with or without a byte order mark; line ends are left as
+    they are.
 
-    Raises: InputError naming `what` and the path where there is no such file, it is no UTF-8, or no CSV where it is
-    read as CSV.
+    Raises: InputError naming `what` and the path where there is no such file, it is no UTF-8, or no
+    CSV where it is read as CSV.
     """
     try:
         with existing(path, what).open(encoding="utf-8-sig", newline="") as file:
@@ -133,6 +149,6 @@ def text_of(path: str | Path, what: str) -> str:
 
 
 def slug(name: str) -> str:
-    """Return the file name of a subtype or scheme: lower case, runs of other characters than letters and digits as
-    one "-"."""
+    """Return the file name of a subtype or scheme: lower case, runs of other characters than
+    letters and digits as one "-"."""
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

@@ -15,7 +15,8 @@ from lowalt.files.errors import InputError, shown
 def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[str, str]]:
     """Return a CSV file's rows as dicts of text; what: the file in words, for errors.
 
-    Raises: InputError naming the file and the columns it lacks, or the line whose number of cells differs.
+    Raises: InputError naming the file and the columns it lacks, or the line whose number of cells
+    differs.
     """
     with text_file(path, what) as file:
         reader = csv.reader(file)
@@ -26,13 +27,17 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
         rows = []
         for cells in filter(None, reader):
             if len(cells) != len(columns):
-                raise InputError(f"{path} line {reader.line_num}: {len(cells)} cells, expected {len(columns)}")
+                raise InputError(
+                    f"{path} line {reader.line_num}: {len(cells)} cells, expected {len(columns)}"
+                )
             rows.append(dict(zip(columns, cells, strict=True)))
         return rows
 
 
 def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
-    """Return a cell of a table of texts as a finite number. Raises: InputError naming the file, column and cell."""
+    """Return a cell of a table of texts as a finite number. Raises: InputError naming the file,
+    column and cell.
+    """
     try:
         value = float(row[column])
     except ValueError:
@@ -43,7 +48,8 @@ def number(row: Mapping[str, str], column: str, path: str | Path) -> float:
 
 
 def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:
-    """Write a header of `columns` and the rows: sequences of cells, or dicts, whose missing keys become empty cells.
+    """Write a header of `columns` and the rows: sequences of cells, or dicts, whose missing keys
+    become empty cells.
 
     Cells are written by `str`, None as an empty cell. The file appears only when it is complete.
     Raises: InputError naming the file and the keys of a dict that are no columns.

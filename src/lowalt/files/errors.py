@@ -1,4 +1,6 @@
-"""The exceptions for bad input: their message names the file, key or value, and what was expected instead."""
+"""The exceptions for bad input: their message names the file, key or value, and what was expected
+instead.
+"""
 
 import difflib
 import re
@@ -11,9 +13,13 @@ from pathlib import Path
 
 
 def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = "") -> str:
-    """Return what was expected instead of unknown names: similar known names, else `otherwise` or all."""
+    """Return what was expected instead of unknown names: similar known names, else `otherwise` or
+    all.
+    """
     known = list(known)
-    near = dict.fromkeys(other for name in unknown for other in difflib.get_close_matches(str(name), known, 1))
+    near = dict.fromkeys(
+        other for name in unknown for other in difflib.get_close_matches(str(name), known, 1)
+    )
     return f"perhaps {list(near)}" if near else otherwise or f"only {known}"
 
 
@@ -22,8 +28,8 @@ LONGEST = 400
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """Return a text of at most `longest` characters, with its middle cut out: the start tells where a fault is, the
-    end what was expected."""
+    """Return a text of at most `longest` characters, with its middle cut out: the start tells where
+    a fault is, the end what was expected."""
     start = 2 * longest // 3
     return text if len(text) <= longest else f"{text[:start]} ... {text[start + 5 - longest :]}"
 
@@ -38,7 +44,8 @@ def shown(value: object) -> str:
 
 
 class InputError(ValueError):
-    """Bad input from outside; the message names the file, key or value and what was expected instead.
+    """Bad input from outside; the message names the file, key or value and what was expected
+    instead.
 
     It has at most LONGEST characters.
     """
@@ -53,14 +60,17 @@ class BelowFloor(InputError):
 
 
 class SpaceError(InputError):
-    """A disk or memory is too small; the message names the file or run, the required and the free space."""
+    """A disk or memory is too small; the message names the file or run, the required and the free
+    space.
+    """
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs the packages of an extra of this package, in a checkout and beside a wheel.
+    """Return the command that installs the packages of an extra of this package, in a checkout and
+    beside a wheel.
 
-    It names the packages of others and never `lowalt[extra]`: no index holds that name, so whoever registered it could
-    run code on the user's machine.
+    It names the packages of others and never `lowalt[extra]`: no index holds that name, so whoever
+    registered it could run code on the user's machine.
     """
     from importlib.metadata import requires  # takes 30 ms, which no other call should pay
 
@@ -73,7 +83,8 @@ def install_command(extra: str) -> str:
 
 
 def lacking(error: ImportError) -> InputError:
-    """Return the refusal of what needs a package that is not installed, with the command that installs it.
+    """Return the refusal of what needs a package that is not installed, with the command that
+    installs it.
 
     Raises: the error unchanged where no extra of this package names that one.
     """
@@ -83,22 +94,29 @@ def lacking(error: ImportError) -> InputError:
     for requirement in requires("lowalt") or ():
         found = re.match(r"([\w-]+).*extra == .(\w+)", requirement)
         if found and found[1].replace("-", "_") == name and found[2] != "test":
-            return InputError(f"the package {name} is not installed, expected `{install_command(found[2])}`")
+            return InputError(
+                f"the package {name} is not installed, expected `{install_command(found[2])}`"
+            )
     raise error
 
 
 @contextmanager
 def reading(path: str | Path, kind: str) -> Iterator[None]:
-    """Turn any exception of a reader into an InputError that names the file, since libraries raise many types.
+    """Turn any exception of a reader into an InputError that names the file, since libraries raise
+    many types.
 
     Raises: InputError, the reader's own, or that the file is not a readable `kind`.
     """
     try:
         yield
     except InputError as error:
-        raise InputError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
+        raise InputError(
+            str(error) if str(error).startswith(str(path)) else f"{path}: {error}"
+        ) from None
     except Exception as error:
-        raise InputError(f"{path}: not a readable {kind} ({type(error).__name__}: {error})") from None
+        raise InputError(
+            f"{path}: not a readable {kind} ({type(error).__name__}: {error})"
+        ) from None
 
 
 def in_one_line(error: Exception) -> str:
@@ -112,7 +130,13 @@ class InputWarning(UserWarning):
 
 def warn(text: str) -> None:
     """Warn with `InputWarning` at the line outside this package that called it."""
-    level, frame, package = 1, sys._getframe(), __name__.partition(".")[0]
-    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in (package, "contextlib"):
-        level, frame = level + 1, frame.f_back
+    level = 1
+    frame = sys._getframe()
+    package = __name__.partition(".")[0]
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in (
+        package,
+        "contextlib",
+    ):
+        level = level + 1
+        frame = frame.f_back
     warnings.warn(text, InputWarning, stacklevel=level)

@@ -1,4 +1,6 @@
-"""Strict reader of untrusted JSON objects (RFC 8259, limited nesting); anything else is refused in one sentence."""
+"""Strict reader of untrusted JSON objects (RFC 8259, limited nesting); anything else is refused in
+one sentence.
+"""
 
 import json
 import math
@@ -23,15 +25,17 @@ def _finite(text: str) -> float:
 def json_object(text: str, where: str | Path, what: str) -> dict:
     """Return the object in a JSON text; what: the text in words, for messages.
 
-    Raises: InputError naming `where` for another text or value, a number that is not finite, or values that are
-    nested too deeply.
+    Raises: InputError naming `where` for another text or value, a number that is not finite, or
+    values that are nested too deeply.
     """
     try:
         value = json.loads(text, parse_constant=_no_number, parse_float=_finite)
     except RecursionError:
         raise InputError(f"{where}: not {what} (values stand in each other too deeply)") from None
     except ValueError as error:
-        raise InputError(f"{where}: not {what}, expected a JSON object ({in_one_line(error)})") from None
+        raise InputError(
+            f"{where}: not {what}, expected a JSON object ({in_one_line(error)})"
+        ) from None
     if not isinstance(value, dict):
         raise InputError(f"{where}: not {what} ({type(value).__name__}, expected a JSON object)")
     return value

@@ -1,6 +1,8 @@
-"""The plan of the package: the core's rooms, each importing only earlier ones, and the extensions, which import any.
+"""The plan of the package: the core's rooms, each importing only earlier ones, and the extensions,
+which import any.
 
-A room of the core imports no extension: `tests/test_house.py` checks this, and `docs/rooms_picture.py` draws it.
+A room of the core imports no extension: `tests/test_house.py` checks this, and
+`docs/rooms_picture.py` draws it.
 """
 
 import ast
@@ -9,12 +11,29 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 ROOMS = (
-    "files", "machine", "numerics", "config", "targets", "motion", "echo", "scene", "noise", "spectra",
-    "tiles", "shards", "recognition", "measure", "report", "workflow", "commands",
-)  # fmt: skip
+    "files",
+    "machine",
+    "numerics",
+    "config",
+    "targets",
+    "motion",
+    "echo",
+    "scene",
+    "noise",
+    "spectra",
+    "tiles",
+    "shards",
+    "recognition",
+    "measure",
+    "report",
+    "workflow",
+    "commands",
+)
 
 
-EXTENSIONS = tuple(f"extensions/{path.parent.name}" for path in sorted(PACKAGE.glob("extensions/*/__init__.py")))
+EXTENSIONS = tuple(
+    f"extensions/{path.parent.name}" for path in sorted(PACKAGE.glob("extensions/*/__init__.py"))
+)
 """The folders of the extensions; none where they have been removed."""
 
 
@@ -25,7 +44,8 @@ def modules(room: str) -> list[Path]:
 
 @cache
 def rooms_imported(path: Path) -> frozenset[str]:
-    """Return the rooms and extensions from which a file imports, including its own if it imports from there.
+    """Return the rooms and extensions from which a file imports, including its own if it imports
+    from there.
 
     The result is cached per process.
     """
@@ -39,7 +59,9 @@ def rooms_imported(path: Path) -> frozenset[str]:
             names.append(node.module)
     parts = [name.split(".") for name in names]
     own = [part[1:] for part in parts if part[0] == PACKAGE.name and len(part) > 1]
-    extensions = {f"extensions/{part[1]}" for part in own if part[0] == "extensions" and len(part) > 1}
+    extensions = {
+        f"extensions/{part[1]}" for part in own if part[0] == "extensions" and len(part) > 1
+    }
     return frozenset(part[0] for part in own if part[0] in ROOMS) | extensions
 
 

@@ -13,14 +13,20 @@ from lowalt.files.errors import InputError
 TIMEOUT_S = 60
 
 
-def download(address: str, target: Path, pinned: str, checksum: Callable[[Path], str] = sha256) -> None:
+def download(
+    address: str, target: Path, pinned: str, checksum: Callable[[Path], str] = sha256
+) -> None:
     """Write the file at `address` to `target` if `checksum` of it is `pinned`.
 
-    Raises: InputError naming the address where the download fails or the content differs; then nothing is kept.
+    Raises: InputError naming the address where the download fails or the content differs; then
+    nothing is kept.
     """
     with replacing(target) as temporary:
         try:
-            with urllib.request.urlopen(address, timeout=TIMEOUT_S) as source, temporary.open("wb") as file:
+            with (
+                urllib.request.urlopen(address, timeout=TIMEOUT_S) as source,
+                temporary.open("wb") as file,
+            ):
                 shutil.copyfileobj(source, file)
         except (urllib.error.URLError, OSError, ValueError) as error:
             raise InputError(f"{address}: download failed ({error})") from None
@@ -30,12 +36,14 @@ def download(address: str, target: Path, pinned: str, checksum: Callable[[Path],
 
 
 def fetch_each(names: Iterable[str], fetch: Callable[[str], bool]) -> None:
-    """Call `fetch` for each file's name and print the result; a file that fails does not stop the others.
+    """Call `fetch` for each file's name and print the result; a file that fails does not stop the
+    others.
 
     fetch: returns False if the file existed already. Failures go to standard error.
     Raises: InputError with the count of files that failed.
     """
-    names, failed = list(names), 0
+    names = list(names)
+    failed = 0
     for name in names:
         try:
             print(name, "fetched" if fetch(name) else "already there")
@@ -43,4 +51,6 @@ def fetch_each(names: Iterable[str], fetch: Callable[[str], bool]) -> None:
             failed += 1
             print(f"failed: {error}", file=sys.stderr)
     if failed:
-        raise InputError(f"{failed} of {len(names)} files could not be fetched (named above), the others are there")
+        raise InputError(
+            f"{failed} of {len(names)} files could not be fetched (named above), the others are there"
+        )

@@ -29,7 +29,9 @@ def state(pid: int) -> str | None:
 
 
 def _fields(pid: int) -> list[str] | None:
-    """Fields of /proc/PID/stat from the third (the state) on; the second may contain spaces and brackets."""
+    """Fields of /proc/PID/stat from the third (the state) on; the second may contain spaces and
+    brackets.
+    """
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:

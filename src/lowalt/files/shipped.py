@@ -13,11 +13,17 @@ SHIPPED = PACKAGE / "shipped" if (PACKAGE / "shipped/Snakefile").is_file() else 
 """The folder that holds `Snakefile`, `config/`, `workflow/` and `profiles/`."""
 
 KEYS = (
-    ("targets", "table"), ("targets", "records"), ("targets", "own"), ("motion", "track"),
-    ("recognition", "table"), ("report", "published"),
+    ("targets", "table"),
+    ("targets", "records"),
+    ("targets", "own"),
+    ("motion", "track"),
+    ("recognition", "table"),
+    ("report", "published"),
     ("report", "accuracy"),
-)  # fmt: skip
-"""Block and key of every file, or list or mapping of files, that a configuration names and the package brings."""
+)
+"""Block and key of every file, or list or mapping of files, that a configuration names and the
+package brings.
+"""
 
 
 def _exists(path: str | Path) -> bool:
@@ -29,7 +35,9 @@ def _exists(path: str | Path) -> bool:
 
 
 def shipped(name: str | Path) -> Path:
-    """Return `name` where the working directory has it, else the package's file of this name, if there is one."""
+    """Return `name` where the working directory has it, else the package's file of this name, if
+    there is one.
+    """
     path = SHIPPED / name
     return path if _exists(path) and not _exists(name) else Path(name)
 
@@ -37,7 +45,8 @@ def shipped(name: str | Path) -> Path:
 def located(config: dict, folder: Path = SHIPPED) -> dict:
     """Return the configuration with absolute paths for files that exist only in `folder`.
 
-    A run in another folder, or another workflow that uses this one as a module, finds config/targets.csv that way.
+    A run in another folder, or another workflow that uses this one as a module, finds
+    config/targets.csv that way.
     """
 
     def packaged(name: str) -> str:
@@ -48,10 +57,11 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
 
 
 def as_named(config: dict, folder: Path = SHIPPED) -> dict:
-    """Return the configuration with files of `folder` named relative to it: the inverse of `located`.
+    """Return the configuration with files of `folder` named relative to it: the inverse of
+    `located`.
 
-    Files that a run stores or shares then do not depend on the place of installation. A path stays absolute if its
-    relative name would mean another file in the working directory.
+    Files that a run stores or shares then do not depend on the place of installation. A path stays
+    absolute if its relative name would mean another file in the working directory.
     """
 
     def named(name: str) -> str:

@@ -23,7 +23,9 @@ class _UniqueKeys:
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)  # type: ignore[attr-defined]
             if key in seen:
-                raise InputError(f"{self.name}: key {key!r} stands twice (line {key_node.start_mark.line + 1})")
+                raise InputError(
+                    f"{self.name}: key {key!r} stands twice (line {key_node.start_mark.line + 1})"
+                )
             seen.append(key)
         return super().construct_mapping(node, deep)  # type: ignore[misc]
 
@@ -33,42 +35,62 @@ class _Loader(_UniqueKeys, yaml.SafeLoader):
 
 
 class _FastLoader(_UniqueKeys, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """libyaml's parser, seven times as fast. It is recursive, so a million nesting levels would crash the process."""
+    """libyaml's parser, seven times as fast. It is recursive, so a million nesting levels would
+    crash the process.
+    """
 
 
 DEEPEST = 10_000
-"""Limit on characters that can open a nesting level; a text with more of them is read by the Python parser."""
+"""Limit on characters that can open a nesting level; a text with more of them is read by the Python
+parser.
+"""
 
 
 MOST_NODES = 1_000_000
-"""Limit on the values of a file after the expansion of anchors: ten lines can expand to billions."""
+"""Limit on the values of a file after the expansion of anchors: ten lines can expand to billions.
+"""
 
 TEMPLATE = "__use_yte__"
-"""The key with which a configuration asks Snakemake's reader to run the Python expressions in it."""
+"""The key with which a configuration asks Snakemake's reader to run the Python expressions in it.
+"""
 
 
 def _check_size(root: yaml.Node | None, path: str | Path) -> None:
-    """Refuse a document whose anchors make more than MOST_NODES values, or make a value contain itself."""
+    """Refuse a document whose anchors make more than MOST_NODES values, or make a value contain
+    itself.
+    """
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node | None) -> int:
-        """Number of values in a node after the expansion of anchors; counting stops beyond MOST_NODES."""
+        """Number of values in a node after the expansion of anchors; counting stops beyond
+        MOST_NODES.
+        """
         if not isinstance(node, yaml.CollectionNode):
             return 1
         if id(node) not in sizes:
-            sizes[id(node)] = MOST_NODES + 1  # until the node is counted; a node inside itself is endless
-            pairs = node.value if isinstance(node, yaml.MappingNode) else [(entry,) for entry in node.value]
+            sizes[id(node)] = (
+                MOST_NODES + 1
+            )  # until the node is counted; a node inside itself is endless
+            pairs = (
+                node.value
+                if isinstance(node, yaml.MappingNode)
+                else [(entry,) for entry in node.value]
+            )
             sizes[id(node)] = 1 + sum(size(entry) for pair in pairs for entry in pair)
         return sizes[id(node)]
 
     if size(root) > MOST_NODES:
-        raise InputError(f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain document")
+        raise InputError(
+            f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain document"
+        )
 
 
 def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
-    """Return the mapping in a YAML file; `what` and `holds` name the file and its entries in messages.
+    """Return the mapping in a YAML file; `what` and `holds` name the file and its entries in
+    messages.
 
-    Raises: InputError naming the file where it is missing, not YAML, no mapping, a template, or has a key twice.
+    Raises: InputError naming the file where it is missing, not YAML, no mapping, a template, or has
+    a key twice.
     """
     text = text_of(path, what)
     try:
@@ -80,13 +102,18 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         value = None if root is None else loader.construct_document(root)
     except InputError:
         raise
-    # PyYAML also raises errors of its converters, such as for month 99 of a date or a number of 5000 digits.
+    # PyYAML also raises errors of its converters, such as for month 99 of a date or a number of
+    # 5000 digits.
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(f"{path}: not YAML ({in_one_line(error)})") from error
     except RecursionError:
-        raise InputError(f"{path}: mappings and lists stand in each other too deeply, expected a few levels") from None
+        raise InputError(
+            f"{path}: mappings and lists stand in each other too deeply, expected a few levels"
+        ) from None
     if not isinstance(value, dict):
         raise InputError(f"{path}: {type(value).__name__}, expected a mapping of {holds}")
     if TEMPLATE in value:
-        raise InputError(f"{path}: key {TEMPLATE!r} makes Snakemake run code in it, expected a plain document")
+        raise InputError(
+            f"{path}: key {TEMPLATE!r} makes Snakemake run code in it, expected a plain document"
+        )
     return value

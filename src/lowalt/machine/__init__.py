@@ -1,1 +1,3 @@
-"""The machine that computes: compiled kernels, threads, memory, clocks, progress. No stage is known here."""
+"""The machine that computes: compiled kernels, threads, memory, clocks, progress. No stage is known
+here.
+"""

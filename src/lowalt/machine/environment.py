@@ -1,4 +1,6 @@
-"""The environment of a run's jobs: which interpreter and source they use, and where the user's inputs lie."""
+"""The environment of a run's jobs: which interpreter and source they use, and where the user's
+inputs lie.
+"""
 
 import os
 import sys
@@ -8,13 +10,17 @@ INPUTS = "LOWALT_INPUTS"
 
 
 def prepare(source: Path, inputs: str | None) -> str | None:
-    """Set the environment of jobs and return the folder of the user's inputs: `inputs`, else LOWALT_INPUTS, else None.
+    """Set the environment of jobs and return the folder of the user's inputs: `inputs`, else
+    LOWALT_INPUTS, else None.
 
-    Jobs run `python -m lowalt.STAGE` with the interpreter of the workflow, even if its environment is not active. They
-    use the source of this checkout, also in an environment of their own (conda, a cluster node).
+    Jobs run `python -m lowalt.STAGE` with the interpreter of the workflow, even if its environment
+    is not active. They use the source of this checkout, also in an environment of their own (conda,
+    a cluster node).
     """
     environment = os.environ
-    environment["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", "")])
+    environment["PATH"] = os.pathsep.join(
+        [str(Path(sys.executable).parent), environment.get("PATH", "")]
+    )
     # Files of the project are UTF-8 whatever the locale says.
     environment["PYTHONUTF8"] = "1"
     known = environment.get("PYTHONPATH")

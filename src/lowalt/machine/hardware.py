@@ -19,17 +19,23 @@ def processor() -> str:
 
 
 def _accelerator() -> str:
-    """Name of the first visible NVIDIA GPU from nvidia-smi, without importing a framework; "no GPU" without one."""
+    """Name of the first visible NVIDIA GPU from nvidia-smi, without importing a framework; "no GPU"
+    without one.
+    """
     tool = shutil.which("nvidia-smi")
     if not tool or os.environ.get("CUDA_VISIBLE_DEVICES") in ("", "-1"):
         return "no GPU"
-    query = subprocess.run([tool, "--query-gpu=name", "--format=csv,noheader"], capture_output=True, text=True)
+    query = subprocess.run(
+        [tool, "--query-gpu=name", "--format=csv,noheader"], capture_output=True, text=True
+    )
     names = query.stdout.split("\n") if query.returncode == 0 else []
     return names[0].strip() if names and names[0].strip() else "no GPU"
 
 
 def describe() -> str:
-    """Return one line without commas (it stands in CSV cells), such as "Intel Xeon; 2 cores; 24 GiB; no GPU"."""
+    """Return one line without commas (it stands in CSV cells), such as "Intel Xeon; 2 cores; 24
+    GiB; no GPU".
+    """
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return f"{processor()}; {cores} cores; {memory:.0f} GiB; {_accelerator()}".replace(",", " ")

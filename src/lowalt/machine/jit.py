@@ -1,9 +1,11 @@
-"""Compilation of kernels: at the first call, once per machine, and again if the code that a kernel runs changes.
+"""Compilation of kernels: at the first call, once per machine, and again if the code that a kernel
+runs changes.
 
-numba's own cache only checks the file of a function, not the functions that it calls in other files, so after an edit
-there old machine code would stay in use. Here the key of a cache entry contains a digest of the kernel's bytecode and
-options and, recursively, of all kernels and constants that it uses. Code that is not compiled is not part of the key.
-`machine_code.py` compiles. numba takes half a second to import, so a command without kernels does not import it.
+numba's own cache only checks the file of a function, not the functions that it calls in other
+files, so after an edit there old machine code would stay in use. Here the key of a cache entry
+contains a digest of the kernel's bytecode and options and, recursively, of all kernels and
+constants that it uses. Code that is not compiled is not part of the key. `machine_code.py`
+compiles. numba takes half a second to import, so a command without kernels does not import it.
 """
 
 import functools
@@ -27,13 +29,17 @@ def _text_of(value) -> str:
 
 
 def _used(function: Any) -> Iterator[tuple[str, object]]:
-    """Yield the names and values of globals, of attributes of modules, and of outer variables that a function uses."""
+    """Yield the names and values of globals, of attributes of modules, and of outer variables that
+    a function uses.
+    """
     code = function.__code__
     for name in code.co_names:
         value = function.__globals__.get(name)
         if isinstance(value, ModuleType):
             held = vars(value)
-            yield from ((f"{name}.{inner}", held[inner]) for inner in code.co_names if inner in held)
+            yield from (
+                (f"{name}.{inner}", held[inner]) for inner in code.co_names if inner in held
+            )
         elif value is not None:
             yield name, value
     for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
@@ -46,7 +52,9 @@ def _options_of(options: dict) -> str:
 
 
 def _parts(function: Any, seen: set[str]) -> Iterator[str]:
-    """Yield as text everything that determines the machine code of `function`; each kernel that it calls comes once."""
+    """Yield as text everything that determines the machine code of `function`; each kernel that it
+    calls comes once.
+    """
     name = f"{function.__module__}.{function.__qualname__}"
     if name in seen:
         return
@@ -69,7 +77,9 @@ def _parts(function: Any, seen: set[str]) -> Iterator[str]:
 
 
 def digest(function: Callable, options: dict | None = None) -> str:
-    """Return the SHA-256 of a kernel's bytecode and options, and of all kernels and constants that it uses."""
+    """Return the SHA-256 of a kernel's bytecode and options, and of all kernels and constants that
+    it uses.
+    """
     total = hashlib.sha256(_options_of(options or {}).encode())
     for part in _parts(function, set()):
         total.update(part.encode() + b"\0")
@@ -77,25 +87,31 @@ def digest(function: Callable, options: dict | None = None) -> str:
 
 
 _DEFAULTS: dict[str, Any] = {"fastmath": False, "error_model": "python", "_nrt": True}
-"""Options of every kernel. numba would take missing ones from the first kernel that calls this one."""
+"""Options of every kernel. numba would take missing ones from the first kernel that calls this one.
+"""
 
 
 class Kernel:
     """A function that numba compiles at the first call, or when a kernel that uses it is compiled.
 
-    function: what is compiled; options: those of numba's `njit`; inner: whether only kernels call it.
+    function: what is compiled; options: those of numba's `njit`; inner: whether only kernels call
+    it.
     """
 
     def __init__(self, function: Callable, options: dict[str, Any], inner: bool):
         functools.update_wrapper(self, function)
-        self.function, self.options, self.inner = function, options, inner
+        self.function = function
+        self.options = options
+        self.inner = inner
 
     @functools.cached_property
     def dispatcher(self) -> Any:
         """numba's dispatcher of the function."""
         from lowalt.machine.machine_code import dispatcher
 
-        return dispatcher(self.function, self.options, functools.partial(digest, self.function, self.options))
+        return dispatcher(
+            self.function, self.options, functools.partial(digest, self.function, self.options)
+        )
 
     @property
     def _numba_type_(self) -> Any:
@@ -103,14 +119,19 @@ class Kernel:
         return self.dispatcher._numba_type_
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the machine code. Raises: TypeError for an inner kernel, which has no entry that Python could jump to."""
+        """Run the machine code. Raises: TypeError for an inner kernel, which has no entry that
+        Python could jump to.
+        """
         if self.inner:
-            raise TypeError(f"{self.function.__qualname__} has no entry for Python, only kernels call it")
+            raise TypeError(
+                f"{self.function.__qualname__} has no entry for Python, only kernels call it"
+            )
         return self.dispatcher(*arguments)
 
 
 def kernel(inner: bool = False, **options) -> Callable[[Callable], Kernel]:
-    """Return a decorator like `numba.njit(**options)` that compiles later and keeps machine code by its digest.
+    """Return a decorator like `numba.njit(**options)` that compiles later and keeps machine code by
+    its digest.
 
     inner: only kernels call the function. Calling it from Python raises TypeError.
     """
@@ -123,11 +144,15 @@ PLAIN = kernel()
 """Every operation is done as written."""
 _LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 LEAN = kernel(**_LEAN)
-"""As PLAIN, but without reference counting, which took a quarter of the time. Such a function cannot allocate."""
+"""As PLAIN, but without reference counting, which took a quarter of the time. Such a function
+cannot allocate.
+"""
 INNER = kernel(inner=True, **_LEAN)
 """As LEAN, for functions that only kernels call."""
 INLINED = kernel(inner=True, forceinline=True, **_LEAN)
-"""As INNER, and copied into its callers, so that named tuples of arrays are not copied at each call."""
+"""As INNER, and copied into its callers, so that named tuples of arrays are not copied at each
+call.
+"""
 _REORDERED = {"contract", "reassoc", "nsz"}
 VECTOR = kernel(fastmath=_REORDERED, **_LEAN)
 """As LEAN, and the compiler may reorder sums and fuse products, so that it can vectorise loops."""

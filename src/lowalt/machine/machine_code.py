@@ -1,8 +1,10 @@
-"""Machine code of kernels, compiled by numba with the options of each and cached by the digest of all code it runs.
+"""Machine code of kernels, compiled by numba with the options of each and cached by the digest of
+all code it runs.
 
-Every kernel states whether products may be fused and sums reordered. numba's internal functions, such as the product
-of complex numbers, are compiled separately for each set of options. Otherwise the first kernel in a process to call a
-function would determine how that function rounds in all others.
+Every kernel states whether products may be fused and sums reordered. numba's internal functions,
+such as the product of complex numbers, are compiled separately for each set of options. Otherwise
+the first kernel in a process to call a function would determine how that function rounds in all
+others.
 """
 
 import functools
@@ -23,12 +25,16 @@ from lowalt.files.errors import InputError
 
 
 def _fields(kind) -> tuple:
-    """Return the names of the fields of a named tuple's type, of those inside it, and so on, in their order."""
+    """Return the names of the fields of a named tuple's type, of those inside it, and so on, in
+    their order.
+    """
     return (getattr(kind, "fields", ()), *map(_fields, getattr(kind, "types", ())))
 
 
 class _PartsByOptions(dict):
-    """numba's own parts of kernels by their names, types, and how freely the kernel that asks for one may round."""
+    """numba's own parts of kernels by their names, types, and how freely the kernel that asks for
+    one may round.
+    """
 
     def _key(self, key):
         """The key together with the options of the kernel that is being compiled."""
@@ -47,22 +53,30 @@ class _PartsByOptions(dict):
 
 
 # Fault: a kernel that is done as written may round like one that fuses products. No issue upstream.
-# Cause: numba compiles its internal functions, such as the product of complex numbers, once for all kernels, with the
-# options of the first. Held in: numba 0.68. Cure: one copy for each set of options.
+# Cause: numba compiles its internal functions, such as the product of complex numbers, once for all
+# kernels, with the options of the first. Held in: numba 0.68. Cure: one copy for each set of
+# options.
 cpu_target.target_context.cached_internal_func = _PartsByOptions()
 _numba_finalizes = CPUCodeLibrary._finalize_final_module
 
 
 def _finalize(library: CPUCodeLibrary) -> None:
-    """Finish a kernel's machine code as numba does, but let the kernel call its own copies of other functions."""
-    # Fault: a kernel calls another copy of a function than it was compiled with. No issue upstream. Held in numba 0.68.
-    # Cause: by numba's linking, all kernels of a process share the copy of a function loaded first. Copies round
-    # differently, since each is optimised with its kernel, and a process that compiles loads other copies than one that
-    # finds its kernels in the cache. Even functions of two sources are shared if they have the same name.
+    """Finish a kernel's machine code as numba does, but let the kernel call its own copies of other
+    functions.
+    """
+    # Fault: a kernel calls another copy of a function than it was compiled with. No issue upstream.
+    # Held in numba 0.68.
+    # Cause: by numba's linking, all kernels of a process share the copy of a function loaded first.
+    # Copies round differently, since each is optimised with its kernel, and a process that compiles
+    # loads other copies than one that finds its kernels in the cache. Even functions of two sources
+    # are shared if they have the same name.
     # Cure: the copies are a kernel's own.
-    functions = [function for function in library._final_module.functions if not function.is_declaration]
+    functions = [
+        function for function in library._final_module.functions if not function.is_declaration
+    ]
     if functions:
-        # Keep a copy of the module as it is, for kernels that call this one; numba makes it of finished libraries only.
+        # Keep a copy of the module as it is, for kernels that call this one; numba makes it of
+        # finished libraries only.
         library._finalized = True
         library._get_module_for_linking()
     for function in functions:
@@ -83,14 +97,21 @@ class _DigestCache(FunctionCache):
     """Gives the digest of all code that the function runs."""
 
     def _index_key(self, sig, codegen):
-        """Numba's key, the digest of code and options, the linking, and the fields of named tuples among arguments."""
-        return *super()._index_key(sig, codegen), self.digest(), "own functions", tuple(map(_fields, sig))
+        """Numba's key, the digest of code and options, the linking, and the fields of named tuples
+        among arguments.
+        """
+        return (
+            *super()._index_key(sig, codegen),
+            self.digest(),
+            "own functions",
+            tuple(map(_fields, sig)),
+        )
 
     def load_overload(self, sig, target_context):
         """Return finished machine code for a signature, or None where none is kept."""
-        # numba's method first loads everything that a compilation may need, including scipy.linalg, which takes a third
-        # of a job's start. Finished machine code needs at most the runtime of reference counting; a compilation loads
-        # the rest.
+        # numba's method first loads everything that a compilation may need, including scipy.linalg,
+        # which takes a third of a job's start. Finished machine code needs at most the runtime of
+        # reference counting; a compilation loads the rest.
         if self.options["_nrt"]:
             rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
@@ -98,7 +119,8 @@ class _DigestCache(FunctionCache):
                 if (kept := self._load_overload(sig, target_context)) is not None:
                     return kept
             except (ImportError, AttributeError):
-                # The index of cached code names argument types; it is unreadable if one of them has moved.
+                # The index of cached code names argument types; it is unreadable if one of them has
+                # moved.
                 self.flush()
         say_once()
         return None
@@ -107,13 +129,20 @@ class _DigestCache(FunctionCache):
 @functools.cache
 def say_once() -> None:
     """Print to standard error that kernels are being compiled."""
-    print("lowalt: compiling for this machine; the machine code is kept for later calls", file=sys.stderr, flush=True)
+    print(
+        "lowalt: compiling for this machine; the machine code is kept for later calls",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
-def dispatcher(function: Callable, options: dict[str, Any], digest: Callable[[], str]) -> Dispatcher:
+def dispatcher(
+    function: Callable, options: dict[str, Any], digest: Callable[[], str]
+) -> Dispatcher:
     """Return numba's dispatcher of a function, with the cache of this module.
 
-    options: those of `njit`; digest: gives the digest of all code that the function runs, which the key needs.
+    options: those of `njit`; digest: gives the digest of all code that the function runs, which the
+    key needs.
     Raises: InputError where no folder can be written that keeps machine code.
     """
     compiled = njit(**options)(function)
@@ -124,5 +153,6 @@ def dispatcher(function: Callable, options: dict[str, Any], digest: Callable[[],
         raise InputError(
             f"machine code can be kept neither {place}, expected XDG_CACHE_HOME: a folder that this user may write"
         ) from None
-    compiled._cache.options, compiled._cache.digest = options, digest
+    compiled._cache.options = options
+    compiled._cache.digest = digest
     return compiled

@@ -1,7 +1,8 @@
 """Memory of a process: a limit for a block of code, and reuse of freed arrays.
 
-By default glibc returns each large freed block to the system, which later provides zeroed pages one by one. That took a
-fifth of the time of a sample with many effects. With other C libraries nothing changes.
+By default glibc returns each large freed block to the system, which later provides zeroed pages one
+by one. That took a fifth of the time of a sample with many effects. With other C libraries nothing
+changes.
 """
 
 import contextlib
@@ -13,7 +14,8 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def at_most(size: int) -> Iterator[None]:
-    """Let a block of code take at most `size` more bytes of address space; an allocation beyond that fails.
+    """Let a block of code take at most `size` more bytes of address space; an allocation beyond
+    that fails.
 
     Systems without /proc set no limit. Source: setrlimit(2), RLIMIT_AS; proc(5), statm.
     """
@@ -34,11 +36,13 @@ def at_most(size: int) -> Iterator[None]:
 def keep_freed_memory() -> None:
     """Let the C library keep freed blocks of any size; only for the project's own processes.
 
-    A stage frees arrays of the same sizes for each sample, and training frees its activations in each step.
+    A stage frees arrays of the same sizes for each sample, and training frees its activations in
+    each step.
     Source: mallopt(3), M_MMAP_THRESHOLD and M_TRIM_THRESHOLD.
     """
     with contextlib.suppress(OSError, AttributeError):
         mallopt = ctypes.CDLL(None).mallopt
-        mmap_threshold, trim_threshold = -3, -1
+        mmap_threshold = -3
+        trim_threshold = -1
         mallopt(mmap_threshold, 1 << 30)
         mallopt(trim_threshold, (1 << 31) - 1)

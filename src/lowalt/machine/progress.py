@@ -1,7 +1,7 @@
 """The progress of a long command, as lines in its log for users and the workflow's display.
 
-A line is `progress 340/2000 steps`; the last one is current. Commands write to their log (standard error) at most every
-two seconds, so short ones write none.
+A line is `progress 340/2000 steps`; the last one is current. Commands write to their log (standard
+error) at most every two seconds, so short ones write none.
 """
 
 import os
@@ -31,9 +31,16 @@ class Reporter:
     """Writes progress lines to the log, at most one every EVERY_S seconds of `clock`."""
 
     def __init__(
-        self, total: int, unit: str, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic
+        self,
+        total: int,
+        unit: str,
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._total, self._unit, self._stream, self._clock = total, unit, stream, clock
+        self._total = total
+        self._unit = unit
+        self._stream = stream
+        self._clock = clock
         self._last = clock()
 
     def __call__(self, done: int) -> None:
@@ -41,7 +48,11 @@ class Reporter:
         now = self._clock()
         if now - self._last >= EVERY_S:
             self._last = now
-            print(f"progress {done}/{self._total} {self._unit}", file=self._stream or sys.stderr, flush=True)
+            print(
+                f"progress {done}/{self._total} {self._unit}",
+                file=self._stream or sys.stderr,
+                flush=True,
+            )
 
 
 def reported(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
@@ -53,9 +64,11 @@ def reported(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
 
 
 def last(log: str | Path, since: float = 0.0) -> Progress | None:
-    """Return the last progress in a log file, or None where it has none in its last lines or is not there.
+    """Return the last progress in a log file, or None where it has none in its last lines or is not
+    there.
 
-    since: seconds since the epoch; a file last written more than a second before is of an earlier run.
+    since: seconds since the epoch; a file last written more than a second before is of an earlier
+    run.
     """
     try:
         with Path(log).open("rb") as file:

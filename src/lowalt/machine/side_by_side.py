@@ -12,10 +12,11 @@ from lowalt.files.errors import InputError, SpaceError
 def together(calls: Sequence[Callable[[], Any]], jobs: int, start: str = "fork") -> list[Any]:
     """Return what every call returns, in their order, `jobs` of them at a time.
 
-    Calls and results are pickled. One job makes the calls in this process, one after the other. start: "fork"
-    inherits the imported modules, which take seconds to import; "spawn" is for calls that use torch.
-    Raises: what the first call that fails raises, after the calls that had begun; InputError for fewer than one job;
-    SpaceError where a process was killed.
+    Calls and results are pickled. One job makes the calls in this process, one after the other.
+    start: "fork" inherits the imported modules, which take seconds to import; "spawn" is for calls
+    that use torch.
+    Raises: what the first call that fails raises, after the calls that had begun; InputError for
+    fewer than one job; SpaceError where a process was killed.
     """
     if jobs < 1:
         raise InputError(f"jobs: {jobs}, expected 1 or more")
@@ -26,7 +27,9 @@ def together(calls: Sequence[Callable[[], Any]], jobs: int, start: str = "fork")
         try:
             return [future.result() for future in begun]
         except BrokenProcessPool as error:
-            raise SpaceError("a process was killed before it had its result, for lack of memory perhaps") from error
+            raise SpaceError(
+                "a process was killed before it had its result, for lack of memory perhaps"
+            ) from error
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

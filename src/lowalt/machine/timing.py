@@ -1,4 +1,6 @@
-"""Timers for all measured times: the median of alternating calls, and the minimum over several calls."""
+"""Timers for all measured times: the median of alternating calls, and the minimum over several
+calls.
+"""
 
 import statistics
 import time
@@ -6,9 +8,11 @@ from collections.abc import Callable
 
 
 def in_turn(
-    calls: list[tuple[Callable[[], object], int, int]], clock: Callable[[], float] = time.perf_counter
+    calls: list[tuple[Callable[[], object], int, int]],
+    clock: Callable[[], float] = time.perf_counter,
 ) -> list[tuple[float, object]]:
-    """Return the median seconds and the last result of each call, given as (call, rounds, times a round).
+    """Return the median seconds and the last result of each call, given as (call, rounds, times a
+    round).
 
     Calls alternate, so that a slow second of the machine affects all of them.
     """
@@ -19,7 +23,9 @@ def in_turn(
             for _ in range(times if turn < rounds else 0):
                 seconds, results[index] = once(call, clock)
                 spent[index].append(seconds)
-    return [(statistics.median(times), result) for times, result in zip(spent, results, strict=True)]
+    return [
+        (statistics.median(times), result) for times, result in zip(spent, results, strict=True)
+    ]
 
 
 def median_s(work: Callable[[], object], repeats: int) -> float:
@@ -28,10 +34,13 @@ def median_s(work: Callable[[], object], repeats: int) -> float:
     return in_turn([(work, repeats, 1)])[0][0]
 
 
-def least_s(work: Callable[[], object], limit_s: float, clock: Callable[[], float], repeats: int = 30) -> float:
+def least_s(
+    work: Callable[[], object], limit_s: float, clock: Callable[[], float], repeats: int = 30
+) -> float:
     """Return the least time (s) by `clock` of up to `repeats` calls, after one that warms up.
 
-    Calls stop once they took `limit_s` together. If the first call alone takes that long, its time is the result.
+    Calls stop once they took `limit_s` together. If the first call alone takes that long, its time
+    is the result.
     """
     spent, _ = once(work, clock)
     if spent > limit_s:

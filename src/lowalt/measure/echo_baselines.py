@@ -1,7 +1,9 @@
 """Other methods for the same signal, only for comparison.
 
-Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and computes everything, including geometry and
-gains: the paper's closed form in NumPy, in single or double precision, and a non-uniform FFT per symbol.
+Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and computes everything,
+including geometry and
+gains: the paper's closed form in NumPy, in single or double precision, and a non-uniform FFT per
+symbol.
 """
 
 import numpy as np
@@ -20,40 +22,60 @@ def _ratio(x: np.ndarray, count: int) -> np.ndarray:
     """Return sin(count x) / sin(x) with its limit."""
     s = np.sin(x)
     small = abs(s) < 1e-12
-    return np.where(small, x.dtype.type(count), np.sin(count * x) / np.where(small, x.dtype.type(1), s))
+    return np.where(
+        small, x.dtype.type(count), np.sin(count * x) / np.where(small, x.dtype.type(1), s)
+    )
 
 
-def amplitudes(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m) -> tuple[np.ndarray, np.ndarray]:
-    """Ranges (N, L) in m and complex amplitudes (N, L), array gains included, in the precision of the motion."""
+def amplitudes(
+    network: Network, station: Station, motion: Rigid, rcs_m2, aim_m
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ranges (N, L) in m and complex amplitudes (N, L), array gains included, in the precision of
+    the motion.
+    """
     place, horizontal, aim, rcs = (
-        np.asarray(value, motion.points.dtype) for value in (station.position_m, station.horizontal, aim_m, rcs_m2)
+        np.asarray(value, motion.points.dtype)
+        for value in (station.position_m, station.horizontal, aim_m, rcs_m2)
     )
     d = positions(motion) - place
     r = np.sqrt(np.einsum("nli,nli->nl", d, d))
     aim = (aim - place) / np.linalg.norm(aim - place)
     kappa = station.frequency_hz / network.carrier_hz
-    psi, omega = d @ horizontal / r - aim @ horizontal, d[..., 2] / r - aim[2]
-    gain, phase = np.ones_like(r), np.zeros_like(r)
+    psi = d @ horizontal / r - aim @ horizontal
+    omega = d[..., 2] / r - aim[2]
+    gain = np.ones_like(r)
+    phase = np.zeros_like(r)
     for counts in (network.transmit, network.receive):
         for count, x in zip(counts, (psi, omega), strict=True):
             u = np.pi * kappa / 2 * x
             gain *= _ratio(u, count)
             phase += (count - 1) * u
     elements = np.prod(network.transmit) * np.prod(network.receive)
-    scale = float(np.sqrt(network.power / elements)) * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi) ** 1.5
+    scale = (
+        float(np.sqrt(network.power / elements))
+        * SPEED_OF_LIGHT
+        / network.carrier_hz
+        / (4 * np.pi) ** 1.5
+    )
     return r, scale * np.sqrt(rcs) / r**2 * gain * np.exp(1j * phase)
 
 
-def closed(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dtype: type = np.float64) -> np.ndarray:
-    """Signal (N,): the closed form in plain NumPy over the cells around the target (arg max not certified).
+def closed(
+    network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dtype: type = np.float64
+) -> np.ndarray:
+    """Signal (N,): the closed form in plain NumPy over the cells around the target (arg max not
+    certified).
 
     dtype: precision of every step, from the positions on.
     """
-    arrays = {name: getattr(motion, name).astype(dtype) for name in ("rotation", "translation", "points")}
+    arrays = {
+        name: getattr(motion, name).astype(dtype) for name in ("rotation", "translation", "points")
+    }
     r, amplitude = amplitudes(network, station, motion._replace(**arrays), rcs_m2, aim_m)
     count = network.subcarriers
     rho = r / network.cell_m
-    low, high = np.floor(rho.min(axis=1)).astype(int), np.ceil(rho.max(axis=1)).astype(int)
+    low = np.floor(rho.min(axis=1)).astype(int)
+    high = np.ceil(rho.max(axis=1)).astype(int)
     centre = station.frequency_hz + (count - 1) / 2 * network.subcarrier_spacing_hz
     wave = amplitude * np.exp(-4j * np.pi / SPEED_OF_LIGHT * centre * r)
     best = np.zeros(len(r), wave.dtype)
@@ -68,7 +90,9 @@ def closed(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dty
 def finufft_cells(
     network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9
 ) -> np.ndarray:
-    """Range cells (N, M): one non-uniform FFT (type 1, FINUFFT) a symbol from points to subcarriers, with one plan."""
+    """Range cells (N, M): one non-uniform FFT (type 1, FINUFFT) a symbol from points to
+    subcarriers, with one plan.
+    """
     from finufft import Plan
 
     r, amplitude = amplitudes(network, station, motion, rcs_m2, aim_m)
@@ -86,7 +110,9 @@ def finufft_cells(
     return result
 
 
-def finufft(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9) -> np.ndarray:
+def finufft(
+    network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9
+) -> np.ndarray:
     """Signal (N,): the strongest of `finufft_cells`."""
     cells = finufft_cells(network, station, motion, rcs_m2, aim_m, tolerance)
     return np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0]

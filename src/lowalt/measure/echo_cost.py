@@ -1,11 +1,13 @@
-"""Error of the echo against computing time: every method and tolerance at several numbers of points.
+"""Error of the echo against computing time: every method and tolerance at several numbers of
+points.
 
     python -m lowalt.measure.echo_cost --settings JSON --clouds a.npz ... --out cost.csv
 
-Settings: network, motion and cost blocks of the configuration, its seed, and the published rows of the targets. The
-table has one row per method, tolerance and number of points:
-    seconds         of one signal at one station on one core: median of the repeats, mean over the clouds
-    relative_error  largest error over the judged symbols and clouds, relative to the largest value of the signal
+Settings: network, motion and cost blocks of the configuration, its seed, and the published rows of
+the targets. The table has one row per method, tolerance and number of points:
+    seconds         of one signal at one station on one core: median of the repeats, mean over the
+    clouds relative_error  largest error over the judged symbols and clouds, relative to the largest
+    value of the signal
 The truth is `lowalt.measure.fifty_digits`, at two random symbols and the deepest fade.
 """
 
@@ -32,7 +34,10 @@ from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud, read
 
 COLUMNS = ("method", "tolerance", "points", "seconds", "relative_error", "hardware")
-ENGINE, NUFFT, NAIVE32, NAIVE64 = "lowalt", "NUFFT", "NumPy, float32", "NumPy, float64"
+ENGINE = "lowalt"
+NUFFT = "NUFFT"
+NAIVE32 = "NumPy, float32"
+NAIVE64 = "NumPy, float64"
 
 
 def hardware() -> str:
@@ -41,18 +46,28 @@ def hardware() -> str:
 
 
 def sample(
-    cloud: Cloud, published: dict, network: Network, motion: dict, seed: int, distance_m: float, points: int
+    cloud: Cloud,
+    published: dict,
+    network: Network,
+    motion: dict,
+    seed: int,
+    distance_m: float,
+    points: int,
 ) -> tuple[Rigid, np.ndarray, np.ndarray]:
-    """A random motion of `cloud` that starts `distance_m` from the first station: (motion, rcs_m2, aim_m).
+    """A random motion of `cloud` that starts `distance_m` from the first station: (motion, rcs_m2,
+    aim_m).
 
     points: how many of the cloud's points are taken, at random and repeated if need be.
     """
     rng = stream(seed, "cost", cloud.subtype, distance_m, points)
     masts = np.array([station.position_m[:2] for station in network.stations])
-    row = draw(rng, cloud, published, masts, region_polygon(masts, motion["region"]["polygon_m"]), motion)
+    row = draw(
+        rng, cloud, published, masts, region_polygon(masts, motion["region"]["polygon_m"]), motion
+    )
     station = network.stations[0]
     rise = float(np.clip(row["z_m"] - station.position_m[2], -0.9 * distance_m, 0.9 * distance_m))
-    flat, turn = np.sqrt(distance_m**2 - rise**2), station.normal_rad + rng.uniform(-0.8, 0.8)
+    flat = np.sqrt(distance_m**2 - rise**2)
+    turn = station.normal_rad + rng.uniform(-0.8, 0.8)
     row["x_m"] = station.position_m[0] + flat * np.cos(turn)
     row["y_m"] = station.position_m[1] + flat * np.sin(turn)
     row["z_m"] = station.position_m[2] + rise
@@ -63,30 +78,52 @@ def sample(
     return moved, cloud.rcs_m2[order], np.array([row["x_m"], row["y_m"], row["z_m"]])
 
 
-def truths(network: Network, sample: tuple, signal: np.ndarray, cell: np.ndarray, seed: int) -> dict[int, mpmath.mpc]:
-    """The true values of the strongest cells (N,) at two random symbols and the deepest fade of a signal (N,)."""
+def truths(
+    network: Network, sample: tuple, signal: np.ndarray, cell: np.ndarray, seed: int
+) -> dict[int, mpmath.mpc]:
+    """The true values of the strongest cells (N,) at two random symbols and the deepest fade of a
+    signal (N,).
+    """
     rng, (motion, rcs_m2, aim_m) = stream(seed, "judged symbols"), sample
-    chosen = {*rng.choice(len(signal), min(2, len(signal)), replace=False).tolist(), int(np.argmin(abs(signal)))}
+    chosen = {
+        *rng.choice(len(signal), min(2, len(signal)), replace=False).tolist(),
+        int(np.argmin(abs(signal))),
+    }
     values = {}
     for n in chosen:
-        places, strongest = places_mp(motion, n), [int(cell[n])]
-        values[n] = cells_mp(network, network.stations[0], places, rcs_m2.tolist(), aim_m.tolist(), strongest)[0]
+        places = places_mp(motion, n)
+        strongest = [int(cell[n])]
+        values[n] = cells_mp(
+            network, network.stations[0], places, rcs_m2.tolist(), aim_m.tolist(), strongest
+        )[0]
     return values
 
 
 def error(signal: np.ndarray, truth: dict[int, mpmath.mpc]) -> float:
     """Largest error of a signal (N,) at the judged symbols, relative to its largest value."""
     with mpmath.workdps(50):
-        return float(max(abs(mpmath.mpc(complex(signal[n])) - value) for n, value in truth.items()) / abs(signal).max())
+        return float(
+            max(abs(mpmath.mpc(complex(signal[n])) - value) for n, value in truth.items())
+            / abs(signal).max()
+        )
 
 
-def measured(network: Network, sample: tuple, seed: int, block: dict) -> dict[tuple, tuple[float, float]]:
-    """Return the median seconds and the error of one sample by (method, tolerance), tolerances that float64 keeps."""
-    arguments, repeats = (network, network.stations[0], *sample), block["repeats"]
+def measured(
+    network: Network, sample: tuple, seed: int, block: dict
+) -> dict[tuple, tuple[float, float]]:
+    """Return the median seconds and the error of one sample by (method, tolerance), tolerances that
+    float64 keeps.
+    """
+    arguments = (network, network.stations[0], *sample)
+    repeats = block["repeats"]
     exact = echo_signal(*arguments)
     truth = truths(network, sample, exact.signal, exact.cell, seed)
     calls = {
-        (NAIVE32, ""): (functools.partial(echo_baselines.closed, *arguments, np.float32), repeats, 1),
+        (NAIVE32, ""): (
+            functools.partial(echo_baselines.closed, *arguments, np.float32),
+            repeats,
+            1,
+        ),
         (NAIVE64, ""): (functools.partial(echo_baselines.closed, *arguments), repeats, 1),
         (NUFFT, ""): (functools.partial(echo_baselines.finufft, *arguments), repeats, 1),
     }
@@ -96,7 +133,8 @@ def measured(network: Network, sample: tuple, seed: int, block: dict) -> dict[tu
             call()
         except BelowFloor:
             continue
-        # A call takes about a millisecond, so with only five calls one interrupt would be a quarter of the time.
+        # A call takes about a millisecond, so with only five calls one interrupt would be a quarter
+        # of the time.
         calls[ENGINE, tolerance or "exact"] = call, repeats, 8
     timed = in_turn(list(calls.values()))
     return {
@@ -106,13 +144,24 @@ def measured(network: Network, sample: tuple, seed: int, block: dict) -> dict[tu
 
 
 def measure(network: Network, clouds: list[Cloud], published: dict, block: dict) -> list[dict]:
-    """Return the table's rows (keys COLUMNS): over all clouds the mean of the seconds and the largest error."""
+    """Return the table's rows (keys COLUMNS): over all clouds the mean of the seconds and the
+    largest error.
+    """
     rows = []
     for points in block["points"]:
         by_method: dict[tuple, list[tuple[float, float]]] = {}
         for cloud in clouds:
-            drawn_with = published[cloud.subtype], network, block["motion"], block["seed"], block["distance_m"], points
-            for key, pair in measured(network, sample(cloud, *drawn_with), block["seed"], block).items():
+            drawn_with = (
+                published[cloud.subtype],
+                network,
+                block["motion"],
+                block["seed"],
+                block["distance_m"],
+                points,
+            )
+            for key, pair in measured(
+                network, sample(cloud, *drawn_with), block["seed"], block
+            ).items():
                 by_method.setdefault(key, []).append(pair)
             print(f"{cloud.subtype}, {points} points", file=sys.stderr)
         for (method, tolerance), pairs in by_method.items():
@@ -125,14 +174,18 @@ def measure(network: Network, clouds: list[Cloud], published: dict, block: dict)
 def main(arguments: list[str]) -> None:
     """Measure and write the table."""
     line = parser("lowalt.measure.echo_cost", __doc__.splitlines()[0])
-    line.add_argument("--clouds", nargs="+", required=True, help="cloud files, best one of each category")
+    line.add_argument(
+        "--clouds", nargs="+", required=True, help="cloud files, best one of each category"
+    )
     line.add_argument("--out", required=True, help="table to write (.csv)")
     options = line.parse_args(arguments)
     keys = ("network", "motion", "seed", "cost", "published")
     network, motion, seed, block, published = pick(options.settings, *keys)
     block |= {"motion": motion, "seed": seed}
     write_csv(
-        options.out, COLUMNS, measure(Network.from_settings(network), list(map(read, options.clouds)), published, block)
+        options.out,
+        COLUMNS,
+        measure(Network.from_settings(network), list(map(read, options.clouds)), published, block),
     )
 
 

@@ -1,7 +1,9 @@
-"""The echo's truth: cells of one symbol in fifty decimal digits, by sums over array elements and subcarriers.
+"""The echo's truth: cells of one symbol in fifty decimal digits, by sums over array elements and
+subcarriers.
 
-Neither code nor formulas are shared with the closed form in `lowalt.echo`: the steering vectors and the inverse DFT of
-Eqs. 8 to 24 of the paper are summed as geometric sums, one point at a time. Needs mpmath (extra `cost`).
+Neither code nor formulas are shared with the closed form in `lowalt.echo`: the steering vectors and
+the inverse DFT of Eqs. 8 to 24 of the paper are summed as geometric sums, one point at a time.
+Needs mpmath (extra `cost`).
 """
 
 import mpmath
@@ -13,20 +15,26 @@ C = 299_792_458
 
 def _run(step, length: int):
     """Return the sum of step^k over k = 0..length - 1, its terms doubled bit by bit of the length."""
-    total, power = mpmath.mpc(0), mpmath.mpc(1)
+    total = mpmath.mpc(0)
+    power = mpmath.mpc(1)
     for bit in f"{length:b}":
-        total, power = total * (1 + power), power * power
+        total = total * (1 + power)
+        power = power * power
         if bit == "1":
-            total, power = total * step + 1, power * step
+            total = total * step + 1
+            power = power * step
     return total
 
 
 def places_mp(motion, n: int, digits: int = 50) -> list[list]:
-    """Return the positions (L, 3) of symbol n of a rigid motion as mpmath numbers, without a rounding in float64."""
+    """Return the positions (L, 3) of symbol n of a rigid motion as mpmath numbers, without a
+    rounding in float64.
+    """
     with mpmath.workdps(digits):
         return [
             [
-                mpmath.fdot(motion.rotation[n, part, axis].tolist(), point) + float(motion.translation[n, part, axis])
+                mpmath.fdot(motion.rotation[n, part, axis].tolist(), point)
+                + float(motion.translation[n, part, axis])
                 for axis in range(3)
             ]
             for point, part in zip(motion.points.tolist(), motion.part, strict=True)
@@ -34,16 +42,21 @@ def places_mp(motion, n: int, digits: int = 50) -> list[list]:
 
 
 def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
-    """The cells listed of one symbol, mpmath complex numbers; points_m: L positions of three numbers, taken as exact.
+    """The cells listed of one symbol, mpmath complex numbers; points_m: L positions of three
+    numbers, taken as exact.
 
     Each point's steering and subcarrier sums are plain geometric sums over exactly given phases.
     """
     with mpmath.workdps(digits):
-        mpf, pi = mpmath.mpf, mpmath.pi
-        carrier, low = mpf(network.carrier_hz), mpf(station.frequency_hz)
-        spacing, count = mpf(network.subcarrier_spacing_hz), network.subcarriers
+        mpf = mpmath.mpf
+        pi = mpmath.pi
+        carrier = mpf(network.carrier_hz)
+        low = mpf(station.frequency_hz)
+        spacing = mpf(network.subcarrier_spacing_hz)
+        count = network.subcarriers
         normal = mpf(station.normal_rad)
-        ahead, across = mpmath.cos(normal), mpmath.sin(normal)
+        ahead = mpmath.cos(normal)
+        across = mpmath.sin(normal)
 
         def look(position):
             """Return range and both direction cosines of a position, seen from the station."""

@@ -3,9 +3,9 @@
     python -m lowalt.measure.network_speed --settings JSON --out speed.json
 
 Settings: scheme, seed, size, colour_map, network, training, augmentation, classes.
-The weights are untrained, because time does not depend on them. The images are in memory, so reading is not timed.
-The minimum of several passes is used, because other work on the machine can only add time. On one thread the time is
-processor time.
+The weights are untrained, because time does not depend on them. The images are in memory, so
+reading is not timed. The minimum of several passes is used, because other work on the machine can
+only add time. On one thread the time is processor time.
 """
 
 import json
@@ -29,7 +29,9 @@ BATCHES = (1, 64)
 
 
 def _clock(machine: Machine, threads: int) -> Callable[[], float]:
-    """Return the clock (s): processor time on one thread, else wall time, on a GPU after its work has finished."""
+    """Return the clock (s): processor time on one thread, else wall time, on a GPU after its work
+    has finished.
+    """
     if machine.device.type == "cuda":
 
         def finished() -> float:
@@ -51,20 +53,28 @@ def _inputs(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
 def measure(scheme: Scheme, settings: dict, limit_s: float = 2.0) -> dict:
     """Return the times of a scheme's network on one machine, in ms per sample, and its size.
 
-    settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training; limit_s: seconds
-    spent on one figure. A batch that takes longer than the limit is omitted (None). The batch of the training step is
-    the largest power of two, up to the setting's batch, that takes at most a quarter of the limit. Its time is
-    estimated from the largest timed batch, because a GPU processes one sample no faster than several. If the settings
-    compile, the training step uses the compiled network, as in a training.
+    settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training;
+    limit_s: seconds spent on one figure. A batch that takes longer than the limit is omitted
+    (None). The batch of the training step is the largest power of two, up to the setting's batch,
+    that takes at most a quarter of the limit. Its time is estimated from the largest timed batch,
+    because a GPU processes one sample no faster than several. If the settings compile, the training
+    step uses the compiled network, as in a training.
     Raises: InputError for a wrong setting.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block = recipe.check(settings["training"])
     recipe.seeded(settings["seed"], ("speed",), block["threads"])
     machine = Machine.here(block["precision"])
-    model = built(scheme, settings["network"], settings["size"], settings["colour_map"], len(settings["classes"]))
+    model = built(
+        scheme,
+        settings["network"],
+        settings["size"],
+        settings["colour_map"],
+        len(settings["classes"]),
+    )
     layout = torch.channels_last if block["channels_last"] else torch.contiguous_format
-    model, clock = model.to(machine.device, memory_format=layout), _clock(machine, block["threads"])
+    model = model.to(machine.device, memory_format=layout)
+    clock = _clock(machine, block["threads"])
     times: dict[str, float | None] = {}
     sample_s = 0.0
     with torch.inference_mode(), machine.autocast():
@@ -72,16 +82,17 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 2.0) -> dict:
         for batch in BATCHES:
             images = _inputs(batch, scheme, settings["size"]).to(machine.device)
             fits = sample_s * batch < limit_s
-            sample_s = least_s(lambda x=images: model(x), limit_s, clock) / batch if fits else sample_s
+            sample_s = (
+                least_s(lambda x=images: model(x), limit_s, clock) / batch if fits else sample_s
+            )
             times[f"inference_ms_{batch}"] = 1e3 * sample_s if fits else None
     # Forward and backward cost about three times a forward.
     most = max(1.0, min(block["batch"], limit_s / 4 / (3 * sample_s)))
     batch = 1 << int(np.log2(most))
-    images, labels = (
-        _inputs(batch, scheme, settings["size"]).to(machine.device),
-        torch.arange(batch) % len(settings["classes"]),
-    )
-    labels, steps = labels.to(machine.device), recipe.optimiser(model, block)
+    images = _inputs(batch, scheme, settings["size"]).to(machine.device)
+    labels = torch.arange(batch) % len(settings["classes"])
+    labels = labels.to(machine.device)
+    steps = recipe.optimiser(model, block)
     model.train()
     trained = torch.compile(model) if block["compile"] else model
 
@@ -95,11 +106,19 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 2.0) -> dict:
         # Do not time the first call, which compiles or loads GPU kernels, once per training.
         step()
     return {
-        "scheme": scheme.name, "size": settings["size"], "parameters": recogniser.parameters(model), **times,
-        "train_ms": 1e3 * least_s(step, limit_s, clock) / batch, "train_batch": batch, "precision": machine.precision,
-        "threads": block["threads"], "batch": block["batch"], "steps": block["steps"],
-        "backbone": scheme.backbone or settings["network"]["backbone"], "hardware": describe(),
-    }  # fmt: skip
+        "scheme": scheme.name,
+        "size": settings["size"],
+        "parameters": recogniser.parameters(model),
+        **times,
+        "train_ms": 1e3 * least_s(step, limit_s, clock) / batch,
+        "train_batch": batch,
+        "precision": machine.precision,
+        "threads": block["threads"],
+        "batch": block["batch"],
+        "steps": block["steps"],
+        "backbone": scheme.backbone or settings["network"]["backbone"],
+        "hardware": describe(),
+    }
 
 
 def main(arguments: list[str]) -> None:

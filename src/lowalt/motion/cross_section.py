@@ -1,7 +1,8 @@
 """The mean radar cross section of a moving target, whose points add with their phases.
 
-The amplitudes of points closer than a quarter of a wavelength add coherently, and a smooth surface that does not face
-the station reflects little. The mean therefore differs from the sum of the points' cross sections by up to 5 dB.
+The amplitudes of points closer than a quarter of a wavelength add coherently, and a smooth surface
+that does not face the station reflects little. The mean therefore differs from the sum of the
+points' cross sections by up to 5 dB.
 """
 
 import numpy as np
@@ -16,18 +17,21 @@ LOOKS = 2048
 TILT_DEG = 20.0
 """Largest pitch and roll of a target in the air, as in config/default.yaml."""
 SEEN_FROM_DEG = {True: (-20.0, 0.0), False: (3.0, 10.0)}
-"""Elevations of a station seen from a target in the air (True) and on the ground: most of those of config/default.yaml,
-masts of 25 m."""
+"""Elevations of a station seen from a target in the air (True) and on the ground: most of those of
+config/default.yaml, masts of 25 m."""
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73)
 
 
 def mean_cross_section(cloud: Cloud, wavelength_m: float) -> float:
-    """Return the mean over aspects and motion of |sum of sqrt(rcs) exp(-j 4 pi r / wavelength)|^2, in m2.
+    """Return the mean over aspects and motion of |sum of sqrt(rcs) exp(-j 4 pi r / wavelength)|^2,
+    in m2.
 
-    For plane waves of one frequency, without the losses of beams and range cells. Aspects are those of
-    config/default.yaml: every yaw, `TILT_DEG`, `SEEN_FROM_DEG`; motion is every phase of rotors, wheels and wings, and
-    every moment of a recording. They follow a low-discrepancy sequence, which gives the mean to about 0.2 dB.
-    Source: Knott et al., Radar Cross Section, 1993, 3.3; multiples of roots of primes: Niederreiter 1992, ch. 3.
+    For plane waves of one frequency, without the losses of beams and range cells. Aspects are those
+    of config/default.yaml: every yaw, `TILT_DEG`, `SEEN_FROM_DEG`; motion is every phase of rotors,
+    wheels and wings, and every moment of a recording. They follow a low-discrepancy sequence, which
+    gives the mean to about 0.2 dB.
+    Source: Knott et al., Radar Cross Section, 1993, 3.3; multiples of roots of primes: Niederreiter
+    1992, ch. 3.
     """
     turning = [*cloud.parts_of("rotor"), *cloud.parts_of("wheel")]
     even = np.arange(1, LOOKS + 1)[:, None] * np.sqrt(_PRIMES[: 5 + len(turning)]) % 1.0
@@ -40,7 +44,9 @@ def mean_cross_section(cloud: Cloud, wavelength_m: float) -> float:
     lasts_s = len(cloud.track) / cloud.record["track_rate_hz"] if len(cloud.track) else 1.0
     row = {"model": 0, **dict.fromkeys(NUMBERS, 0.0), "rate_hz": 1.0, "playback": 1.0}
     turns = {part: 2 * np.pi * even[:, 5 + order] for order, part in enumerate(turning)}
-    rotation, translation = poses(cloud, row, lasts_s * even[:, 4], Perturbation(turns, None, attitude))
+    rotation, translation = poses(
+        cloud, row, lasts_s * even[:, 4], Perturbation(turns, None, attitude)
+    )
     nearer = portable.dot(translation, toward[:, None])[:, cloud.part]
     axes = portable.applied(rotation.swapaxes(2, 3), toward[:, None])
     for axis in range(3):

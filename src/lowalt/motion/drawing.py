@@ -1,7 +1,8 @@
-"""Drawing motion models from the published ranges, and from our defaults where the paper gives none.
+"""Drawing motion models from the published ranges, and from our defaults where the paper gives
+none.
 
-Each motion model has its own stream (seed, "motion", subtype, model) and a fixed order of draws, so it does not depend
-on the rest of the configuration.
+Each motion model has its own stream (seed, "motion", subtype, model) and a fixed order of draws, so
+it does not depend on the rest of the configuration.
 """
 
 import math
@@ -16,7 +17,8 @@ from lowalt.targets.cloud import Cloud, extent
 
 
 def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
-    """Return the region's corners (K, 2) m, counter-clockwise: `polygon_m`, or the convex hull of `masts_m` (S, 2).
+    """Return the region's corners (K, 2) m, counter-clockwise: `polygon_m`, or the convex hull of
+    `masts_m` (S, 2).
 
     Raises: InputError where the polygon is degenerate.
     """
@@ -36,44 +38,60 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
             f"motion: region polygon {corners.tolist()} is flat, expected corners around an area"
         ) from None
     if polygon_m is not None and len(hull) < len(corners):
-        raise InputError(f"motion.region.polygon_m: value {polygon_m} is not convex, expected a convex polygon")
+        raise InputError(
+            f"motion.region.polygon_m: value {polygon_m} is not convex, expected a convex polygon"
+        )
     return corners[hull]
 
 
 def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Return cross products (K,) of each edge and the vector to a point; all > 0 inside a counter-clockwise polygon."""
-    step, to_point = np.roll(corners, -1, axis=0) - corners, point - corners
+    """Return cross products (K,) of each edge and the vector to a point; all > 0 inside a
+    counter-clockwise polygon.
+    """
+    step = np.roll(corners, -1, axis=0) - corners
+    to_point = point - corners
     return step[:, 0] * to_point[:, 1] - step[:, 1] * to_point[:, 0]
 
 
-def masts_in_reach(masts_m: list[list[float]], polygon_m: list | None, mast_clearance_m: float) -> list[list[float]]:
+def masts_in_reach(
+    masts_m: list[list[float]], polygon_m: list | None, mast_clearance_m: float
+) -> list[list[float]]:
     """Return the masts [x, y] (m) on which the places of targets depend.
 
-    polygon_m: corners of a convex region, or None where the masts themselves span it; mast_clearance_m: least distance
-    of a target to a mast. A mast farther than that from a given region changes no draw.
+    polygon_m: corners of a convex region, or None where the masts themselves span it;
+    mast_clearance_m: least distance of a target to a mast. A mast farther than that from a given
+    region changes no draw.
     """
     if polygon_m is None:
         return masts_m
     corners = region_polygon(np.zeros((0, 2)), polygon_m)
     # Use twice the clearance, so that rounding cannot change a draw.
-    return [mast for mast in masts_m if _distance_m(np.array(mast, dtype=float), corners) < 2 * mast_clearance_m]
+    return [
+        mast
+        for mast in masts_m
+        if _distance_m(np.array(mast, dtype=float), corners) < 2 * mast_clearance_m
+    ]
 
 
 def _distance_m(point: np.ndarray, corners: np.ndarray) -> float:
     """Distance of a point (2,) to a convex polygon (K, 2), 0 inside (m)."""
     if np.all(_edges(corners, point) >= 0):
         return 0.0
-    side, away = np.roll(corners, -1, axis=0) - corners, point - corners
+    side = np.roll(corners, -1, axis=0) - corners
+    away = point - corners
     share = np.clip((away * side).sum(1) / (side * side).sum(1), 0.0, 1.0)
     return float(np.hypot(*(away - share[:, None] * side).T).min())
 
 
-def place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float) -> np.ndarray:
+def place(
+    rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float
+) -> np.ndarray:
     """Draw a place (2,) m inside the polygon `corners` and at least `clearance_m` from every mast.
 
     Raises: InputError where 10,000 draws find none.
     """
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    low = corners.min(axis=0)
+    high = corners.max(axis=0)
     for _ in range(10_000):
         point = rng.uniform(low, high)
         far = np.all(portable.dot(masts - point, masts - point) >= clearance_m * clearance_m)
@@ -83,13 +101,16 @@ def place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clea
 
 
 def heights(settings: dict, subtype: str, category: str, like: str) -> list[float]:
-    """Return the lowest and highest flight (m) that `height_m` gives for the subtype, its class or its `like`."""
+    """Return the lowest and highest flight (m) that `height_m` gives for the subtype, its class or
+    its `like`.
+    """
     block = settings["height_m"]
     return next(block[name] for name in (subtype, category, like) if name in block)
 
 
 def follow_speed(cloud: Cloud, row: dict, speed: float, cadence: str) -> None:
-    """Set the values that depend on the ground speed (m/s): the rate of wheels and the playback rate of a recording.
+    """Set the values that depend on the ground speed (m/s): the rate of wheels and the playback
+    rate of a recording.
 
     cadence: "free", or "tied" to the speed.
     """
@@ -100,20 +121,32 @@ def follow_speed(cloud: Cloud, row: dict, speed: float, cadence: str) -> None:
         row["playback"] = speed / cloud.record["track_speed_mps"] if tied else 1.0
 
 
-def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str) -> None:
-    """Fill in a row's rate, phases and place in a recording; speed: over ground (m/s); cadence: "free", or "tied" to
-    the speed.
+def draw_rates(
+    rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str
+) -> None:
+    """Fill in a row's rate, phases and place in a recording; speed: over ground (m/s); cadence:
+    "free", or "tied" to the speed.
 
     Raises: InputError for more moving parts than the motion table has phases.
     """
     follow_speed(cloud, row, speed, cadence)
-    if not cloud.parts_of("wheel") and cloud.like in AIRBORNE and published["freq_lo_hz"] is not None:
+    if (
+        not cloud.parts_of("wheel")
+        and cloud.like in AIRBORNE
+        and published["freq_lo_hz"] is not None
+    ):
         row["rate_hz"] = rng.uniform(published["freq_lo_hz"], published["freq_hi_hz"])
-    moving = len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
+    moving = (
+        len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
+    )
     if moving > PHASES:
-        raise InputError(f"motion of {cloud.subtype}: {moving} moving parts, expected at most {PHASES}")
+        raise InputError(
+            f"motion of {cloud.subtype}: {moving} moving parts, expected at most {PHASES}"
+        )
     if moving and math.isnan(row["rate_hz"]):
-        raise InputError(f"motion of {cloud.subtype}: the table of targets has no freq_lo_hz, expected a rate in hertz")
+        raise InputError(
+            f"motion of {cloud.subtype}: the table of targets has no freq_lo_hz, expected a rate in hertz"
+        )
     for index in range(moving):
         row[f"phase_{index}_rad"] = rng.uniform(0.0, 2 * math.pi)
     if "node" in cloud.kinds:
@@ -122,10 +155,12 @@ def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dic
 
 
 def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float, row: dict) -> None:
-    """Draw the target's longest side from `low_m` to `high_m`, uniform in its logarithm, and scale rate and height.
+    """Draw the target's longest side from `low_m` to `high_m`, uniform in its logarithm, and scale
+    rate and height.
 
-    A craft or bird `s` times as large turns or beats `s` times as slowly, so blade tips and wings keep their speed; a
-    wheel of `s` times the diameter turns `s` times as slowly at the same road speed. A recording keeps its cadence.
+    A craft or bird `s` times as large turns or beats `s` times as slowly, so blade tips and wings
+    keep their speed; a wheel of `s` times the diameter turns `s` times as slowly at the same road
+    speed. A recording keeps its cadence.
     """
     low, high = map(float, portable.log(np.array([low_m, high_m])))
     scale = row[SCALE] = float(portable.exp(rng.uniform(low, high))) / extent(cloud)
@@ -135,18 +170,25 @@ def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float,
 
 
 def draw(
-    rng: np.random.Generator, cloud: Cloud, published: dict, masts_m: np.ndarray, corners: np.ndarray, settings: dict
+    rng: np.random.Generator,
+    cloud: Cloud,
+    published: dict,
+    masts_m: np.ndarray,
+    corners: np.ndarray,
+    settings: dict,
 ) -> dict:
     """Return one motion model's row (without group and model) for the target `cloud`.
 
-    published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' places; corners: (K, 2) m
-    from `region_polygon`; settings: the motion block of the configuration. All values are drawn
-    uniformly; where `sizes_m` asks for sizes, the logarithm of the size is. Wheels turn at F = v / (pi D) (paper
-    Eq. 16).
+    published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' places;
+    corners: (K, 2) m from `region_polygon`; settings: the motion block of the configuration. All
+    values are drawn uniformly; where `sizes_m` asks for sizes, the logarithm of the size is. Wheels
+    turn at F = v / (pi D) (paper Eq. 16).
     Raises: InputError where no place satisfies the region or the target has too many parts.
     """
     row = dict.fromkeys(NUMBERS, math.nan)
-    row["x_m"], row["y_m"] = map(float, place(rng, corners, masts_m, settings["region"]["mast_clearance_m"]))
+    row["x_m"], row["y_m"] = map(
+        float, place(rng, corners, masts_m, settings["region"]["mast_clearance_m"])
+    )
     row["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
     row["pitch_rad"] = row["roll_rad"] = 0.0
     speed = 0.0

@@ -1,7 +1,7 @@
 """Sines, cosines and matrix products of the poses, with the same bits on every processor.
 
-numpy's sine depends on the processor's vector instructions, and a BLAS adds in an order of its own with fused
-operations. Here every operation is one that IEEE 754 fixes, in the order written.
+numpy's sine depends on the processor's vector instructions, and a BLAS adds in an order of its own
+with fused operations. Here every operation is one that IEEE 754 fixes, in the order written.
 """
 
 import numpy as np
@@ -20,12 +20,14 @@ def _sines(angles, sines, cosines):
     """Fill `sines` and `cosines` (K,) for angles (K,) rad."""
     for i in range(np.uint64(len(angles))):
         s, c = sine_cosine(multiply(TURNS, (angles[i], 0.0)))
-        sines[i], cosines[i] = s[0], c[0]
+        sines[i] = s[0]
+        cosines[i] = c[0]
 
 
 def sines_cosines(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return sine and cosine of angles (N,) rad, each rounded from about 24 digits."""
-    sines, cosines = np.empty(len(angles)), np.empty(len(angles))
+    sines = np.empty(len(angles))
+    cosines = np.empty(len(angles))
     _sines(angles, sines, cosines)
     return sines, cosines
 

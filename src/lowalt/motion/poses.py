@@ -1,7 +1,9 @@
-"""Poses: position and orientation of each rigid part at each symbol, in closed form from the initial pose.
+"""Poses: position and orientation of each rigid part at each symbol, in closed form from the
+initial pose.
 
-Angles are beta_0 + 2 pi F t instead of products of many small rotations, so errors do not accumulate. All
-poses have the same bits on every processor: sines and products are those of `pose_kernels` and `portable`.
+Angles are beta_0 + 2 pi F t instead of products of many small rotations, so errors do not
+accumulate. All poses have the same bits on every processor: sines and products are those of
+`pose_kernels` and `portable`.
 """
 
 from typing import NamedTuple
@@ -16,7 +18,8 @@ from lowalt.targets.cloud import Cloud
 
 
 class Poses(NamedTuple):
-    """Rigid transforms of every part: a point u of part p is at rotation[n, p] @ u + translation[n, p].
+    """Rigid transforms of every part: a point u of part p is at rotation[n, p] @ u + translation[n,
+    p].
 
     rotation: (N, P, 3, 3); translation: (N, P, 3) m, global frame.
     """
@@ -26,10 +29,11 @@ class Poses(NamedTuple):
 
 
 class Perturbation(NamedTuple):
-    """Changes that are added to a target's own motion at N symbols; a field that is None changes nothing.
+    """Changes that are added to a target's own motion at N symbols; a field that is None changes
+    nothing.
 
-    angle_rad: part -> (N,) rad, added to that part's turn; offset_m: (N, 3) m, added to the whole target's place,
-    global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.
+    angle_rad: part -> (N,) rad, added to that part's turn; offset_m: (N, 3) m, added to the whole
+    target's place, global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.
     """
 
     angle_rad: dict[int, np.ndarray] | None = None
@@ -38,7 +42,9 @@ class Perturbation(NamedTuple):
 
 
 def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
-    """Matrices A (3, Q, 4, 4): A[0] + cos(angle) A[1] + sin(angle) A[2] turns about the hinged axes (Q, 3)."""
+    """Matrices A (3, Q, 4, 4): A[0] + cos(angle) A[1] + sin(angle) A[2] turns about the hinged axes
+    (Q, 3).
+    """
     result = np.zeros((3, len(axes), 4, 4))
     turn = result[..., :3, :3]
     turn[0] = axes[:, :, None] * axes[:, None]
@@ -52,13 +58,18 @@ def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
     return result
 
 
-def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.ndarray], dict[int, tuple[str, float]]]:
-    """Angles that change with time, (N,) rad by name, and the moving parts: part -> (name of its angle, phase in rad).
+def _angles(
+    cloud: Cloud, row: dict, times_s: np.ndarray
+) -> tuple[dict[str, np.ndarray], dict[int, tuple[str, float]]]:
+    """Angles that change with time, (N,) rad by name, and the moving parts: part -> (name of its
+    angle, phase in rad).
 
-    A rotor or wheel turns at the row's rate times its own factor; those of one factor differ by a constant angle only.
+    A rotor or wheel turns at the row's rate times its own factor; those of one factor differ by a
+    constant angle only.
     Raises: InputError naming the parts without a rate or phase.
     """
-    angles, phases = {"cycle": 2 * np.pi * turns(row["rate_hz"], times_s)}, {}
+    angles = {"cycle": 2 * np.pi * turns(row["rate_hz"], times_s)}
+    phases = {}
     factors = cloud.rate_factors
     for kind in ("rotor", "wheel"):
         for order, part in enumerate(cloud.parts_of(kind)):
@@ -77,14 +88,23 @@ def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.
         for part in wings:
             phases[part] = ("shoulder" if cloud.parents[part] < 0 else "fold", 0.0)
     known = {name: np.isfinite(angle).all() for name, angle in angles.items()}
-    bad = [cloud.names[part] for part, (name, phase) in phases.items() if not (known[name] and np.isfinite(phase))]
+    bad = [
+        cloud.names[part]
+        for part, (name, phase) in phases.items()
+        if not (known[name] and np.isfinite(phase))
+    ]
     if bad:
-        raise InputError(f"motion of {cloud.subtype}, model {row['model']}: no finite rate or phase for parts {bad}")
+        raise InputError(
+            f"motion of {cloud.subtype}, model {row['model']}: no finite rate or phase for parts {bad}"
+        )
     return angles, phases
 
 
 def _perturbed(
-    cloud: Cloud, angles: dict[str, np.ndarray], phases: dict[int, tuple[str, float]], added: dict[int, np.ndarray]
+    cloud: Cloud,
+    angles: dict[str, np.ndarray],
+    phases: dict[int, tuple[str, float]],
+    added: dict[int, np.ndarray],
 ) -> None:
     """Give each part in `added` its own angle: its previous angle plus added[part] (N,) rad.
 
@@ -92,7 +112,9 @@ def _perturbed(
     """
     still = sorted(set(added) - set(phases))
     if still:
-        raise InputError(f"motion of {cloud.subtype}: angles added to parts {still}, expected some of {sorted(phases)}")
+        raise InputError(
+            f"motion of {cloud.subtype}: angles added to parts {still}, expected some of {sorted(phases)}"
+        )
     for part, angle in added.items():
         name, phase = phases[part]
         angles[f"{name} {part}"] = angles[name] + angle
@@ -102,11 +124,12 @@ def _perturbed(
 def _series(
     cloud: Cloud, row: dict, times_s: np.ndarray, added: dict[int, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return functions of time (N, K) and matrices (K, P, 4, 4); the sum of their products over K is the parts' motion.
+    """Return functions of time (N, K) and matrices (K, P, 4, 4); the sum of their products over K
+    is the parts' motion.
 
-    A turn by angle a about a hinge is A + cos(a) B + sin(a) C; the motion of a part on a moving part is a product of
-    such sums. The cost is a few cosines per symbol and one matrix product, for any number of parts. The body's own
-    motion is not included.
+    A turn by angle a about a hinge is A + cos(a) B + sin(a) C; the motion of a part on a moving
+    part is a product of such sums. The cost is a few cosines per symbol and one matrix product, for
+    any number of parts. The body's own motion is not included.
     """
     angles, phases = _angles(cloud, row, times_s)
     _perturbed(cloud, angles, phases, added)
@@ -116,12 +139,16 @@ def _series(
         columns["sin " + name,], columns["cos " + name,] = compiled().sines_cosines(angles[name])
     moving = list(phases)
     still, cosine, sine = _hinged(cloud.axes[moving], cloud.hinges[moving])
-    s, c = compiled().sines_cosines(np.array([phase for _, phase in phases.values()], dtype=np.float64))
-    s, c = s[:, None, None], c[:, None, None]
+    s, c = compiled().sines_cosines(
+        np.array([phase for _, phase in phases.values()], dtype=np.float64)
+    )
+    s = s[:, None, None]
+    c = c[:, None, None]
     turning = np.stack([still, c * cosine + s * sine, c * sine - s * cosine])
     terms: list[tuple[list[tuple[str, ...]], np.ndarray]] = []
     for part, parent in enumerate(cloud.parents):
-        names, matrices = [constant], np.eye(4)[None]
+        names = [constant]
+        matrices = np.eye(4)[None]
         if part in phases:
             names = [constant, ("cos " + phases[part][0],), ("sin " + phases[part][0],)]
             matrices = turning[:, moving.index(part)]
@@ -142,16 +169,21 @@ def _series(
 
 
 def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
-    """Attitudes (N, 3, 3) of the row's yaw, pitch and roll with `tilt_rad` (N, 3) added; order as `attitude`."""
+    """Attitudes (N, 3, 3) of the row's yaw, pitch and roll with `tilt_rad` (N, 3) added; order as
+    `attitude`.
+    """
     yaw, pitch, roll = (
-        row[name] + added for name, added in zip(("yaw_rad", "pitch_rad", "roll_rad"), tilt_rad.T, strict=True)
+        row[name] + added
+        for name, added in zip(("yaw_rad", "pitch_rad", "roll_rad"), tilt_rad.T, strict=True)
     )
     right, front, up = np.eye(3)
     return product(product(rodrigues(up, yaw), rodrigues(right, pitch)), rodrigues(front, roll))
 
 
 def _curved(row: dict, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Deviation of a track's path from its tangent (N, 3) m, and change of yaw, pitch and roll (N, 3) rad."""
+    """Deviation of a track's path from its tangent (N, 3) m, and change of yaw, pitch and roll (N,
+    3) rad.
+    """
     bent, bending = (np.array([row[name] for name in PATH[start : start + 3]]) for start in (0, 3))
     turned_rad = np.zeros((len(times_s), 3))
     turned_rad[:, 0] = row["turn_radps"] * times_s
@@ -159,24 +191,31 @@ def _curved(row: dict, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Return the nodes' positions (N, L, 3) in a recording turned by `body`, linear between frames (paper Eq. 22)."""
+    """Return the nodes' positions (N, L, 3) in a recording turned by `body`, linear between frames
+    (paper Eq. 22).
+    """
     frames = len(cloud.track)
     place = (row["start_s"] + row["playback"] * times_s) * cloud.record["track_rate_hz"] % frames
     first = np.minimum(place.astype(np.int64), frames - 1)
     turned = compiled().product(cloud.track.reshape(-1, 3), body.T).reshape(frames, -1)
-    before, result = turned.take(first, axis=0), turned.take((first + 1) % frames, axis=0)
+    before = turned.take(first, axis=0)
+    result = turned.take((first + 1) % frames, axis=0)
     result -= before
     result *= (place - first)[:, None]
     result += before
     return result.reshape(len(times_s), -1, 3)
 
 
-def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbation | None = None) -> Poses:
-    """Return the poses of all parts of `cloud` under the motion of `row` (motion table) at `times_s` (N,) s.
+def poses(
+    cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbation | None = None
+) -> Poses:
+    """Return the poses of all parts of `cloud` under the motion of `row` (motion table) at
+    `times_s` (N,) s.
 
-    `perturbation` is added to that motion. A cloud of nodes gets rotations of zeros (read-only), and its
-    translations are the positions of its nodes.
-    Raises: InputError where the row lacks a value the cloud needs, or a part that does not move is to be turned.
+    `perturbation` is added to that motion. A cloud of nodes gets rotations of zeros (read-only),
+    and its translations are the positions of its nodes.
+    Raises: InputError where the row lacks a value the cloud needs, or a part that does not move is
+    to be turned.
     Source: paper Eqs. 17 to 20 and 22, Rodrigues' formula.
     """
     times_s = np.asarray(times_s, dtype=np.float64)
@@ -185,7 +224,9 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
     origin = np.array([row["x_m"], row["y_m"], row["z_m"]])
     velocity = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
     if not np.isfinite([*origin, *velocity, *body.flat]).all():
-        raise InputError(f"motion of {cloud.subtype}, model {row['model']}: position, velocity or attitude not finite")
+        raise InputError(
+            f"motion of {cloud.subtype}, model {row['model']}: position, velocity or attitude not finite"
+        )
     path = origin + times_s[:, None] * velocity
     if "turn_radps" in row:
         course, turned_rad = _curved(row, times_s)
@@ -194,8 +235,10 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
     if offset is not None:
         path += offset
     if tilt is not None:
-        turned, body = _attitudes(row, tilt), np.eye(3)
-    count, parts = len(times_s), len(cloud.kinds)
+        turned = _attitudes(row, tilt)
+        body = np.eye(3)
+    count = len(times_s)
+    parts = len(cloud.kinds)
     if "node" in cloud.kinds:
         _perturbed(cloud, {}, {}, added or {})
         translation = _track(cloud, row, times_s, body)
@@ -206,8 +249,14 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
     functions, matrices = _series(cloud, row, times_s, added or {})
     matrices = product(body, matrices[..., :3, :])
     terms = functions.shape[1]
-    rotation = compiled().product(functions, matrices[..., :3].reshape(terms, -1)).reshape(count, parts, 3, 3)
-    translation = compiled().product(functions, matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
+    rotation = (
+        compiled()
+        .product(functions, matrices[..., :3].reshape(terms, -1))
+        .reshape(count, parts, 3, 3)
+    )
+    translation = (
+        compiled().product(functions, matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
+    )
     if tilt is not None:
         rotation = product(turned[:, None], rotation)
         translation = applied(turned[:, None], translation)
@@ -216,7 +265,9 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
 
 
 def positions(cloud: Cloud, row: dict, times_s: np.ndarray) -> np.ndarray:
-    """Return every point's position (N, L, 3) in metres, global frame; arguments and errors as `poses`."""
+    """Return every point's position (N, L, 3) in metres, global frame; arguments and errors as
+    `poses`.
+    """
     rotation, translation = poses(cloud, row, times_s)
     if "node" in cloud.kinds:
         return translation

@@ -1,6 +1,7 @@
 """Rotation angles from a rate and a time, and rotation matrices.
 
-All of them have the same bits on every processor: sines and products are those of `pose_kernels` and `portable`.
+All of them have the same bits on every processor: sines and products are those of `pose_kernels`
+and `portable`.
 """
 
 import numpy as np
@@ -10,14 +11,17 @@ from lowalt.numerics.portable import product
 
 
 def compiled():
-    """Return the module of compiled functions, imported at the first call: other stages start without numba."""
+    """Return the module of compiled functions, imported at the first call: other stages start
+    without numba.
+    """
     from lowalt.motion import pose_kernels
 
     return pose_kernels
 
 
 def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
-    """Return rate_hz * times_s minus the nearest integer number of turns, in [-1/2, 1/2]; shape of `times_s`.
+    """Return rate_hz * times_s minus the nearest integer number of turns, in [-1/2, 1/2]; shape of
+    `times_s`.
 
     The product is a double-double, so the fraction keeps full precision after 10^6 turns.
     """
@@ -26,19 +30,27 @@ def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
 
 
 def rodrigues(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Return the matrices that turn by `angle` (N,) rad about the unit vector `axis` (3,); shape (N, 3, 3).
+    """Return the matrices that turn by `angle` (N,) rad about the unit vector `axis` (3,); shape
+    (N, 3, 3).
 
     Source: Rodrigues' rotation formula, paper Eq. 17.
     """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = (values[:, None, None] for values in compiled().sines_cosines(np.ascontiguousarray(angle, float)))
+    sine, cosine = (
+        values[:, None, None]
+        for values in compiled().sines_cosines(np.ascontiguousarray(angle, float))
+    )
     return cosine * np.eye(3) + sine * cross + (1.0 - cosine) * np.outer(axis, axis)
 
 
 def attitude(yaw_rad: float, pitch_rad: float, roll_rad: float) -> np.ndarray:
-    """Return R_Y(yaw) R_P(pitch) R_R(roll), turns about z, x and y; shape (3, 3). Source: paper Eq. 18."""
-    (d, e, f), (a, b, c) = compiled().sines_cosines(np.array([yaw_rad, pitch_rad, roll_rad], dtype=np.float64))
+    """Return R_Y(yaw) R_P(pitch) R_R(roll), turns about z, x and y; shape (3, 3). Source: paper Eq.
+    18.
+    """
+    (d, e, f), (a, b, c) = compiled().sines_cosines(
+        np.array([yaw_rad, pitch_rad, roll_rad], dtype=np.float64)
+    )
     yaw = np.array([[a, -d, 0.0], [d, a, 0.0], [0.0, 0.0, 1.0]])
     pitch = np.array([[1.0, 0.0, 0.0], [0.0, b, -e], [0.0, e, b]])
     roll = np.array([[c, 0.0, f], [0.0, 1.0, 0.0], [-f, 0.0, c]])

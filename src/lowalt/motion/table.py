@@ -15,20 +15,32 @@ PHASES = MOST_TURNING_PARTS
 
 TEXTS = ("subtype", "category", "group")
 NUMBERS = (
-    "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad",
-    "rate_hz", *(f"phase_{index}_rad" for index in range(PHASES)), "start_s", "playback",
-)  # fmt: skip
+    "x_m",
+    "y_m",
+    "z_m",
+    "vx_mps",
+    "vy_mps",
+    "vz_mps",
+    "yaw_rad",
+    "pitch_rad",
+    "roll_rad",
+    "rate_hz",
+    *(f"phase_{index}_rad" for index in range(PHASES)),
+    "start_s",
+    "playback",
+)
 COLUMNS = (*TEXTS, "model", *NUMBERS)
 TRACK = ("track", "look")
 PATH = ("ax_mps2", "ay_mps2", "az_mps2", "jx_mps3", "jy_mps3", "jz_mps3", "turn_radps")
-"""Further columns of tables with tracks: number of the track in its subtype and of the look in its track; acceleration
-at the first symbol, its rate of change (jerk), and heading rate."""
+"""Further columns of tables with tracks: number of the track in its subtype and of the look in its
+track; acceleration at the first symbol, its rate of change (jerk), and heading rate."""
 SCALE = "scale"
 """A further column of tables with random sizes: size of the target relative to its cloud."""
 
 
 def write_table(path: str | Path, rows: list[dict]) -> None:
-    """Write rows (one dict per motion model, NaN where a column does not apply) as CSV; equal rows give equal bytes.
+    """Write rows (one dict per motion model, NaN where a column does not apply) as CSV; equal rows
+    give equal bytes.
 
     Rows of targets with random sizes have the key SCALE, those of tracks the keys TRACK and PATH.
     """
@@ -42,15 +54,19 @@ def _further(names: Collection[str]) -> tuple[str, ...]:
 
 
 def _cells(row: dict, names: tuple[str, ...]) -> list:
-    """Return the cells of a row: texts, the model's number, then numbers in full precision, empty where NaN."""
+    """Return the cells of a row: texts, the model's number, then numbers in full precision, empty
+    where NaN.
+    """
     numbers = (
-        int(row[name]) if name in TRACK else "" if math.isnan(row[name]) else repr(float(row[name])) for name in names
+        int(row[name]) if name in TRACK else "" if math.isnan(row[name]) else repr(float(row[name]))
+        for name in names
     )
     return [*(row[name] for name in TEXTS), int(row["model"]), *numbers]
 
 
 def read_table(path: str | Path) -> list[dict]:
-    """Read a motion table: dicts with `model`, `track`, `look` as ints, numbers as floats, NaN where a cell is empty.
+    """Read a motion table: dicts with `model`, `track`, `look` as ints, numbers as floats, NaN
+    where a cell is empty.
 
     Raises: InputError naming the file, line and column that is wrong.
     """
@@ -58,7 +74,9 @@ def read_table(path: str | Path) -> list[dict]:
         reader = csv.reader(file)
         header = tuple(next(reader, ()))
         if header != (*COLUMNS, *_further(header)):
-            raise InputError(f"{path}: columns {sorted(set(header) ^ set(COLUMNS))} missing, unknown or out of order")
+            raise InputError(
+                f"{path}: columns {sorted(set(header) ^ set(COLUMNS))} missing, unknown or out of order"
+            )
         return [_row(path, line, header, cells) for line, cells in enumerate(reader, start=2)]
 
 
@@ -70,12 +88,20 @@ def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str])
     for name in header[len(TEXTS) :]:
         text = row[name]
         try:
-            row[name] = int(text) if name in ("model", *TRACK) else float(text) if text else math.nan
+            row[name] = (
+                int(text) if name in ("model", *TRACK) else float(text) if text else math.nan
+            )
             infinite = math.isinf(row[name])
         except (ValueError, OverflowError):
-            raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a number") from None
+            raise InputError(
+                f"{path}, line {line}, column {name}: {text!r}, expected a number"
+            ) from None
         if infinite:
-            raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a finite number")
+            raise InputError(
+                f"{path}, line {line}, column {name}: {text!r}, expected a finite number"
+            )
     if SCALE in row and not row[SCALE] > 0:
-        raise InputError(f"{path}, line {line}, column {SCALE}: {row[SCALE]}, expected a positive number")
+        raise InputError(
+            f"{path}, line {line}, column {SCALE}: {row[SCALE]}, expected a positive number"
+        )
     return row

@@ -1,7 +1,7 @@
 """The path of a flight log: a CSV table of times and places, resampled at the starts of looks.
 
-Columns time_s, x_m, y_m, z_m; or time_s, lat, lon, alt, in degrees and metres above ground: the first row lies in the
-middle of the cell, +x is east, +y north.
+Columns time_s, x_m, y_m, z_m; or time_s, lat, lon, alt, in degrees and metres above ground: the
+first row lies in the middle of the cell, +x is east, +y north.
 """
 
 import math
@@ -15,29 +15,35 @@ from lowalt.files.errors import InputError
 from lowalt.motion.tracks import Cell, LookStarts
 from lowalt.numerics import portable
 
-METRES, DEGREES = ("time_s", "x_m", "y_m", "z_m"), ("time_s", "lat", "lon", "alt")
-SEMI_MAJOR_M, ECCENTRICITY_2 = 6378137.0, 0.00669437999014
+METRES = ("time_s", "x_m", "y_m", "z_m")
+DEGREES = ("time_s", "lat", "lon", "alt")
+SEMI_MAJOR_M = 6378137.0
+ECCENTRICITY_2 = 0.00669437999014
 """The ellipsoid WGS 84: semi-major axis, and square of the first eccentricity."""
 SLOWEST_MPS = 0.5
 """Speed over ground below which a course says nothing; the heading stays."""
 
 
 def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStarts | None:
-    """Return the path at the starts of looks of the flight log that the block `motion` names under `track`, None where
-    it names none.
+    """Return the path at the starts of looks of the flight log that the block `motion` names under
+    `track`, None where it names none.
 
-    corners (K, 2), masts_m (S, 2): as of `Cell`. Velocities at the log's rows are differences of its places (second
-    order), and cubics join the rows. The heading is the course.
+    corners (K, 2), masts_m (S, 2): as of `Cell`. Velocities at the log's rows are differences of
+    its places (second order), and cubics join the rows. The heading is the course.
     Raises: InputError naming the file, and the line, column or place that is wrong.
     """
     if "track" not in motion:
         return None
-    path, looks, look_s = motion["track"], motion["looks"], motion["look_s"]
+    path = motion["track"]
+    looks = motion["looks"]
+    look_s = motion["look_s"]
     cell = Cell(corners, masts_m, motion["region"]["mast_clearance_m"])
     times_s, places = _numbers(path, cell)
     long_s = times_s[-1] - times_s[0]
     if long_s < looks * look_s * (1 - 1e-9):
-        raise InputError(f"{path}: {long_s:g} s long, expected {looks * look_s:g} s for motion.looks {looks}")
+        raise InputError(
+            f"{path}: {long_s:g} s long, expected {looks * look_s:g} s for motion.looks {looks}"
+        )
     place_m, velocity_mps = _resampled(times_s, places, times_s[0] + look_s * np.arange(looks + 1))
     outside = np.flatnonzero(cell.room_m(place_m[:, :2]) <= 0)
     if len(outside):
@@ -58,7 +64,12 @@ def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
             f"{path}: {len(rows)} rows of the columns {list(rows[0]) if rows else []}, expected two or more of "
             f"{list(METRES)} or {list(DEGREES)}"
         )
-    values = np.array([[_number(path, line, name, row[name]) for name in named] for line, row in enumerate(rows, 2)])
+    values = np.array(
+        [
+            [_number(path, line, name, row[name]) for name in named]
+            for line, row in enumerate(rows, 2)
+        ]
+    )
     back = np.flatnonzero(np.diff(values[:, 0]) <= 0)
     if len(back):
         line = int(back[0])
@@ -66,7 +77,9 @@ def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
             f"{path}, line {line + 3}, column time_s: {values[line + 1, 0]:g} after {values[line, 0]:g}, expected "
             "times that increase"
         )
-    return values[:, 0], values[:, 1:] if named == METRES else _flat(values[:, 1:], cell.corners.mean(axis=0))
+    return values[:, 0], values[:, 1:] if named == METRES else _flat(
+        values[:, 1:], cell.corners.mean(axis=0)
+    )
 
 
 def _number(path: str | Path, line: int, column: str, text: str) -> float:
@@ -81,8 +94,8 @@ def _number(path: str | Path, line: int, column: str, text: str) -> float:
 
 
 def _flat(degrees: np.ndarray, middle_m: np.ndarray) -> np.ndarray:
-    """Places (R, 3) m of latitudes, longitudes (degrees) and heights (R, 3): on the plane that touches WGS 84 at the
-    first row, which lies at `middle_m` (2,)."""
+    """Places (R, 3) m of latitudes, longitudes (degrees) and heights (R, 3): on the plane that
+    touches WGS 84 at the first row, which lies at `middle_m` (2,)."""
     latitude, longitude, height = degrees.T
     sine, cosine = portable.sine_cosine(math.radians(latitude[0]))
     square = 1.0 - ECCENTRICITY_2 * float(sine) ** 2
@@ -93,21 +106,28 @@ def _flat(degrees: np.ndarray, middle_m: np.ndarray) -> np.ndarray:
     return np.stack([middle_m[0] + x, middle_m[1] + y, height], axis=1)
 
 
-def _resampled(times_s: np.ndarray, places_m: np.ndarray, wanted_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _resampled(
+    times_s: np.ndarray, places_m: np.ndarray, wanted_s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Places and velocities (N, 3) at the times wanted, on cubics between the rows."""
     order: Literal[1, 2] = 2 if len(times_s) > 2 else 1
     velocities = np.gradient(places_m, times_s, axis=0, edge_order=order)
     first = np.clip(np.searchsorted(times_s, wanted_s, side="right") - 1, 0, len(times_s) - 2)
     step = (times_s[first + 1] - times_s[first])[:, None]
     u = (wanted_s - times_s[first])[:, None] / step
-    a, b = places_m[first], places_m[first + 1]
-    m, n = step * velocities[first], step * velocities[first + 1]
-    second, third = 3 * (b - a) - 2 * m - n, m + n - 2 * (b - a)
+    a = places_m[first]
+    b = places_m[first + 1]
+    m = step * velocities[first]
+    n = step * velocities[first + 1]
+    second = 3 * (b - a) - 2 * m - n
+    third = m + n - 2 * (b - a)
     return a + u * (m + u * (second + u * third)), (m + u * (2 * second + 3 * u * third)) / step
 
 
 def _headings(velocity_mps: np.ndarray) -> np.ndarray:
-    """Yaw (N,) rad along the course; where the target is slow, that before, at first the next one, or 0."""
+    """Yaw (N,) rad along the course; where the target is slow, that before, at first the next one,
+    or 0.
+    """
     x, y, _ = velocity_mps.T
     heading = portable.arctan2(-x, y)
     fast = np.flatnonzero(portable.norm(velocity_mps[:, :2]) >= SLOWEST_MPS)

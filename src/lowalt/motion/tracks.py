@@ -1,7 +1,9 @@
-"""Tracks: motion models that are looked at again and again, on a drawn path that turns or on that of a flight log.
+"""Tracks: motion models that are looked at again and again, on a drawn path that turns or on that
+of a flight log.
 
-The path of a look is the cubic with the places and velocities of both its ends, and its heading turns at a constant
-rate. Place, velocity, heading, rotors, wheels, wings and gait therefore continue from look to look without a jump.
+The path of a look is the cubic with the places and velocities of both its ends, and its heading
+turns at a constant rate. Place, velocity, heading, rotors, wheels, wings and gait therefore
+continue from look to look without a jump.
 """
 
 import math
@@ -34,8 +36,8 @@ class LookStarts(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Where targets may be: inside the convex region of `corners` (K, 2) m, counter-clockwise, and at least
-    `clearance_m` from each of `masts_m` (S, 2) m."""
+    """Where targets may be: inside the convex region of `corners` (K, 2) m, counter-clockwise, and
+    at least `clearance_m` from each of `masts_m` (S, 2) m."""
 
     corners: np.ndarray
     masts_m: np.ndarray
@@ -50,18 +52,27 @@ class Cell(NamedTuple):
         return np.concatenate([rooms, masts], axis=1).min(axis=1)
 
 
-def turned(place_m: np.ndarray, velocity_mps: np.ndarray, rate: float, times_s: np.ndarray) -> tuple:
-    """Return place and velocity (N, 2) in a coordinated turn: constant speed, heading rate `rate` (rad/s), not 0.
+def turned(
+    place_m: np.ndarray, velocity_mps: np.ndarray, rate: float, times_s: np.ndarray
+) -> tuple:
+    """Return place and velocity (N, 2) in a coordinated turn: constant speed, heading rate `rate`
+    (rad/s), not 0.
 
-    Source: Li and Jilkov, Survey of maneuvering target tracking, part I, IEEE Trans. AES 39, 2003, section V-A.
+    Source: Li and Jilkov, Survey of maneuvering target tracking, part I, IEEE Trans. AES 39, 2003,
+    section V-A.
     """
     sine, cosine = (value[:, None] for value in portable.sine_cosine(rate * times_s))
     left = np.array([-velocity_mps[1], velocity_mps[0]])
-    return (place_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left, cosine * velocity_mps + sine * left)
+    return (
+        place_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left,
+        cosine * velocity_mps + sine * left,
+    )
 
 
 def _way_back(cell: Cell, place_m: np.ndarray, velocity_mps: np.ndarray) -> float:
-    """The heading rate, TURN_RADPS to a side, whose full circle stays in the cell; 0 where neither does."""
+    """The heading rate, TURN_RADPS to a side, whose full circle stays in the cell; 0 where neither
+    does.
+    """
     left = np.array([-velocity_mps[1], velocity_mps[0]]) / TURN_RADPS
     room = cell.room_m(place_m + np.stack([left, -left])) >= portable.norm(left)
     return TURN_RADPS if room[0] else -TURN_RADPS if room[1] else 0.0
@@ -91,39 +102,61 @@ def _begun(rng: np.random.Generator, row: dict, cell: Cell) -> None:
 
 
 def drawn_path(
-    rng: np.random.Generator, row: dict, cell: Cell, heights_m: tuple[float, float], looks: int, look_s: float
+    rng: np.random.Generator,
+    row: dict,
+    cell: Cell,
+    heights_m: tuple[float, float],
+    looks: int,
+    look_s: float,
 ) -> LookStarts:
     """Return a path of `looks` looks of `look_s` seconds from the place and velocity of `row`.
 
-    The heading rate of each look is uniform within TURN_RADPS, drawn again where the target would leave the cell or
-    could not turn back; after 20 draws it turns back. It climbs the other way at the ends of `heights_m` (lowest and
-    highest, m). The speed over ground is constant.
+    The heading rate of each look is uniform within TURN_RADPS, drawn again where the target would
+    leave the cell or could not turn back; after 20 draws it turns back. It climbs the other way at
+    the ends of `heights_m` (lowest and highest, m). The speed over ground is constant.
     """
     step = look_s / 8 * np.arange(1, 9)
-    here, velocity = np.array([row["x_m"], row["y_m"]]), np.array([row["vx_mps"], row["vy_mps"]])
-    height, climb, heading = row["z_m"], 0.0, row["yaw_rad"]
+    here = np.array([row["x_m"], row["y_m"]])
+    velocity = np.array([row["vx_mps"], row["vy_mps"]])
+    height = row["z_m"]
+    climb = 0.0
+    heading = row["yaw_rad"]
     climb = _climb(height, row["vz_mps"], row["vz_mps"], heights_m, 0.0, look_s)
     starts = [(*here, height, *velocity, climb, heading)]
     for _ in range(looks):
         for attempt in range(21):
-            rate = rng.uniform(-TURN_RADPS, TURN_RADPS) if attempt < 20 else _way_back(cell, here, velocity)
+            rate = (
+                rng.uniform(-TURN_RADPS, TURN_RADPS)
+                if attempt < 20
+                else _way_back(cell, here, velocity)
+            )
             places, velocities = turned(here, velocity, rate, step)
             if (cell.room_m(places) > 0).all() and _way_back(cell, places[-1], velocities[-1]):
                 break
-        here, velocity, heading = places[-1], velocities[-1], heading + rate * look_s
+        here = places[-1]
+        velocity = velocities[-1]
+        heading = heading + rate * look_s
         later = _climb(height, climb, climb, heights_m, look_s, look_s)
-        height, climb = height + look_s * (climb + later) / 2, later
+        height = height + look_s * (climb + later) / 2
+        climb = later
         starts.append((*here, height, *velocity, climb, heading))
     nodes = np.array(starts)
     return LookStarts(nodes[:, :3], nodes[:, 3:6], nodes[:, 6])
 
 
 def _climb(
-    height: float, before: float, wanted: float, heights_m: tuple[float, float], ago_s: float, look_s: float
+    height: float,
+    before: float,
+    wanted: float,
+    heights_m: tuple[float, float],
+    ago_s: float,
+    look_s: float,
 ) -> float:
-    """The climb (m/s) after a look that began at `height` (m) and climbed `before`: as wanted, the other way, or none.
+    """The climb (m/s) after a look that began at `height` (m) and climbed `before`: as wanted, the
+    other way, or none.
 
-    ago_s: length of that look, 0 at the first one. At the climb returned, the next look ends within the heights.
+    ago_s: length of that look, 0 at the first one. At the climb returned, the next look ends within
+    the heights.
     """
     for climb in (wanted, -wanted):
         if heights_m[0] <= height + ago_s * (before + climb) / 2 + look_s * climb <= heights_m[1]:
@@ -131,17 +164,24 @@ def _climb(
     return 0.0
 
 
-def rows_along(cloud: Cloud, row: dict, path: LookStarts, look_s: float, cadence: str | None) -> list[dict]:
-    """Return the rows of a track's looks: `row` moved along `path`, the target's own motion going on.
+def rows_along(
+    cloud: Cloud, row: dict, path: LookStarts, look_s: float, cadence: str | None
+) -> list[dict]:
+    """Return the rows of a track's looks: `row` moved along `path`, the target's own motion going
+    on.
 
-    cadence: as of `follow_speed`, for a path of changing speed; None where the row's speed is the path's.
+    cadence: as of `follow_speed`, for a path of changing speed; None where the row's speed is the
+    path's.
     """
-    rows, row = [], dict(row)
+    rows = []
+    row = dict(row)
     bent, bending = _cubic(path, look_s)
     turn = (np.diff(path.heading_rad) + math.pi) % (2 * math.pi) - math.pi
     for look in range(len(turn)):
         row |= dict(zip(("x_m", "y_m", "z_m"), path.place_m[look].tolist(), strict=True))
-        row |= dict(zip(("vx_mps", "vy_mps", "vz_mps"), path.velocity_mps[look].tolist(), strict=True))
+        row |= dict(
+            zip(("vx_mps", "vy_mps", "vz_mps"), path.velocity_mps[look].tolist(), strict=True)
+        )
         row["yaw_rad"] = float(path.heading_rad[look] % (2 * math.pi))
         if cadence is not None:
             way = (path.place_m[look + 1] - path.place_m[look])[:2]
@@ -155,10 +195,16 @@ def rows_along(cloud: Cloud, row: dict, path: LookStarts, look_s: float, cadence
 
 
 def _cubic(path: LookStarts, look_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Acceleration at the start of each look, and its rate of change, (L, 3) both: the cubic between its ends."""
+    """Acceleration at the start of each look, and its rate of change, (L, 3) both: the cubic
+    between its ends.
+    """
     way = np.diff(path.place_m, axis=0)
-    first, last = path.velocity_mps[:-1], path.velocity_mps[1:]
-    return ((6 * way / look_s - 4 * first - 2 * last) / look_s, (6 * (first + last) - 12 * way / look_s) / look_s**2)
+    first = path.velocity_mps[:-1]
+    last = path.velocity_mps[1:]
+    return (
+        (6 * way / look_s - 4 * first - 2 * last) / look_s,
+        (6 * (first + last) - 12 * way / look_s) / look_s**2,
+    )
 
 
 def _go_on(cloud: Cloud, row: dict, look_s: float) -> None:
@@ -176,30 +222,46 @@ def _go_on(cloud: Cloud, row: dict, look_s: float) -> None:
 
 
 def model_rows(
-    seed: int, cloud: Cloud, published: dict, masts_m: np.ndarray, corners: np.ndarray, settings: dict, track: int,
+    seed: int,
+    cloud: Cloud,
+    published: dict,
+    masts_m: np.ndarray,
+    corners: np.ndarray,
+    settings: dict,
+    track: int,
     path: LookStarts | None = None,
-) -> list[dict]:  # fmt: skip
-    """Return the rows (without group and model) of one motion model: its only look, or all looks of a track.
+) -> list[dict]:
+    """Return the rows (without group and model) of one motion model: its only look, or all looks of
+    a track.
 
-    settings: the configuration's block `motion`, and look_s (s), the length of a look, where it has `looks`; track:
-    number of the motion model; path: that of a flight log. Everything else is as of `draw`. Each motion model has a
-    stream of its own. Raises: InputError as `draw`, and where the region is too small to turn in.
+    settings: the configuration's block `motion`, and look_s (s), the length of a look, where it has
+    `looks`; track: number of the motion model; path: that of a flight log. Everything else is as of
+    `draw`. Each motion model has a stream of its own. Raises: InputError as `draw`, and where the
+    region is too small to turn in.
     """
     rng = stream(seed, "motion", cloud.subtype, track)
     row = draw(rng, cloud, published, masts_m, corners, settings)
     if "looks" not in settings:
         return [row]
-    look_s, looks, height_m = settings["look_s"], settings["looks"], row["z_m"]
+    look_s = settings["look_s"]
+    looks = settings["looks"]
+    height_m = row["z_m"]
     airborne = cloud.like in AIRBORNE
     if path is None:
         cell = Cell(corners, masts_m, settings["region"]["mast_clearance_m"])
         _begun(rng, row, cell)
-        lowest, highest = heights(settings, cloud.subtype, cloud.category, cloud.like) if airborne else (height_m,) * 2
-        path, cadence = drawn_path(rng, row, cell, (lowest, highest), looks, look_s), None
+        lowest, highest = (
+            heights(settings, cloud.subtype, cloud.category, cloud.like)
+            if airborne
+            else (height_m,) * 2
+        )
+        path = drawn_path(rng, row, cell, (lowest, highest), looks, look_s)
+        cadence = None
     else:
         cadence = settings["cadence"]
         if not airborne:
             path = path._replace(
-                place_m=path.place_m * [1, 1, 0] + [0, 0, height_m], velocity_mps=path.velocity_mps * [1, 1, 0]
+                place_m=path.place_m * [1, 1, 0] + [0, 0, height_m],
+                velocity_mps=path.velocity_mps * [1, 1, 0],
             )
     return [{**row, "track": track} for row in rows_along(cloud, row, path, look_s, cadence)]

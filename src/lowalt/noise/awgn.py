@@ -1,4 +1,6 @@
-"""Complex white Gaussian noise at a set SNR: for one signal, whose mean power is the reference, and for a chunk."""
+"""Complex white Gaussian noise at a set SNR: for one signal, whose mean power is the reference, and
+for a chunk.
+"""
 
 import math
 from collections.abc import Callable
@@ -15,13 +17,15 @@ from lowalt.numerics.streams import stream
 def add_noise(
     signal: np.ndarray, snr_db: float, rng: np.random.Generator | None, power: float | None = None
 ) -> np.ndarray:
-    """Return `signal` plus circular complex Gaussian noise at `snr_db`, complex128 of the same shape (N,).
+    """Return `signal` plus circular complex Gaussian noise at `snr_db`, complex128 of the same
+    shape (N,).
 
-    The noise power is `power` / 10^(snr_db / 10), where `power` is mean |signal|^2 by default; give the power of
-    the target's echo where the signal holds more than that. At an SNR of +inf nothing is drawn and the signal is
-    returned unchanged. A signal of zeros has no power to refer to and stays zeros.
-    Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, a negative power, or no generator
-    where noise is to be drawn.
+    The noise power is `power` / 10^(snr_db / 10), where `power` is mean |signal|^2 by default; give
+    the power of the target's echo where the signal holds more than that. At an SNR of +inf nothing
+    is drawn and the signal is returned unchanged. A signal of zeros has no power to refer to and
+    stays zeros.
+    Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, a negative
+    power, or no generator where noise is to be drawn.
     Source: paper, section V-A; unit-power circular noise has variance 1/2 per component.
 
         >>> signal = np.exp(1j * np.arange(10_000))
@@ -48,7 +52,8 @@ def add_noise(
     real, imaginary = circular(rng.bit_generator.random_raw(2 * signal.size), scale * share)
     result = np.empty(signal.shape, np.complex128)
     result.real, result.imag = (
-        part + more.reshape(signal.shape) for part, more in ((signal.real, real), (signal.imag, imaginary))
+        part + more.reshape(signal.shape)
+        for part, more in ((signal.real, real), (signal.imag, imaginary))
     )
     return result
 
@@ -62,11 +67,13 @@ def noisy_signals(
     powers: np.ndarray | None = None,
     behind: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:
-    """Return noisy signals (models, snrs, stations, N) complex64 of clean `echoes` (stations, models, N).
+    """Return noisy signals (models, snrs, stations, N) complex64 of clean `echoes` (stations,
+    models, N).
 
-    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by default; behind: filters
-    noise (N,) as the scene's canceller does, if there is one. Echoes (stations, models, snrs, N) already contain their
-    noise. Each (subtype, model, station, SNR) has its own noise stream.
+    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by
+    default; behind: filters noise (N,) as the scene's canceller does, if there is one. Echoes
+    (stations, models, snrs, N) already contain their noise. Each (subtype, model, station, SNR) has
+    its own noise stream.
     """
     if np.ndim(echoes) == 4:
         return np.ascontiguousarray(np.moveaxis(echoes, 0, 2), np.complex64)
@@ -74,9 +81,15 @@ def noisy_signals(
     for model, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
             for place, name in enumerate(stations):
-                rng = None if np.isposinf(snr_db) else stream(seed, "noise", row["subtype"], row["model"], name, snr_db)
+                rng = (
+                    None
+                    if np.isposinf(snr_db)
+                    else stream(seed, "noise", row["subtype"], row["model"], name, snr_db)
+                )
                 power = None if powers is None else float(powers[place, model])
-                result[model, level, place] = _noisy(echoes[place, model], snr_db, rng, power, behind)
+                result[model, level, place] = _noisy(
+                    echoes[place, model], snr_db, rng, power, behind
+                )
     return result
 
 

@@ -1,1 +1,3 @@
-"""Numbers whose bits are the same on every processor: elementary functions, exact sums, random draws."""
+"""Numbers whose bits are the same on every processor: elementary functions, exact sums, random
+draws.
+"""

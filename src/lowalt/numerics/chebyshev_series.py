@@ -1,4 +1,6 @@
-"""Chebyshev series: how many terms a wave needs, points, interpolation, a band of waves, and a smooth function."""
+"""Chebyshev series: how many terms a wave needs, points, interpolation, a band of waves, and a
+smooth function.
+"""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -15,7 +17,9 @@ STRIP = 256
 ENOUGH = 1e-14
 """Share of the largest coefficient below which the last quarter of a series must be."""
 SPARE = 24
-"""Points of a wave's series beyond its terms, so that what is left of the series does not fold back into them."""
+"""Points of a wave's series beyond its terms, so that what is left of the series does not fold back
+into them.
+"""
 
 
 def orders_of(argument: float, error: float) -> int:
@@ -45,7 +49,9 @@ def polynomials(count: int, at: np.ndarray) -> np.ndarray:
 
 
 def _to_terms(count: int, terms: int) -> np.ndarray:
-    """The matrix (count, terms) from values at `chebyshev_points(count)` to the first terms of their series."""
+    """The matrix (count, terms) from values at `chebyshev_points(count)` to the first terms of
+    their series.
+    """
     # Whole turns of a cosine are left out as whole numbers.
     eighths = np.outer(2 * np.arange(count) + 1, np.arange(terms)) % (4 * count)
     result = 2.0 / count * sine_cosine_turns(eighths / (4 * count))[1]
@@ -54,7 +60,8 @@ def _to_terms(count: int, terms: int) -> np.ndarray:
 
 
 def interpolation(count: int, at: np.ndarray) -> np.ndarray:
-    """Return the Lagrange weights (count, K) from values at `chebyshev_points(count)` to those at `at` (K,).
+    """Return the Lagrange weights (count, K) from values at `chebyshev_points(count)` to those at
+    `at` (K,).
 
     Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
     """
@@ -62,23 +69,30 @@ def interpolation(count: int, at: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def band_tables(nodes: int, spread: float, count: int, error: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the matrices (2 Q P, 2 K) from moments to K frequencies of the band, and (K, M) from these to subcarriers.
+def band_tables(
+    nodes: int, spread: float, count: int, error: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrices (2 Q P, 2 K) from moments to K frequencies of the band, and (K, M) from
+    these to subcarriers.
 
-    Rows of the first stand for the moments of each of Q nodes, P real parts and then P imaginary ones; columns for K
-    real parts and then K imaginary ones.
-    spread: largest |u| = 1 times the band, in turns: the phase of subcarrier m is 2 pi spread x u / 2,
-    x = (2 m - M + 1) / M; error: largest one, relative to the sum of the amplitudes. Both must not be changed.
+    Rows of the first stand for the moments of each of Q nodes, P real parts and then P imaginary
+    ones; columns for K real parts and then K imaginary ones.
+    spread: largest |u| = 1 times the band, in turns: the phase of subcarrier m is 2 pi spread x u /
+    2, x = (2 m - M + 1) / M; error: largest one, relative to the sum of the amplitudes. Both must
+    not be changed.
     """
     argument = np.pi * spread * max(count - 1, 1) / count
-    orders, kept = orders_of(argument, error), orders_of(argument, error) + nodes
+    orders = orders_of(argument, error)
+    kept = orders_of(argument, error) + nodes
     band = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
     points = chebyshev_points(kept)
-    # By the Jacobi-Anger expansion the terms are eps_p (-j)^p J_p; the waves' own series needs no Bessel functions.
+    # By the Jacobi-Anger expansion the terms are eps_p (-j)^p J_p; the waves' own series needs no
+    # Bessel functions.
     places = chebyshev_points(orders + SPARE)
     sine, cosine = sine_cosine(argument * points[:, None] * places)
     to_terms = _to_terms(orders + SPARE, orders)
-    real, imag = matrix_product(cosine, to_terms).T, -matrix_product(sine, to_terms).T
+    real = matrix_product(cosine, to_terms).T
+    imag = -matrix_product(sine, to_terms).T
     weights = interpolation(nodes, points)[:, None, None]
     parts = np.block([[real, imag], [-imag, real]]).reshape(1, 2 * orders, 2, kept)
     to_nodes = (weights * parts).reshape(2 * nodes * orders, 2 * kept)
@@ -86,7 +100,8 @@ def band_tables(nodes: int, spread: float, count: int, error: float) -> tuple[np
 
 
 def over_band(moments: np.ndarray, tables: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Return the waves' sum at all subcarriers, (N, 2, M), from moments (N, 2 Q P) and tables of `band_tables`.
+    """Return the waves' sum at all subcarriers, (N, 2, M), from moments (N, 2 Q P) and tables of
+    `band_tables`.
 
     Index 1 tells the real from the imaginary part.
     """
@@ -97,14 +112,24 @@ def over_band(moments: np.ndarray, tables: tuple[np.ndarray, np.ndarray]) -> np.
 
 @LEAN
 def _summed(x, terms, work, out):
-    """Fill out (K,) with the series of terms (T,) complex at x (K,), -1 to 1, by Clenshaw's rule; work: (4, STRIP)."""
+    """Fill out (K,) with the series of terms (T,) complex at x (K,), -1 to 1, by Clenshaw's rule;
+    work: (4, STRIP).
+    """
     for first in range(0, len(x), STRIP):
         size = min(STRIP, len(x) - first)
-        re, im, last_re, last_im = work[0], work[1], work[2], work[3]
+        re = work[0]
+        im = work[1]
+        last_re = work[2]
+        last_im = work[3]
         for i in range(size):
-            re[i], im[i], last_re[i], last_im[i] = 0.0, 0.0, 0.0, 0.0
+            re[i] = 0.0
+            im[i] = 0.0
+            last_re[i] = 0.0
+            last_im[i] = 0.0
         for k in range(len(terms) - 1, -1, -1):
-            a, b, twice = terms[k].real, terms[k].imag, 2.0 if k else 1.0
+            a = terms[k].real
+            b = terms[k].imag
+            twice = 2.0 if k else 1.0
             for i in range(size):
                 last_re[i] = a + twice * x[first + i] * re[i] - last_re[i]
                 last_im[i] = b + twice * x[first + i] * im[i] - last_im[i]
@@ -114,19 +139,24 @@ def _summed(x, terms, work, out):
 
 
 def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
-    """Return the complex values of a smooth function at real places (any shape), to rounding; `function` is pointwise.
+    """Return the complex values of a smooth function at real places (any shape), to rounding;
+    `function` is pointwise.
 
-    The number of terms is doubled until the last quarter of them is below rounding, up to 64; a function that needs
-    more is called at every place, as one of few places is. Source: Aurentz & Trefethen, Chopping a Chebyshev series,
-    ACM Trans. Math. Softw. 43(4), 2017, whose plateau is this quarter.
+    The number of terms is doubled until the last quarter of them is below rounding, up to 64; a
+    function that needs more is called at every place, as one of few places is. Source: Aurentz &
+    Trefethen, Chopping a Chebyshev series, ACM Trans. Math. Softw. 43(4), 2017, whose plateau is
+    this quarter.
     """
-    middle, half = 0.5 * (places.max() + places.min()), max(0.5 * float(np.ptp(places)), 1e-12)
+    middle = 0.5 * (places.max() + places.min())
+    half = max(0.5 * float(np.ptp(places)), 1e-12)
     for count in (8, 16, 32, 64) if places.size > 256 else ():
         values = function(middle + half * chebyshev_points(count)).astype(np.complex128)
         parts = matrix_product(np.stack([values.real, values.imag]), _to_terms(count, count))
         terms = parts[0] + 1j * parts[1]
         if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
             out = np.empty(places.shape, np.complex128)
-            _summed(((places - middle) / half).ravel(), terms, np.empty((4, STRIP)), out.reshape(-1))
+            _summed(
+                ((places - middle) / half).ravel(), terms, np.empty((4, STRIP)), out.reshape(-1)
+            )
             return out
     return function(places).astype(np.complex128)

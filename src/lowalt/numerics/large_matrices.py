@@ -1,7 +1,8 @@
-"""Large real matrices in a written order of operations, compiled: products, triangular roots and principal axes.
+"""Large real matrices in a written order of operations, compiled: products, triangular roots and
+principal axes.
 
-A BLAS chooses its kernels, and with them the order of its sums, by the processor. These loops add each sum from the
-first term on and take half to twice the time.
+A BLAS chooses its kernels, and with them the order of its sums, by the processor. These loops add
+each sum from the first term on and take half to twice the time.
 """
 
 import numpy as np
@@ -25,9 +26,14 @@ def multiply(a, b, out):
         k = 1
         # Four terms share a pass over the row; each is still added by itself, the lowest k first.
         while k + 4 <= inner:
-            p, q, r, s = a[i, k], a[i, k + 1], a[i, k + 2], a[i, k + 3]
+            p = a[i, k]
+            q = a[i, k + 1]
+            r = a[i, k + 2]
+            s = a[i, k + 3]
             for j in range(np.uint64(columns)):
-                row[j] = (((row[j] + p * b[k, j]) + q * b[k + 1, j]) + r * b[k + 2, j]) + s * b[k + 3, j]
+                row[j] = (((row[j] + p * b[k, j]) + q * b[k + 1, j]) + r * b[k + 2, j]) + s * b[
+                    k + 3, j
+                ]
             k += 4
         while k < inner:
             p = a[i, k]
@@ -37,7 +43,9 @@ def multiply(a, b, out):
 
 
 def matrix_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the product (I, J) of real matrices (I, K) and (K, J), K > 0, equal to `portable.product` in every bit."""
+    """Return the product (I, J) of real matrices (I, K) and (K, J), K > 0, equal to
+    `portable.product` in every bit.
+    """
     out = np.empty((a.shape[0], b.shape[1]))
     multiply(np.ascontiguousarray(a, np.float64), np.ascontiguousarray(b, np.float64), out)
     return out
@@ -53,15 +61,18 @@ def _factor(left):
         for j in range(k, count):
             pivot[j] /= root
         for i in range(k + 1, count):
-            row, share = left[i], pivot[i]
+            row = left[i]
+            share = pivot[i]
             for j in range(np.uint64(i), np.uint64(count)):
                 row[j] -= share * pivot[j]
 
 
 def upper_root(covariance: np.ndarray) -> np.ndarray:
-    """Return the upper triangular U (N, N) with U^T U = `covariance`, symmetric and positive definite.
+    """Return the upper triangular U (N, N) with U^T U = `covariance`, symmetric and positive
+    definite.
 
-    Raises: ValueError for a matrix that is not positive definite. Source: Cholesky's decomposition, Higham 2002, 10.1.
+    Raises: ValueError for a matrix that is not positive definite. Source: Cholesky's decomposition,
+    Higham 2002, 10.1.
     """
     result = np.array(covariance, np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -73,8 +84,13 @@ def upper_root(covariance: np.ndarray) -> np.ndarray:
 
 @INNER
 def _along(first, second):
-    """The sum of first times second, (N,) each: every fourth product by itself, then these four sums."""
-    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    """The sum of first times second, (N,) each: every fourth product by itself, then these four
+    sums.
+    """
+    a = 0.0
+    b = 0.0
+    c = 0.0
+    d = 0.0
     whole = len(first) // 4 * 4
     for i in range(0, whole, 4):
         a += first[i] * second[i]
@@ -88,14 +104,17 @@ def _along(first, second):
 
 @LEAN
 def _orthogonalise(rows, square):
-    """Rotate pairs of rows (K, N) until all are orthogonal; returns whether they are. square: (K,) work space."""
+    """Rotate pairs of rows (K, N) until all are orthogonal; returns whether they are. square: (K,)
+    work space.
+    """
     for _ in range(SWEEPS):
         turned = False
         for p in range(len(rows)):
             square[p] = _along(rows[p], rows[p])
         for p in range(len(rows) - 1):
             for q in range(p + 1, len(rows)):
-                first, second = rows[p], rows[q]
+                first = rows[p]
+                second = rows[q]
                 both = _along(first, second)
                 # The products are those of the sweep's beginning, carried along by the rotations.
                 if abs(both) <= ORTHOGONAL * np.sqrt(square[p] * square[q]):
@@ -109,7 +128,8 @@ def _orthogonalise(rows, square):
                 square[p] = max(square[p] - tangent * both, 0.0)
                 square[q] += tangent * both
                 for i in range(np.uint64(len(first))):
-                    a, b = first[i], second[i]
+                    a = first[i]
+                    b = second[i]
                     first[i] = cosine * a - sine * b
                     second[i] = sine * a + cosine * b
         if not turned:
@@ -118,10 +138,12 @@ def _orthogonalise(rows, square):
 
 
 def principal_axes(root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the eigenvalues (K,) of B B^T for a root B (N, K), and its unit eigenvectors (N, K), in no order.
+    """Return the eigenvalues (K,) of B B^T for a root B (N, K), and its unit eigenvectors (N, K),
+    in no order.
 
     Eigenvectors of eigenvalue 0 are zeros. Raises: ValueError where the rotations do not converge.
-    Source: one-sided Jacobi rotations of a pivoted Cholesky factor, Demmel and Veselic 1992, accurate in every digit.
+    Source: one-sided Jacobi rotations of a pivoted Cholesky factor, Demmel and Veselic 1992,
+    accurate in every digit.
     """
     rows = np.array(root.T, np.float64, order="C")
     if not _orthogonalise(rows, np.empty(len(rows))):

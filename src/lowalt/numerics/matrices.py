@@ -1,4 +1,6 @@
-"""3 x 3 matrices in portable operations: the axis of least variance of vectors, and the nearest rotations."""
+"""3 x 3 matrices in portable operations: the axis of least variance of vectors, and the nearest
+rotations.
+"""
 
 import numpy as np
 
@@ -6,7 +8,8 @@ from lowalt.numerics.portable import dot, product, total
 
 
 def thinnest(vectors: np.ndarray) -> np.ndarray:
-    """Return the unit vector (3,) along which vectors (N, 3) of zero mean vary least; its largest entry is positive.
+    """Return the unit vector (3,) along which vectors (N, 3) of zero mean vary least; its largest
+    entry is positive.
 
     Source: Jacobi's rotations of the 3 x 3 matrix of second moments.
     """
@@ -39,7 +42,11 @@ def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
     result = np.asarray(matrices, np.float64)
     # Each step squares the error; blends of similar rotations need five steps.
     for _ in range(10):
-        rows = [np.cross(result[..., (i + 1) % 3, :], result[..., (i + 2) % 3, :]) for i in range(3)]
+        rows = [
+            np.cross(result[..., (i + 1) % 3, :], result[..., (i + 2) % 3, :]) for i in range(3)
+        ]
         cofactors = np.stack(rows, axis=-2)
-        result = 0.5 * (result + cofactors / dot(result[..., 0, :], cofactors[..., 0, :])[..., None, None])
+        result = 0.5 * (
+            result + cofactors / dot(result[..., 0, :], cofactors[..., 0, :])[..., None, None]
+        )
     return result

@@ -1,11 +1,12 @@
-"""Elementary functions, products and sums whose last bit is the same on every processor and with every library.
+"""Elementary functions, products and sums whose last bit is the same on every processor and with
+every library.
 
-A library may use other polynomials for a sine with wider registers, a BLAS may add in another order, and a fused
-multiply-add rounds once instead of twice. This module uses only additions, products, divisions and square roots of
-float64 arrays in a fixed order, which IEEE 754 specifies; NumPy performs each as a separate operation. Results
-are within a few units in the last place of the true values. Arguments are arrays of float64 or numbers; shapes
-broadcast; NaN and infinity are not expected.
-Source of the polynomials and of the reductions: Sun's fdlibm (Ng 1993).
+A library may use other polynomials for a sine with wider registers, a BLAS may add in another
+order, and a fused multiply-add rounds once instead of twice. This module uses only additions,
+products, divisions and square roots of float64 arrays in a fixed order, which IEEE 754 specifies;
+NumPy performs each as a separate operation. Results are within a few units in the last place of the
+true values. Arguments are arrays of float64 or numbers; shapes broadcast; NaN and infinity are not
+expected. Source of the polynomials and of the reductions: Sun's fdlibm (Ng 1993).
 """
 
 import math
@@ -17,21 +18,37 @@ _TWO_OVER_PI = 0.6366197723675814
 _HALF_PI = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 _LARGEST_ANGLE = 1.0e6
 SINE = (
-    -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
-    2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10,
-)  # fmt: skip
+    -1.66666666666666324348e-01,
+    8.33333333332248946124e-03,
+    -1.98412698298579493134e-04,
+    2.75573137070700676789e-06,
+    -2.50507602534068634195e-08,
+    1.58969099521155010221e-10,
+)
 COSINE = (
-    4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
-    -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11,
-)  # fmt: skip
+    4.16666666666666019037e-02,
+    -1.38888888888741095749e-03,
+    2.48015872894767294178e-05,
+    -2.75573143513906633035e-07,
+    2.08757232129817482790e-09,
+    -1.13596475577881948265e-11,
+)
 _EXPONENTIAL = (
-    1.66666666666666019037e-01, -2.77777777770155933842e-03, 6.61375632143793436117e-05,
-    -1.65339022054652515390e-06, 4.13813679705723846039e-08,
-)  # fmt: skip
+    1.66666666666666019037e-01,
+    -2.77777777770155933842e-03,
+    6.61375632143793436117e-05,
+    -1.65339022054652515390e-06,
+    4.13813679705723846039e-08,
+)
 LOGARITHM = (
-    6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01, 2.222219843214978396e-01,
-    1.818357216161805012e-01, 1.531383769920937332e-01, 1.479819860511658591e-01,
-)  # fmt: skip
+    6.666666666666735130e-01,
+    3.999999999940941908e-01,
+    2.857142874366239149e-01,
+    2.222219843214978396e-01,
+    1.818357216161805012e-01,
+    1.531383769920937332e-01,
+    1.479819860511658591e-01,
+)
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
 LN_10 = 2.302585092994046
 """Natural logarithm of 10."""
@@ -69,12 +86,17 @@ def _eighth(high: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sine, cosine
 
 
-def _turned(quarter: np.ndarray, sine: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _turned(
+    quarter: np.ndarray, sine: np.ndarray, cosine: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Sine and cosine after a whole number of quarter turns."""
     quarter = np.asarray(quarter, np.int64) & 3
     odd = (quarter & 1) == 1
-    first, second = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
-    return np.where(quarter >= 2, -first, first), np.where((quarter == 1) | (quarter == 2), -second, second)
+    first = np.where(odd, cosine, sine)
+    second = np.where(odd, sine, cosine)
+    return np.where(quarter >= 2, -first, first), np.where(
+        (quarter == 1) | (quarter == 2), -second, second
+    )
 
 
 def sine_cosine(angle_rad: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
@@ -95,7 +117,9 @@ def sine_cosine(angle_rad: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sine_cosine_turns(turns: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """Return sine and cosine of 2 pi `turns`, below 2^50, of any shape; quarter turns give exactly 0 and +-1."""
+    """Return sine and cosine of 2 pi `turns`, below 2^50, of any shape; quarter turns give exactly
+    0 and +-1.
+    """
     turns = np.asarray(turns, np.float64)
     quarter = np.rint(4.0 * turns)
     return _turned(quarter, *_eighth((turns - 0.25 * quarter) * (2 * np.pi), np.zeros_like(turns)))
@@ -115,7 +139,8 @@ def exp(x: np.ndarray | float) -> np.ndarray:
     """Return e^x for x of any shape, |x| <= 700."""
     x = np.asarray(x, np.float64)
     twos = np.rint(x * 1.44269504088896338700)
-    high, low = x - twos * LN2[0], twos * LN2[1]
+    high = x - twos * LN2[0]
+    low = twos * LN2[1]
     rest = high - low
     square = rest * rest
     c = rest - square * _polynomial(square, _EXPONENTIAL)
@@ -156,11 +181,15 @@ def arctan(x: np.ndarray | float) -> np.ndarray:
     size = np.abs(x)
     limits = (0.4375, 0.6875, 1.1875, 2.4375)
     place = sum((size >= limit).astype(np.int64) for limit in limits)
-    # Every branch is computed for all numbers, so divisors must not be zero in unused branches either.
+    # Every branch is computed for all numbers, so divisors must not be zero in unused branches
+    # either.
     choices = [
-        size, (2 * size - 1) / (2 + size), (size - 1) / (size + 1), (size - 1.5) / (1 + 1.5 * size),
+        size,
+        (2 * size - 1) / (2 + size),
+        (size - 1) / (size + 1),
+        (size - 1.5) / (1 + 1.5 * size),
         -1 / np.where(size > 0, size, 1.0),
-    ]  # fmt: skip
+    ]
     near = np.choose(place, choices)
     square = near * near
     tail = near * (square * _polynomial(square, TANGENT))
@@ -174,7 +203,8 @@ def arctan2(y: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
     """Return the angle (rad) of the points (x, y), in [-pi, pi]; 0 at the origin."""
     y, x = np.asarray(y, np.float64), np.asarray(x, np.float64)
     steep = np.abs(y) > np.abs(x)
-    over, under = np.where(steep, x, y), np.where(steep, y, x)
+    over = np.where(steep, x, y)
+    under = np.where(steep, y, x)
     angle = arctan(over / np.where(under == 0, 1.0, under))
     flat = np.where(x < 0, np.where(y < 0, angle - np.pi, angle + np.pi), angle)
     return np.where(steep, np.where(y > 0, np.pi / 2, -np.pi / 2) - angle, flat)
@@ -182,7 +212,8 @@ def arctan2(y: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
 
 def total(values: np.ndarray, axis: int = -1) -> np.ndarray:
     """Return the sum along an axis that is not empty, added one by one from the first value on."""
-    # Each value of a cumulative sum depends on the previous one, so every library adds in this order.
+    # Each value of a cumulative sum depends on the previous one, so every library adds in this
+    # order.
     return np.add.accumulate(np.asarray(values, np.float64), axis=axis).take(-1, axis=axis)
 
 
@@ -192,8 +223,11 @@ def mean(values: np.ndarray, axis: int = -1) -> np.ndarray:
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the sum over the last axis of a b, added from the first product on; other axes broadcast."""
-    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    """Return the sum over the last axis of a b, added from the first product on; other axes
+    broadcast.
+    """
+    a = np.asarray(a, np.float64)
+    b = np.asarray(b, np.float64)
     result = a[..., 0] * b[..., 0]
     for index in range(1, max(a.shape[-1], b.shape[-1])):
         result = result + a[..., index] * b[..., index]
@@ -206,8 +240,11 @@ def norm(vectors: np.ndarray) -> np.ndarray:
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the matrix product of (..., I, K) and (..., K, J): (..., I, J), added from the first k on."""
-    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    """Return the matrix product of (..., I, K) and (..., K, J): (..., I, J), added from the first k
+    on.
+    """
+    a = np.asarray(a, np.float64)
+    b = np.asarray(b, np.float64)
     result = a[..., :, 0, None] * b[..., None, 0, :]
     for index in range(1, a.shape[-1]):
         result = result + a[..., :, index, None] * b[..., None, index, :]
@@ -231,5 +268,8 @@ def rms(signal: np.ndarray) -> float:
         return 0.0
     twos = math.frexp(peak)[1]
     parts = np.ldexp(parts, -twos)
-    # Square the parts separately and add one by one, because a library's |z| and sum depend on the processor.
-    return math.ldexp(math.sqrt(float(total(parts[0] * parts[0] + parts[1] * parts[1])) / signal.size), twos)
+    # Square the parts separately and add one by one, because a library's |z| and sum depend on the
+    # processor.
+    return math.ldexp(
+        math.sqrt(float(total(parts[0] * parts[0] + parts[1] * parts[1])) / signal.size), twos
+    )

@@ -12,17 +12,20 @@ STEPS = 6
 
 @lru_cache(maxsize=256)
 def gauss_legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes (count,) on [-1, 1], rising, and their weights, whose sum is 2. They must not be changed.
+    """Return the nodes (count,) on [-1, 1], rising, and their weights, whose sum is 2. They must
+    not be changed.
 
     Source: Newton's method on the Legendre polynomial from Tricomi's guess, DLMF 18.16.
     """
     x = -cos(np.pi * (np.arange(count) + 0.75) / (count + 0.5))
     slope = np.ones(count)
     for _ in range(STEPS):
-        before, value = np.ones(count), x
+        before = np.ones(count)
+        value = x
         for order in range(2, count + 1):
             later = ((2 * order - 1) * x * value - (order - 1) * before) / order
-            before, value = value, later
+            before = value
+            value = later
         slope = count * (x * value - before) / (x * x - 1.0)
         x = x - value / slope
     weight = 2.0 / ((1.0 - x * x) * slope * slope)

@@ -21,14 +21,20 @@ def _views(arguments: list[str]) -> None:
     line = parser("lowalt.recognition views", _views.__doc__)
     line.add_argument("--index", required=True, help="index of the shards (.json)")
     line.add_argument("--shard", required=True, help="name of the shard, {group}-{fold}-{part}.tar")
-    line.add_argument("--reduced", help="images of the shard's chunk at this size, from the tiles stage (.npy)")
+    line.add_argument(
+        "--reduced", help="images of the shard's chunk at this size, from the tiles stage (.npy)"
+    )
     line.add_argument("--motion", help="with --reduced: motion table of the chunk")
     line.add_argument("--out", required=True, help="views to write (.npz)")
     options = line.parse_args(arguments)
     if (options.reduced is None) != (options.motion is None):
         raise InputError("expected both --reduced and --motion, or neither")
     size, *levels = pick(options.settings, "size", *(["snr_db"] if options.reduced else []))
-    source = Reduced(Path(options.reduced), Path(options.motion), tuple(map(float, levels[0]))) if levels else None
+    source = (
+        Reduced(Path(options.reduced), Path(options.motion), tuple(map(float, levels[0])))
+        if levels
+        else None
+    )
     count = cache_shard(options.index, options.shard, size, options.out, source)
     print(f"{options.out}: {count} samples", file=sys.stderr)
 
@@ -38,8 +44,12 @@ def _freeze(arguments: list[str]) -> None:
     from lowalt.recognition.freeze import freeze, verify
 
     line = parser("lowalt.recognition freeze", _freeze.__doc__)
-    line.add_argument("--files", nargs="+", help="clouds and motion tables, below the folder of --out")
-    line.add_argument("--out", required=True, help="SHA256SUMS, written where --files is given, else checked")
+    line.add_argument(
+        "--files", nargs="+", help="clouds and motion tables, below the folder of --out"
+    )
+    line.add_argument(
+        "--out", required=True, help="SHA256SUMS, written where --files is given, else checked"
+    )
     options = line.parse_args(arguments)
     pick(options.settings)
     if options.files:
@@ -50,9 +60,18 @@ def _freeze(arguments: list[str]) -> None:
 def _add_source(line: ArgumentParser) -> None:
     """Add the options that name the source of samples and the frozen files behind them."""
     line.add_argument("--views", nargs="+", help="caches of views (.npz)")
-    line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
-    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds; samples are simulated")
-    line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
+    line.add_argument(
+        "--index", help="instead of --views: index of the shards, read sample by sample"
+    )
+    line.add_argument(
+        "--dataset", help="instead of both: config.yaml of a run with clouds; samples are simulated"
+    )
+    line.add_argument(
+        "--frozen",
+        nargs="+",
+        default=[],
+        help="SHA256SUMS of clouds and motion tables, checked first",
+    )
 
 
 def _source(options: Namespace):
@@ -72,15 +91,21 @@ def _source(options: Namespace):
 
 
 def _train(arguments: list[str]) -> None:
-    """Train one scheme in one protocol. Settings: scheme, seed, size, colour_map, network, training, augmentation,
-    classes."""
+    """Train one scheme in one protocol. Settings: scheme, seed, size, colour_map, network,
+    training, augmentation, classes."""
     from lowalt.recognition.runs import train
 
     line = parser("lowalt.recognition train", _train.__doc__)
     _add_source(line)
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
-    line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
-    line.add_argument("--out", required=True, help="folder for model.safetensors, history.csv and run.json")
+    line.add_argument(
+        "--tensorboard",
+        action="store_true",
+        help="write the metrics for TensorBoard too, to OUT/events",
+    )
+    line.add_argument(
+        "--out", required=True, help="folder for model.safetensors, history.csv and run.json"
+    )
     options = line.parse_args(arguments)
     scheme, settings = with_scheme(options.settings)
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
@@ -89,18 +114,29 @@ def _train(arguments: list[str]) -> None:
 
 
 def _evaluate(arguments: list[str]) -> None:
-    """Predict all validation and test samples of a model's protocol. Settings: batch, threads, precision, mirror."""
+    """Predict all validation and test samples of a model's protocol. Settings: batch, threads,
+    precision, mirror.
+    """
     from lowalt.recognition.runs import evaluate, load
 
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
     _add_source(line)
     line.add_argument("--model", required=True, help="model.safetensors of a training run")
     name_backbone(line)
-    line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
-    line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
+    line.add_argument(
+        "--trained-on",
+        default="",
+        help="name of the run that trained the model, where it is another",
+    )
+    line.add_argument(
+        "--out", required=True, help="predictions to write (.csv), and the run's record (.json)"
+    )
     options = line.parse_args(arguments)
-    source, trained = _source(options), load(options.model, options.backbone)
-    samples = source.samples(trained.scheme.columns, evaluated_folds(trained.protocol), trained.size, placed=True)
+    source = _source(options)
+    trained = load(options.model, options.backbone)
+    samples = source.samples(
+        trained.scheme.columns, evaluated_folds(trained.protocol), trained.size, placed=True
+    )
     evaluate(trained, samples, options.settings, options.out, options.trained_on)
 
 
@@ -111,8 +147,12 @@ def _tables(arguments: list[str]) -> None:
     from lowalt.recognition.paper_claims import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
-    line.add_argument("--predictions", nargs="+", required=True, help="predictions (.csv), records next to them")
-    line.add_argument("--published", help="the paper's accuracies (.csv), if there are any to compare with")
+    line.add_argument(
+        "--predictions", nargs="+", required=True, help="predictions (.csv), records next to them"
+    )
+    line.add_argument(
+        "--published", help="the paper's accuracies (.csv), if there are any to compare with"
+    )
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="folder for the tables")
     options = line.parse_args(arguments)
@@ -128,9 +168,18 @@ def _transfer(arguments: list[str]) -> None:
     from lowalt.recognition.evaluated import Evaluated
 
     line = parser("lowalt.recognition transfer", _transfer.__doc__)
-    line.add_argument("--own", nargs="+", required=True, help="prediction files of this run's models (.csv)")
-    line.add_argument("--other", nargs="+", required=True, help="those of other runs' models (evaluate --trained-on)")
-    line.add_argument("--configs", nargs="+", required=True, help="configuration of this run, then of the others")
+    line.add_argument(
+        "--own", nargs="+", required=True, help="prediction files of this run's models (.csv)"
+    )
+    line.add_argument(
+        "--other",
+        nargs="+",
+        required=True,
+        help="those of other runs' models (evaluate --trained-on)",
+    )
+    line.add_argument(
+        "--configs", nargs="+", required=True, help="configuration of this run, then of the others"
+    )
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="table to write (.csv)")
     options = line.parse_args(arguments)
@@ -150,20 +199,30 @@ def _distances(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition distances", _distances.__doc__)
     line.add_argument("--clouds", nargs="+", required=True, help="all cloud files")
-    line.add_argument("--motion", nargs="+", required=True, help="motion tables with a row of every subtype")
+    line.add_argument(
+        "--motion", nargs="+", required=True, help="motion tables with a row of every subtype"
+    )
     line.add_argument("--out", required=True, help="table to write (.csv)")
     options = line.parse_args(arguments)
     pick(options.settings)
     motion = [row for path in options.motion for row in read_table(path)]
-    distances.write(options.out, distances.rows([read_cloud(path) for path in options.clouds], motion))
+    distances.write(
+        options.out, distances.rows([read_cloud(path) for path in options.clouds], motion)
+    )
 
 
 def _score(arguments: list[str]) -> None:
-    """Score a prediction file on a protocol's test part, with the labels of the shards. Settings: none ({})."""
+    """Score a prediction file on a protocol's test part, with the labels of the shards. Settings:
+    none ({}).
+    """
     from lowalt.recognition.score import score
 
     line = parser("lowalt.recognition score", _score.__doc__)
-    line.add_argument("--predictions", required=True, help="prediction file: key and class probabilities are enough")
+    line.add_argument(
+        "--predictions",
+        required=True,
+        help="prediction file: key and class probabilities are enough",
+    )
     line.add_argument("--index", required=True, help="index of the shards")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--out", required=True, help="scores to write (.json)")
@@ -182,16 +241,25 @@ def _export(arguments: list[str]) -> None:
     line = parser("lowalt.recognition export", _export.__doc__)
     line.add_argument("--model", required=True, help="model.safetensors of a training run")
     name_backbone(line)
-    line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md) or .onnx")
+    line.add_argument(
+        "--out", required=True, help="file to write: .safetensors (and its card, .md) or .onnx"
+    )
     options = line.parse_args(arguments)
     pick(options.settings)
     export(load(options.model, options.backbone), options.out)
 
 
 COMMANDS = {
-    "views": _views, "freeze": _freeze, "distances": _distances, "train": _train, "evaluate": _evaluate,
-    "tables": _tables, "transfer": _transfer, "score": _score, "export": _export,
-}  # fmt: skip
+    "views": _views,
+    "freeze": _freeze,
+    "distances": _distances,
+    "train": _train,
+    "evaluate": _evaluate,
+    "tables": _tables,
+    "transfer": _transfer,
+    "score": _score,
+    "export": _export,
+}
 
 
 def main(arguments: list[str]) -> None:

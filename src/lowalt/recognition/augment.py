@@ -1,9 +1,11 @@
 """Light augmentation of index images: one draw per sample, the same for all its views.
 
-Every change keeps the class: a mirrored Doppler axis is the target turned by 180 degrees, a cyclic shift along it
-another speed, a shift in time another start. No left-right flip: that would be time reversed.
+Every change keeps the class: a mirrored Doppler axis is the target turned by 180 degrees, a cyclic
+shift along it another speed, a shift in time another start. No left-right flip: that would be time
+reversed.
 
-Settings are the block `recognition.augmentation` of workflow/schemas/config.schema.yaml; zeros change nothing.
+Settings are the block `recognition.augmentation` of workflow/schemas/config.schema.yaml; zeros
+change nothing.
 """
 
 import numpy as np
@@ -12,19 +14,22 @@ from lowalt.spectra.catalogue import NAMES, zero_index
 
 
 def _contrast(exponents: np.ndarray, zero: int) -> np.ndarray:
-    """Return tables (samples, 256) uint8 that raise the distance from the zero index to powers (samples,); the ends
-    stay."""
+    """Return tables (samples, 256) uint8 that raise the distance from the zero index to powers
+    (samples,); the ends stay."""
     index = np.arange(256) - zero
     reach = 255 - zero
     values = zero + np.sign(index) * reach * (np.abs(index) / reach) ** exponents[:, None]
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)
 
 
-def _moved(images: np.ndarray, mirror: np.ndarray, down: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return images (samples, views, rows, columns) turned around along rows, where `mirror` (samples,) says so, then
-    shifted cyclically by `down` and `right` (samples,) pixels."""
+def _moved(
+    images: np.ndarray, mirror: np.ndarray, down: np.ndarray, right: np.ndarray
+) -> np.ndarray:
+    """Return images (samples, views, rows, columns) turned around along rows, where `mirror`
+    (samples,) says so, then shifted cyclically by `down` and `right` (samples,) pixels."""
     samples, views, rows, columns = images.shape
-    row, column = (np.arange(rows) - down[:, None]) % rows, (np.arange(columns) - right[:, None]) % columns
+    row = (np.arange(rows) - down[:, None]) % rows
+    column = (np.arange(columns) - right[:, None]) % columns
     row = np.where(mirror[:, None], rows - 1 - row, row)
     pixel = (row[:, :, None] * columns + column[:, None]).reshape(samples, -1)
     result = np.empty((samples, views, rows * columns), images.dtype)
@@ -34,8 +39,11 @@ def _moved(images: np.ndarray, mirror: np.ndarray, down: np.ndarray, right: np.n
     return result.reshape(images.shape)
 
 
-def augment(images: np.ndarray, columns: list[int], block: dict, generator: np.random.Generator) -> np.ndarray:
-    """Return changed copies of index images (samples, views, rows, columns) uint8; rows are Doppler, columns time.
+def augment(
+    images: np.ndarray, columns: list[int], block: dict, generator: np.random.Generator
+) -> np.ndarray:
+    """Return changed copies of index images (samples, views, rows, columns) uint8; rows are
+    Doppler, columns time.
 
     columns: numbers of their views (`Scheme.columns`). Equal generators give equal changes.
     """
@@ -51,13 +59,19 @@ def augment(images: np.ndarray, columns: list[int], block: dict, generator: np.r
         tables = {zero: _contrast(exponents, zero) for zero in set(zeros)}
         for number, image in enumerate(result):
             of_zero = {zero: table[number].tobytes() for zero, table in tables.items()}
-            # Faster than the table indexed by the image, for which numpy first widens the image to 64 bits.
-            changed = b"".join(view.tobytes().translate(of_zero[zero]) for zero, view in zip(zeros, image, strict=True))
+            # Faster than the table indexed by the image, for which numpy first widens the image to
+            # 64 bits.
+            changed = b"".join(
+                view.tobytes().translate(of_zero[zero])
+                for zero, view in zip(zeros, image, strict=True)
+            )
             image[:] = np.frombuffer(changed, np.uint8).reshape(image.shape)
     for number, image in enumerate(result):
         draw = draws[number]
-        band, strip = int(draw[4] * block["mask_doppler"] * rows), int(draw[6] * block["mask_time"] * width)
-        top, left = int(draw[5] * (rows - band + 1)), int(draw[7] * (width - strip + 1))
+        band = int(draw[4] * block["mask_doppler"] * rows)
+        strip = int(draw[6] * block["mask_time"] * width)
+        top = int(draw[5] * (rows - band + 1))
+        left = int(draw[7] * (width - strip + 1))
         drop = drops[number] if not drops[number].all() else np.zeros(views, dtype=bool)
         if not (band or strip or drop.any()):
             continue

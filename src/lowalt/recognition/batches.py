@@ -1,7 +1,8 @@
-"""The batches of a training and an evaluation: the order of samples in an epoch, and worker processes that read ahead.
+"""The batches of a training and an evaluation: the order of samples in an epoch, and worker
+processes that read ahead.
 
-The order depends only on seed and epoch, so an interrupted training resumes at any step. Workers start once and live as
-long as their reader, not once per epoch.
+The order depends only on seed and epoch, so an interrupted training resumes at any step. Workers
+start once and live as long as their reader, not once per epoch.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,11 +16,14 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition.samples import Facts, Samples
 
 
-def epoch_order(facts: Facts, seed: int, keys: tuple, epoch: int, snrs_per_model: int) -> np.ndarray:
+def epoch_order(
+    facts: Facts, seed: int, keys: tuple, epoch: int, snrs_per_model: int
+) -> np.ndarray:
     """Return the sample numbers of one epoch, shuffled.
 
-    snrs_per_model: how many randomly chosen SNRs of each motion model the epoch visits; 0 visits all. Fewer give
-    more epochs of distinct motion for the same time, since SNRs of one motion model are nearly the same image.
+    snrs_per_model: how many randomly chosen SNRs of each motion model the epoch visits; 0 visits
+    all. Fewer give more epochs of distinct motion for the same time, since SNRs of one motion model
+    are nearly the same image.
     """
     generator = stream(seed, "recognition-order", *keys, epoch)
     draw = generator.random(len(facts))
@@ -36,7 +40,9 @@ def epoch_order(facts: Facts, seed: int, keys: tuple, epoch: int, snrs_per_model
 
 
 def batches(order: np.ndarray, size: int) -> list[np.ndarray]:
-    """Cut an epoch's order into full batches; a shorter last one is left out unless it is the only one."""
+    """Cut an epoch's order into full batches; a shorter last one is left out unless it is the only
+    one.
+    """
     full = len(order) // size
     if full == 0:
         return [order]
@@ -45,11 +51,17 @@ def batches(order: np.ndarray, size: int) -> list[np.ndarray]:
 
 def tensors(arrays: Any) -> Any:
     """Return an array, or every array of a named tuple, as a tensor."""
-    return type(arrays)(*map(torch.from_numpy, arrays)) if isinstance(arrays, tuple) else torch.from_numpy(arrays)
+    return (
+        type(arrays)(*map(torch.from_numpy, arrays))
+        if isinstance(arrays, tuple)
+        else torch.from_numpy(arrays)
+    )
 
 
 class Unchanged(Dataset):
-    """Index images of samples as they are: the map from sample numbers to a batch that evaluation reads."""
+    """Index images of samples as they are: the map from sample numbers to a batch that evaluation
+    reads.
+    """
 
     def __init__(self, source: Samples) -> None:
         """Take the samples."""
@@ -63,16 +75,22 @@ class Unchanged(Dataset):
 class Augmented(Dataset):
     """Augmented batches of a training by (step, sample numbers)."""
 
-    def __init__(self, source: Samples, columns: list[int], block: dict, keys: tuple, rank: int, ranks: int) -> None:
-        """columns: views of the samples; block: `recognition.augmentation`; keys: seed and names of the random stream;
+    def __init__(
+        self, source: Samples, columns: list[int], block: dict, keys: tuple, rank: int, ranks: int
+    ) -> None:
+        """columns: views of the samples; block: `recognition.augmentation`; keys: seed and names of
+        the random stream;
         rank, ranks: the share of each batch that is read here."""
-        self.source, self.columns, self.block, self.keys, self.rank, self.ranks = (
-            source, columns, block, keys, rank, ranks
-        )  # fmt: skip
+        self.source = source
+        self.columns = columns
+        self.block = block
+        self.keys = keys
+        self.rank = rank
+        self.ranks = ranks
 
     def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[Any, torch.Tensor]:
-        """Return this rank's share of a batch: index images (B, views, S, S) uint8, or what else the source gives, and
-        labels (B,)."""
+        """Return this rank's share of a batch: index images (B, views, S, S) uint8, or what else
+        the source gives, and labels (B,)."""
         step, numbers = item
         mine = numbers[self.rank :: self.ranks]
         seed, *names = self.keys
@@ -82,18 +100,25 @@ class Augmented(Dataset):
 
 
 class Prefetch:
-    """Calls a map for one item after the other, in worker processes where there are any, and keeps their order."""
+    """Calls a map for one item after the other, in worker processes where there are any, and keeps
+    their order.
+    """
 
     def __init__(self, read: Dataset, workers: int, pin: bool) -> None:
-        """read: map from an item to a batch; workers: processes that call it, 0 for this one; pin: whether batches go
-        to memory from which a GPU copies."""
+        """read: map from an item to a batch; workers: processes that call it, 0 for this one; pin:
+        whether batches go to memory from which a GPU copies."""
         self._items: list = []
         self._loader = DataLoader(
-            read, sampler=self._items, batch_size=None, num_workers=workers, persistent_workers=workers > 0,
+            read,
+            sampler=self._items,
+            batch_size=None,
+            num_workers=workers,
+            persistent_workers=workers > 0,
             pin_memory=pin,
-            # A generator of its own: the loader must not draw from the stream that dropout draws from.
+            # A generator of its own: the loader must not draw from the stream that dropout draws
+            # from.
             generator=torch.Generator(),
-        )  # fmt: skip
+        )
 
     def __call__(self, items: Sequence) -> Iterator:
         """Return the batches of these items; the workers drop batches of an earlier call."""

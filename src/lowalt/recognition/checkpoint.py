@@ -1,7 +1,9 @@
-"""Checkpoints: written atomically. A damaged checkpoint, or one of another run, is refused with an error.
+"""Checkpoints: written atomically. A damaged checkpoint, or one of another run, is refused with an
+error.
 
-A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity holds everything that
-determines the weights (settings, scheme, protocol, samples). A training resumes only from a file of its own identity.
+A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity
+holds everything that determines the weights (settings, scheme, protocol, samples). A training
+resumes only from a file of its own identity.
 """
 
 import hashlib
@@ -50,7 +52,8 @@ def identity(**parts: object) -> str:
 
 def save(path: str | Path, name: str, state: dict) -> None:
     """Write `state` (tensors, numbers, text, nested dicts and lists) of the run `name`."""
-    # Pass an open file: torch would write the name of a path, which here holds a process id, into the archive.
+    # Pass an open file: torch would write the name of a path, which here holds a process id, into
+    # the archive.
     with replacing(path) as temporary, temporary.open("wb") as file:
         torch.save({"identity": name, "digest": _digest(state), "state": state}, file)
 
@@ -67,44 +70,66 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
     """Return the identity and the state of a checkpoint.
 
     name: the identity it must have, or None for any.
-    Raises: InputError naming the file where it is missing, damaged, or of another run (with the parts that differ).
+    Raises: InputError naming the file where it is missing, damaged, or of another run (with the
+    parts that differ).
     """
     existing(path, "checkpoint")
     try:
         # Load tensors and plain values only, so that a checkpoint from elsewhere cannot run code.
         content = torch.load(path, map_location="cpu", weights_only=True)
-        stored, digest, state = content["identity"], content["digest"], content["state"]
-        computed, named = _digest(state), isinstance(stored, str)
+        stored = content["identity"]
+        digest = content["digest"]
+        state = content["state"]
+        computed = _digest(state)
+        named = isinstance(stored, str)
     except Exception as error:
         # For damaged bytes torch's reader raises almost any exception.
         raise InputError(f"{path}: not a checkpoint ({in_one_line(error)})") from error
     if not named:
-        raise InputError(f"{path}: not a checkpoint (its identity is {type(stored).__name__}, expected text)")
+        raise InputError(
+            f"{path}: not a checkpoint (its identity is {type(stored).__name__}, expected text)"
+        )
     if computed != digest:
         raise InputError(f"{path}: checkpoint is damaged, its values do not match their SHA-256")
     if name is not None and stored != name:
-        theirs, ours = _facts(stored), _facts(name)
-        differs = sorted(key for key in theirs.keys() | ours.keys() if theirs.get(key) != ours.get(key))
+        theirs = _facts(stored)
+        ours = _facts(name)
+        differs = sorted(
+            key for key in theirs.keys() | ours.keys() if theirs.get(key) != ours.get(key)
+        )
         raise InputError(f"{path}: checkpoint of another run, its {', '.join(differs)} differ")
     return stored, state
 
 
 def check_model(facts: dict, settings: dict, path: str | Path) -> None:
-    """Refuse a model file whose settings are wrong, or contradict the identity under which it was trained.
+    """Refuse a model file whose settings are wrong, or contradict the identity under which it was
+    trained.
 
-    facts: its identity; settings: of its network; path: the file. Raises: InputError naming the setting that is wrong.
+    facts: its identity; settings: of its network; path: the file. Raises: InputError naming the
+    setting that is wrong.
     """
     check_brought("model", settings, path)
     trained = facts.get("settings")
     trained = trained if isinstance(trained, dict) else {}
-    named = {"network": trained, "size": trained, "colour_map": trained, "classes": trained, "protocol": facts}
+    named = {
+        "network": trained,
+        "size": trained,
+        "colour_map": trained,
+        "classes": trained,
+        "protocol": facts,
+    }
     if isinstance(facts.get("scheme"), dict):
         named["scheme"] = facts
     for key, block in named.items():
-        said, meant = block.get(key), json.loads(json.dumps(settings.get(key)))
+        said = block.get(key)
+        meant = json.loads(json.dumps(settings.get(key)))
         if None in (said, meant) or said == meant:
             continue
         if isinstance(said, dict) and isinstance(meant, dict):
             inner = next(name for name in {**meant, **said} if meant.get(name) != said.get(name))
-            key, said, meant = f"{key}.{inner}", said.get(inner), meant.get(inner)
-        raise InputError(f"{path}: {key} is {shown(meant)}, expected {shown(said)}, with which it was trained")
+            key = f"{key}.{inner}"
+            said = said.get(inner)
+            meant = meant.get(inner)
+        raise InputError(
+            f"{path}: {key} is {shown(meant)}, expected {shown(said)}, with which it was trained"
+        )

@@ -1,6 +1,7 @@
 """Samples for the network, simulated on access (`lowalt.Dataset`), so that no shards are needed.
 
-Order, metadata and pixels equal those of the shards of the same configuration, so a training sees the same batches.
+Order, metadata and pixels equal those of the shards of the same configuration, so a training sees
+the same batches.
 """
 
 import hashlib
@@ -29,11 +30,14 @@ from lowalt.targets.cloud import Cloud
 from lowalt.tiles.resample import resize
 
 CLEAN_BYTES = 2**30
-"""Memory limit for cached clean echoes (bytes); if a training's motion models need more, only recent ones are kept."""
+"""Memory limit for cached clean echoes (bytes); if a training's motion models need more, only
+recent ones are kept.
+"""
 
 
 def opened(config: str | Path) -> Dataset:
-    """Return the data set of a run by its config.yaml, with the clouds and surfaces that stand next to it.
+    """Return the data set of a run by its config.yaml, with the clouds and surfaces that stand next
+    to it.
 
     Raises: InputError naming what is missing or wrong.
     """
@@ -47,22 +51,34 @@ def opened(config: str | Path) -> Dataset:
 def cloud_sha256(cloud: Cloud) -> str:
     """SHA-256 of all arrays of a cloud, in the order of its fields."""
     arrays = [
-        value for value in (getattr(cloud, field.name) for field in fields(cloud)) if isinstance(value, np.ndarray)
+        value
+        for value in (getattr(cloud, field.name) for field in fields(cloud))
+        if isinstance(value, np.ndarray)
     ]
-    return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
+    return hashlib.sha256(
+        b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
+    ).hexdigest()
 
 
 def stations_of(maker: Maker, columns: list[int]) -> list[int] | None:
-    """Return the numbers of the stations that the images show; None (all) where they show range cells."""
+    """Return the numbers of the stations that the images show; None (all) where they show range
+    cells.
+    """
     spectra = Spectra.from_settings(maker.render["spectra"])
     shown = sorted({number // len(spectra) for number in columns})
     return None if of_cells(spectra) else shown
 
 
 def views_of(
-    maker: Maker, row: dict, snr_db: float, columns: list[int], size: int, stations: list[int] | None = None
+    maker: Maker,
+    row: dict,
+    snr_db: float,
+    columns: list[int],
+    size: int,
+    stations: list[int] | None = None,
 ) -> np.ndarray:
-    """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row at an SNR (dB).
+    """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row
+    at an SNR (dB).
 
     stations: the stations to compute, as `stations_of` returns them; all by default.
     """
@@ -74,19 +90,26 @@ def views_of(
 class DatasetSamples(samples.Samples):
     """Samples simulated on access; same methods, order and pixels as `ShardSamples`."""
 
-    def __init__(self, dataset: Dataset, columns: list[int], folds: set, size: int, placed: bool) -> None:
-        """columns: views to keep; folds: (group, fold) pairs; size: pixels; placed: whether facts carry ranges and
-        aspects.
+    def __init__(
+        self, dataset: Dataset, columns: list[int], folds: set, size: int, placed: bool
+    ) -> None:
+        """columns: views to keep; folds: (group, fold) pairs; size: pixels; placed: whether facts
+        carry ranges and aspects.
 
-        The clean echoes of all motion models are computed here, once, if they fit into CLEAN_BYTES. Forked workers
-        inherit them, so that a training step only adds noise and renders images.
+        The clean echoes of all motion models are computed here, once, if they fit into CLEAN_BYTES.
+        Forked workers inherit them, so that a training step only adds noise and renders images.
         Raises: InputError where nothing is left, or a station or spectrum is missing.
         """
-        self.dataset, self.size = dataset, size
+        self.dataset = dataset
+        self.size = size
         stations = len(dataset.maker.network.stations)
-        self.columns = columns_in(columns, named(dataset.maker.render["spectra"]), stations, "dataset")
+        self.columns = columns_in(
+            columns, named(dataset.maker.render["spectra"]), stations, "dataset"
+        )
         self.stations = stations_of(dataset.maker, self.columns)
-        self.rows, self.chosen, parts = [], [], []
+        self.rows = []
+        self.chosen = []
+        parts = []
         for name in sorted(dataset.plan.shards, key=lambda shard: f"{shard}.tar"):
             group, fold, part = name.split("-")
             if (group, fold) in folds:
@@ -98,7 +121,8 @@ class DatasetSamples(samples.Samples):
 
     def _shard(self, chunk: str, fold: str, placed: bool) -> Facts:
         """Note the samples of one shard in its order; return their facts."""
-        plan, network = self.dataset.plan, self.dataset.maker.network
+        plan = self.dataset.plan
+        network = self.dataset.maker.network
         rows, first = rows_of(self.dataset, chunk), len(self.rows)
         levels = plan.chunk(chunk).snrs
         chosen = select(rows, list(levels), plan.split, plan.seed, fold)
@@ -107,11 +131,17 @@ class DatasetSamples(samples.Samples):
         blank = [math.nan] * len(network.stations)
         places = []
         for number, level in chosen if placed else ():
-            entry = json.loads(record(rows[number], levels[level], fold, plan.seed, network, self.dataset.classes))
+            entry = json.loads(
+                record(rows[number], levels[level], fold, plan.seed, network, self.dataset.classes)
+            )
             places.append(geometry(entry, network))
         places = places or [(blank, blank)] * len(chosen)
-        models, snrs = [rows[number] for number, _ in chosen], [levels[level] for _, level in chosen]
-        keys = [sample_key(row["subtype"], row["model"], snr) for row, snr in zip(models, snrs, strict=True)]
+        models = [rows[number] for number, _ in chosen]
+        snrs = [levels[level] for _, level in chosen]
+        keys = [
+            sample_key(row["subtype"], row["model"], snr)
+            for row, snr in zip(models, snrs, strict=True)
+        ]
         return Facts(
             key=np.array(keys),
             subtype=np.array([row["subtype"] for row in models]),
@@ -139,25 +169,42 @@ class DatasetSamples(samples.Samples):
 
     def keep(self, numbers: np.ndarray) -> None:
         """Drop all samples but those at `numbers`."""
-        self.chosen, self.facts = [self.chosen[number] for number in numbers], self.facts.take(numbers)
+        self.chosen, self.facts = (
+            [self.chosen[number] for number in numbers],
+            self.facts.take(numbers),
+        )
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
-        maker, images = self.dataset.maker, []
+        maker = self.dataset.maker
+        images = []
         for number in numbers:
             place, snr_db = self.chosen[number]
-            images.append(views_of(maker, self.rows[place], snr_db, self.columns, self.size, self.stations))
+            images.append(
+                views_of(maker, self.rows[place], snr_db, self.columns, self.size, self.stations)
+            )
         return np.stack(images)
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training uses of these samples: clouds, rows and settings instead of images.
+        """Return the SHA-256 of all that a training uses of these samples: clouds, rows and
+        settings instead of images.
 
         The same samples from shards or a cache have another sum.
         """
-        maker, subtypes = self.dataset.maker, sorted({self.rows[place]["subtype"] for place, _ in self.chosen})
+        maker = self.dataset.maker
+        subtypes = sorted({self.rows[place]["subtype"] for place, _ in self.chosen})
         clouds = {name: self.dataset.clouds[name] for name in subtypes}
         sums = {name: cloud_sha256(cloud) for name, cloud in clouds.items()}
-        rows = hashlib.sha256(json.dumps([self.rows[place] for place, _ in self.chosen], sort_keys=True).encode())
-        settings = {"size": self.size, "columns": self.columns, "render": maker.render, "echo": maker.echo}
-        described = json.dumps([settings, self.dataset.plan.seed, sums, rows.hexdigest()], sort_keys=True)
+        rows = hashlib.sha256(
+            json.dumps([self.rows[place] for place, _ in self.chosen], sort_keys=True).encode()
+        )
+        settings = {
+            "size": self.size,
+            "columns": self.columns,
+            "render": maker.render,
+            "echo": maker.echo,
+        }
+        described = json.dumps(
+            [settings, self.dataset.plan.seed, sums, rows.hexdigest()], sort_keys=True
+        )
         return samples.fingerprint(self.facts, described.encode())

@@ -1,17 +1,21 @@
-"""Distances between the subtypes of a category: whether an easy unseen subtype is nearly a copy of a trained one.
+"""Distances between the subtypes of a category: whether an easy unseen subtype is nearly a copy of
+a trained one.
 
-A subtype is represented by the points that its cloud sweeps over one cycle (a turn, a beat, a recording) in its own
-frame: shape and own motion, which together cause the micro-Doppler. Each set of points is centred and divided by its
-root mean square radius; the energy distance of two sets then compares their form, and the ratio of their radii is given
-as the ratio of size. The energy distance is a metric, is zero for equal distributions only, needs no correspondence and
-no grid, and changes little by one stray point, unlike the Hausdorff distance (Szekely and Rizzo, J. Stat. Plan.
-Inference 143, 2013).
+A subtype is represented by the points that its cloud sweeps over one cycle (a turn, a beat, a
+recording) in its own
+frame: shape and own motion, which together cause the micro-Doppler. Each set of points is centred
+and divided by its root mean square radius; the energy distance of two sets then compares their
+form, and the ratio of their radii is given as the ratio of size. The energy distance is a metric,
+is zero for equal distributions only, needs no correspondence and no grid, and changes little by one
+stray point, unlike the Hausdorff distance (Szekely and Rizzo, J. Stat. Plan. Inference 143, 2013).
 
 distances.csv, one row per subtype:
     category, subtype, group
     nearest, distance, size_ratio                the nearest other subtype of the category
-    nearest_trained, trained_distance, trained_size_ratio    the same among the subtypes of the group seen, on which the
-                                                 unseen protocol trains; of a trained subtype, another one
+    nearest_trained, trained_distance, trained_size_ratio    the same among the subtypes of the
+    group seen, on which the
+                                                 unseen protocol trains; of a trained subtype,
+                                                 another one
 """
 
 from pathlib import Path
@@ -26,27 +30,41 @@ from lowalt.motion.table import PATH
 from lowalt.targets.cloud import Cloud
 
 COLUMNS = (
-    "category", "subtype", "group", "nearest", "distance", "size_ratio", "nearest_trained", "trained_distance",
+    "category",
+    "subtype",
+    "group",
+    "nearest",
+    "distance",
+    "size_ratio",
+    "nearest_trained",
+    "trained_distance",
     "trained_size_ratio",
-)  # fmt: skip
-INSTANTS, POINTS = 16, 1200
+)
+INSTANTS = 16
+POINTS = 1200
 
 
 def still_row(row: dict) -> dict:
-    """Return the motion row without place, velocity and attitude, so that only the parts' own motion is left."""
+    """Return the motion row without place, velocity and attitude, so that only the parts' own
+    motion is left.
+    """
     names = ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad")
     return {name: 0.0 if name in (*names, *PATH) else value for name, value in row.items()}
 
 
 def cycle_s(cloud: Cloud, row: dict) -> float:
-    """Return the time of one cycle (s): a turn, a beat, or the whole recording; a second where nothing turns."""
+    """Return the time of one cycle (s): a turn, a beat, or the whole recording; a second where
+    nothing turns.
+    """
     if len(cloud.track):
         return len(cloud.track) / cloud.record["track_rate_hz"] / row["playback"]
     return 1.0 / row["rate_hz"] if row["rate_hz"] > 0 else 1.0
 
 
 def swept(cloud: Cloud, row: dict) -> np.ndarray:
-    """Points (at most 1200, 3) m that a cloud sweeps over one cycle in its own frame, evenly taken from all of them."""
+    """Points (at most 1200, 3) m that a cloud sweeps over one cycle in its own frame, evenly taken
+    from all of them.
+    """
     times = np.arange(INSTANTS) / INSTANTS * cycle_s(cloud, row)
     points = positions(cloud, still_row(row), times).reshape(-1, 3)
     return points[np.linspace(0, len(points) - 1, min(POINTS, len(points))).round().astype(int)]
@@ -57,12 +75,15 @@ def energy_distance(first: np.ndarray, second: np.ndarray) -> float:
 
     sqrt(2 E|X - Y| - E|X - X'| - E|Y - Y'|), over all pairs. Source: Szekely and Rizzo 2013, Eq. 6.
     """
-    square = 2 * cdist(first, second).mean() - cdist(first, first).mean() - cdist(second, second).mean()
+    square = (
+        2 * cdist(first, second).mean() - cdist(first, first).mean() - cdist(second, second).mean()
+    )
     return float(np.sqrt(max(square, 0.0)))
 
 
 def form(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return points (n, 3) centred and divided by their root mean square radius, and that radius (m).
+    """Return points (n, 3) centred and divided by their root mean square radius, and that radius
+    (m).
 
     Raises: InputError where all points coincide.
     """
@@ -74,7 +95,8 @@ def form(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
-    """Return the rows of distances.csv by category and subtype; `motion` holds at least one row of every subtype.
+    """Return the rows of distances.csv by category and subtype; `motion` holds at least one row of
+    every subtype.
 
     Raises: InputError for a cloud without a motion row.
     """
@@ -88,19 +110,31 @@ def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
     lines = []
     for category in dict.fromkeys(cloud.category for cloud in clouds):
         names = sorted(cloud.subtype for cloud in clouds if cloud.category == category)
-        apart = {(a, b): energy_distance(forms[a][0], forms[b][0]) for a in names for b in names if a < b}
+        apart = {
+            (a, b): energy_distance(forms[a][0], forms[b][0]) for a in names for b in names if a < b
+        }
         for name in names:
             line = [category, name, first[name]["group"]]
             for trained in (False, True):
                 others = [
-                    other for other in names if other != name and (not trained or first[other]["group"] == "seen")
+                    other
+                    for other in names
+                    if other != name and (not trained or first[other]["group"] == "seen")
                 ]
-                near = min(others, key=lambda other: (apart[min(name, other), max(name, other)], other), default=None)
+                near = min(
+                    others,
+                    key=lambda other: (apart[min(name, other), max(name, other)], other),
+                    default=None,
+                )
                 if near is None:
                     line += ["", "", ""]
                     continue
                 sizes = sorted((forms[name][1], forms[near][1]))
-                line += [near, f"{apart[min(name, near), max(name, near)]:.4f}", f"{sizes[1] / sizes[0]:.3f}"]
+                line += [
+                    near,
+                    f"{apart[min(name, near), max(name, near)]:.4f}",
+                    f"{sizes[1] / sizes[0]:.3f}",
+                ]
             lines.append(line)
     return lines
 

@@ -1,4 +1,6 @@
-"""Evaluated schemes, read from prediction files and the records next to them, and differences between schemes."""
+"""Evaluated schemes, read from prediction files and the records next to them, and differences
+between schemes.
+"""
 
 from pathlib import Path
 
@@ -16,21 +18,29 @@ class Evaluated:
     """One evaluated scheme: its predictions and the record of the run."""
 
     def __init__(self, path: str | Path) -> None:
-        """path: the prediction file; the JSON file next to it holds protocol, scheme, seed and hardware.
+        """path: the prediction file; the JSON file next to it holds protocol, scheme, seed and
+        hardware.
 
         Raises: InputError where either is missing or the test part is empty.
         """
         self.about = about = predictions.record(path)
         try:
-            self.protocol, self.scheme, self.seed = about["protocol"], about["scheme"], about["seed"]
-            self.hardware, self.trained_on = about["hardware"], about.get("trained_on", "")
+            self.protocol = about["protocol"]
+            self.scheme = about["scheme"]
+            self.seed = about["seed"]
+            self.hardware = about["hardware"]
+            self.trained_on = about.get("trained_on", "")
             self.classes = stated(about)
         except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{Path(path).with_suffix('.json')}: not a run record ({error!r})") from error
+            raise InputError(
+                f"{Path(path).with_suffix('.json')}: not a run record ({error!r})"
+            ) from error
         self.all = predictions.read(path, self.classes)
         self.test = self.part("test")
         if not len(self.test):
-            raise InputError(f"{path}: no predictions for the test part of the {self.protocol} protocol")
+            raise InputError(
+                f"{path}: no predictions for the test part of the {self.protocol} protocol"
+            )
 
     def part(self, name: str) -> Predictions:
         """Return the predictions of a part of the run's protocol."""
@@ -38,13 +48,19 @@ class Evaluated:
 
 
 def difference(
-    first: list[Evaluated], second: list[Evaluated], generator: np.random.Generator, snr_db: float | None = None
+    first: list[Evaluated],
+    second: list[Evaluated],
+    generator: np.random.Generator,
+    snr_db: float | None = None,
 ) -> Interval:
-    """Return the mean over seeds of first - second, with its 95 % interval; all in shares of correct samples.
+    """Return the mean over seeds of first - second, with its 95 % interval; all in shares of
+    correct samples.
 
-    first, second: trainings of the two schemes, one per seed; snr_db: the SNR whose samples count, None for all. The
-    interval resamples seeds, subtypes (unseen protocol) and motion models. The difference of a scheme to itself is 0.
-    Raises: InputError where the trainings were tested on different samples. Source: `intervals.strict_difference`.
+    first, second: trainings of the two schemes, one per seed; snr_db: the SNR whose samples count,
+    None for all. The interval resamples seeds, subtypes (unseen protocol) and motion models. The
+    difference of a scheme to itself is 0.
+    Raises: InputError where the trainings were tested on different samples. Source:
+    `intervals.strict_difference`.
     """
     test = first[0].test
     for run in (*first, *second):
@@ -53,18 +69,31 @@ def difference(
     if first is second:
         return Interval(0.0, 0.0, 0.0)
     rows = slice(None) if snr_db is None else test.snr_db == snr_db
-    shares = [model_shares(test.motion[rows], [run.test.correct[rows] for run in runs]) for runs in (first, second)]
+    shares = [
+        model_shares(test.motion[rows], [run.test.correct[rows] for run in runs])
+        for runs in (first, second)
+    ]
     (place, count, ours), (*_, theirs) = shares
-    return strict_difference(ours, theirs, count, test.subtype[rows][place], whole_subtypes(first), generator)
+    return strict_difference(
+        ours, theirs, count, test.subtype[rows][place], whole_subtypes(first), generator
+    )
 
 
 def whole_subtypes(runs: list[Evaluated]) -> bool:
-    """Return whether intervals resample whole subtypes, because the results should generalise to other subtypes."""
+    """Return whether intervals resample whole subtypes, because the results should generalise to
+    other subtypes.
+    """
     return runs[0].protocol == "unseen"
 
 
 def spread_points(*groups: list[float]) -> float | None:
-    """Return the standard deviation between seeds, pooled over groups of accuracies in percent; None for one seed."""
+    """Return the standard deviation between seeds, pooled over groups of accuracies in percent;
+    None for one seed.
+    """
     several = [np.array(group) for group in groups if len(group) > 1]
     freedom = sum(len(group) - 1 for group in several)
-    return float(np.sqrt(sum(((group - group.mean()) ** 2).sum() for group in several) / freedom)) if freedom else None
+    return (
+        float(np.sqrt(sum(((group - group.mean()) ** 2).sum() for group in several) / freedom))
+        if freedom
+        else None
+    )

@@ -1,5 +1,5 @@
-"""A trained model for other programs: index images in, class probabilities out, as ONNX; or its weights and
-records as safetensors, with a card.
+"""A trained model for other programs: index images in, class probabilities out, as ONNX; or its
+weights and records as safetensors, with a card.
 """
 
 from pathlib import Path
@@ -14,7 +14,9 @@ from lowalt.recognition.runs import Trained
 
 
 class Probabilities(nn.Module):
-    """The network with its softmax: index images (B, views, size, size) uint8 -> probabilities (B, classes)."""
+    """The network with its softmax: index images (B, views, size, size) uint8 -> probabilities (B,
+    classes).
+    """
 
     def __init__(self, model: nn.Module) -> None:
         """model: a Recogniser in evaluation mode."""
@@ -27,10 +29,11 @@ class Probabilities(nn.Module):
 
 
 def export(trained: Trained, out: str | Path) -> None:
-    """Write the model as ONNX (.onnx), for any batch size; or its weights and records (.safetensors) with a card (.md)
-    next to them.
+    """Write the model as ONNX (.onnx), for any batch size; or its weights and records
+    (.safetensors) with a card (.md) next to them.
 
-    Raises: InputError for another suffix, or where ONNX is asked for and its packages are not installed.
+    Raises: InputError for another suffix, or where ONNX is asked for and its packages are not
+    installed.
     """
     suffix = Path(out).suffix
     if suffix not in (".onnx", ".safetensors"):
@@ -38,15 +41,28 @@ def export(trained: Trained, out: str | Path) -> None:
     if suffix == ".safetensors":
         content = model_file.of_run(trained.path)
         model_file.write(out, content)
-        model_card.write(out, content, model_card.accuracy_rows(trained.path, trained.protocol, trained.scheme.name))
+        model_card.write(
+            out,
+            content,
+            model_card.accuracy_rows(trained.path, trained.protocol, trained.scheme.name),
+        )
         return
     model = Probabilities(trained.model).eval()
     # Two samples, since a batch of one would be taken for a constant.
-    example = torch.zeros(2, len(trained.scheme.columns), trained.size, trained.size, dtype=torch.uint8)
+    example = torch.zeros(
+        2, len(trained.scheme.columns), trained.size, trained.size, dtype=torch.uint8
+    )
     dynamic = {"index": {0: torch.export.Dim("batch")}}
     with torch.no_grad(), replacing(out) as temporary:
         try:
-            torch.onnx.export(model, (example,), temporary, dynamic_shapes=dynamic, dynamo=True, external_data=False)
+            torch.onnx.export(
+                model,
+                (example,),
+                temporary,
+                dynamic_shapes=dynamic,
+                dynamo=True,
+                external_data=False,
+            )
         except ImportError as error:
             raise InputError(
                 f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `{install_command('export')}`"

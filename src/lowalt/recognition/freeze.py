@@ -1,7 +1,8 @@
-"""Frozen inputs: the checksums of clouds and motion tables, written before the first training and checked before every
-later use.
+"""Frozen inputs: the checksums of clouds and motion tables, written before the first training and
+checked before every later use.
 
-The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies it without our code.
+The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies it without our
+code.
 """
 
 from pathlib import Path
@@ -35,9 +36,13 @@ def verify(sums: str | Path) -> int:
     folder = existing(sums, "checksums").resolve().parent
     lines = text_of(sums, "checksums").splitlines()
     for number, line in enumerate(lines, start=1):
-        digest, gap, name = line[:64], line[64:66], line[66:]
+        digest = line[:64]
+        gap = line[64:66]
+        name = line[66:]
         if gap != "  " or not name:
-            raise InputError(f"{sums} line {number}: {line!r}, expected a SHA-256, two spaces and a path")
+            raise InputError(
+                f"{sums} line {number}: {line!r}, expected a SHA-256, two spaces and a path"
+            )
         # No file has a null byte in its name, and `resolve` does not answer for one.
         if "\0" in name or not (folder / name).resolve().is_relative_to(folder):
             raise InputError(f"{sums} line {number}: {name!r}, expected a file below {folder}")

@@ -1,10 +1,11 @@
-"""Fusion: how the tokens of all views become one decision. Attention is the paper's proposal, mean its baseline.
+"""Fusion: how the tokens of all views become one decision. Attention is the paper's proposal, mean
+its baseline.
 
 Axes: B samples, K stations, V views of a station, then features. A fusion offers
     forward        tokens (B, K, V, features) -> fused feature (B, width)
     decided        tokens and the classifier -> logits (B, classes)
-    each_station   tokens (B, K, V, features) -> tokens of B * K samples, each as if one station were the only one
-    both           the logits of all stations together, and of each alone
+    each_station   tokens (B, K, V, features) -> tokens of B * K samples, each as if one station
+    were the only one both           the logits of all stations together, and of each alone
 """
 
 from collections.abc import Callable
@@ -16,11 +17,19 @@ from lowalt.files.errors import InputError
 
 
 def encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
-    """Return a transformer encoder of `depth` layers over tokens of `width` features; the identity for depth 0."""
+    """Return a transformer encoder of `depth` layers over tokens of `width` features; the identity
+    for depth 0.
+    """
     if depth == 0:
         return nn.Identity()
     layer = nn.TransformerEncoderLayer(
-        width, heads, round(width * feed_forward), dropout, activation="gelu", batch_first=True, norm_first=True
+        width,
+        heads,
+        round(width * feed_forward),
+        dropout,
+        activation="gelu",
+        batch_first=True,
+        norm_first=True,
     )
     # Pre-norm layers leave their sum unnormalised: the stack needs a norm of its own.
     return nn.TransformerEncoder(layer, depth, norm=nn.LayerNorm(width), enable_nested_tensor=False)
@@ -42,13 +51,19 @@ class Fusion(nn.Module):
         """Tokens (B, K, V, features) -> (B * K, 1, V, features), station by station."""
         return tokens.flatten(0, 1).unsqueeze(1)
 
-    def both(self, tokens: torch.Tensor, classifier: nn.Module) -> tuple[torch.Tensor, torch.Tensor]:
-        """Tokens (B, K, V, features) -> logits (B, classes), and (B * K, classes) of each station alone."""
+    def both(
+        self, tokens: torch.Tensor, classifier: nn.Module
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Tokens (B, K, V, features) -> logits (B, classes), and (B * K, classes) of each station
+        alone.
+        """
         return self.decided(tokens, classifier), self.decided(self.each_station(tokens), classifier)
 
 
 class AttentionFusion(Fusion):
-    """The paper's fusion: spectra of a station by encoder and mean pool, stations by encoder and max pool."""
+    """The paper's fusion: spectra of a station by encoder and mean pool, stations by encoder and
+    max pool.
+    """
 
     def __init__(self, width: int, views: int, block: dict) -> None:
         """width: features of a token; views: of a station; block: the network's settings.
@@ -57,7 +72,9 @@ class AttentionFusion(Fusion):
         """
         super().__init__(width)
         if width % block["heads"]:
-            raise InputError(f"network: heads is {block['heads']}, expected a divisor of the {width} features")
+            raise InputError(
+                f"network: heads is {block['heads']}, expected a divisor of the {width} features"
+            )
         self.modality = nn.Parameter(torch.empty(views, width))
         nn.init.trunc_normal_(self.modality, std=0.02)
         self.draws = block["dropout"] > 0
@@ -74,13 +91,19 @@ class AttentionFusion(Fusion):
         station = self.intra((tokens + self.modality).flatten(0, 1)).mean(dim=1)
         return station.unflatten(0, tokens.shape[:2])
 
-    def both(self, tokens: torch.Tensor, classifier: nn.Module) -> tuple[torch.Tensor, torch.Tensor]:
-        """As `Fusion.both`. The encoder over spectra runs once, except where dropout draws anew for each part."""
+    def both(
+        self, tokens: torch.Tensor, classifier: nn.Module
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """As `Fusion.both`. The encoder over spectra runs once, except where dropout draws anew for
+        each part.
+        """
         if self.draws and self.training:
             return super().both(tokens, classifier)
         station = self.stations(tokens)
         alone = station.flatten(0, 1).unsqueeze(1)
-        return classifier(self.inter(station).amax(dim=1)), classifier(self.inter(alone).amax(dim=1))
+        return classifier(self.inter(station).amax(dim=1)), classifier(
+            self.inter(alone).amax(dim=1)
+        )
 
 
 class MeanFusion(Fusion):
@@ -95,26 +118,36 @@ FUSIONS: dict[str, Callable[[int, tuple[int, int], dict], Fusion]] = {
     "attention": lambda width, shape, block: AttentionFusion(width, shape[1], block),
     "mean": lambda width, shape, block: MeanFusion(width),
 }
-"""How each fusion is made of the features of a token, (stations, views of a station) and the network's settings."""
+"""How each fusion is made of the features of a token, (stations, views of a station) and the
+network's settings.
+"""
 
 
 class Fused(nn.Module):
-    """A network of tokens, fusion and classifier; a subclass makes `backbone` and says how inputs become tokens."""
+    """A network of tokens, fusion and classifier; a subclass makes `backbone` and says how inputs
+    become tokens.
+    """
 
-    def add_head(self, name: str, width: int, shape: tuple[int, int], block: dict, classes: int) -> None:
+    def add_head(
+        self, name: str, width: int, shape: tuple[int, int], block: dict, classes: int
+    ) -> None:
         """Add fusion and classifier behind the tokens.
 
-        name: of FUSIONS; width: features of a token; shape: stations, views of a station; block: `recognition.network`.
+        name: of FUSIONS; width: features of a token; shape: stations, views of a station; block:
+        `recognition.network`.
         Raises: InputError for heads that do not divide the features.
         """
-        self.shape, self.classes = shape, classes
+        self.shape = shape
+        self.classes = classes
         self.fusion = FUSIONS[name](width, shape, block)
         width = self.fusion.width
         if block["hidden"]:
             self.classifier = nn.Sequential(
-                nn.Linear(width, block["hidden"]), nn.GELU(), nn.Dropout(block["dropout"]),
+                nn.Linear(width, block["hidden"]),
+                nn.GELU(),
+                nn.Dropout(block["dropout"]),
                 nn.Linear(block["hidden"], classes),
-            )  # fmt: skip
+            )
         else:
             self.classifier = nn.Linear(width, classes)
 
@@ -122,11 +155,13 @@ class Fused(nn.Module):
         """Inputs of all views -> tokens (B, K, V, features)."""
         raise NotImplementedError
 
-    def forward(self, inputs: torch.Tensor, alone: bool = False) -> torch.Tensor | tuple[torch.Tensor, torch.Tensor]:
+    def forward(
+        self, inputs: torch.Tensor, alone: bool = False
+    ) -> torch.Tensor | tuple[torch.Tensor, torch.Tensor]:
         """Inputs of all views (B, K * V, ...), station-major -> logits (B, classes).
 
-        alone: return as well the logits (B * K, classes) of each station as if it were the only one; the backbone runs
-        once.
+        alone: return as well the logits (B * K, classes) of each station as if it were the only
+        one; the backbone runs once.
         """
         decide = self.fusion.both if alone else self.fusion.decided
         return decide(self.tokens(inputs), self.classifier)

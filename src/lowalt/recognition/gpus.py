@@ -1,8 +1,8 @@
 """A GPU of one's own: jobs of one process that run on a machine at the same time never share a GPU.
 
-A job locks one file per GPU, and the system frees the lock of a job that ends. Processes that torchrun starts take the
-visible GPUs in order and lock none: on one machine let one such training run at a time, by `recognition.gpu: true` and
-`--resources gpu=N` with N its processes.
+A job locks one file per GPU, and the system frees the lock of a job that ends. Processes that
+torchrun starts take the visible GPUs in order and lock none: on one machine let one such training
+run at a time, by `recognition.gpu: true` and `--resources gpu=N` with N its processes.
 """
 
 import contextlib
@@ -27,7 +27,9 @@ def _opened(name: str) -> int:
 
 @functools.cache
 def claimed(names: tuple[str, ...]) -> int:
-    """Return the place in `names` (UUIDs) of a GPU that is this process's own until it ends; wait until one is free."""
+    """Return the place in `names` (UUIDs) of a GPU that is this process's own until it ends; wait
+    until one is free.
+    """
     waiting = False
     while True:
         for place, name in enumerate(names):
@@ -39,6 +41,10 @@ def claimed(names: tuple[str, ...]) -> int:
             except BlockingIOError:
                 os.close(descriptor)
         if not waiting:
-            print(f"waiting for one of {len(names)} GPUs, which other jobs use", file=sys.stderr, flush=True)
+            print(
+                f"waiting for one of {len(names)} GPUs, which other jobs use",
+                file=sys.stderr,
+                flush=True,
+            )
             waiting = True
         time.sleep(POLL_S)

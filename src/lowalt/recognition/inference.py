@@ -1,4 +1,6 @@
-"""Class probabilities of a network, on one machine or several ranks; any number of ranks gives the same bits."""
+"""Class probabilities of a network, on one machine or several ranks; any number of ranks gives the
+same bits.
+"""
 
 import contextlib
 import hashlib
@@ -19,9 +21,11 @@ from lowalt.recognition.samples import Samples
 
 
 def arithmetic(precision: str, device: str) -> str:
-    """Return "bf16" or "fp32" for a setting: "auto" is bf16 where the hardware has bf16 multipliers.
+    """Return "bf16" or "fp32" for a setting: "auto" is bf16 where the hardware has bf16
+    multipliers.
 
-    device: "cpu" or "cuda". A processor without such units emulates bf16 and takes ten times as long as in fp32.
+    device: "cpu" or "cuda". A processor without such units emulates bf16 and takes ten times as
+    long as in fp32.
     """
     if precision != "auto":
         return precision
@@ -29,12 +33,16 @@ def arithmetic(precision: str, device: str) -> str:
         return "bf16" if torch.cuda.is_bf16_supported(including_emulation=False) else "fp32"
     known = torch.cpu.get_capabilities()
     # Arm processors use other names for these units.
-    return "bf16" if any(known.get(unit) for unit in ("amx_bf16", "avx512_bf16", "bf16")) else "fp32"
+    return (
+        "bf16" if any(known.get(unit) for unit in ("amx_bf16", "avx512_bf16", "bf16")) else "fp32"
+    )
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Where torch runs: device, arithmetic ("bf16" or "fp32"), this process's place among the ranks of torchrun."""
+    """Where torch runs: device, arithmetic ("bf16" or "fp32"), this process's place among the ranks
+    of torchrun.
+    """
 
     device: torch.device
     precision: str
@@ -45,7 +53,8 @@ class Machine:
     def here(cls, precision: str) -> "Machine":
         """Return this process's machine: a free GPU if there is any, else the CPU.
 
-        Under torchrun, ranks take the visible GPUs in order and communicate by nccl (GPU) or gloo (CPU).
+        Under torchrun, ranks take the visible GPUs in order and communicate by nccl (GPU) or gloo
+        (CPU).
         precision: "auto", "bf16" or "fp32". Raises: InputError where a rank finds no GPU left.
         """
         gpu = torch.cuda.is_available()
@@ -53,7 +62,9 @@ class Machine:
         place = int(os.environ.get("LOCAL_RANK", "0"))
         if gpu and ranks == 1:
             every = range(torch.cuda.device_count())
-            place = gpus.claimed(tuple(str(torch.cuda.get_device_properties(number).uuid) for number in every))
+            place = gpus.claimed(
+                tuple(str(torch.cuda.get_device_properties(number).uuid) for number in every)
+            )
         elif gpu and place >= torch.cuda.device_count():
             count = torch.cuda.device_count()
             raise InputError(
@@ -62,7 +73,9 @@ class Machine:
         device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
             distributed.init_process_group("nccl" if gpu else "gloo")
-        return cls(device, arithmetic(precision, device.type), int(os.environ.get("RANK", "0")), ranks)
+        return cls(
+            device, arithmetic(precision, device.type), int(os.environ.get("RANK", "0")), ranks
+        )
 
     @property
     def gpu(self) -> bool:
@@ -70,7 +83,9 @@ class Machine:
         return self.device.type == "cuda"
 
     def placed(self, model: nn.Module) -> nn.Module:
-        """Return a model on the device for predictions; in fp32 on a processor in the form that it computes fastest."""
+        """Return a model on the device for predictions; in fp32 on a processor in the form that it
+        computes fastest.
+        """
         if self.gpu or self.precision != "fp32":
             return model.to(self.device)
         return as_products(model).to(self.device, memory_format=torch.channels_last)
@@ -82,13 +97,18 @@ class Machine:
         return torch.autocast(self.device.type, torch.bfloat16)
 
     def with_shared_statistics(self, model: nn.Module) -> nn.Module:
-        """Return the model with every batch norm taking its statistics over all ranks, which torch offers on GPUs.
+        """Return the model with every batch norm taking its statistics over all ranks, which torch
+        offers on GPUs.
 
         Raises: InputError for a batch norm that several ranks would train on processors.
         """
         if self.ranks == 1:
             return model
-        layers = [name for name, layer in model.named_modules() if isinstance(layer, nn.modules.batchnorm._BatchNorm)]
+        layers = [
+            name
+            for name, layer in model.named_modules()
+            if isinstance(layer, nn.modules.batchnorm._BatchNorm)
+        ]
         if layers and not self.gpu:
             raise InputError(
                 f"training: {self.ranks} processes on processors share no batch norm, and the backbone has "
@@ -103,7 +123,8 @@ class Machine:
     def agree(self, identity: str, steps: int) -> None:
         """Refuse ranks whose settings, samples or steps differ, since the result would not show it.
 
-        identity: all that determines the weights; steps: those done before. Raises: InputError on every rank.
+        identity: all that determines the weights; steps: those done before. Raises: InputError on
+        every rank.
         """
         if self.ranks == 1:
             return
@@ -113,13 +134,15 @@ class Machine:
         if int(bounds.sum()):
             raise InputError(
                 f"training: rank {self.rank} computes in {self.precision} and stands at step {steps}, another rank "
-                "differs in that or in its samples; expected identical nodes that see the same files (with an "
+                "differs in that or in its samples; expected identical nodes that see the same "
+                "files (with an "
                 "explicit training.precision instead of auto, different nodes compute alike)"
             )
 
 
 def evaluation(block: dict) -> list:
-    """Return batch, threads, precision, mirror and workers (0 where left out) of the block `recognition.evaluation`.
+    """Return batch, threads, precision, mirror and workers (0 where left out) of the block
+    `recognition.evaluation`.
 
     Raises: InputError naming a missing or unknown key.
     """
@@ -138,9 +161,10 @@ def probabilities(
 ) -> np.ndarray:
     """Return class probabilities (len(numbers), classes) float64 of the samples `numbers`.
 
-    mirror: average with the probabilities of the inputs mirrored along Doppler, which show the target turned by 180
-    degrees. ahead: reads the samples' images (`Unchanged`) in worker processes; without it this process reads them.
-    Each rank gets whole batches, so that sums do not depend on the number of ranks.
+    mirror: average with the probabilities of the inputs mirrored along Doppler, which show the
+    target turned by 180 degrees. ahead: reads the samples' images (`Unchanged`) in worker
+    processes; without it this process reads them. Each rank gets whole batches, so that sums do not
+    depend on the number of ranks.
     """
     model.eval()
     result = torch.zeros(len(numbers), model.classes, dtype=torch.float64)
@@ -152,7 +176,9 @@ def probabilities(
         seen = (images, model.mirrored(images)) if mirror else (images,)
         with machine.autocast():
             logits = [model(image) for image in seen]
-        result[start : start + batch] = torch.stack([value.double().softmax(1) for value in logits]).mean(0).cpu()
+        result[start : start + batch] = (
+            torch.stack([value.double().softmax(1) for value in logits]).mean(0).cpu()
+        )
     if machine.ranks > 1:
         # Each entry is non-zero on one rank only, so the sum is exact.
         result = result.to(machine.device)

@@ -1,8 +1,9 @@
 """Intervals of means and differences by resampling training seeds, subtypes and motion models.
 
-Motion models, not samples, are the independent units: all SNRs of a motion model share its echo, so intervals
-resample whole motion models (cluster bootstrap; Field and Welsh, J. R. Stat. Soc. B 69, 2007). Intervals of differences
-between schemes also resample training seeds and, for unseen subtypes, the subtypes (`strict_difference`).
+Motion models, not samples, are the independent units: all SNRs of a motion model share its echo, so
+intervals resample whole motion models (cluster bootstrap; Field and Welsh, J. R. Stat. Soc. B 69,
+2007). Intervals of differences between schemes also resample training seeds and, for unseen
+subtypes, the subtypes (`strict_difference`).
 """
 
 from typing import NamedTuple
@@ -21,9 +22,11 @@ class Interval(NamedTuple):
 def bootstrap(
     clusters: np.ndarray, values: np.ndarray, generator: np.random.Generator, repeats: int = 4000
 ) -> Interval:
-    """Mean of `values` (samples,) with the percentile interval from resampling whole clusters (samples,).
+    """Mean of `values` (samples,) with the percentile interval from resampling whole clusters
+    (samples,).
 
-    Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13; clusters as in the module's docstring.
+    Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13; clusters as in the
+    module's docstring.
     """
     _, place = np.unique(clusters, return_inverse=True)
     count = np.bincount(place).astype(float)
@@ -36,13 +39,17 @@ def bootstrap(
     return Interval(float(np.mean(values)), float(low), float(high))
 
 
-def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return for each motion model its first sample (models,), its number of samples (models,) and its share of correct
-    samples by seed (seeds, models).
+def model_shares(
+    motion: np.ndarray, correct: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return for each motion model its first sample (models,), its number of samples (models,) and
+    its share of correct samples by seed (seeds, models).
 
     motion (samples,): name of the motion model; correct: (samples,) of every training seed.
     """
-    _, first, place, count = np.unique(motion, return_index=True, return_inverse=True, return_counts=True)
+    _, first, place, count = np.unique(
+        motion, return_index=True, return_inverse=True, return_counts=True
+    )
     sums = np.array([np.bincount(place, weights=row) for row in correct])
     return first, count, sums / count
 
@@ -50,8 +57,8 @@ def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndar
 def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> np.ndarray:
     """Return how often each seed is drawn, (repeats, seeds), as a share of the draws.
 
-    Deviations from 1 / seeds are multiplied by `_stretch`. Two schemes with `seeds` seeds each have 2 (seeds - 1)
-    degrees of freedom.
+    Deviations from 1 / seeds are multiplied by `_stretch`. Two schemes with `seeds` seeds each have
+    2 (seeds - 1) degrees of freedom.
     """
     if seeds == 1:
         return np.ones((repeats, 1))
@@ -60,23 +67,30 @@ def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> n
 
 
 def _stretch(count: int, freedom: int) -> float:
-    """Return the factor by which an interval of a mean from resampling `count` values is too narrow.
+    """Return the factor by which an interval of a mean from resampling `count` values is too
+    narrow.
 
-    Resampling n values gives (n - 1) / n of the variance of their mean. A spread that is estimated with `freedom`
-    degrees of freedom needs Student's quantile instead of the normal one. Source: Davison and Hinkley, Bootstrap
-    Methods and their Application, 1997, section 2; Hesterberg, What Teachers Should Know about the Bootstrap, 2015.
+    Resampling n values gives (n - 1) / n of the variance of their mean. A spread that is estimated
+    with `freedom` degrees of freedom needs Student's quantile instead of the normal one. Source:
+    Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 2; Hesterberg, What
+    Teachers Should Know about the Bootstrap, 2015.
     """
-    # Imported late and not from scipy.stats (same values, one second), because the Snakefile imports this module.
+    # Imported late and not from scipy.stats (same values, one second), because the Snakefile
+    # imports this module.
     from scipy.special import ndtri, stdtrit
 
     return float(np.sqrt(count / (count - 1)) * stdtrit(freedom, 0.975) / ndtri(0.975))
 
 
-def _subtype_weights(subtypes: np.ndarray, repeats: int, generator: np.random.Generator) -> np.ndarray:
-    """Weight of each motion model, (repeats, models), when whole subtypes are drawn with all their models.
+def _subtype_weights(
+    subtypes: np.ndarray, repeats: int, generator: np.random.Generator
+) -> np.ndarray:
+    """Weight of each motion model, (repeats, models), when whole subtypes are drawn with all their
+    models.
 
-    Models are not resampled within a drawn subtype, because the spread between subtypes includes theirs. Deviations
-    are stretched for few subtypes, so a weight may be slightly negative. Source: Davison and Hinkley 1997, section 3.8.
+    Models are not resampled within a drawn subtype, because the spread between subtypes includes
+    theirs. Deviations are stretched for few subtypes, so a weight may be slightly negative. Source:
+    Davison and Hinkley 1997, section 3.8.
     """
     names, place = np.unique(subtypes, return_inverse=True)
     if len(names) == 1:
@@ -85,13 +99,18 @@ def _subtype_weights(subtypes: np.ndarray, repeats: int, generator: np.random.Ge
     return (1 + (drawn - 1) * _stretch(len(names), len(names) - 1))[:, place]
 
 
-def model_weights(subtypes: np.ndarray, whole: bool, repeats: int, generator: np.random.Generator) -> np.ndarray:
+def model_weights(
+    subtypes: np.ndarray, whole: bool, repeats: int, generator: np.random.Generator
+) -> np.ndarray:
     """Return how often each motion model is drawn, (repeats, models).
 
-    subtypes (models,): the subtype each motion model belongs to; whole: draw subtypes first, then models within each.
+    subtypes (models,): the subtype each motion model belongs to; whole: draw subtypes first, then
+    models within each.
     """
     if not whole:
-        return generator.multinomial(len(subtypes), np.full(len(subtypes), 1 / len(subtypes)), repeats).astype(float)
+        return generator.multinomial(
+            len(subtypes), np.full(len(subtypes), 1 / len(subtypes)), repeats
+        ).astype(float)
     names, place = np.unique(subtypes, return_inverse=True)
     drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
     weights = np.zeros((repeats, len(subtypes)))
@@ -105,17 +124,24 @@ def model_weights(subtypes: np.ndarray, whole: bool, repeats: int, generator: np
 
 
 def strict_difference(
-    first: np.ndarray, second: np.ndarray, count: np.ndarray, subtypes: np.ndarray, whole_subtypes: bool,
-    generator: np.random.Generator, repeats: int = 4000,
-) -> Interval:  # fmt: skip
-    """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes and models.
+    first: np.ndarray,
+    second: np.ndarray,
+    count: np.ndarray,
+    subtypes: np.ndarray,
+    whole_subtypes: bool,
+    generator: np.random.Generator,
+    repeats: int = 4000,
+) -> Interval:
+    """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes
+    and models.
 
-    first, second (seeds, models): share of correct samples of each motion model, a row per training seed; the seeds of
-    both are drawn independently, because equal seeds give two schemes different numbers. count (models,): samples
-    of each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of
-    motion models, for results that should generalise to other subtypes. With one seed the interval is valid only for
-    these trained networks.
-    The coverage of these intervals is simulated in `benchmarks/interval_coverage.py`. Source: as `_stretch`.
+    first, second (seeds, models): share of correct samples of each motion model, a row per training
+    seed; the seeds of both are drawn independently, because equal seeds give two schemes different
+    numbers. count (models,): samples of each model; subtypes (models,): the subtype each belongs
+    to. whole_subtypes: draw whole subtypes instead of motion models, for results that should
+    generalise to other subtypes. With one seed the interval is valid only for these trained
+    networks. The coverage of these intervals is simulated in `benchmarks/interval_coverage.py`.
+    Source: as `_stretch`.
     """
     if whole_subtypes:
         weights = _subtype_weights(subtypes, repeats, generator) * count
@@ -123,7 +149,8 @@ def strict_difference(
         weights = model_weights(subtypes, False, repeats, generator) * count
     weights /= weights.sum(1, keepdims=True)
     means = [
-        ((weights @ shares.T) * _seed_weights(len(shares), repeats, generator)).sum(1) for shares in (first, second)
+        ((weights @ shares.T) * _seed_weights(len(shares), repeats, generator)).sum(1)
+        for shares in (first, second)
     ]
     low, high = np.quantile(means[0] - means[1], [0.025, 0.975])
     value = np.average(first.mean(0) - second.mean(0), weights=count)

@@ -1,7 +1,8 @@
-"""Convolutions that are one matrix product, computed as one: with 1 x 1 kernels, or with an output of a single pixel.
+"""Convolutions that are one matrix product, computed as one: with 1 x 1 kernels, or with an output
+of a single pixel.
 
-A small backbone on small images ends in convolutions of a few pixels, most of whose weights only meet the padding. In
-float32 on a processor, the gradients of these took a sixth of a step's time.
+A small backbone on small images ends in convolutions of a few pixels, most of whose weights only
+meet the padding. In float32 on a processor, the gradients of these took a sixth of a step's time.
 """
 
 from typing import Any
@@ -11,7 +12,8 @@ from torch import nn
 
 
 def _span(size: int, kernel: int, stride: int, padding: int) -> tuple[int, int] | None:
-    """Return how many input pixels meet the kernel along an axis, and the kernel's first weight that meets one.
+    """Return how many input pixels meet the kernel along an axis, and the kernel's first weight
+    that meets one.
 
     None where the output along this axis has another number of pixels than one.
     """
@@ -21,25 +23,41 @@ def _span(size: int, kernel: int, stride: int, padding: int) -> tuple[int, int] 
 
 
 class _OnePixel(torch.autograd.Function):
-    """The product of all input pixels with the weights that meet them: a convolution's only output pixel."""
+    """The product of all input pixels with the weights that meet them: a convolution's only output
+    pixel.
+    """
 
     @staticmethod
-    def forward(context: Any, images: torch.Tensor, weight: torch.Tensor, at: tuple[slice, ...]) -> torch.Tensor:
-        """images (B, C, r, c); weight (O, C, kernel); at: its rows and columns that meet the images -> (B, O)."""
-        seen, met = images.permute(0, 2, 3, 1).flatten(1), weight[at].permute(0, 2, 3, 1).flatten(1)
+    def forward(
+        context: Any, images: torch.Tensor, weight: torch.Tensor, at: tuple[slice, ...]
+    ) -> torch.Tensor:
+        """images (B, C, r, c); weight (O, C, kernel); at: its rows and columns that meet the images
+        -> (B, O).
+        """
+        seen = images.permute(0, 2, 3, 1).flatten(1)
+        met = weight[at].permute(0, 2, 3, 1).flatten(1)
         context.save_for_backward(seen, met, weight)
-        context.at, context.images = at, images.shape
+        context.at = at
+        context.images = images.shape
         return seen @ met.t()
 
     @staticmethod
-    def backward(context: Any, gradient: torch.Tensor) -> tuple[torch.Tensor | None, torch.Tensor, None]:
-        """Return the gradients of images and weights; that of weights that only meet the padding is zero."""
+    def backward(
+        context: Any, gradient: torch.Tensor
+    ) -> tuple[torch.Tensor | None, torch.Tensor, None]:
+        """Return the gradients of images and weights; that of weights that only meet the padding is
+        zero.
+        """
         seen, met, weight = context.saved_tensors
         _, channels, rows, columns = context.images
         spread = (-1, rows, columns, channels)
         of_weight = torch.zeros_like(weight)
         of_weight[context.at] = (gradient.t() @ seen).view(spread).permute(0, 3, 1, 2)
-        of_images = (gradient @ met).view(spread).permute(0, 3, 1, 2) if context.needs_input_grad[0] else None
+        of_images = (
+            (gradient @ met).view(spread).permute(0, 3, 1, 2)
+            if context.needs_input_grad[0]
+            else None
+        )
         return of_images, of_weight, None
 
 
@@ -47,9 +65,13 @@ class MatrixProduct(nn.Conv2d):
     """`nn.Conv2d`, as a matrix product where it is one. Results differ by the order of sums only."""
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
-        """Images (B, C, rows, columns) -> (B, O, rows, columns), channels last where it is a matrix product."""
+        """Images (B, C, rows, columns) -> (B, O, rows, columns), channels last where it is a matrix
+        product.
+        """
         if self.kernel_size == self.stride == (1, 1) and self.padding == (0, 0):
-            return nn.functional.linear(images.permute(0, 2, 3, 1), self.weight.flatten(1), self.bias).movedim(-1, 1)
+            return nn.functional.linear(
+                images.permute(0, 2, 3, 1), self.weight.flatten(1), self.bias
+            ).movedim(-1, 1)
         axes = zip(images.shape[2:], self.kernel_size, self.stride, self.padding, strict=True)
         spans = [_span(*axis) for axis in axes]
         if None in spans:
@@ -61,7 +83,9 @@ class MatrixProduct(nn.Conv2d):
 
 
 def as_products(model: nn.Module) -> nn.Module:
-    """Let every plain 2-D convolution of a model be a `MatrixProduct`, in place; weights and their names stay."""
+    """Let every plain 2-D convolution of a model be a `MatrixProduct`, in place; weights and their
+    names stay.
+    """
     for layer in model.modules():
         plain = type(layer) is nn.Conv2d and layer.groups == 1 and layer.padding_mode == "zeros"
         if plain and not isinstance(layer.padding, str) and layer.dilation == (1, 1):

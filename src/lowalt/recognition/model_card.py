@@ -1,6 +1,8 @@
-"""The card of a trained model, Markdown with the block of metadata that hubs read: written next to every model file.
+"""The card of a trained model, Markdown with the block of metadata that hubs read: written next to
+every model file.
 
-It holds the training's record, the run's table of accuracy, and how 8-bit weights change the answers.
+It holds the training's record, the run's table of accuracy, and how 8-bit weights change the
+answers.
 """
 
 from pathlib import Path
@@ -15,11 +17,18 @@ from lowalt.recognition.schemes import SPECTRA
 from lowalt.shards.hub import TAGS
 
 RUN = {
-    "train_samples": "training samples", "steps": "steps", "batch": "batch", "samples_seen": "samples seen",
-    "parameters": "trained values", "validation_accuracy": "accuracy on the validation fold when training ended",
-    "hardware": "hardware", "train_s": "training, s", "precision": "arithmetic of the training", "torch": "torch",
+    "train_samples": "training samples",
+    "steps": "steps",
+    "batch": "batch",
+    "samples_seen": "samples seen",
+    "parameters": "trained values",
+    "validation_accuracy": "accuracy on the validation fold when training ended",
+    "hardware": "hardware",
+    "train_s": "training, s",
+    "precision": "arithmetic of the training",
+    "torch": "torch",
     "timm": "timm",
-}  # fmt: skip
+}
 """Entries of run.json that a card shows, and their words."""
 MEANING = {
     "seen": "trained and tested on the same subtypes, with different motion models",
@@ -36,7 +45,9 @@ LIMITS = """\
 - One target a sample, tracked perfectly. It always answers with one of its classes, also for noise alone.
 - Accuracy on subtypes that it was not trained on is lower: compare the tables of both protocols.
 """
-RADAR_ACCURACY = "It classifies {percent:.1f} % of {windows} simulated windows correctly that no training saw.\n"
+RADAR_ACCURACY = (
+    "It classifies {percent:.1f} % of {windows} simulated windows correctly that no training saw.\n"
+)
 RADAR_USE = """\
     lowalt predict {name} recording.yaml
 
@@ -49,11 +60,21 @@ RADAR_LIMITS = """\
 
 
 def accuracy_rows(model: str | Path, protocol: str, scheme: str) -> list[dict[str, str]]:
-    """Return the rows of the run's accuracy.csv for a model; none where it lies in no run with such a table."""
+    """Return the rows of the run's accuracy.csv for a model; none where it lies in no run with such
+    a table.
+    """
     folder = run_folder(model)
     if folder is None or not (folder / "accuracy.csv").is_file():
         return []
-    rows = read_csv(folder / "accuracy.csv", "protocol", "scheme", "snr_db", "accuracy_percent", "samples", "seeds")
+    rows = read_csv(
+        folder / "accuracy.csv",
+        "protocol",
+        "scheme",
+        "snr_db",
+        "accuracy_percent",
+        "samples",
+        "seeds",
+    )
     return [row for row in rows if (row["protocol"], row["scheme"]) == (protocol, scheme)]
 
 
@@ -73,14 +94,25 @@ def _accuracy(rows: list[dict[str, str]]) -> str:
     if not rows:
         return "The run had no table of accuracy when this card was written.\n"
     seeds = rows[0]["seeds"]
-    whose = "of this model" if seeds == "1" else f"mean over the {seeds} trainings of the run, of which this is one"
+    whose = (
+        "of this model"
+        if seeds == "1"
+        else f"mean over the {seeds} trainings of the run, of which this is one"
+    )
     cells = [
-        ("all" if row["snr_db"] == "avg" else row["snr_db"], row["accuracy_percent"], row["samples"]) for row in rows
+        (
+            "all" if row["snr_db"] == "avg" else row["snr_db"],
+            row["accuracy_percent"],
+            row["samples"],
+        )
+        for row in rows
     ]
     return (
         f"From the run's accuracy.csv: accuracy {whose}, with weights as trained, on the test fold of the protocol, "
-        "evaluated as the run's\nconfiguration says (there, answers may be means over a sample and its mirror image; "
-        "`lowalt predict` takes no such mean).\n\n" + _table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
+        "evaluated as the run's\nconfiguration says (there, answers may be means over a sample and "
+        "its mirror image; "
+        "`lowalt predict` takes no such mean).\n\n"
+        + _table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
     )
 
 
@@ -94,16 +126,23 @@ all {measured["samples"]} samples of the validation fold, in float32:
 {
         _table(
             ("weights", "accuracy (%)"),
-            [("as trained", f"{measured['exact_percent']:.3f}"), ("8 bits", f"{measured['percent']:.3f}")],
+            [
+                ("as trained", f"{measured['exact_percent']:.3f}"),
+                ("8 bits", f"{measured['percent']:.3f}"),
+            ],
         )
     }
-{measured["changed"]} answers differ; the largest change of a probability is {measured["largest_change"]:.4f}.
+{measured["changed"]} answers differ; the largest change of a probability is {
+        measured["largest_change"]:.4f}.
 """
 
 
 def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
-    """Return the card of a model; accuracy: rows of the run's table (`accuracy_rows`); name: of the model's file."""
-    state, scheme = content.model, content.model["scheme"]
+    """Return the card of a model; accuracy: rows of the run's table (`accuracy_rows`); name: of the
+    model's file.
+    """
+    state = content.model
+    scheme = content.model["scheme"]
     front = {
         "license": "mit",
         "library_name": "lowalt",
@@ -112,31 +151,53 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
     method = scheme.get("method") or scheme.get("backbone") or state["network"].get("backbone", "")
     spectra = "+".join(SPECTRA[number] for number in scheme["spectra"])
     facts = [
-        ("classes", ", ".join(state["classes"])), ("scheme", scheme["name"]), ("protocol", state["protocol"]),
+        ("classes", ", ".join(state["classes"])),
+        ("scheme", scheme["name"]),
+        ("protocol", state["protocol"]),
         ("network", f"{method}, fusion {scheme['fusion']}"),
-        ("sees", f"{spectra}, {state['size']} x {state['size']} pixels each" if spectra else "the slow-time signals"),
+        (
+            "sees",
+            f"{spectra}, {state['size']} x {state['size']} pixels each"
+            if spectra
+            else "the slow-time signals",
+        ),
         ("seed", state["seed"]),
-        *([("started from the weights of", state["start"]["training"])] if "start" in state else []),
+        *(
+            [("started from the weights of", state["start"]["training"])]
+            if "start" in state
+            else []
+        ),
         *((words, _shown(content.run[key])) for key, words in RUN.items() if key in content.run),
-        *((f"SHA-256 of the {part} samples", f"`{digest}`")
-          for part, digest in sorted(content.identity.get("samples", {}).items())),
-    ]  # fmt: skip
+        *(
+            (f"SHA-256 of the {part} samples", f"`{digest}`")
+            for part, digest in sorted(content.identity.get("samples", {}).items())
+        ),
+    ]
     if "radar" in content.input:
-        radar, use, caution = content.input["radar"], RADAR_USE, content.input.get("caution", "")
+        radar = content.input["radar"]
+        use = RADAR_USE
+        caution = content.input.get("caution", "")
         expected = content.input.get("expected")
         measured = RADAR_ACCURACY.format(**expected) if expected else "Not stated.\n"
         limits = RADAR_LIMITS + (f"- {caution[0].upper()}{caution[1:]}.\n" if caution else "")
         where = f"a radar of {radar['carrier_hz'] / 1e9:g} GHz with a\n{radar['channel']} channel, trained on its twin"
     else:
-        where, measured, use, limits = "base stations, trained", _accuracy(accuracy), USE, LIMITS
+        where = "base stations, trained"
+        measured = _accuracy(accuracy)
+        use = USE
+        limits = LIMITS
     parts = [
         f"---\n{yaml.safe_dump(front, sort_keys=False)}---\n\n# {name}\n",
         f"A network that tells {', '.join(state['classes'])} apart by their echoes at {where} by lowalt "
         f"{__version__}.\nProtocol {state['protocol']}: {MEANING.get(state['protocol'], 'of the user')}.\n",
-        "## Training\n", _table(("entry", "value"), facts), "## Accuracy\n", measured,
+        "## Training\n",
+        _table(("entry", "value"), facts),
+        "## Accuracy\n",
+        measured,
         _rounded(content.measured) if content.weights == EIGHT and content.measured else "",
-        f"## Use\n\n{use.format(name=name)}", f"## Limits\n\n{limits}",
-    ]  # fmt: skip
+        f"## Use\n\n{use.format(name=name)}",
+        f"## Limits\n\n{limits}",
+    ]
     return "\n".join(part for part in parts if part)
 
 

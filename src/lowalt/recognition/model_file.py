@@ -1,16 +1,21 @@
-"""A trained model as one safetensors file, which any program reads without running code: weights, and all known of it.
+"""A trained model as one safetensors file, which any program reads without running code: weights,
+and all known of it.
 
-The file's metadata has one entry, `lowalt`, a JSON object (the library writes several entries in random order):
-    identity    all that determined the weights, as in the training's checkpoint: settings, scheme, protocol, SHA-256 of
+The file's metadata has one entry, `lowalt`, a JSON object (the library writes several entries in
+random order):
+    identity    all that determined the weights, as in the training's checkpoint: settings, scheme,
+    protocol, SHA-256 of
                 the samples, version of torch
     model       scheme, protocol, network, size, seed, colour_map, classes; start, where it had one
     run         content of the training's run.json; {} where there was none
     input       network, spectra and images of the run's configuration; {} where there was none
-    weights     "as trained", or "8 bits": each row of a matrix as whole numbers -127..127 and one scale (float32), a
+    weights     "as trained", or "8 bits": each row of a matrix as whole numbers -127..127 and one
+    scale (float32), a
                 quarter of the bytes; biases, norms, running means and colours stay as they are
     measured    of 8-bit weights: how they change the answers (`zoo`)
     digest      SHA-256 of everything above and of every tensor
-Source of 8 bits: Krishnamoorthi, Quantizing deep convolutional networks, arXiv:1806.08342, 2018, per-channel symmetric.
+Source of 8 bits: Krishnamoorthi, Quantizing deep convolutional networks, arXiv:1806.08342, 2018,
+per-channel symmetric.
 """
 
 import hashlib
@@ -36,7 +41,8 @@ LARGEST = 127
 """Largest whole number of an 8-bit weight."""
 INPUT = ("network", "spectra", "images")
 """Blocks of a configuration that say how a model's images are made of signals."""
-EXACT, EIGHT = "as trained", "8 bits"
+EXACT = "as trained"
+EIGHT = "8 bits"
 
 
 @dataclass(frozen=True)
@@ -57,21 +63,29 @@ class ModelFile:
 
 
 def run_folder(model: str | Path) -> Path | None:
-    """Return the folder of the run that a model lies in, RUN/models/PROTOCOL/SCHEME/SEED/; None elsewhere."""
+    """Return the folder of the run that a model lies in, RUN/models/PROTOCOL/SCHEME/SEED/; None
+    elsewhere.
+    """
     parents = Path(model).resolve().parents
     return parents[4] if len(parents) > 4 and parents[3].name == "models" else None
 
 
 def of_run(path: str | Path) -> ModelFile:
-    """Return the content of a training's model.safetensors, with the records next to it and above it.
+    """Return the content of a training's model.safetensors, with the records next to it and above
+    it.
 
     Raises: InputError where the model is missing or damaged.
     """
     content = read(path)
-    record, folder = Path(path).with_name("run.json"), run_folder(path)
-    config = load_yaml(folder / "config.yaml") if folder and (folder / "config.yaml").is_file() else {}
+    record = Path(path).with_name("run.json")
+    folder = run_folder(path)
+    config = (
+        load_yaml(folder / "config.yaml") if folder and (folder / "config.yaml").is_file() else {}
+    )
     kept = read_object(record, "a run record") if record.is_file() else {}
-    return replace(content, run=kept, input={name: config[name] for name in INPUT} if config else {})
+    return replace(
+        content, run=kept, input={name: config[name] for name in INPUT} if config else {}
+    )
 
 
 def _digest(tensors: dict[str, torch.Tensor], about: dict) -> str:
@@ -105,10 +119,19 @@ def read(path: str | Path) -> ModelFile:
         with safe_open(path, framework="pt") as file:
             about = json_object((file.metadata() or {})["lowalt"], path, "a model file")
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        digest, computed = about.pop("digest"), _digest(tensors, about)
+        digest = about.pop("digest")
+        computed = _digest(tensors, about)
     except InputError:
         raise
-    except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (
+        SafetensorError,
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ) as error:
         raise InputError(
             f"{path}: not a model file of lowalt ({type(error).__name__}: {in_one_line(error)})"
         ) from error
@@ -130,8 +153,11 @@ def weights_of(content: ModelFile, path: str | Path) -> dict[str, torch.Tensor]:
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
 
 
-def rounded(weights: Mapping[str, torch.Tensor], matrices: Collection[str]) -> dict[str, torch.Tensor]:
-    """Return weights by name, those named in `matrices` as int8 of the same shape, their scales with them.
+def rounded(
+    weights: Mapping[str, torch.Tensor], matrices: Collection[str]
+) -> dict[str, torch.Tensor]:
+    """Return weights by name, those named in `matrices` as int8 of the same shape, their scales
+    with them.
 
     weights: float32 (rows, ...) where they are to be rounded.
     """
@@ -158,7 +184,9 @@ def restored(tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
     weights = {}
     for name, value in tensors.items():
         if value.dtype == torch.int8:
-            weights[name] = (value.flatten(1).float() * tensors[name + SCALE][:, None]).view(value.shape)
+            weights[name] = (value.flatten(1).float() * tensors[name + SCALE][:, None]).view(
+                value.shape
+            )
         elif name not in scales:
             weights[name] = value
     return weights

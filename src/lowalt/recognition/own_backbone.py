@@ -1,8 +1,10 @@
-"""A backbone of the user's own: a function of a Python file, which the configuration names as FILE.py:FUNCTION.
+"""A backbone of the user's own: a function of a Python file, which the configuration names as
+FILE.py:FUNCTION.
 
-The function takes the pixels per side of an image and returns a torch module, RGB images (B, 3, size, size) float32 to
-features (B, features). The file runs with the rights of the user, so it is to be trusted like any program: its name
-comes from the user's configuration or command line. A model keeps the name, which is never followed.
+The function takes the pixels per side of an image and returns a torch module, RGB images (B, 3,
+size, size) float32 to features (B, features). The file runs with the rights of the user, so it is
+to be trusted like any program: its name comes from the user's configuration or command line. A
+model keeps the name, which is never followed.
 """
 
 import importlib.util
@@ -15,18 +17,22 @@ from lowalt.config.named_code import file_of
 from lowalt.files.errors import InputError
 
 MIDDLE = {"mean": (0.5, 0.5, 0.5), "std": (0.5, 0.5, 0.5)}
-"""How colours in 0..1 are shifted and scaled for a module that has no `pretrained_cfg` of its own."""
+"""How colours in 0..1 are shifted and scaled for a module that has no `pretrained_cfg` of its own.
+"""
 
 
 def backbone(name: str, size: int) -> nn.Module:
-    """Return the module that FILE.py:FUNCTION makes for size x size images, with its number of features noted.
+    """Return the module that FILE.py:FUNCTION makes for size x size images, with its number of
+    features noted.
 
-    Raises: InputError where the file is missing, has no such function or ends in an error, or where the module gives no
-    features (B, features).
+    Raises: InputError where the file is missing, has no such function or ends in an error, or where
+    the module gives no features (B, features).
     """
     path = file_of(name)
     if path is None or not path.is_file():
-        raise InputError(f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that exists")
+        raise InputError(
+            f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that exists"
+        )
     function = name.rpartition(":")[2]
     specification = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)
     module = importlib.util.module_from_spec(specification)
@@ -43,8 +49,12 @@ def backbone(name: str, size: int) -> nn.Module:
     except Exception as error:
         raise InputError(f"network: backbone {name!r}: {type(error).__name__}: {error}") from error
     if not isinstance(features, torch.Tensor) or features.ndim != 2 or len(features) != 2:
-        shape = tuple(features.shape) if isinstance(features, torch.Tensor) else type(features).__name__
-        raise InputError(f"network: backbone {name!r} gives {shape} for two images, expected (2, features)")
+        shape = (
+            tuple(features.shape) if isinstance(features, torch.Tensor) else type(features).__name__
+        )
+        raise InputError(
+            f"network: backbone {name!r} gives {shape} for two images, expected (2, features)"
+        )
     network.num_features = features.shape[1]
     if not hasattr(network, "pretrained_cfg"):
         network.pretrained_cfg = MIDDLE

@@ -9,12 +9,16 @@ from lowalt.files.errors import InputError
 CLAIMS = (
     *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),
     *(("ABC:VRP+TRP+VT", f"{station}:VRP+TRP+VT", "three stations over one") for station in "ABC"),
-    *(("ABC:VRP+TRP+VT", f"ABC:{name}mean fusion", "proposed over mean fusion")
-      for name in ("", "Swin-B ", "ConvNeXt-B ", "ViT-B/16 ")),
-)  # fmt: skip
+    *(
+        ("ABC:VRP+TRP+VT", f"ABC:{name}mean fusion", "proposed over mean fusion")
+        for name in ("", "Swin-B ", "ConvNeXt-B ", "ViT-B/16 ")
+    ),
+)
 """The paper's claims: the scheme said to be better, the other, and the claim's name."""
 SEEDS = 3
-"""Trainings a scheme must have before its rank is stated: another seed moves accuracies as much as many schemes do."""
+"""Trainings a scheme must have before its rank is stated: another seed moves accuracies as much as
+many schemes do.
+"""
 
 
 def read_published(path: str | Path) -> dict[tuple[str, str], float]:
@@ -22,24 +26,31 @@ def read_published(path: str | Path) -> dict[tuple[str, str], float]:
 
     Raises: InputError for a file that is no such table.
     """
-    rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent", what="published accuracies")
+    rows = read_csv(
+        path, "protocol", "scheme", "snr_db", "accuracy_percent", what="published accuracies"
+    )
     try:
         return {
-            (row["protocol"], row["scheme"]): float(row["accuracy_percent"]) for row in rows if row["snr_db"] == "avg"
+            (row["protocol"], row["scheme"]): float(row["accuracy_percent"])
+            for row in rows
+            if row["snr_db"] == "avg"
         }
     except ValueError as error:
         raise InputError(f"{path}: not a table of accuracies ({error!r})") from error
 
 
 def verdict(low: float, high: float, seeds: int) -> str:
-    """Return whether an ordering holds by the bounds of its interval, or that too few trainings were made to say."""
+    """Return whether an ordering holds by the bounds of its interval, or that too few trainings
+    were made to say.
+    """
     if seeds < SEEDS:
         return "not ranked"
     return "holds" if low > 0 else "reversed" if high < 0 else "undecided"
 
 
 def ordering_rows(compared: list[list], published: dict[tuple[str, str], float]) -> Iterable[list]:
-    """Yield rows [protocol, scheme, over, claim, paper_points, seeds, difference_points, low, high, ordering].
+    """Yield rows [protocol, scheme, over, claim, paper_points, seeds, difference_points, low, high,
+    ordering].
 
     compared: the rows of comparisons.csv.
     """

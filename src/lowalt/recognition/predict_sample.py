@@ -19,7 +19,8 @@ from lowalt.tiles import Renderer, decode, resize, split
 def images_of(path: Path, settings: dict) -> np.ndarray:
     """Return all index images (stations spectra, S, S) uint8 of a signal file or a tile.
 
-    path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
+    path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra,
+    images}.
     Raises: InputError naming the file, for another kind of file or a shape that does not fit.
     """
     if path.suffix == ".png":
@@ -38,12 +39,16 @@ def _named(path: Path, call: Callable[..., Any], *arguments: object) -> Any:
 
 
 def _signals(path: Path) -> np.ndarray:
-    """Return the complex array of a signal file. Raises: InputError naming the file, for another kind of file."""
+    """Return the complex array of a signal file. Raises: InputError naming the file, for another
+    kind of file.
+    """
     if path.suffix != ".npy":
         raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
     signals = array_of(path, "signals")
     if signals.dtype.kind != "c" or signals.ndim != 2:
-        raise InputError(f"{path}: {signals.dtype} {signals.shape}, expected complex (stations, symbols)")
+        raise InputError(
+            f"{path}: {signals.dtype} {signals.shape}, expected complex (stations, symbols)"
+        )
     return signals
 
 
@@ -53,7 +58,8 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     A signal of three stations, by a model of the zoo:
 
         >>> from lowalt.recognition.zoo import opened
-        >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4).astype(np.complex64))
+        >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) **
+        1.4).astype(np.complex64))
         >>> model, settings = opened("default-seen")
         >>> list(predict(model, Path("sample.npy"), settings))
         ['UAV', 'Bird', 'Vehicle', 'Pedestrian']
@@ -62,10 +68,12 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
 
 
 def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> dict[str, float]:
-    """Return the probability of each category for all index images (stations spectra, S, S) uint8 of one sample.
+    """Return the probability of each category for all index images (stations spectra, S, S) uint8
+    of one sample.
 
     settings: {network, spectra, images}; where: what the images are of, for refusals.
-    Raises: InputError naming `where`, for images that the model does not see, or an answer that is not finite.
+    Raises: InputError naming `where`, for images that the model does not see, or an answer that is
+    not finite.
     """
     names = named(settings["spectra"])
     places = columns_in(trained.scheme.columns, names, len(images) // len(names), where)
@@ -73,5 +81,7 @@ def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> 
     with torch.inference_mode():
         shares = trained.model(views).double().softmax(1)[0]
     if not torch.isfinite(shares).all():
-        raise InputError(f"{trained.path}: answers {where} with numbers that are not finite, expected another model")
+        raise InputError(
+            f"{trained.path}: answers {where} with numbers that are not finite, expected another model"
+        )
     return dict(zip(trained.classes, shares.tolist(), strict=True))

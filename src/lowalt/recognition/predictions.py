@@ -1,13 +1,16 @@
-"""The prediction file: class probabilities of every sample, in a format that any other program can write.
+"""The prediction file: class probabilities of every sample, in a format that any other program can
+write.
 
-A CSV table, one row per sample, in any order. The command `score` needs only `key` and the probabilities and takes the
-rest from the data set. Probabilities are not negative and sum to one within 1e-3.
+A CSV table, one row per sample, in any order. The command `score` needs only `key` and the
+probabilities and takes the rest from the data set. Probabilities are not negative and sum to one
+within 1e-3.
 
     key            the sample's key in the shards
     subtype, group, fold, model, snr_db, label    as in the sample's record ("inf" for no noise)
-    range_m        distance of the nearest station the model used, aspect_deg the aspect seen from it; may be empty
-    p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities, by the names and in the order of the classes
-    part           of the training's protocol: "test" (its accuracy counts), "validation" or, in the unseen protocol,
+    range_m        distance of the nearest station the model used, aspect_deg the aspect seen from
+    it; may be empty p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities, by the names
+    and in the order of the classes part           of the training's protocol: "test" (its accuracy
+    counts), "validation" or, in the unseen protocol,
                    "seen_test"; optional
 """
 
@@ -38,14 +41,17 @@ def probability_columns(classes: tuple[str, ...]) -> tuple[str, ...]:
 def shares_of(row: dict, columns: tuple[str, ...], where: str) -> list[float]:
     """Return the class probabilities of a row of a prediction file; columns: theirs.
 
-    Raises: InputError naming `where` for values that are not numbers, are negative, or do not sum to one.
+    Raises: InputError naming `where` for values that are not numbers, are negative, or do not sum
+    to one.
     """
     try:
         values = [float(row[name]) for name in columns]
     except (TypeError, ValueError) as error:
         raise InputError(f"{where}: {error}") from error
     if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
-        raise InputError(f"{where}: probabilities {values}, expected {len(columns)} >= 0 with sum 1")
+        raise InputError(
+            f"{where}: probabilities {values}, expected {len(columns)} >= 0 with sum 1"
+        )
     return values
 
 
@@ -83,8 +89,12 @@ class Predictions:
         return Predictions(**{name: value[numbers] for name, value in vars(self).items()})
 
     def of(self, pairs: set[tuple[str, str]]) -> "Predictions":
-        """Return the rows whose (group, fold) is among `pairs`, sorted by key so that schemes align."""
-        inside = [pair in pairs for pair in zip(self.group.tolist(), self.fold.tolist(), strict=True)]
+        """Return the rows whose (group, fold) is among `pairs`, sorted by key so that schemes
+        align.
+        """
+        inside = [
+            pair in pairs for pair in zip(self.group.tolist(), self.fold.tolist(), strict=True)
+        ]
         rows = np.flatnonzero(inside)
         return self.take(rows[np.argsort(self.key[rows], kind="stable")])
 
@@ -99,13 +109,20 @@ def record(path: str | Path) -> dict:
 
 
 def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarray) -> Predictions:
-    """Return predictions for samples with these facts; range and aspect are the nearest of `stations`."""
+    """Return predictions for samples with these facts; range and aspect are the nearest of
+    `stations`.
+    """
     ranges = facts.range_m[:, list(stations)]
     nearest = np.where(np.isnan(ranges), math.inf, ranges).argmin(1)
     rows = np.arange(len(facts))
     aspects = np.degrees(facts.aspect_rad[:, list(stations)][rows, nearest])
-    same = {name: getattr(facts, name) for name in ("key", "subtype", "group", "fold", "model", "snr_db", "label")}
-    return Predictions(**same, range_m=ranges[rows, nearest], aspect_deg=aspects, probabilities=probabilities)
+    same = {
+        name: getattr(facts, name)
+        for name in ("key", "subtype", "group", "fold", "model", "snr_db", "label")
+    }
+    return Predictions(
+        **same, range_m=ranges[rows, nearest], aspect_deg=aspects, probabilities=probabilities
+    )
 
 
 def _number(value: float) -> str:
@@ -114,20 +131,32 @@ def _number(value: float) -> str:
 
 
 def write(
-    path: str | Path, table: Predictions, classes: tuple[str, ...] = CATEGORIES, protocol: str | None = None
+    path: str | Path,
+    table: Predictions,
+    classes: tuple[str, ...] = CATEGORIES,
+    protocol: str | None = None,
 ) -> None:
-    """Write a prediction file, with the column `part` for one of the protocols; equal predictions give equal bytes."""
+    """Write a prediction file, with the column `part` for one of the protocols; equal predictions
+    give equal bytes.
+    """
     parts = {pair: part for part, pairs in FOLDS.get(protocol or "", {}).items() for pair in pairs}
     part_column = ("part",) if parts else ()
     rows = (
         [
-            table.key[row], table.subtype[row], table.group[row], table.fold[row], int(table.model[row]),
-            _number(table.snr_db[row]), int(table.label[row]), _number(table.range_m[row]),
-            _number(table.aspect_deg[row]), *(repr(float(value)) for value in table.probabilities[row]),
+            table.key[row],
+            table.subtype[row],
+            table.group[row],
+            table.fold[row],
+            int(table.model[row]),
+            _number(table.snr_db[row]),
+            int(table.label[row]),
+            _number(table.range_m[row]),
+            _number(table.aspect_deg[row]),
+            *(repr(float(value)) for value in table.probabilities[row]),
             *(parts[table.group[row], table.fold[row]] for _ in part_column),
         ]
         for row in range(len(table))
-    )  # fmt: skip
+    )
     write_csv(path, (*COLUMNS, *probability_columns(classes), *part_column), rows)
 
 
@@ -136,17 +165,30 @@ def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions
 
     Raises: InputError naming the file, the line and what is wrong.
     """
-    rows, columns = [], probability_columns(classes)
+    rows = []
+    columns = probability_columns(classes)
     with text_file(path, "predictions") as file:
         reader = csv.DictReader(file)
-        if tuple(name for name in reader.fieldnames or () if name != "part") != (*COLUMNS, *columns):
-            raise InputError(f"{path}: columns {reader.fieldnames}, expected {[*COLUMNS, *columns]}")
+        if tuple(name for name in reader.fieldnames or () if name != "part") != (
+            *COLUMNS,
+            *columns,
+        ):
+            raise InputError(
+                f"{path}: columns {reader.fieldnames}, expected {[*COLUMNS, *columns]}"
+            )
         for line, row in enumerate(reader, start=2):
             try:
                 facts = (
-                    row["key"], row["subtype"], row["group"], row["fold"], int(row["model"]), float(row["snr_db"]),
-                    int(row["label"]), float(row["range_m"] or "nan"), float(row["aspect_deg"] or "nan"),
-                )  # fmt: skip
+                    row["key"],
+                    row["subtype"],
+                    row["group"],
+                    row["fold"],
+                    int(row["model"]),
+                    float(row["snr_db"]),
+                    int(row["label"]),
+                    float(row["range_m"] or "nan"),
+                    float(row["aspect_deg"] or "nan"),
+                )
             except (TypeError, ValueError) as error:
                 raise InputError(f"{path} line {line}: {error}") from error
             rows.append((*facts, shares_of(row, columns, f"{path} line {line}")))

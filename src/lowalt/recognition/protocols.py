@@ -2,8 +2,10 @@
 
 from lowalt.files.errors import InputError
 
-_SEEN_FOLDS = {part: {("seen", fold), ("unseen", fold)} for part, fold in
-               (("train", "train"), ("validation", "val"), ("test", "test"))}  # fmt: skip
+_SEEN_FOLDS = {
+    part: {("seen", fold), ("unseen", fold)}
+    for part, fold in (("train", "train"), ("validation", "val"), ("test", "test"))
+}
 _UNSEEN_FOLDS = {
     "train": {("seen", "train")},
     "validation": {("seen", "val")},
@@ -14,16 +16,23 @@ FOLDS = {"seen": _SEEN_FOLDS, "unseen": _UNSEEN_FOLDS}
 
 
 def folds(protocol: str, part: str) -> set[tuple[str, str]]:
-    """Return the (group, fold) pairs of a protocol's part: "train", "validation", "test" or ("unseen") "seen_test".
+    """Return the (group, fold) pairs of a protocol's part: "train", "validation", "test" or
+    ("unseen") "seen_test".
 
     Raises: InputError for an unknown protocol or part. Source: paper, section V-A.
     """
     try:
         return FOLDS[protocol][part]
     except KeyError:
-        raise InputError(f"protocol {protocol!r} has no part {part!r}, expected one of {FOLDS}") from None
+        raise InputError(
+            f"protocol {protocol!r} has no part {part!r}, expected one of {FOLDS}"
+        ) from None
 
 
 def evaluated_folds(protocol: str) -> set[tuple[str, str]]:
-    """Return the (group, fold) pairs of all parts of a protocol but its training part. Raises: as `folds`."""
-    return set().union(*(folds(protocol, part) for part in FOLDS.get(protocol, ("test",)) if part != "train"))
+    """Return the (group, fold) pairs of all parts of a protocol but its training part. Raises: as
+    `folds`.
+    """
+    return set().union(
+        *(folds(protocol, part) for part in FOLDS.get(protocol, ("test",)) if part != "train")
+    )

@@ -1,6 +1,7 @@
 """The recipe of a training run: its settings, rates over time, optimiser, fixed randomness.
 
-Settings are the block `recognition.training` of workflow/schemas/config.schema.yaml, which says what each means.
+Settings are the block `recognition.training` of workflow/schemas/config.schema.yaml, which says
+what each means.
 """
 
 import math
@@ -25,12 +26,15 @@ def check(block: dict) -> dict:
     check_brought("training", block, "recognition.training")
     block = OPTIONAL | block
     if block["accumulate"] > block["batch"]:
-        raise InputError(f"training: accumulate is {block['accumulate']}, expected at most batch, {block['batch']}")
+        raise InputError(
+            f"training: accumulate is {block['accumulate']}, expected at most batch, {block['batch']}"
+        )
     return block
 
 
 def schedule(share: float, warmup: float) -> float:
-    """Factor on the learning rate after `share` (0..1) of all steps: linear up to `warmup`, then a cosine to 0.
+    """Factor on the learning rate after `share` (0..1) of all steps: linear up to `warmup`, then a
+    cosine to 0.
 
     >>> [round(schedule(share, 0.1), 3) for share in (0.05, 0.1, 0.55, 1.0)]
     [0.5, 1.0, 0.5, 0.0]
@@ -41,10 +45,11 @@ def schedule(share: float, warmup: float) -> float:
 
 
 def averaging(decay: float, step: int) -> float:
-    """Weight of the old average after `step` (1, 2, ...) so that the average is sum d^k w_k / sum d^k over all ages k.
+    """Weight of the old average after `step` (1, 2, ...) so that the average is sum d^k w_k / sum
+    d^k over all ages k.
 
-    A constant weight d would keep the first, random weights in the average for 1 / (1 - d) steps. Source: the bias
-    correction of Kingma and Ba, Adam, 2015, section 3.
+    A constant weight d would keep the first, random weights in the average for 1 / (1 - d) steps.
+    Source: the bias correction of Kingma and Ba, Adam, 2015, section 3.
 
         >>> [round(averaging(0.5, step), 3) for step in (1, 2, 9)]
         [0.0, 0.333, 0.499]
@@ -61,7 +66,8 @@ def optimiser(model: nn.Module, block: dict) -> torch.optim.AdamW:
             members = [
                 value
                 for name, value in named
-                if name.startswith("backbone.") == of_backbone and (value.ndim > 1 and "modality" not in name) == matrix
+                if name.startswith("backbone.") == of_backbone
+                and (value.ndim > 1 and "modality" not in name) == matrix
             ]
             factor = block["backbone_rate"] if of_backbone else 1.0
             decay = block["weight_decay"] if matrix else 0.0
@@ -71,18 +77,21 @@ def optimiser(model: nn.Module, block: dict) -> torch.optim.AdamW:
 
 
 def seeded(seed: int, keys: tuple, threads: int) -> None:
-    """Fix everything torch draws from or sums with: seed of the run, thread count, deterministic algorithms."""
+    """Fix everything torch draws from or sums with: seed of the run, thread count, deterministic
+    algorithms.
+    """
     torch.manual_seed(int.from_bytes(digest(seed, "recognition-torch", *keys)[:8], "little") >> 1)
     torch.set_num_threads(threads)
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     torch.use_deterministic_algorithms(True)
-    # Filling every new tensor helps to find reads of unset memory. This code has none, and filling costs a tenth of the
-    # time.
+    # Filling every new tensor helps to find reads of unset memory. This code has none, and filling
+    # costs a tenth of the time.
     torch.utils.deterministic.fill_uninitialized_memory = False
 
 
 def random_state(device: torch.device) -> dict[str, torch.Tensor]:
-    """Return the states of the generators that a training on `device` draws from: the processor's, and a GPU's own.
+    """Return the states of the generators that a training on `device` draws from: the processor's,
+    and a GPU's own.
 
     All ranks draw the same numbers, so one rank's states serve all.
     """
@@ -96,7 +105,9 @@ def set_random_state(device: torch.device, states: dict[str, torch.Tensor]) -> N
     Raises: InputError where a training that ran on another kind of device is to go on.
     """
     if ("cuda" in states) != (device.type == "cuda"):
-        raise InputError(f"checkpoint: random states of {sorted(states)}, but this training runs on {device.type}")
+        raise InputError(
+            f"checkpoint: random states of {sorted(states)}, but this training runs on {device.type}"
+        )
     torch.set_rng_state(states["cpu"])
     if device.type == "cuda":
         torch.cuda.set_rng_state(states["cuda"], device)

@@ -1,7 +1,7 @@
 """Build and train a network from settings, load a trained one, and evaluate it.
 
-`model.safetensors` holds everything needed to use the model: scheme, protocol, network settings, image size, palettes
-and weights.
+`model.safetensors` holds everything needed to use the model: scheme, protocol, network settings,
+image size, palettes and weights.
 """
 
 import json
@@ -35,22 +35,32 @@ from lowalt.recognition.training import Trainer, TrainingRun, tensorboard
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
 
 Build = Callable[[Scheme, dict, int, str, int], nn.Module]
-"""Makes a network from: scheme, block `recognition.network`, image size, colour map, number of classes."""
+"""Makes a network from: scheme, block `recognition.network`, image size, colour map, number of
+classes.
+"""
 
 
 def train(
-    samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False,
+    samples: dict[str, Samples],
+    scheme: Scheme,
+    protocol: str,
+    settings: dict,
+    folder: Path,
+    events: bool = False,
     build: Build = built,
-) -> None:  # fmt: skip
-    """Train a scheme, from its checkpoint if there is one; write `model.safetensors`, `history.csv` and `run.json`.
+) -> None:
+    """Train a scheme, from its checkpoint if there is one; write `model.safetensors`, `history.csv`
+    and `run.json`.
 
-    samples: the sources "train", of which the scheme's share is kept, and "validation"; settings: {seed, size,
-    colour_map, network, training, augmentation, classes}, the classes by label; folder: where the files go; events:
-    whether to write the metrics for TensorBoard too, into `events/` of the folder; build: makes the network.
+    samples: the sources "train", of which the scheme's share is kept, and "validation"; settings:
+    {seed, size, colour_map, network, training, augmentation, classes}, the classes by label;
+    folder: where the files go; events: whether to write the metrics for TensorBoard too, into
+    `events/` of the folder; build: makes the network.
     Raises: InputError for a wrong setting, a checkpoint of another run, or a loss that becomes NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
-    block, classes = recipe.check(settings["training"]), settings["classes"]
+    block = recipe.check(settings["training"])
+    classes = settings["classes"]
     if len(classes) < 2:
         raise InputError(f"training: classes {classes}, expected two or more to tell apart")
     check_brought("augmentation", settings["augmentation"], "recognition.augmentation")
@@ -60,7 +70,9 @@ def train(
     identity = _identity(samples, scheme, protocol, settings, machine)
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
-    model = build(scheme, settings["network"], settings["size"], settings["colour_map"], len(classes))
+    model = build(
+        scheme, settings["network"], settings["size"], settings["colour_map"], len(classes)
+    )
     run = TrainingRun(keys, identity, folder)
     trainer = Trainer(model, samples, scheme.columns, {**settings, "training": block}, run, machine)
     resumed = trainer.resume()
@@ -69,39 +81,70 @@ def train(
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
     if events and machine.rank == 0:
         trainer.metrics = tensorboard(folder / "events", trainer.at.steps)
-    began, busy, steps = time.monotonic(), time.process_time(), trainer.at.steps
+    began = time.monotonic()
+    busy = time.process_time()
+    steps = trainer.at.steps
     at = trainer.fit()
-    seconds, busy = time.monotonic() - began, time.process_time() - busy
-    trainer.finish({
-        "scheme": scheme.record, "protocol": protocol, "network": settings["network"], "size": settings["size"],
-        "seed": settings["seed"], "colour_map": settings["colour_map"], "classes": list(classes),
-    })  # fmt: skip
+    seconds = time.monotonic() - began
+    busy = time.process_time() - busy
+    trainer.finish(
+        {
+            "scheme": scheme.record,
+            "protocol": protocol,
+            "network": settings["network"],
+            "size": settings["size"],
+            "seed": settings["seed"],
+            "colour_map": settings["colour_map"],
+            "classes": list(classes),
+        }
+    )
     if machine.rank == 0:
-        _record(folder / "run.json", {
-            "protocol": protocol, "scheme": scheme.name, "seed": settings["seed"], "hardware": describe(),
-            "backbone": scheme.backbone_of(settings["network"]),
-            "weights": settings["network"]["weights"],
-            "parameters": recogniser.parameters(model), "train_samples": len(samples["train"].facts),
-            "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
-            "train_processor_s": busy, "size": settings["size"], "steps": at.steps, "batch": block["batch"],
-            "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
-            "precision": machine.precision,
-            "waiting_share": trainer.waited_s / max(seconds, 1e-9), "ranks": machine.ranks,
-            "torch": torch.__version__, "timm": timm.__version__, "classes": list(classes),
-        })  # fmt: skip
+        _record(
+            folder / "run.json",
+            {
+                "protocol": protocol,
+                "scheme": scheme.name,
+                "seed": settings["seed"],
+                "hardware": describe(),
+                "backbone": scheme.backbone_of(settings["network"]),
+                "weights": settings["network"]["weights"],
+                "parameters": recogniser.parameters(model),
+                "train_samples": len(samples["train"].facts),
+                "samples_seen": at.steps * block["batch"],
+                "validation_accuracy": at.best,
+                "train_s": seconds,
+                "train_processor_s": busy,
+                "size": settings["size"],
+                "steps": at.steps,
+                "batch": block["batch"],
+                "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9),
+                "resumed": resumed,
+                "precision": machine.precision,
+                "waiting_share": trainer.waited_s / max(seconds, 1e-9),
+                "ranks": machine.ranks,
+                "torch": torch.__version__,
+                "timm": timm.__version__,
+                "classes": list(classes),
+            },
+        )
 
 
-def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine) -> str:
+def _identity(
+    samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine
+) -> str:
     """Return the JSON text of all that determines a training's weights."""
     code = file_of(scheme.backbone_of(settings["network"]))
-    # Leave out settings that change no weight, and name the precision that this machine computes with.
+    # Leave out settings that change no weight, and name the precision that this machine computes
+    # with.
     replaced = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     return checkpoint.identity(
-        scheme=scheme.record, protocol=protocol,
+        scheme=scheme.record,
+        protocol=protocol,
         settings={**settings, "training": {**settings["training"], **replaced}},
-        samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
+        samples={part: source.sha256() for part, source in samples.items()},
+        torch=torch.__version__,
         **({"own": sha256(code)} if code and code.is_file() else {}),
-    )  # fmt: skip
+    )
 
 
 def _record(path: Path, content: dict) -> None:
@@ -130,22 +173,31 @@ def load(path: str | Path, trusted: str = "", build: Build = built) -> Trained:
     return of_file(model_file.read(path), path, trusted, build)
 
 
-def of_file(content: ModelFile, path: str | Path, trusted: str = "", build: Build = built) -> Trained:
-    """Return the model of a file's content, ready to answer; path: where it came from; the rest as in `of_state`.
+def of_file(
+    content: ModelFile, path: str | Path, trusted: str = "", build: Build = built
+) -> Trained:
+    """Return the model of a file's content, ready to answer; path: where it came from; the rest as
+    in `of_state`.
 
     Raises: InputError where weights and settings do not fit together.
     """
-    return of_state({**content.model, "weights": model_file.weights_of(content, path)}, path, trusted, build)
+    return of_state(
+        {**content.model, "weights": model_file.weights_of(content, path)}, path, trusted, build
+    )
 
 
 def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = built) -> Trained:
-    """Return the trained model of what a model file keeps: `weights` and the checked settings of its network.
+    """Return the trained model of what a model file keeps: `weights` and the checked settings of
+    its network.
 
-    path: its file; trusted: the user's FILE.py:FUNCTION for a model whose backbone is such code; build: makes its
-    network.
-    Raises: InputError where weights and settings do not fit together, or the backbone is code that nobody named.
+    path: its file; trusted: the user's FILE.py:FUNCTION for a model whose backbone is such code;
+    build: makes its network.
+    Raises: InputError where weights and settings do not fit together, or the backbone is code that
+    nobody named.
     """
-    scheme, classes, weights = of_record(state["scheme"]), stated(state), state["weights"]
+    scheme = of_record(state["scheme"])
+    classes = stated(state)
+    weights = state["weights"]
     try:
         refuse_unfinite(weights, path)
         model = _network(scheme, state, len(classes), path, trusted, build)
@@ -154,22 +206,33 @@ def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = bu
     except Exception as error:
         # For settings that do not fit together, torch and timm raise almost any exception.
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
-    return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), classes)
+    return Trained(
+        model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), classes
+    )
 
 
-def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, trusted: str, build: Build) -> nn.Module:
+def _network(
+    scheme: Scheme, state: dict, classes: int, path: str | Path, trusted: str, build: Build
+) -> nn.Module:
     """The network of a file with its weights; trusted, build: as in `of_state`."""
     named_backbone = scheme.backbone_of(state["network"])
     name = allowed(named_backbone, trusted)
-    block, bare = {**state["network"], "backbone": name, "weights": "none"}, replace(scheme, backbone="")
-    views, size = len(scheme.columns), state["size"]
+    block = {**state["network"], "backbone": name, "weights": "none"}
+    bare = replace(scheme, backbone="")
+    views = len(scheme.columns)
+    size = state["size"]
 
     def fresh() -> nn.Module:
         """The network with fresh weights."""
         return build(bare, block, size, state["colour_map"], classes)
 
     if name == named_backbone and build is built:
-        return filled(fresh, lambda: torch.zeros(1, views, size, size, dtype=torch.uint8), state["weights"], path)
+        return filled(
+            fresh,
+            lambda: torch.zeros(1, views, size, size, dtype=torch.uint8),
+            state["weights"],
+            path,
+        )
     # The user named this code, so it is trusted; its output cannot be checked here.
     model = fresh()
     refuse_unfit(state["weights"], model, path)
@@ -178,25 +241,36 @@ def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, truste
 
 
 def answers(trained: Trained, samples: Samples, settings: dict, machine: Machine) -> np.ndarray:
-    """Return the class probabilities (n, classes) of all samples of a source; settings as in `evaluate`."""
+    """Return the class probabilities (n, classes) of all samples of a source; settings as in
+    `evaluate`.
+    """
     batch, threads, _, mirror, workers = inference.evaluation(settings)
     recipe.seeded(trained.seed, ("evaluate",), threads)
     ahead = Prefetch(Unchanged(samples), workers, pin=machine.gpu)
     every = np.arange(len(samples.facts))
-    return probabilities(machine.placed(trained.model), samples, every, machine, batch, mirror, ahead)
+    return probabilities(
+        machine.placed(trained.model), samples, every, machine, batch, mirror, ahead
+    )
 
 
 def evaluate(
-    trained: Trained, samples: Samples, settings: dict, out: str | Path, trained_on: str = "", more: dict | None = None
+    trained: Trained,
+    samples: Samples,
+    settings: dict,
+    out: str | Path,
+    trained_on: str = "",
+    more: dict | None = None,
 ) -> None:
-    """Write the predictions for all samples of a source, and the run's record (.json) in the same folder.
+    """Write the predictions for all samples of a source, and the run's record (.json) in the same
+    folder.
 
-    settings: {batch, threads, precision, mirror}, perhaps with workers, the processes that read samples; trained_on:
-    the run that trained the model, where it is another; more: further entries of the record.
-    Under torchrun the ranks share the work and rank 0 writes.
+    settings: {batch, threads, precision, mirror}, perhaps with workers, the processes that read
+    samples; trained_on: the run that trained the model, where it is another; more: further entries
+    of the record. Under torchrun the ranks share the work and rank 0 writes.
     """
     _, _, precision, mirror, _ = inference.evaluation(settings)
-    machine, start = Machine.here(precision), time.monotonic()
+    machine = Machine.here(precision)
+    start = time.monotonic()
     shares = answers(trained, samples, settings, machine)
     seconds = time.monotonic() - start
     if machine.rank:
@@ -205,8 +279,19 @@ def evaluate(
     predictions.write(out, table, trained.classes, trained.protocol)
     side = trained.path.with_name("run.json")
     known = read_object(side, "a run record") if side.exists() else {}
-    _record(Path(out).with_suffix(".json"), {
-        **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
-        "hardware": describe(), "evaluated_samples": len(shares), "evaluate_s": seconds,
-        "trained_on": trained_on, "mirror": mirror, "classes": list(trained.classes), **(more or {}),
-    })  # fmt: skip
+    _record(
+        Path(out).with_suffix(".json"),
+        {
+            **known,
+            "protocol": trained.protocol,
+            "scheme": trained.scheme.name,
+            "seed": trained.seed,
+            "hardware": describe(),
+            "evaluated_samples": len(shares),
+            "evaluate_s": seconds,
+            "trained_on": trained_on,
+            "mirror": mirror,
+            "classes": list(trained.classes),
+            **(more or {}),
+        },
+    )

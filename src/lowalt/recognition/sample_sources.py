@@ -1,4 +1,6 @@
-"""The source of samples that training and evaluation use: caches of views, shards, or simulation on access."""
+"""The source of samples that training and evaluation use: caches of views, shards, or simulation on
+access.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,10 +16,11 @@ from lowalt.shards import ShardSet
 
 @dataclass(frozen=True)
 class Source:
-    """Exactly one of three sources: caches of views, the index of shards, or a function that simulates samples.
+    """Exactly one of three sources: caches of views, the index of shards, or a function that
+    simulates samples.
 
-    made: the function, with the arguments of `samples`. The caller imports it, so that reading stored samples does not
-    import the simulation.
+    made: the function, with the arguments of `samples`. The caller imports it, so that reading
+    stored samples does not import the simulation.
     """
 
     views: list[str | Path] | None = None
@@ -26,16 +29,20 @@ class Source:
 
     @classmethod
     def of_run(cls, index: Path, size: int) -> "Source":
-        """Return a run's caches of views of this size if every shard has one, else its shards (index)."""
+        """Return a run's caches of views of this size if every shard has one, else its shards
+        (index).
+        """
         caches = sorted(index.parents[1].glob(f"views/{size}/*.npz"))
         shards = {Path(shard["name"]).stem for shard in ShardSet(index).index["shards"]}
         return cls(views=caches) if {path.stem for path in caches} == shards else cls(index=index)
 
-    def samples(self, columns: list[int], pairs: set[tuple[str, str]], size: int, placed: bool = False) -> Samples:
+    def samples(
+        self, columns: list[int], pairs: set[tuple[str, str]], size: int, placed: bool = False
+    ) -> Samples:
         """Return the samples of some (group, fold) pairs.
 
-        columns: views of a scheme (`Scheme.columns`); size: pixels per side; placed: whether facts carry ranges and
-        aspects, which those of a cache always do.
+        columns: views of a scheme (`Scheme.columns`); size: pixels per side; placed: whether facts
+        carry ranges and aspects, which those of a cache always do.
         Raises: InputError for cached images of another size, or what the source refuses.
         """
         if self.made is not None:
@@ -49,4 +56,7 @@ class Source:
 
     def for_training(self, scheme: Scheme, protocol: str, size: int) -> dict[str, Samples]:
         """Return the samples of a protocol's parts "train" and "validation" as a scheme sees them."""
-        return {part: self.samples(scheme.columns, folds(protocol, part), size) for part in ("train", "validation")}
+        return {
+            part: self.samples(scheme.columns, folds(protocol, part), size)
+            for part in ("train", "validation")
+        }

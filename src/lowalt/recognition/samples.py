@@ -1,11 +1,12 @@
 """Samples for the network: index images with their metadata. A `Samples` is a source of them.
 
-There are three sources: caches of views (`ViewSamples`, here), shards (`views.ShardSamples`), and a data set that
-simulates samples on access (`dataset_samples.DatasetSamples`). `sample_sources.Source` chooses one. No torch here.
+There are three sources: caches of views (`ViewSamples`, here), shards (`views.ShardSamples`), and a
+data set that simulates samples on access (`dataset_samples.DatasetSamples`).
+`sample_sources.Source` chooses one. No torch here.
 
 A cache file (.npz) holds, for the samples of one shard in its order,
-    views   (samples, stations spectra, size, size) uint8, station-major, index images averaged over areas
-    spectra names of the spectra, in the order of the tiles
+    views   (samples, stations spectra, size, size) uint8, station-major, index images averaged over
+    areas spectra names of the spectra, in the order of the tiles
     one array (samples,) for every name of FACTS
 """
 
@@ -66,10 +67,11 @@ def joined(parts: list[Facts]) -> Facts:
 
 
 def first_models(facts: Facts, share: float) -> np.ndarray:
-    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one per subtype.
+    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one per
+    subtype.
 
-    Models are drawn independently, so the first ones are a random sample. The models of a smaller share are a subset of
-    those of a larger one.
+    Models are drawn independently, so the first ones are a random sample. The models of a smaller
+    share are a subset of those of a larger one.
     """
     chosen = np.zeros(len(facts), dtype=bool)
     for subtype in np.unique(facts.subtype):
@@ -81,7 +83,9 @@ def first_models(facts: Facts, share: float) -> np.ndarray:
 
 
 def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
-    """Return the SHA-256 of keys, labels, subtypes, models and SNRs of some samples, and of `content`."""
+    """Return the SHA-256 of keys, labels, subtypes, models and SNRs of some samples, and of
+    `content`.
+    """
     hasher = hashlib.sha256()
     for name in ("key", "label", "subtype", "model", "snr_db"):
         values = np.ascontiguousarray(getattr(facts, name))
@@ -93,9 +97,11 @@ def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
 
 
 class Samples:
-    """A source of samples: `facts` of each, `size` of its images, `views` of some, and `sha256` of all.
+    """A source of samples: `facts` of each, `size` of its images, `views` of some, and `sha256` of
+    all.
 
-    A training calls `changed`, an evaluation `inputs`. A source whose network takes more than images overrides both.
+    A training calls `changed`, an evaluation `inputs`. A source whose network takes more than
+    images overrides both.
     """
 
     facts: Facts
@@ -110,30 +116,42 @@ class Samples:
         raise NotImplementedError
 
     def inputs(self, numbers: np.ndarray) -> Any:
-        """Return what the network takes of the samples `numbers`: an array, or several in a named tuple."""
+        """Return what the network takes of the samples `numbers`: an array, or several in a named
+        tuple.
+        """
         return self.views(numbers)
 
-    def changed(self, numbers: np.ndarray, columns: list[int], block: dict, generator: np.random.Generator) -> Any:
-        """Return `inputs` augmented; columns: numbers of the views; block: `recognition.augmentation`."""
+    def changed(
+        self, numbers: np.ndarray, columns: list[int], block: dict, generator: np.random.Generator
+    ) -> Any:
+        """Return `inputs` augmented; columns: numbers of the views; block:
+        `recognition.augmentation`.
+        """
         return augment(self.views(numbers), columns, block, generator)
 
 
 class ViewSamples(Samples):
     """Samples held in memory, read from cache files; the scheme's columns only."""
 
-    def __init__(self, paths: list[str | Path], columns: list[int], folds: set[tuple[str, str]]) -> None:
+    def __init__(
+        self, paths: list[str | Path], columns: list[int], folds: set[tuple[str, str]]
+    ) -> None:
         """paths: cache files; columns: views to keep; folds: the (group, fold) pairs to keep.
 
-        Raises: InputError naming a file that is no cache, differs in size, or where nothing is left.
+        Raises: InputError naming a file that is no cache, differs in size, or where nothing is
+        left.
         """
-        images, facts = [], []
+        images = []
+        facts = []
         for path in sorted(map(Path, paths)):
             of_file, facts_of_file = _load(path, columns, folds)
             if len(facts_of_file):
                 images.append(of_file)
                 facts.append(facts_of_file)
         if not images:
-            raise InputError(f"views: none of the {len(paths)} files has samples of {sorted(folds)}")
+            raise InputError(
+                f"views: none of the {len(paths)} files has samples of {sorted(folds)}"
+            )
         sizes = {array.shape[2:] for array in images}
         if len(sizes) > 1:
             raise InputError(f"views: image sizes {sorted(sizes)}, expected one size")
@@ -156,7 +174,9 @@ class ViewSamples(Samples):
         return self.images[numbers]
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training sees of these samples: images, labels, keys and their order."""
+        """Return the SHA-256 of all that a training sees of these samples: images, labels, keys and
+        their order.
+        """
         return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
 
 
@@ -183,26 +203,38 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
         with np.load(path, allow_pickle=False) as data:
             facts = Facts(*(data[name] for name in FACTS))
             if any(
-                value.dtype.kind not in KINDS[name] or value.ndim != 1 + (name in OF_STATIONS)
-                or len(value) != len(facts) or (name in OF_STATIONS and value.shape != facts.range_m.shape)
+                value.dtype.kind not in KINDS[name]
+                or value.ndim != 1 + (name in OF_STATIONS)
+                or len(value) != len(facts)
+                or (name in OF_STATIONS and value.shape != facts.range_m.shape)
                 for name, value in vars(facts).items()
-            ):  # fmt: skip
+            ):
                 raise ValueError("facts of other shapes or types than one of each sample")
             pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
             wanted = np.array([pair in folds for pair in pairs], dtype=bool)
             if not wanted.any():
                 return np.empty(0), facts.take(wanted)
-            images, spectra = data["views"], data["spectra"].tolist()
+            images = data["views"]
+            spectra = data["spectra"].tolist()
     except UNREADABLE as error:
         raise InputError(f"{path}: not a views file ({error})") from error
     stations = facts.range_m.shape[1]
     count = len(spectra) * stations
     if images.ndim != 4 or images.shape[:2] != (len(facts), count) or images.dtype != np.uint8:
-        raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, S, S)")
+        raise InputError(
+            f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, S, S)"
+        )
     return images[wanted][:, columns_in(columns, spectra, stations, str(path))], facts.take(wanted)
 
 
-def write(path: str | Path, views: np.ndarray, facts: Facts, spectra: Sequence[str] = LISTED) -> None:
+def write(
+    path: str | Path, views: np.ndarray, facts: Facts, spectra: Sequence[str] = LISTED
+) -> None:
     """Write a cache file; equal samples give equal bytes. spectra: names in the order of the tiles."""
     with replacing(path, views.nbytes) as temporary:
-        np.savez(temporary, views=views, spectra=np.array(spectra), **{name: getattr(facts, name) for name in FACTS})
+        np.savez(
+            temporary,
+            views=views,
+            spectra=np.array(spectra),
+            **{name: getattr(facts, name) for name in FACTS},
+        )

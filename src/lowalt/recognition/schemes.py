@@ -3,8 +3,8 @@
 `config/schemes.csv` contains the rows of the paper's tables, one line per scheme:
 
     scheme      published name, "ABC:VRP+TRP+VT"; also the key of accuracy.csv
-    stations    names of stations of the run's network, joined by "+"; names of one letter may stand together, "ABC"
-    spectra     spectra joined by "+"
+    stations    names of stations of the run's network, joined by "+"; names of one letter may stand
+    together, "ABC" spectra     spectra joined by "+"
     fusion      attention (the paper's proposal) | mean (its baseline)
     backbone    timm name, or empty for the configuration's own backbone
     protocols   protocols in whose tables the paper has this row, joined by "+"
@@ -37,8 +37,8 @@ OPTIONAL = ("size", "steps", "share")
 
 @dataclass(frozen=True)
 class Scheme:
-    """One row: `stations` and `spectra` are index tuples into the network's stations and SPECTRA; size and steps are 0
-    where the row leaves them to the configuration."""
+    """One row: `stations` and `spectra` are index tuples into the network's stations and SPECTRA;
+    size and steps are 0 where the row leaves them to the configuration."""
 
     name: str
     stations: tuple[int, ...]
@@ -75,16 +75,23 @@ class Scheme:
 
         `columns_in` converts them to indices in a data set, which may have fewer spectra.
         """
-        return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
+        return [
+            len(SPECTRA) * station + spectrum
+            for station in self.stations
+            for spectrum in self.spectra
+        ]
 
 
 def of_record(record: dict) -> Scheme:
     """Return the scheme of a checked record in a trained model."""
-    return Scheme(**{key: tuple(value) if isinstance(value, list) else value for key, value in record.items()})
+    return Scheme(
+        **{key: tuple(value) if isinstance(value, list) else value for key, value in record.items()}
+    )
 
 
 def with_scheme(settings: dict) -> tuple[Scheme, dict]:
-    """Return the scheme that the settings of a training hold as a record, and the others as the scheme settles them.
+    """Return the scheme that the settings of a training hold as a record, and the others as the
+    scheme settles them.
 
     Raises: InputError where there is no record of a scheme, or a wrong one.
     """
@@ -94,10 +101,13 @@ def with_scheme(settings: dict) -> tuple[Scheme, dict]:
     return scheme, scheme.settled(others)
 
 
-def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, where: str) -> list[int]:
+def columns_in(
+    columns: Sequence[int], spectra: Sequence[str], stations: int, where: str
+) -> list[int]:
     """Return the indices of views (`Scheme.columns`) among the images of a data set.
 
-    spectra: names of the data set's spectra, in the order of its tiles; stations: how many stations it has.
+    spectra: names of the data set's spectra, in the order of its tiles; stations: how many stations
+    it has.
     Raises: InputError naming `where` and the spectrum or the number of stations that is missing.
     """
     pairs = [divmod(column, len(NAMES)) for column in columns]
@@ -106,19 +116,29 @@ def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, wh
         raise InputError(f"{where}: {stations} stations, the scheme needs {needed}")
     lacking = {NAMES[number] for _, number in pairs} - set(spectra)
     if lacking:
-        raise InputError(f"{where}: spectra {list(spectra)}, the scheme also needs {sorted(lacking)}")
-    return [len(spectra) * station + list(spectra).index(NAMES[number]) for station, number in pairs]
+        raise InputError(
+            f"{where}: spectra {list(spectra)}, the scheme also needs {sorted(lacking)}"
+        )
+    return [
+        len(spectra) * station + list(spectra).index(NAMES[number]) for station, number in pairs
+    ]
 
 
-def _indices(text: str, parts: list[str], known: tuple[str, ...], kind: str, where: str) -> tuple[int, ...]:
-    """Return the sorted places of names among the known ones; refuse an unknown name or one given twice."""
+def _indices(
+    text: str, parts: list[str], known: tuple[str, ...], kind: str, where: str
+) -> tuple[int, ...]:
+    """Return the sorted places of names among the known ones; refuse an unknown name or one given
+    twice.
+    """
     if not parts or len(set(parts)) != len(parts) or not set(parts) <= set(known):
         raise InputError(f"{where}: {kind} {text!r}, expected some of {known}, each once")
     return tuple(sorted(known.index(part) for part in parts))
 
 
 def _number(row: dict, column: str, kind: type, low: float, high: float, where: str) -> float:
-    """Return the number in an optional column, its default where the cell is empty; refuse one out of range."""
+    """Return the number in an optional column, its default where the cell is empty; refuse one out
+    of range.
+    """
     if not (text := row.get(column)):
         return 1.0 if column == "share" else 0
     try:
@@ -126,7 +146,9 @@ def _number(row: dict, column: str, kind: type, low: float, high: float, where: 
     except ValueError:
         value = -1
     if not low <= value <= high:
-        raise InputError(f"{where}: {column} {text!r}, expected nothing or a number in {low:g}..{high:g}")
+        raise InputError(
+            f"{where}: {column} {text!r}, expected nothing or a number in {low:g}..{high:g}"
+        )
     return value
 
 
@@ -142,13 +164,16 @@ def joined(names: Sequence[str]) -> str:
 
 
 def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
-    """Return the scheme of one table row (all values are strings) for a network of these stations, in its order.
+    """Return the scheme of one table row (all values are strings) for a network of these stations,
+    in its order.
 
     Raises: InputError naming `where`, the column and the value.
     """
     if set(row) - set(OPTIONAL) != set(COLUMNS):
         columns = sorted(map(str, row))
-        raise InputError(f"{where}: columns {columns}, expected {list(COLUMNS)}, perhaps {list(OPTIONAL)}")
+        raise InputError(
+            f"{where}: columns {columns}, expected {list(COLUMNS)}, perhaps {list(OPTIONAL)}"
+        )
     if row["fusion"] not in FUSIONS:
         raise InputError(f"{where}: fusion {row['fusion']!r}, expected one of {FUSIONS}")
     protocols = tuple(row["protocols"].split("+"))
@@ -171,7 +196,8 @@ def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
     """Rows of a table, each with its place in words, by the scheme's name; no name stands twice."""
     rows: dict[str, tuple[dict, str]] = {}
     for number, row in enumerate(read_csv(path, "scheme", what="table of schemes"), start=2):
-        name, where = row["scheme"], f"{path} line {number}"
+        name = row["scheme"]
+        where = f"{path} line {number}"
         if slug(name) in map(slug, rows):
             raise InputError(f"{where}: scheme {name!r} stands twice")
         rows[name] = row, where
@@ -181,7 +207,9 @@ def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
 
 
 def names(path: str | Path) -> list[str]:
-    """Return the names of all schemes of a table, in its order. Raises: InputError for a name that stands twice."""
+    """Return the names of all schemes of a table, in its order. Raises: InputError for a name that
+    stands twice.
+    """
     return list(_rows(path))
 
 
@@ -194,7 +222,8 @@ def read(path: str | Path, stations: Sequence[str]) -> dict[str, Scheme]:
 
 
 def named(path: str | Path, name: str, stations: Sequence[str]) -> Scheme:
-    """Return the scheme called `name` (or with that slug) from a table; its other rows may name other stations.
+    """Return the scheme called `name` (or with that slug) from a table; its other rows may name
+    other stations.
 
     Raises: InputError naming the schemes there are, or what is wrong with this one.
     """

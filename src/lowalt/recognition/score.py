@@ -1,4 +1,6 @@
-"""The scorer for other people's predictions: truth comes from the shards, never from the file that is scored."""
+"""The scorer for other people's predictions: truth comes from the shards, never from the file that
+is scored.
+"""
 
 from pathlib import Path
 
@@ -27,34 +29,45 @@ def _probabilities(path: str | Path, columns: tuple[str, ...]) -> dict[str, list
 def score(path: str | Path, index: str | Path, protocol: str) -> dict:
     """Return accuracies, confusion and calibration of a prediction file on a protocol's test part.
 
-    The file needs the columns `key` and a probability for each class of the data set. Rows of other samples are
-    ignored.
+    The file needs the columns `key` and a probability for each class of the data set. Rows of other
+    samples are ignored.
     Raises: InputError where a test sample has no prediction, or a row is malformed.
     """
     pairs = folds(protocol, "test")
-    shards = ShardSet(index, sorted({group for group, _ in pairs}), sorted({fold for _, fold in pairs}), check=False)
+    shards = ShardSet(
+        index,
+        sorted({group for group, _ in pairs}),
+        sorted({fold for _, fold in pairs}),
+        check=False,
+    )
     facts = facts_of(shards, np.arange(len(shards)), placed=False)
     by_key = _probabilities(path, probability_columns(shards.classes))
     missing = [key for key in facts.key.tolist() if key not in by_key]
     if missing:
-        raise InputError(f"{path}: {len(missing)} test samples have no prediction, the first is {missing[0]!r}")
+        raise InputError(
+            f"{path}: {len(missing)} test samples have no prediction, the first is {missing[0]!r}"
+        )
     probabilities = np.array([by_key[key] for key in facts.key.tolist()])
     return {"protocol": protocol, **scores(facts, probabilities)}
 
 
 def scores(facts: Facts, probabilities: np.ndarray) -> dict:
-    """Return accuracies (the mean over the SNRs, and by SNR and subtype), confusion and calibration of predictions.
+    """Return accuracies (the mean over the SNRs, and by SNR and subtype), confusion and calibration
+    of predictions.
 
     probabilities: (samples, classes), in the order of `facts`.
     """
-    guesses, classes = probabilities.argmax(1), probabilities.shape[1]
+    guesses = probabilities.argmax(1)
+    classes = probabilities.shape[1]
     correct = guesses == facts.label
     by_snr = accuracy_by(facts.snr_db, correct)
     return {
         "samples": len(facts),
         "accuracy_percent": 100 * float(np.mean([share for share, _ in by_snr.values()])),
         "by_snr_percent": {f"{snr:g}": 100 * share for snr, (share, _) in by_snr.items()},
-        "by_subtype_percent": {name: 100 * share for name, (share, _) in accuracy_by(facts.subtype, correct).items()},
+        "by_subtype_percent": {
+            name: 100 * share for name, (share, _) in accuracy_by(facts.subtype, correct).items()
+        },
         "confusion": confusion(facts.label, guesses, classes).tolist(),
         "confusion_by_snr": {
             f"{snr:g}": confusion(facts.label[some], guesses[some], classes).tolist()

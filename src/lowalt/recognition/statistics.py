@@ -1,4 +1,5 @@
-"""Numbers from predictions: accuracy, confusion, calibration, thresholds and false alarms. NumPy only.
+"""Numbers from predictions: accuracy, confusion, calibration, thresholds and false alarms. NumPy
+only.
 
 Intervals of means and differences are those of `lowalt.recognition.intervals`.
 """
@@ -11,14 +12,18 @@ from lowalt.recognition.intervals import Interval, model_weights
 from lowalt.recognition.predictions import Predictions
 
 LOOKED_FOR = 0
-"""Label of the target class, whose detections and false alarms are counted: the first class, by default UAV."""
+"""Label of the target class, whose detections and false alarms are counted: the first class, by
+default UAV.
+"""
 FEWEST_MISSED = 10
-"""A threshold must leave at least this many validation samples of the target class undetected. The standard deviation
-of that number is then a third of it."""
+"""A threshold must leave at least this many validation samples of the target class undetected. The
+standard deviation of that number is then a third of it."""
 
 
 class AlarmPart(NamedTuple):
-    """Data for counting false alarms, each (samples,): target class's probability, label, motion model, subtype."""
+    """Data for counting false alarms, each (samples,): target class's probability, label, motion
+    model, subtype.
+    """
 
     scores: np.ndarray
     labels: np.ndarray
@@ -27,17 +32,23 @@ class AlarmPart(NamedTuple):
 
 
 def cross_entropy(probabilities: np.ndarray, labels: np.ndarray) -> float:
-    """Mean negative log of the true class's probability; probabilities (samples, classes), labels (samples,)."""
+    """Mean negative log of the true class's probability; probabilities (samples, classes), labels
+    (samples,).
+    """
     chosen = probabilities[np.arange(len(labels)), labels]
     return float(-np.log(np.maximum(chosen, np.finfo(float).tiny)).mean())
 
 
 def accuracy_by(groups: np.ndarray, correct: np.ndarray) -> dict:
-    """Share of correct samples and their number in each group, in sorted order: {group: (share, samples)}."""
+    """Share of correct samples and their number in each group, in sorted order: {group: (share,
+    samples)}.
+    """
     names, place = np.unique(groups, return_inverse=True)
     count = np.bincount(place)
     hits = np.bincount(place, weights=correct)
-    return {name.item(): (float(h / n), int(n)) for name, h, n in zip(names, hits, count, strict=True)}
+    return {
+        name.item(): (float(h / n), int(n)) for name, h, n in zip(names, hits, count, strict=True)
+    }
 
 
 def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarray:
@@ -48,9 +59,11 @@ def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarr
 def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -> dict[str, float]:
     """Expected calibration error (equal-width bins of confidence), Brier score and cross entropy.
 
-    Source: Guo et al., On calibration of modern neural networks, 2017; Brier 1950 (sum over the classes).
+    Source: Guo et al., On calibration of modern neural networks, 2017; Brier 1950 (sum over the
+    classes).
     """
-    confidence, guesses = probabilities.max(1), probabilities.argmax(1)
+    confidence = probabilities.max(1)
+    guesses = probabilities.argmax(1)
     place = np.minimum((confidence * bins).astype(int), bins - 1)
     gap = np.bincount(place, weights=confidence - (guesses == labels), minlength=bins)
     truth = np.eye(probabilities.shape[1])[labels]
@@ -62,10 +75,11 @@ def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -
 
 
 def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float:
-    """Largest threshold on the probability of the target class that still detects at least a share `detection` of it.
+    """Largest threshold on the probability of the target class that still detects at least a share
+    `detection` of it.
 
-    scores (samples,), labels (samples,); a sample is detected where its score is at least the threshold. Set it on
-    validation samples, never on the samples that it is then tested on.
+    scores (samples,), labels (samples,); a sample is detected where its score is at least the
+    threshold. Set it on validation samples, never on the samples that it is then tested on.
     """
     wanted = np.sort(scores[labels == LOOKED_FOR])[::-1]
     needed = int(np.ceil(detection * len(wanted) - 1e-9))
@@ -73,10 +87,11 @@ def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float
 
 
 def measurable(labels: np.ndarray, detection: float) -> bool:
-    """Whether a threshold for `detection` can be set on validation samples: at least `FEWEST_MISSED` samples of the
-    target class are below it.
+    """Whether a threshold for `detection` can be set on validation samples: at least
+    `FEWEST_MISSED` samples of the target class are below it.
 
-    labels (samples,) of the validation samples. With fewer, a handful of samples would decide the threshold.
+    labels (samples,) of the validation samples. With fewer, a handful of samples would decide the
+    threshold.
     """
     return (1 - detection) * np.sum(labels == LOOKED_FOR) >= FEWEST_MISSED - 1e-9
 
@@ -89,23 +104,32 @@ def _weighted_threshold(scores: np.ndarray, weights: np.ndarray, detection: floa
 
 
 def alarm_intervals(
-    validation: list["AlarmPart"], test: list["AlarmPart"], detection: float, whole_subtypes: bool,
-    generator: np.random.Generator, classes: int, repeats: int = 400,
-) -> np.ndarray:  # fmt: skip
-    """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates of the other classes.
+    validation: list["AlarmPart"],
+    test: list["AlarmPart"],
+    detection: float,
+    whole_subtypes: bool,
+    generator: np.random.Generator,
+    classes: int,
+    repeats: int = 400,
+) -> np.ndarray:
+    """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates of the
+    other classes.
 
-    validation, test: one part for each training seed, samples in the same order. Every repeat draws seeds, motion
-    models of both parts and, with `whole_subtypes`, subtypes of the test part. It sets its thresholds on the drawn
-    validation samples.
+    validation, test: one part for each training seed, samples in the same order. Every repeat draws
+    seeds, motion models of both parts and, with `whole_subtypes`, subtypes of the test part. It
+    sets its thresholds on the drawn validation samples.
     Source: `lowalt.recognition.intervals.strict_difference`.
     """
 
     def sample_weights(part: AlarmPart, whole: bool) -> np.ndarray:
-        """Return how often each sample is drawn in each repeat, (repeats, samples), by its motion model."""
+        """Return how often each sample is drawn in each repeat, (repeats, samples), by its motion
+        model.
+        """
         _, first, place = np.unique(part.motion, return_index=True, return_inverse=True)
         return model_weights(part.subtypes[first], whole, repeats, generator)[:, place]
 
-    judged, set_on = sample_weights(test[0], whole_subtypes), sample_weights(validation[0], False)
+    judged = sample_weights(test[0], whole_subtypes)
+    set_on = sample_weights(validation[0], False)
     wanted = validation[0].labels == LOOKED_FOR
     of_class = [test[0].labels == label for label in range(classes)]
     drawn = generator.integers(0, len(test), (repeats, len(test)))
@@ -113,31 +137,43 @@ def alarm_intervals(
     for repeat in range(repeats):
         rates = []
         for seed in drawn[repeat]:
-            level = _weighted_threshold(validation[seed].scores[wanted], set_on[repeat, wanted], detection)
+            level = _weighted_threshold(
+                validation[seed].scores[wanted], set_on[repeat, wanted], detection
+            )
             called = test[seed].scores >= level
             totals = [judged[repeat, members].sum() for members in of_class]
             hits = [judged[repeat, members] @ called[members] for members in of_class]
-            rates.append([hit / total if total else np.nan for hit, total in zip(hits, totals, strict=True)])
+            rates.append(
+                [hit / total if total else np.nan for hit, total in zip(hits, totals, strict=True)]
+            )
         resampled[repeat] = np.mean(rates, axis=0)
     kept = resampled[~np.isnan(resampled).any(1)]
-    return np.quantile(kept, [0.025, 0.975], axis=0).T if len(kept) else np.full((classes, 2), np.nan)
+    return (
+        np.quantile(kept, [0.025, 0.975], axis=0).T if len(kept) else np.full((classes, 2), np.nan)
+    )
 
 
-def alarm_rates(scores: np.ndarray, labels: np.ndarray, level: float, classes: int) -> tuple[float, np.ndarray]:
+def alarm_rates(
+    scores: np.ndarray, labels: np.ndarray, level: float, classes: int
+) -> tuple[float, np.ndarray]:
     """Detection rate at a threshold, and the false alarm rates (classes - 1,) of the other classes."""
     called = scores >= level
     return float(called[labels == LOOKED_FOR].mean()), np.array(
-        [called[labels == other].mean() if (labels == other).any() else np.nan for other in range(1, classes)]
+        [
+            called[labels == other].mean() if (labels == other).any() else np.nan
+            for other in range(1, classes)
+        ]
     )
 
 
 def pareto(cost: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Return which points (n,) are on the Pareto front.
 
-    A point is on it if no other point has cost <= its cost and value >= its value with one of them strict. Points whose
-    cost or value is NaN are never on the front.
+    A point is on it if no other point has cost <= its cost and value >= its value with one of them
+    strict. Points whose cost or value is NaN are never on the front.
     """
-    cheaper, better = cost[:, None] <= cost, value[:, None] >= value
+    cheaper = cost[:, None] <= cost
+    better = value[:, None] >= value
     strictly = (cost[:, None] < cost) | (value[:, None] > value)
     return ~(cheaper & better & strictly).any(0) & ~np.isnan(cost) & ~np.isnan(value)
 
@@ -146,40 +182,61 @@ def macro_f1(counts: np.ndarray) -> np.ndarray:
     """Return the macro F1 (...,) of confusion counts (..., classes, classes), true class by row.
 
     Classes without samples are left out of the mean. F1 of a class is 2 TP / (2 TP + FP + FN).
-    Source: van Rijsbergen, Information Retrieval, 1979, ch. 7; Sokolova and Lapalme, Inf. Process. Manag. 45, 2009.
+    Source: van Rijsbergen, Information Retrieval, 1979, ch. 7; Sokolova and Lapalme, Inf. Process.
+    Manag. 45, 2009.
     """
     counts = np.asarray(counts, dtype=float)
-    hits, true, guessed = np.diagonal(counts, axis1=-2, axis2=-1), counts.sum(-1), counts.sum(-2)
+    hits = np.diagonal(counts, axis1=-2, axis2=-1)
+    true = counts.sum(-1)
+    guessed = counts.sum(-2)
     present = true > 0
     f1 = np.where(present, 2 * hits / np.where(present, true + guessed, 1), 0)
     return f1.sum(-1) / np.maximum(present.sum(-1), 1)
 
 
-def _counts(predictions: Predictions, chosen: np.ndarray, place: np.ndarray, models: int, classes: int) -> np.ndarray:
-    """Confusion counts (models, classes, classes) of the samples `chosen`; place (samples,): their motion models."""
+def _counts(
+    predictions: Predictions, chosen: np.ndarray, place: np.ndarray, models: int, classes: int
+) -> np.ndarray:
+    """Confusion counts (models, classes, classes) of the samples `chosen`; place (samples,): their
+    motion models.
+    """
     cell = (place * classes + predictions.label) * classes + predictions.guesses
-    return np.bincount(cell[chosen], minlength=models * classes**2).reshape(models, classes, classes)
+    return np.bincount(cell[chosen], minlength=models * classes**2).reshape(
+        models, classes, classes
+    )
 
 
 def f1_by_snr(
-    parts: list[Predictions], classes: int, whole_subtypes: bool, generator: np.random.Generator, repeats: int = 400
+    parts: list[Predictions],
+    classes: int,
+    whole_subtypes: bool,
+    generator: np.random.Generator,
+    repeats: int = 400,
 ) -> dict[float | str, Interval]:
     """Return macro F1 with its 95 % interval at each SNR, and as "avg" the mean over the SNRs.
 
-    parts: the same samples as every training seed predicted them; F1 is the mean over the seeds. Every repeat draws
-    seeds, subtypes where `whole_subtypes`, and motion models, the same for all SNRs.
+    parts: the same samples as every training seed predicted them; F1 is the mean over the seeds.
+    Every repeat draws seeds, subtypes where `whole_subtypes`, and motion models, the same for all
+    SNRs.
     Source: `lowalt.recognition.statistics.alarm_intervals`, which draws likewise.
     """
     test = parts[0]
     _, first, place = np.unique(test.motion, return_index=True, return_inverse=True)
     weights = model_weights(test.subtype[first], whole_subtypes, repeats, generator)
     drawn = generator.integers(0, len(parts), (repeats, len(parts)))
-    values, resampled = {}, {}
+    values = {}
+    resampled = {}
     for snr in np.unique(test.snr_db).tolist():
-        counts = [_counts(predictions, test.snr_db == snr, place, len(first), classes) for predictions in parts]
+        counts = [
+            _counts(predictions, test.snr_db == snr, place, len(first), classes)
+            for predictions in parts
+        ]
         values[snr] = float(np.mean([macro_f1(seed.sum(0)) for seed in counts]))
         of_seed = np.stack([macro_f1(np.tensordot(weights, seed, 1)) for seed in counts], axis=1)
         resampled[snr] = np.take_along_axis(of_seed, drawn, axis=1).mean(1)
-    values["avg"], resampled["avg"] = np.mean(list(values.values())), np.mean(list(resampled.values()), axis=0)
+    values["avg"], resampled["avg"] = (
+        np.mean(list(values.values())),
+        np.mean(list(resampled.values()), axis=0),
+    )
     bounds = {snr: np.quantile(means, [0.025, 0.975]) for snr, means in resampled.items()}
     return {snr: Interval(float(value), *map(float, bounds[snr])) for snr, value in values.items()}

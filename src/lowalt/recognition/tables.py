@@ -1,25 +1,31 @@
 """Tables (CSV) from prediction files: the paper's and further ones. Nothing is tuned on test data.
 
 The first columns of each file are `protocol, scheme`:
-    accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, macro F1 in percent with its 95 % interval,
-                     samples, hardware; averages over several seeds; seeds is their number, spread_points
-                     their standard deviation (empty for one)
+    accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, macro F1 in percent with
+    its 95 % interval,
+                     samples, hardware; averages over several seeds; seeds is their number,
+                     spread_points their standard deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
-    seeds.csv        one row per training: accuracy_percent on average over the SNRs, its network, cost and hardware
-    confusion.csv    category, predicted, samples
+    seeds.csv        one row per training: accuracy_percent on average over the SNRs, its network,
+    cost and hardware confusion.csv    category, predicted, samples
     confusion_by_snr.csv  snr_db, category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
-    alarms.csv       required detection of the first class, its threshold (set on validation), and on test the
-                     detection and the false alarms of the other classes with 95 % intervals. Each model has its own
-                     threshold; values are means over the seeds. "not measurable" where fewer than ten validation
-                     samples would be below the threshold
+    alarms.csv       required detection of the first class, its threshold (set on validation), and
+    on test the
+                     detection and the false alarms of the other classes with 95 % intervals. Each
+                     model has its own threshold; values are means over the seeds. "not measurable"
+                     where fewer than ten validation samples would be below the threshold
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
-    comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the interval resamples:
-                     training seeds (where there are several), subtypes (unseen protocol), motion models
-    orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds here (the interval
-                     lies above zero), is reversed (below), undecided (zero inside) or not ranked (fewer than 3 seeds)
+    comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the
+    interval resamples:
+                     training seeds (where there are several), subtypes (unseen protocol), motion
+                     models
+    orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds
+    here (the interval
+                     lies above zero), is reversed (below), undecided (zero inside) or not ranked
+                     (fewer than 3 seeds)
 """
 
 from collections.abc import Callable, Iterable
@@ -38,8 +44,18 @@ from lowalt.recognition.predictions import Predictions
 
 F1 = ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
 """Columns of accuracy.csv with macro F1 and the bounds of its 95 % interval."""
-TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train_s", "train_processor_s",
-            "samples_per_s", "precision", "ranks")  # fmt: skip
+TRAINING = (
+    "backbone",
+    "weights",
+    "parameters",
+    "steps",
+    "samples_seen",
+    "train_s",
+    "train_processor_s",
+    "samples_per_s",
+    "precision",
+    "ranks",
+)
 """Columns that seeds.csv repeats from a training's record."""
 DETECTIONS = (0.9, 0.95, 0.99)
 """Required detection rates of the first class, for each of which a threshold is set."""
@@ -56,20 +72,26 @@ def snr_text(snr_db: float) -> str:
 
 
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
-    """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one scheme's runs.
+    """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one
+    scheme's runs.
 
-    Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of macro F1 resample whole
-    subtypes if these are held out from training.
+    Values are means over the runs, one per training seed; seed: of the bootstrap. Intervals of
+    macro F1 resample whole subtypes if these are held out from training.
     """
     parts = [run.part(part) for run in runs]
-    protocol, name = runs[0].protocol, runs[0].scheme
+    protocol = runs[0].protocol
+    name = runs[0].scheme
     generator = stream(seed, "macro-f1", protocol, name, part)
     whole = (protocol, part) == ("unseen", "test")
     scores = {
         snr if snr == "avg" else snr_text(snr): interval
-        for snr, interval in statistics.f1_by_snr(parts, len(runs[0].classes), whole, generator).items()
+        for snr, interval in statistics.f1_by_snr(
+            parts, len(runs[0].classes), whole, generator
+        ).items()
     }
-    by_snr = [statistics.accuracy_by(predictions.snr_db, predictions.correct) for predictions in parts]
+    by_snr = [
+        statistics.accuracy_by(predictions.snr_db, predictions.correct) for predictions in parts
+    ]
     shares = {snr_text(snr): [table[snr][0] for table in by_snr] for snr in by_snr[0]}
     counts = {snr_text(snr): count for snr, (_, count) in by_snr[0].items()}
     shares["avg"] = np.mean(list(shares.values()), axis=0).tolist()
@@ -77,21 +99,36 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
     for snr, values in shares.items():
         spread = percent(np.std(values, ddof=1)) if len(values) > 1 else ""
         f1 = map(percent, scores[snr])
-        yield [snr, percent(np.mean(values)), *f1, counts[snr], runs[0].hardware, len(values), spread]
+        yield [
+            snr,
+            percent(np.mean(values)),
+            *f1,
+            counts[snr],
+            runs[0].hardware,
+            len(values),
+            spread,
+        ]
 
 
 def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
-    """Yield rows [seed, accuracy_percent, *TRAINING, hardware], the accuracy on average over the SNRs."""
+    """Yield rows [seed, accuracy_percent, *TRAINING, hardware], the accuracy on average over the
+    SNRs.
+    """
     for run in runs:
-        shares = [share for share, _ in statistics.accuracy_by(run.test.snr_db, run.test.correct).values()]
+        shares = [
+            share for share, _ in statistics.accuracy_by(run.test.snr_db, run.test.correct).values()
+        ]
         known = [run.about.get(name, "") for name in TRAINING]
         took = [f"{value:.6g}" if isinstance(value, float) else value for value in known]
         yield [run.seed, percent(np.mean(shares)), *took, run.hardware]
 
 
 def confusion_rows(runs: list[Evaluated], snr_db: float | None = None) -> Iterable[list]:
-    """Yield rows [category, predicted, samples], summed over the seeds, at one SNR (dB) or over all."""
-    classes, counts = runs[0].classes, 0
+    """Yield rows [category, predicted, samples], summed over the seeds, at one SNR (dB) or over
+    all.
+    """
+    classes = runs[0].classes
+    counts = 0
     for test in (run.test for run in runs):
         some = slice(None) if snr_db is None else test.snr_db == snr_db
         counts = counts + statistics.confusion(test.label[some], test.guesses[some], len(classes))
@@ -108,41 +145,60 @@ def confusion_by_snr_rows(runs: list[Evaluated]) -> Iterable[list]:
 
 def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [category, subtype, accuracy_percent, samples], the worst of each category first."""
-    test, classes = runs[0].test, runs[0].classes
-    category = {name: classes[label] for name, label in zip(test.subtype.tolist(), test.label, strict=True)}
+    test = runs[0].test
+    classes = runs[0].classes
+    category = {
+        name: classes[label] for name, label in zip(test.subtype.tolist(), test.label, strict=True)
+    }
     correct = np.mean([run.test.correct for run in runs], axis=0)
     table = statistics.accuracy_by(test.subtype, correct)
-    for name in sorted(table, key=lambda name: (classes.index(category[name]), table[name][0], name)):
+    for name in sorted(
+        table, key=lambda name: (classes.index(category[name]), table[name][0], name)
+    ):
         yield [category[name], name, percent(table[name][0]), table[name][1]]
 
 
-def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float) -> Iterable[list]:
-    """Yield rows [from, to, accuracy_percent, samples] for bands of a value; samples without the value are omitted."""
+def band_rows(
+    runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float
+) -> Iterable[list]:
+    """Yield rows [from, to, accuracy_percent, samples] for bands of a value; samples without the
+    value are omitted.
+    """
     test = runs[0].test
     numbers = values(test)
     known = ~np.isnan(numbers)
     correct = np.mean([run.test.correct for run in runs], axis=0)
-    for band, (share, count) in statistics.accuracy_by(np.floor(numbers[known] / width), correct[known]).items():
+    for band, (share, count) in statistics.accuracy_by(
+        np.floor(numbers[known] / width), correct[known]
+    ).items():
         yield [f"{band * width:g}", f"{(band + 1) * width:g}", percent(share), count]
 
 
 def _alarm_part(predictions: Predictions) -> statistics.AlarmPart:
     """The data of predictions for counting false alarms."""
     return statistics.AlarmPart(
-        predictions.probabilities[:, statistics.LOOKED_FOR], predictions.label, predictions.motion, predictions.subtype
+        predictions.probabilities[:, statistics.LOOKED_FOR],
+        predictions.label,
+        predictions.motion,
+        predictions.subtype,
     )
 
 
 def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
-    """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false alarms of others.
+    """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false
+    alarms of others.
 
-    In percent, with 95 % intervals; thresholds come from validation samples. "not measurable" where there are too few
-    validation samples to set a threshold.
+    In percent, with 95 % intervals; thresholds come from validation samples. "not measurable" where
+    there are too few validation samples to set a threshold.
     """
     classes = len(runs[0].classes)
     validations = [_alarm_part(run.part("validation")) for run in runs]
     tests = [_alarm_part(run.test) for run in runs]
-    for asked in DETECTIONS if all((part.labels == statistics.LOOKED_FOR).any() for part in validations) else ():
+    for asked in (
+        DETECTIONS
+        if all((part.labels == statistics.LOOKED_FOR).any() for part in validations)
+        else ()
+    ):
         if not statistics.measurable(validations[0].labels, asked):
             yield [percent(asked), *["not measurable"] * (1 + 3 * classes)]
             continue
@@ -152,21 +208,34 @@ def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
             detected, alarms = statistics.alarm_rates(part.scores, part.labels, level, classes)
             rates.append([detected, *alarms])
         generator = stream(seed, "alarms", runs[0].protocol, runs[0].scheme, asked)
-        bounds = statistics.alarm_intervals(validations, tests, asked, whole_subtypes(runs), generator, classes)
-        cells = [[percent(rate), *map(percent, pair)] for rate, pair in zip(np.mean(rates, 0), bounds, strict=True)]
-        yield [percent(asked), repr(float(np.mean(levels))), *(cell for three in cells for cell in three)]
+        bounds = statistics.alarm_intervals(
+            validations, tests, asked, whole_subtypes(runs), generator, classes
+        )
+        cells = [
+            [percent(rate), *map(percent, pair)]
+            for rate, pair in zip(np.mean(rates, 0), bounds, strict=True)
+        ]
+        yield [
+            percent(asked),
+            repr(float(np.mean(levels))),
+            *(cell for three in cells for cell in three),
+        ]
 
 
 def calibration_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [calibration_error, brier, cross_entropy] on the test part."""
-    of_runs = [list(statistics.calibration(run.test.probabilities, run.test.label).values()) for run in runs]
+    of_runs = [
+        list(statistics.calibration(run.test.probabilities, run.test.label).values())
+        for run in runs
+    ]
     yield [f"{value:.6f}" for value in np.mean(of_runs, axis=0)]
 
 
 def comparison_rows(first: list[Evaluated], second: list[Evaluated], seed: int) -> Iterable[list]:
     """Yield one row [resampled, seeds, difference, low, high] of two schemes on the same samples.
 
-    Difference in percentage points, mean over the seeds; seeds: the smaller number of trainings of the two schemes.
+    Difference in percentage points, mean over the seeds; seeds: the smaller number of trainings of
+    the two schemes.
     Raises: InputError where the schemes were tested on different samples.
     """
     seeds = min(len(first), len(second))
@@ -185,30 +254,44 @@ def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
     """The classes that all runs share; refuses runs with different classes."""
     sets = sorted({run.classes for run in runs})
     if len(sets) != 1:
-        raise InputError(f"predictions of the classes {' and '.join(map(str, sets))}, expected one set of classes")
+        raise InputError(
+            f"predictions of the classes {' and '.join(map(str, sets))}, expected one set of classes"
+        )
     return sets[0]
 
 
-def write(runs: list[Evaluated], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
-    """Write all tables into `folder`, sorted by protocol (seen first), then by scheme as in `order`.
+def write(
+    runs: list[Evaluated], order: list[str], published: dict, folder: str | Path, seed: int
+) -> None:
+    """Write all tables into `folder`, sorted by protocol (seen first), then by scheme as in
+    `order`.
 
     published: as `paper_claims.read_published` gives it; seed: of the bootstrap.
-    Raises: InputError for a scheme outside `order`, the same run twice, or runs with different classes.
+    Raises: InputError for a scheme outside `order`, the same run twice, or runs with different
+    classes.
     """
     groups: dict[tuple[str, str], list[Evaluated]] = {}
     for run in sorted(runs, key=lambda run: run.seed):
         if run.scheme not in order:
-            raise InputError(f"scheme {run.scheme!r}: not in the table of schemes, which has {order}")
+            raise InputError(
+                f"scheme {run.scheme!r}: not in the table of schemes, which has {order}"
+            )
         group = groups.setdefault((run.protocol, run.scheme), [])
         if any(other.seed == run.seed for other in group):
-            raise InputError(f"{run.protocol} {run.scheme}: two prediction files of seed {run.seed}")
+            raise InputError(
+                f"{run.protocol} {run.scheme}: two prediction files of seed {run.seed}"
+            )
         group.append(run)
     keys = sorted(groups, key=lambda key: (key[0], order.index(key[1])))
     share = ["accuracy_percent", "samples"]
     measured = ["snr_db", "accuracy_percent", *F1, "samples", "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
     rates = ("detected", *map(word, _one_set(runs)[1:]))
-    alarm = ["asked_percent", "threshold", *(f"{rate}_{end}" for rate in rates for end in ("percent", "low", "high"))]
+    alarm = [
+        "asked_percent",
+        "threshold",
+        *(f"{rate}_{end}" for rate in rates for end in ("percent", "low", "high")),
+    ]
     tables = {
         "accuracy": (measured, lambda group: accuracy_rows(group, "test", seed)),
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
@@ -221,9 +304,17 @@ def write(runs: list[Evaluated], order: list[str], published: dict, folder: str 
         "calibration": (["calibration_error", "brier", "cross_entropy"], calibration_rows),
     }
     for name, (columns, rows) in tables.items():
-        _write(Path(folder) / f"{name}.csv", columns, [[*key, *row] for key in keys for row in rows(groups[key])])
-    seen = [[*key, *row] for key in keys if key[0] == "unseen" and len(groups[key][0].part("seen_test"))
-            for row in accuracy_rows(groups[key], "seen_test", seed)]  # fmt: skip
+        _write(
+            Path(folder) / f"{name}.csv",
+            columns,
+            [[*key, *row] for key in keys for row in rows(groups[key])],
+        )
+    seen = [
+        [*key, *row]
+        for key in keys
+        if key[0] == "unseen" and len(groups[key][0].part("seen_test"))
+        for row in accuracy_rows(groups[key], "seen_test", seed)
+    ]
     _write(Path(folder) / "seen_test.csv", measured, seen)
     compared = [
         [protocol, better, other, claim, *row]
@@ -234,5 +325,14 @@ def write(runs: list[Evaluated], order: list[str], published: dict, folder: str 
     ]
     columns = ["over", "claim", "resampled", "seeds", "difference_points", "low", "high"]
     _write(Path(folder) / "comparisons.csv", columns, compared)
-    columns = ["over", "claim", "paper_points", "seeds", "difference_points", "low", "high", "ordering"]
+    columns = [
+        "over",
+        "claim",
+        "paper_points",
+        "seeds",
+        "difference_points",
+        "low",
+        "high",
+        "ordering",
+    ]
     _write(Path(folder) / "orderings.csv", columns, list(ordering_rows(compared, published)))

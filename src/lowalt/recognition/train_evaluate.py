@@ -22,15 +22,22 @@ from lowalt.shards import ShardSet
 
 
 def train(
-    run: str | Path, scheme: str = "ABC:VRP+TRP+VT", protocol: str = "unseen", seed: int = 0,
-    out: str | Path = "model", backbone: str = "", **training: object,
-) -> runs.Trained:  # fmt: skip
-    """Train a scheme on the data set of a finished run and return the model, which stays in `out`/model.safetensors.
+    run: str | Path,
+    scheme: str = "ABC:VRP+TRP+VT",
+    protocol: str = "unseen",
+    seed: int = 0,
+    out: str | Path = "model",
+    backbone: str = "",
+    **training: object,
+) -> runs.Trained:
+    """Train a scheme on the data set of a finished run and return the model, which stays in
+    `out`/model.safetensors.
 
-    run: its folder, such as results/default; scheme: a name of config/schemes.csv; protocol: "unseen" trains on twenty
-    subtypes and tests on the others, "seen" trains and tests on other motion of all; backbone: FILE.py:FUNCTION of your
-    own, which a run's folder may not choose; training: settings that replace the run's own, such as steps=500. A
-    training that was interrupted goes on.
+    run: its folder, such as results/default; scheme: a name of config/schemes.csv; protocol:
+    "unseen" trains on twenty subtypes and tests on the others, "seen" trains and tests on other
+    motion of all; backbone: FILE.py:FUNCTION of your own, which a run's folder may not choose;
+    training: settings that replace the run's own, such as steps=500. A training that was
+    interrupted goes on.
     Raises: InputError for a run that is not finished or names code, or a wrong name or setting.
     """
     config, index = _opened(run)
@@ -38,23 +45,36 @@ def train(
     chosen = named(block["table"], scheme, station_names(config["network"]))
     name = backbone or allowed(chosen.backbone_of(block["network"]), "", run)
     network = {**block["network"], "backbone": name}
-    settings = chosen.settled({
-        "size": block["size"], "augmentation": block["augmentation"], "network": network, "seed": seed,
-        "training": {**block["training"], **training}, "colour_map": config["images"]["colour_map"],
-        "classes": list(ShardSet(index).classes),
-    })  # fmt: skip
-    samples = Source.of_run(index, settings["size"]).for_training(chosen, protocol, settings["size"])
-    runs.train(samples, replace(chosen, backbone=chosen.backbone and name), protocol, settings, Path(out))
+    settings = chosen.settled(
+        {
+            "size": block["size"],
+            "augmentation": block["augmentation"],
+            "network": network,
+            "seed": seed,
+            "training": {**block["training"], **training},
+            "colour_map": config["images"]["colour_map"],
+            "classes": list(ShardSet(index).classes),
+        }
+    )
+    samples = Source.of_run(index, settings["size"]).for_training(
+        chosen, protocol, settings["size"]
+    )
+    runs.train(
+        samples, replace(chosen, backbone=chosen.backbone and name), protocol, settings, Path(out)
+    )
     return runs.load(Path(out) / "model.safetensors", backbone)
 
 
 def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = "") -> dict:
-    """Return how a trained model does on the test samples of its protocol in the data set of a finished run.
+    """Return how a trained model does on the test samples of its protocol in the data set of a
+    finished run.
 
-    model: of `train`, a file (.safetensors), or a name of the zoo; run: a folder such as results/default;
+    model: of `train`, a file (.safetensors), or a name of the zoo; run: a folder such as
+    results/default;
     backbone: the FILE.py:FUNCTION of a model file that names code.
-    The result has `accuracy_percent`, the mean over the SNRs, `by_snr_percent`, `by_subtype_percent`, `confusion`
-    (samples by true class and answer, in the order of the classes), `confusion_by_snr` and the calibration.
+    The result has `accuracy_percent`, the mean over the SNRs, `by_snr_percent`,
+    `by_subtype_percent`, `confusion` (samples by true class and answer, in the order of the
+    classes), `confusion_by_snr` and the calibration.
     Raises: InputError for a run that is not finished, or a model that does not fit its images.
     """
     trained = model if isinstance(model, runs.Trained) else zoo.opened(model, trusted=backbone)[0]
@@ -62,13 +82,18 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = 
     settings = config["recognition"]["evaluation"]
     machine = Machine.here(inference.evaluation(settings)[2])
     pairs = folds(trained.protocol, "test")
-    samples = Source.of_run(index, trained.size).samples(trained.scheme.columns, pairs, trained.size)
-    return {"protocol": trained.protocol, **scores(samples.facts, runs.answers(trained, samples, settings, machine))}
+    samples = Source.of_run(index, trained.size).samples(
+        trained.scheme.columns, pairs, trained.size
+    )
+    return {
+        "protocol": trained.protocol,
+        **scores(samples.facts, runs.answers(trained, samples, settings, machine)),
+    }
 
 
 class Confusion(NamedTuple):
-    """Names of the classes (C,), and the number of test samples (C, C) int of each true class (row) that each class
-    (column) was the answer for."""
+    """Names of the classes (C,), and the number of test samples (C, C) int of each true class (row)
+    that each class (column) was the answer for."""
 
     classes: tuple[str, ...]
     samples: np.ndarray
@@ -80,12 +105,18 @@ class Confusion(NamedTuple):
 
 
 def confusion(
-    run: str | Path, scheme: str = "ABC:VRP+TRP+VT", protocol: str = "unseen", snr_db: float | None = None
+    run: str | Path,
+    scheme: str = "ABC:VRP+TRP+VT",
+    protocol: str = "unseen",
+    snr_db: float | None = None,
 ) -> Confusion:
-    """Return what a finished run's networks took for what, at one SNR (dB; `math.inf`: no noise) or over all.
+    """Return what a finished run's networks took for what, at one SNR (dB; `math.inf`: no noise) or
+    over all.
 
-    run: its folder; scheme, protocol: as in its table confusion_by_snr.csv, which sums over the training seeds.
-    Raises: InputError for a folder without that table, or a scheme, a protocol or an SNR that it lacks.
+    run: its folder; scheme, protocol: as in its table confusion_by_snr.csv, which sums over the
+    training seeds.
+    Raises: InputError for a folder without that table, or a scheme, a protocol or an SNR that it
+    lacks.
     """
     path = Path(run) / "confusion_by_snr.csv"
     rows = read_csv(path, "protocol", "scheme", "snr_db", "category", "predicted", "samples")
@@ -98,7 +129,9 @@ def confusion(
     classes = tuple(dict.fromkeys(row["category"] for row in rows))
     samples = np.zeros((len(classes), len(classes)), int)
     for row in rows:
-        samples[classes.index(row["category"]), classes.index(row["predicted"])] += int(number(row, "samples", path))
+        samples[classes.index(row["category"]), classes.index(row["predicted"])] += int(
+            number(row, "samples", path)
+        )
     return Confusion(classes, samples)
 
 
@@ -107,8 +140,12 @@ def _opened(run: str | Path) -> tuple[dict, Path]:
     folder = Path(run)
     index = folder / "shards/index.json"
     if not index.is_file():
-        raise InputError(f"{folder}: has no shards/index.json, expected the folder of a finished run")
+        raise InputError(
+            f"{folder}: has no shards/index.json, expected the folder of a finished run"
+        )
     try:
         return located(check(of_run(folder), shipped(SCHEMA))), index
     except InputError as error:
-        raise InputError(str(error) if str(folder) in str(error) else f"{folder / 'config.yaml'}: {error}") from None
+        raise InputError(
+            str(error) if str(folder) in str(error) else f"{folder / 'config.yaml'}: {error}"
+        ) from None

@@ -1,7 +1,9 @@
-"""Training in plain torch: deterministic order, exact resume, early stopping on validation, an error at the first NaN.
+"""Training in plain torch: deterministic order, exact resume, early stopping on validation, an
+error at the first NaN.
 
-An exact resume needs access to the order of samples and to every random state, which training libraries hide; without a
-library the loop is still one page. The settings are those of `lowalt.recognition.recipe`.
+An exact resume needs access to the order of samples and to every random state, which training
+libraries hide; without a library the loop is still one page. The settings are those of
+`lowalt.recognition.recipe`.
 """
 
 import math
@@ -31,15 +33,25 @@ from lowalt.recognition.recipe import averaging, optimiser, random_state, schedu
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.statistics import cross_entropy
 
-HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", "validation_accuracy")
+HISTORY = (
+    "step",
+    "epoch",
+    "samples",
+    "rate",
+    "train_loss",
+    "validation_loss",
+    "validation_accuracy",
+)
 
 Metrics = Callable[[int, dict[str, float]], None]
 
 
 def tensorboard(folder: str | Path, first: int) -> Metrics:
-    """Return a function (step, {name: value}) that appends to TensorBoard's event files in `folder`.
+    """Return a function (step, {name: value}) that appends to TensorBoard's event files in
+    `folder`.
 
-    first: the step that the run starts from; entries of an earlier, killed run after it are removed.
+    first: the step that the run starts from; entries of an earlier, killed run after it are
+    removed.
     Raises: InputError where the package is not installed.
     """
     try:
@@ -61,8 +73,8 @@ def tensorboard(folder: str | Path, first: int) -> Metrics:
 
 
 class TrainingRun(NamedTuple):
-    """Identification of a run. keys: names of its random streams; identity: text stored in its checkpoints; folder:
-    where its files are written."""
+    """Identification of a run. keys: names of its random streams; identity: text stored in its
+    checkpoints; folder: where its files are written."""
 
     keys: tuple
     identity: str
@@ -86,19 +98,31 @@ class TrainingState:
 
 
 class Trainer:
-    """One training run: `finish` writes the best averaged weights (`model.safetensors`) and `history.csv`."""
+    """One training run: `finish` writes the best averaged weights (`model.safetensors`) and
+    `history.csv`.
+    """
 
     def __init__(
-        self, model: nn.Module, samples: dict[str, Samples], columns: list[int], settings: dict, run: TrainingRun,
+        self,
+        model: nn.Module,
+        samples: dict[str, Samples],
+        columns: list[int],
+        settings: dict,
+        run: TrainingRun,
         machine: Machine,
-    ) -> None:  # fmt: skip
-        """model: a Recogniser; samples: the sources "train" and "validation"; columns: views of the scheme.
+    ) -> None:
+        """model: a Recogniser; samples: the sources "train" and "validation"; columns: views of the
+        scheme.
 
         settings: {seed, training (as `recipe.check` returns it), augmentation, classes}.
         Raises: InputError for a class without training samples.
         """
-        self.block, self.seed, self.run, self.machine = settings["training"], settings["seed"], run, machine
-        self.train, self.validation = samples["train"], samples["validation"]
+        self.block = settings["training"]
+        self.seed = settings["seed"]
+        self.run = run
+        self.machine = machine
+        self.train = samples["train"]
+        self.validation = samples["validation"]
         classes = settings["classes"]
         missing = sorted(set(range(len(classes))) - set(np.unique(self.train.facts.label).tolist()))
         if missing:
@@ -113,12 +137,18 @@ class Trainer:
         self.model = shared.to(machine.device, memory_format=layout)
         self.optimiser = optimiser(self.model, self.block)
         self.average = timm.utils.ModelEmaV3(self.model)
-        self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model).train()
+        self.step_model = machine.parallel(
+            torch.compile(self.model) if self.block["compile"] else self.model
+        ).train()
         # Create the readers once: their workers then live through all epochs and validations.
         keys = (self.seed, *run.keys)
-        augmented = Augmented(self.train, columns, settings["augmentation"], keys, machine.rank, machine.ranks)
+        augmented = Augmented(
+            self.train, columns, settings["augmentation"], keys, machine.rank, machine.ranks
+        )
         readers = (augmented, Unchanged(self.validation))
-        self.read, self.read_validation = (Prefetch(read, self.block["workers"], pin=machine.gpu) for read in readers)
+        self.read, self.read_validation = (
+            Prefetch(read, self.block["workers"], pin=machine.gpu) for read in readers
+        )
         self.best_weights: dict = {}
         self.waited_s = 0.0
         self.metrics: Metrics | None = None
@@ -134,10 +164,13 @@ class Trainer:
     def _state(self) -> dict:
         """Return everything that a resumed training needs."""
         return {
-            "model": self.model.state_dict(), "ema": self.average.module.state_dict(), "best": self.best_weights,
-            "optimiser": self.optimiser.state_dict(), "at": vars(self.at),
+            "model": self.model.state_dict(),
+            "ema": self.average.module.state_dict(),
+            "best": self.best_weights,
+            "optimiser": self.optimiser.state_dict(),
+            "at": vars(self.at),
             "random": random_state(self.machine.device),
-        }  # fmt: skip
+        }
 
     def resume(self) -> bool:
         """Continue from the checkpoint of this run, if there is one; return whether there was one."""
@@ -161,10 +194,13 @@ class Trainer:
 
     def _refuse_unfinite_weights(self) -> None:
         """Raise InputError naming the weights that are not finite."""
-        # A weight can overflow although loss and gradient are finite; the next loss would reveal it after a checkpoint.
+        # A weight can overflow although loss and gradient are finite; the next loss would reveal it
+        # after a checkpoint.
         for name, value in self.model.state_dict().items():
             if value.is_floating_point() and not bool(value.isfinite().all()):
-                raise InputError(f"training: weights {name} are not finite after step {self.at.steps}; {self._advice}")
+                raise InputError(
+                    f"training: weights {name} are not finite after step {self.at.steps}; {self._advice}"
+                )
 
     @property
     def _advice(self) -> str:
@@ -177,7 +213,9 @@ class Trainer:
 
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         """Take one optimiser step on a batch and update the moving average of the weights."""
-        images, labels = (part.to(self.machine.device, non_blocking=True) for part in (images, labels))
+        images, labels = (
+            part.to(self.machine.device, non_blocking=True) for part in (images, labels)
+        )
         for group in self.optimiser.param_groups:
             group["lr"] = self._rate(self.at.steps + 1) * group["factor"]
         loss = descent(self.step_model, images, labels, self.block, self.machine)
@@ -189,11 +227,17 @@ class Trainer:
             self.optimiser.step()
             self.at.skipped = 0
         else:
-            # A gradient can overflow although the loss is finite. Skip such a step; ten in a row end the training.
+            # A gradient can overflow although the loss is finite. Skip such a step; ten in a row
+            # end the training.
             self.at.skipped += 1
-            print(f"training: gradient is {float(norm)} at step {self.at.steps}, step skipped", file=sys.stderr)
+            print(
+                f"training: gradient is {float(norm)} at step {self.at.steps}, step skipped",
+                file=sys.stderr,
+            )
             if self.at.skipped >= 10:
-                raise InputError(f"training: ten gradients in a row were not finite, last at step {self.at.steps}")
+                raise InputError(
+                    f"training: ten gradients in a row were not finite, last at step {self.at.steps}"
+                )
         self.optimiser.zero_grad()
         self.at.steps += 1
         self.average.decay = averaging(self.block["ema"], self.at.steps)
@@ -202,34 +246,61 @@ class Trainer:
     def _validate(self) -> None:
         """Validate the averaged weights, keep the best, and decide whether to stop early."""
         self._refuse_unfinite_weights()
-        facts, loss = self.validation.facts, self.at.loss_sum / self.at.loss_steps
+        facts = self.validation.facts
+        loss = self.at.loss_sum / self.at.loss_steps
         answers = probabilities(
-            self.average.module, self.validation, np.arange(len(facts)), self.machine, self.block["batch"],
+            self.average.module,
+            self.validation,
+            np.arange(len(facts)),
+            self.machine,
+            self.block["batch"],
             ahead=self.read_validation,
-        )  # fmt: skip
+        )
         accuracy = float(np.mean(answers.argmax(1) == facts.label))
-        row = (self.at.steps, self.at.epoch, self.at.steps * self.block["batch"], self._rate(self.at.steps),
-               loss, float(cross_entropy(answers, facts.label)), accuracy)  # fmt: skip
+        row = (
+            self.at.steps,
+            self.at.epoch,
+            self.at.steps * self.block["batch"],
+            self._rate(self.at.steps),
+            loss,
+            float(cross_entropy(answers, facts.label)),
+            accuracy,
+        )
         self.at.history.append(row)
         if accuracy >= self.at.best:
             self.at.since_best = 0 if accuracy > self.at.best else self.at.since_best + 1
             self.at.best = accuracy
             weights = self.average.module.state_dict()
-            self.best_weights = {key: value.detach().cpu().clone() for key, value in weights.items()}
+            self.best_weights = {
+                key: value.detach().cpu().clone() for key, value in weights.items()
+            }
         else:
             self.at.since_best += 1
-        self.at.loss_sum, self.at.loss_steps = 0.0, 0
+        self.at.loss_sum = 0.0
+        self.at.loss_steps = 0
         self.at.done = bool(self.block["patience"]) and self.at.since_best >= self.block["patience"]
 
     def fit(self) -> TrainingState:
-        """Train until the last step or until validation stops improving, starting at the current state."""
-        start, saved, first = time.monotonic(), time.monotonic(), self.at.steps
+        """Train until the last step or until validation stops improving, starting at the current
+        state.
+        """
+        start = time.monotonic()
+        saved = time.monotonic()
+        first = self.at.steps
         report = Reporter(steps := self.block["steps"], "steps")
         while self.at.steps < steps and not self.at.done:
-            order = epoch_order(self.train.facts, self.seed, self.run.keys, self.at.epoch, self.block["snrs_per_model"])
+            order = epoch_order(
+                self.train.facts,
+                self.seed,
+                self.run.keys,
+                self.at.epoch,
+                self.block["snrs_per_model"],
+            )
             parts = batches(order, self.block["batch"])
             # Number the batches by step: the step alone determines the augmentation.
-            numbered = list(enumerate(parts[self.at.batch :], start=self.at.steps))[: steps - self.at.steps]
+            numbered = list(enumerate(parts[self.at.batch :], start=self.at.steps))[
+                : steps - self.at.steps
+            ]
             read = self.read(numbered)
             for _ in numbered:
                 asked = time.monotonic()
@@ -248,18 +319,24 @@ class Trainer:
                 if self.at.done:
                     break
             if self.at.batch == len(parts):
-                self.at.epoch, self.at.batch = self.at.epoch + 1, 0
+                self.at.epoch = self.at.epoch + 1
+                self.at.batch = 0
         return self.at
 
     def _say(self, start: float, first: int) -> None:
-        """Print the last validation and the speed; start: when this process began (s), first: its first step."""
+        """Print the last validation and the speed; start: when this process began (s), first: its
+        first step.
+        """
         if self.machine.rank:
             return
         spent = time.monotonic() - start
         speed = (self.at.steps - first) / spent
         left = (self.block["steps"] - self.at.steps) / speed
         row = dict(zip(HISTORY, self.at.history[-1], strict=True))
-        pace = {"samples_per_s": speed * self.block["batch"], "waiting_share": self.waited_s / spent}
+        pace = {
+            "samples_per_s": speed * self.block["batch"],
+            "waiting_share": self.waited_s / spent,
+        }
         if self.metrics:
             self.metrics(row["step"], {name: row[name] for name in HISTORY[3:]} | pace)
         print(
@@ -272,12 +349,20 @@ class Trainer:
         )
 
     def finish(self, extra: dict) -> None:
-        """Write `model.safetensors` (best averaged weights, `extra`) and `history.csv`, and delete the checkpoint."""
+        """Write `model.safetensors` (best averaged weights, `extra`) and `history.csv`, and delete
+        the checkpoint.
+        """
         if self.machine.rank:
             return
         folder = self.run.folder
         weights = {name: value.contiguous() for name, value in self.best_weights.items()}
-        content = ModelFile(weights, json_object(self.run.identity, folder, "a training"), extra, {}, {})
+        content = ModelFile(
+            weights, json_object(self.run.identity, folder, "a training"), extra, {}, {}
+        )
         model_file.write(folder / "model.safetensors", content)
-        write_csv(folder / "history.csv", HISTORY, [[repr(value) for value in row] for row in self.at.history])
+        write_csv(
+            folder / "history.csv",
+            HISTORY,
+            [[repr(value) for value in row] for row in self.at.history],
+        )
         (folder / "checkpoint.pt").unlink(missing_ok=True)

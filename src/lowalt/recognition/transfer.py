@@ -1,15 +1,18 @@
-"""Models of other runs on this run's test samples, next to this run's own: how training on other data changes accuracy.
+"""Models of other runs on this run's test samples, next to this run's own: how training on other
+data changes accuracy.
 
 Both models classify the same test samples, and their results are compared sample by sample.
 
 transfer.csv, one row per protocol, scheme, other run and SNR ("avg": mean over SNRs):
     trained_on                   the other run
-    accuracy_percent             of the other run's model on this run's test samples, several seeds averaged
-    own_percent                  of this run's own model
-    difference_points, low, high the other's minus this run's own, with the 95 % interval that resamples training seeds,
+    accuracy_percent             of the other run's model on this run's test samples, several seeds
+    averaged own_percent                  of this run's own model
+    difference_points, low, high the other's minus this run's own, with the 95 % interval that
+    resamples training seeds,
                                  motion models and, in the unseen protocol, subtypes
     samples, hardware            of this run's test part
-    seeds, spread_points         training seeds of the other's model, and the standard deviation of accuracy between the
+    seeds, spread_points         training seeds of the other's model, and the standard deviation of
+    accuracy between the
                                  seeds of a model, pooled over both models (empty for one seed)
 """
 
@@ -25,16 +28,29 @@ from lowalt.recognition.evaluated import Evaluated, difference, spread_points
 from lowalt.recognition.tables import snr_text
 
 COLUMNS = (
-    "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low", "high",
-    "samples", "hardware", "seeds", "spread_points",
-)  # fmt: skip
+    "protocol",
+    "scheme",
+    "trained_on",
+    "snr_db",
+    "accuracy_percent",
+    "own_percent",
+    "difference_points",
+    "low",
+    "high",
+    "samples",
+    "hardware",
+    "seeds",
+    "spread_points",
+)
 
 
 def check_folds(own: dict, other: dict) -> None:
-    """Refuse a pair of configurations in which a motion model may train in the other run and test in this one.
+    """Refuse a pair of configurations in which a motion model may train in the other run and test
+    in this one.
 
-    Folds follow from (seed, subtype, number of the motion model) and the split: with equal seeds, only equal splits
-    test the same motion models; with other seeds, all motion models are different.
+    Folds follow from (seed, subtype, number of the motion model) and the split: with equal seeds,
+    only equal splits test the same motion models; with other seeds, all motion models are
+    different.
     Raises: InputError naming both splits.
     """
     if own["seed"] == other["seed"] and own["split"] != other["split"]:
@@ -44,18 +60,25 @@ def check_folds(own: dict, other: dict) -> None:
         )
 
 
-def comparison(own: list[Evaluated], other: list[Evaluated], name: str, seed: int) -> Iterable[list]:
+def comparison(
+    own: list[Evaluated], other: list[Evaluated], name: str, seed: int
+) -> Iterable[list]:
     """Yield the columns from snr_db on, in percent and points, of one scheme.
 
-    own, other: runs (seeds) of the two models; name: the other run, which keys the bootstrap's stream with `seed`.
+    own, other: runs (seeds) of the two models; name: the other run, which keys the bootstrap's
+    stream with `seed`.
     Raises: InputError where they were tested on different samples.
     """
     test = own[0].test
     for run in (*own, *other):
         if run.classes != own[0].classes:
-            raise InputError(f"transfer: {name} has the classes {run.classes}, expected {own[0].classes} as this run")
+            raise InputError(
+                f"transfer: {name} has the classes {run.classes}, expected {own[0].classes} as this run"
+            )
         if not np.array_equal(run.test.key, test.key):
-            raise InputError(f"transfer: {run.scheme} of {name} was tested on other samples than this run's own")
+            raise InputError(
+                f"transfer: {run.scheme} of {name} was tested on other samples than this run's own"
+            )
     mine, theirs = (np.mean([run.test.correct for run in runs], axis=0) for runs in (own, other))
     snrs = np.unique(test.snr_db).tolist()
     # The mean over all samples is the mean over the SNRs, since every SNR has as many samples.
@@ -64,17 +87,32 @@ def comparison(own: list[Evaluated], other: list[Evaluated], name: str, seed: in
         word = "avg" if snr is None else snr_text(snr)
         generator = stream(seed, "transfer-bootstrap", own[0].protocol, own[0].scheme, name, word)
         interval = difference(other, own, generator, snr)
-        numbers = [f"{100 * value:.4f}" for value in (theirs[rows].mean(), mine[rows].mean(), *interval)]
-        spread = spread_points(*([100 * run.test.correct[rows].mean() for run in runs] for runs in (own, other)))
-        yield [word, *numbers, len(mine[rows]), own[0].hardware, len(other), "" if spread is None else f"{spread:.4f}"]
+        numbers = [
+            f"{100 * value:.4f}" for value in (theirs[rows].mean(), mine[rows].mean(), *interval)
+        ]
+        spread = spread_points(
+            *([100 * run.test.correct[rows].mean() for run in runs] for runs in (own, other))
+        )
+        yield [
+            word,
+            *numbers,
+            len(mine[rows]),
+            own[0].hardware,
+            len(other),
+            "" if spread is None else f"{spread:.4f}",
+        ]
 
 
-def write(own: list[Evaluated], other: list[Evaluated], order: list[str], out: str | Path, seed: int) -> None:
-    """Write transfer.csv; schemes stand in `order`, protocols seen first. `other` runs say which run trained them.
+def write(
+    own: list[Evaluated], other: list[Evaluated], order: list[str], out: str | Path, seed: int
+) -> None:
+    """Write transfer.csv; schemes stand in `order`, protocols seen first. `other` runs say which
+    run trained them.
 
     Raises: InputError where a model has no counterpart in this run.
     """
-    mine, theirs = {}, {}
+    mine = {}
+    theirs = {}
     for run in own:
         mine.setdefault((run.protocol, run.scheme), []).append(run)
     for run in other:
@@ -82,6 +120,8 @@ def write(own: list[Evaluated], other: list[Evaluated], order: list[str], out: s
     lines = []
     for key in sorted(theirs, key=lambda key: (key[0], order.index(key[1]))):
         if key[:2] not in mine:
-            raise InputError(f"transfer: {key[2]} has {key[1]} in the {key[0]} protocol, this run has not")
+            raise InputError(
+                f"transfer: {key[2]} has {key[1]} in the {key[0]} protocol, this run has not"
+            )
         lines += [[*key, *row] for row in comparison(mine[key[:2]], theirs[key], key[2], seed)]
     write_csv(out, COLUMNS, lines)

@@ -1,8 +1,8 @@
 """Index images at the training size, read from shards one by one or cached for a whole shard.
 
-Decoding and shrinking 256 x 256 images takes longer than a step of a small network, so a cache pays as soon as two
-runs share it. Large trainings read the shards directly, with the same pixels. For sizes to which the tiles stage has
-reduced its images, the cache is made without decoding.
+Decoding and shrinking 256 x 256 images takes longer than a step of a small network, so a cache pays
+as soon as two runs share it. Large trainings read the shards directly, with the same pixels. For
+sizes to which the tiles stage has reduced its images, the cache is made without decoding.
 """
 
 import json
@@ -28,14 +28,15 @@ _KEY = re.compile(r"(.+)-\d{6}-snr")
 def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
     """Range (m) and aspect (rad) of a sample at every station.
 
-    Aspect is the angle, seen from above, between the target's front and the direction to the station: 0 head-on, pi
-    from behind, NaN without a yaw.
+    Aspect is the angle, seen from above, between the target's front and the direction to the
+    station: 0 head-on, pi from behind, NaN without a yaw.
     """
     motion = record["motion"]
     # Without an attitude there is no aspect.
     yaw = math.nan if motion["yaw_rad"] is None else motion["yaw_rad"]
     front = np.array([-math.sin(yaw), math.cos(yaw)])
-    ranges, aspects = [], []
+    ranges = []
+    aspects = []
     for station in network.stations:
         distance = record["geometry"][station.name]["range_m"]
         # In a recording the target's position is unknown.
@@ -47,15 +48,17 @@ def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
         towards = np.array(station.position_m[:2]) - [motion["x_m"], motion["y_m"]]
         length = float(np.hypot(*towards))
         cosine = float(front @ towards) / length if length else 1.0
-        aspects.append(math.acos(max(-1.0, min(1.0, cosine))) if math.isfinite(cosine) else math.nan)
+        aspects.append(
+            math.acos(max(-1.0, min(1.0, cosine))) if math.isfinite(cosine) else math.nan
+        )
     return ranges, aspects
 
 
 def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Facts:
     """Return the metadata of the samples `numbers` from the shards.
 
-    placed: read ranges and aspects from the records too; without it they are NaN and only one record of each subtype is
-    read, which is enough for a training on a million samples.
+    placed: read ranges and aspects from the records too; without it they are NaN and only one
+    record of each subtype is read, which is enough for a training on a million samples.
     """
     ends = np.cumsum([shard["samples"] for shard in shards.shards])
     owner = np.searchsorted(ends, numbers, side="right")
@@ -63,7 +66,8 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
     network = Network.from_settings(shards.index["render"]["network"])
     blank = ([math.nan] * len(network.stations), [math.nan] * len(network.stations))
     names: dict[str, str] = {}
-    subtypes, places = [], []
+    subtypes = []
+    places = []
     for key, number in zip(keys, numbers, strict=True):
         slug = _KEY.match(key)[1]
         if placed or slug not in names:
@@ -88,9 +92,11 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
 
 @dataclass(frozen=True)
 class Reduced:
-    """Images of a whole chunk that the tiles stage has already reduced, a file of `lowalt.tiles.reduced`.
+    """Images of a whole chunk that the tiles stage has already reduced, a file of
+    `lowalt.tiles.reduced`.
 
-    motion: the chunk's motion table; snrs_db: the SNRs of every motion model, in the order of the chunk's signals.
+    motion: the chunk's motion table; snrs_db: the SNRs of every motion model, in the order of the
+    chunk's signals.
     """
 
     path: Path
@@ -100,24 +106,35 @@ class Reduced:
     def images(self, facts: Facts, size: int) -> np.ndarray:
         """Return the images (len(facts), views, size, size) uint8 of these samples.
 
-        Raises: InputError where the chunk has no such motion model or SNR, or the file does not fit them.
+        Raises: InputError where the chunk has no such motion model or SNR, or the file does not fit
+        them.
         """
-        rows = {(row["subtype"], row["model"]): number for number, row in enumerate(read_table(self.motion))}
+        rows = {
+            (row["subtype"], row["model"]): number
+            for number, row in enumerate(read_table(self.motion))
+        }
         levels = {snr: number for number, snr in enumerate(self.snrs_db)}
         keys = zip(facts.subtype.tolist(), facts.model.tolist(), facts.snr_db.tolist(), strict=True)
         try:
-            places = [rows[subtype, model] * len(levels) + levels[snr] for subtype, model, snr in keys]
+            places = [
+                rows[subtype, model] * len(levels) + levels[snr] for subtype, model, snr in keys
+            ]
         except KeyError as error:
-            raise InputError(f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}") from None
+            raise InputError(
+                f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}"
+            ) from None
         return reduced.read(self.path, size, len(rows) * len(levels))[np.array(places, np.int64)]
 
 
-def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source: Reduced | None = None) -> int:
+def cache_shard(
+    index: str | Path, name: str, size: int, out: str | Path, source: Reduced | None = None
+) -> int:
     """Write the cache file of the shard `name` and return its number of samples.
 
-    source: images of the shard's chunk at this size, if the tiles stage has made them. Otherwise every image of the
-    shard is decoded (or rendered) and reduced, with the same bytes.
-    Raises: InputError where the index has no such shard, the size is wrong, or the shard is damaged.
+    source: images of the shard's chunk at this size, if the tiles stage has made them. Otherwise
+    every image of the shard is decoded (or rendered) and reduced, with the same bytes.
+    Raises: InputError where the index has no such shard, the size is wrong, or the shard is
+    damaged.
     """
     if isinstance(size, bool) or not isinstance(size, int) or size < 8:
         raise InputError(f"settings: size is {size!r}, expected a whole number of pixels >= 8")
@@ -126,7 +143,8 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
     if name not in names:
         raise InputError(f"{index}: no shard {name!r}, expected one of {names}")
     ends = np.cumsum([shard["samples"] for shard in shards.shards])
-    end, count = ends[names.index(name)], shards.shards[names.index(name)]["samples"]
+    end = ends[names.index(name)]
+    count = shards.shards[names.index(name)]["samples"]
     numbers = np.arange(end - count, end)
     # Decoding verifies the images, so skip the check when reading the records.
     facts = facts_of(ShardSet(index, check=False), numbers)
@@ -143,22 +161,35 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
 class ShardSamples(samples.Samples):
     """Samples read from shards on access; same methods and pixels as `ViewSamples`."""
 
-    def __init__(self, index: str | Path, columns: list[int], folds: set, size: int, placed: bool) -> None:
-        """index: index file of the shards; columns: views to keep, some spectra of some stations; folds: (group, fold)
-        pairs; size: pixels.
+    def __init__(
+        self, index: str | Path, columns: list[int], folds: set, size: int, placed: bool
+    ) -> None:
+        """index: index file of the shards; columns: views to keep, some spectra of some stations;
+        folds: (group, fold) pairs; size: pixels.
 
         placed: whether facts carry ranges and aspects (reads every record).
         Raises: InputError where nothing is left.
         """
-        groups, names = sorted({group for group, _ in folds}), sorted({fold for _, fold in folds})
-        self.shards, self.size = ShardSet(index, groups, names), size
+        groups = sorted({group for group, _ in folds})
+        names = sorted({fold for _, fold in folds})
+        self.shards = ShardSet(index, groups, names)
+        self.size = size
         known = station_names(self.shards.index["render"]["network"])
         names = self.shards.spectra
         places = columns_in(columns, names, len(known), str(index))
-        self.stations = [known[number] for number in sorted({place // len(names) for place in places})]
-        self.spectra = [names[number] for number in sorted({place % len(names) for place in places})]
-        flags = [[(shard["group"], shard["fold"]) in folds] * shard["samples"] for shard in self.shards.shards]
-        self.numbers = np.flatnonzero(np.concatenate(flags)) if flags else np.zeros(0, dtype=np.int64)
+        self.stations = [
+            known[number] for number in sorted({place // len(names) for place in places})
+        ]
+        self.spectra = [
+            names[number] for number in sorted({place % len(names) for place in places})
+        ]
+        flags = [
+            [(shard["group"], shard["fold"]) in folds] * shard["samples"]
+            for shard in self.shards.shards
+        ]
+        self.numbers = (
+            np.flatnonzero(np.concatenate(flags)) if flags else np.zeros(0, dtype=np.int64)
+        )
         if not len(self.numbers):
             raise InputError(f"{index}: no samples of {sorted(folds)}")
         self.facts = facts_of(self.shards, self.numbers, placed)
@@ -173,10 +204,16 @@ class ShardSamples(samples.Samples):
         return np.stack([self.shards.images(self.numbers[number], *chosen) for number in numbers])
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training uses of these samples; the shards' checksums represent the images.
+        """Return the SHA-256 of all that a training uses of these samples; the shards' checksums
+        represent the images.
 
         Reading checks the shards against these. The same samples from a cache have another sum.
         """
-        render = {"size": self.size, "stations": self.stations, "spectra": self.spectra, **self.shards.index["render"]}
+        render = {
+            "size": self.size,
+            "stations": self.stations,
+            "spectra": self.spectra,
+            **self.shards.index["render"],
+        }
         sums = sorted(shard["table_sha256"] for shard in self.shards.shards)
         return samples.fingerprint(self.facts, json.dumps([render, sums], sort_keys=True).encode())

@@ -1,7 +1,8 @@
 """The zoo: small trained models under 1 MB in `results/zoo`, which `lowalt predict` takes by name.
 
-`python -m lowalt.recognition.zoo --model MODEL.pt --views FILES --name NAME` makes an entry of a finished run: weights
-in 8 bits, their answers on the whole validation fold compared with those of the weights as trained, and a card.
+`python -m lowalt.recognition.zoo --model MODEL.pt --views FILES --name NAME` makes an entry of a
+finished run: weights in 8 bits, their answers on the whole validation fold compared with those of
+the weights as trained, and a card.
 """
 
 import argparse
@@ -28,10 +29,11 @@ FEWER_POINTS = 0.5
 
 
 def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Trained, dict]:
-    """Return a trained model and how its images are made of signals ({network, spectra, images}; {} where unknown).
+    """Return a trained model and how its images are made of signals ({network, spectra, images}; {}
+    where unknown).
 
-    model: a model file (.safetensors) of a training or another, or the name of an entry of the zoo; trusted: the user's
-    FILE.py:FUNCTION for a model whose backbone is such code.
+    model: a model file (.safetensors) of a training or another, or the name of an entry of the zoo;
+    trusted: the user's FILE.py:FUNCTION for a model whose backbone is such code.
     Raises: InputError naming the entries there are, or the fault of the file.
     """
     path = path_of(model, zoo)
@@ -42,21 +44,29 @@ def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Train
 def small(content: ModelFile, trusted: str = "") -> ModelFile:
     """Return a model with its trained matrices in 8 bits; trusted: as in `opened`."""
     exact = of_file(content, "model", trusted)
-    matrices = {name for name, value in exact.model.named_parameters() if value.ndim > 1 and not value.is_complex()}
+    matrices = {
+        name
+        for name, value in exact.model.named_parameters()
+        if value.ndim > 1 and not value.is_complex()
+    }
     return replace(content, tensors=rounded(content.tensors, matrices), weights=EIGHT)
 
 
 def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 64) -> dict:
-    """Return how an entry answers samples next to the weights as trained: both in float32, without mirroring.
+    """Return how an entry answers samples next to the weights as trained: both in float32, without
+    mirroring.
 
-    Keys: samples; exact_percent, percent: accuracies; changed: samples with another answer; largest_change: of any
-    probability.
+    Keys: samples; exact_percent, percent: accuracies; changed: samples with another answer;
+    largest_change: of any probability.
     """
-    machine, everything = Machine(torch.device("cpu"), "fp32"), np.arange(len(samples.facts))
+    machine = Machine(torch.device("cpu"), "fp32")
+    everything = np.arange(len(samples.facts))
     as_trained, rounded_off = (
         probabilities(model.model, samples, everything, machine, batch) for model in (exact, entry)
     )
-    guesses, changed_guesses, labels = as_trained.argmax(1), rounded_off.argmax(1), samples.facts.label
+    guesses = as_trained.argmax(1)
+    changed_guesses = rounded_off.argmax(1)
+    labels = samples.facts.label
     return {
         "samples": len(labels),
         "exact_percent": 100 * float(np.mean(guesses == labels)),
@@ -66,27 +76,38 @@ def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 
     }
 
 
-def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = "") -> dict:
+def entry(
+    model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = ""
+) -> dict:
     """Write NAME.safetensors and NAME.md into the zoo and return the measurements.
 
     model: model.safetensors of a training; samples: its validation fold; trusted: as in `opened`.
-    Raises: InputError for a name that is no plain file name, samples that are not the validation fold of the training,
-    an entry of 1 MB or more, or one that loses accuracy.
+    Raises: InputError for a name that is no plain file name, samples that are not the validation
+    fold of the training, an entry of 1 MB or more, or one that loses accuracy.
     """
     if not name or slug(name) != name:
         raise InputError(f"--name: {name!r}, expected lower-case letters, digits and hyphens")
     content = model_file.of_run(model)
     if content.identity.get("samples", {}).get("validation") != samples.sha256():
-        raise InputError(f"{model}: was validated on other samples, expected the validation fold of its own run")
+        raise InputError(
+            f"{model}: was validated on other samples, expected the validation fold of its own run"
+        )
     return kept(content, model, samples, name, zoo, trusted)
 
 
 def kept(
-    content: ModelFile, model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = ""
+    content: ModelFile,
+    model: str | Path,
+    samples: Samples,
+    name: str,
+    zoo: Path = ZOO,
+    trusted: str = "",
 ) -> dict:
-    """Write a model's content in 8 bits as NAME.safetensors and NAME.md and return the measurements, as `entry` does.
+    """Write a model's content in 8 bits as NAME.safetensors and NAME.md and return the
+    measurements, as `entry` does.
 
-    samples: those that both sets of weights answer. Raises: InputError as `entry`, for size and accuracy.
+    samples: those that both sets of weights answer. Raises: InputError as `entry`, for size and
+    accuracy.
     """
     reduced = small(content, trusted)
     size = len(model_file.packed(reduced))
@@ -102,15 +123,26 @@ def kept(
     reduced = replace(reduced, measured=measured)
     out = zoo / f"{name}.safetensors"
     model_file.write(out, reduced)
-    model_card.write(out, reduced, model_card.accuracy_rows(model, exact.protocol, exact.scheme.name))
+    model_card.write(
+        out, reduced, model_card.accuracy_rows(model, exact.protocol, exact.scheme.name)
+    )
     return measured
 
 
 def main(arguments: list[str]) -> None:
-    """Make an entry of the zoo of a finished training: 8-bit weights, measured on the validation fold, and a card."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.recognition.zoo", description=main.__doc__)
+    """Make an entry of the zoo of a finished training: 8-bit weights, measured on the validation
+    fold, and a card.
+    """
+    line = argparse.ArgumentParser(
+        prog="python -m lowalt.recognition.zoo", description=main.__doc__
+    )
     line.add_argument("--model", required=True, help="model.safetensors of a training run")
-    line.add_argument("--views", nargs="+", required=True, help="caches of views (.npz) that hold the validation fold")
+    line.add_argument(
+        "--views",
+        nargs="+",
+        required=True,
+        help="caches of views (.npz) that hold the validation fold",
+    )
     line.add_argument("--name", required=True, help="name of the entry, such as default-seen")
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
     name_backbone(line)

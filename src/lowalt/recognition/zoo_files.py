@@ -6,16 +6,21 @@ from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, shipped
 
 ZOO = Path("results/zoo")
-"""Where entries lie, from the working directory or, for those that come with the package, from its folder."""
+"""Where entries lie, from the working directory or, for those that come with the package, from its
+folder.
+"""
 
 
 def names(zoo: Path = ZOO) -> list[str]:
     """Return the names of all entries, sorted."""
-    return sorted({path.stem for folder in (zoo, SHIPPED / zoo) for path in folder.glob("*.safetensors")})
+    return sorted(
+        {path.stem for folder in (zoo, SHIPPED / zoo) for path in folder.glob("*.safetensors")}
+    )
 
 
 def path_of(model: str | Path, zoo: Path = ZOO) -> Path:
-    """Return the file of a model: a path, with or without .safetensors, or that of the entry of the zoo.
+    """Return the file of a model: a path, with or without .safetensors, or that of the entry of the
+    zoo.
 
     Raises: InputError naming the entries there are.
     """

@@ -1,4 +1,6 @@
-"""Command line of the report: the run's tables, pictures and measurements -> one self-contained HTML page."""
+"""Command line of the report: the run's tables, pictures and measurements -> one self-contained
+HTML page.
+"""
 
 import json
 import sys
@@ -23,11 +25,17 @@ def main(arguments: list[str]) -> None:
     line = parser("lowalt.report", __doc__)
     line.add_argument("--manifest", required=True, help="files of the run by name (.json)")
     line.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
-    line.add_argument("--figures", required=True, type=Path, help="folder of the figures to write (.svg, .csv)")
+    line.add_argument(
+        "--figures", required=True, type=Path, help="folder of the figures to write (.svg, .csv)"
+    )
     line.add_argument("--out", required=True, help="page to write (.html)")
-    line.add_argument("--jobs", type=int, default=1, help="sections made at a time, each in a process of its own")
+    line.add_argument(
+        "--jobs", type=int, default=1, help="sections made at a time, each in a process of its own"
+    )
     options = line.parse_args(arguments)
-    reported = ReportedRun(Inputs.read(options.manifest), *pick(options.settings, "config", "published"))
+    reported = ReportedRun(
+        Inputs.read(options.manifest), *pick(options.settings, "config", "published")
+    )
     write_stages(options.stages, reported)
     sections = together([partial(section, reported, name) for name in SECTIONS], options.jobs)
     write_plots(options.figures, [plot for made in sections for plot in made.plots])

@@ -2,9 +2,11 @@
 
 It is a JSON object that maps names to files, for example
 
-    {"accuracy": "results/default/accuracy.csv", "clouds": ["results/default/clouds/crow.npz", ...], ...}
+    {"accuracy": "results/default/accuracy.csv", "clouds": ["results/default/clouds/crow.npz", ...],
+    ...}
 
-Paths are relative to the folder in which the report is made. The workflow writes the manifest of a run.
+Paths are relative to the folder in which the report is made. The workflow writes the manifest of a
+run.
 """
 
 import json
@@ -14,13 +16,31 @@ from lowalt.files.atomic import existing, text_of
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 
-FILES = ("accuracy", "confusion_by_snr", "subtypes", "comparisons", "orderings", "seeds", "distances", "index")
+FILES = (
+    "accuracy",
+    "confusion_by_snr",
+    "subtypes",
+    "comparisons",
+    "orderings",
+    "seeds",
+    "distances",
+    "index",
+)
 """Names that every manifest has, with one file each."""
 LISTS = ("clouds", "benchmarks")
 """Names that every manifest has, with a list of files each."""
 KEPT = {"accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv"}
-"""Tables in results/reference that the page shows if the run has none: file by the name of the run's table."""
-OPTIONAL = ("published", "predictions", "transfer", "benchmark", *KEPT, *(f"kept_{name}" for name in KEPT))
+"""Tables in results/reference that the page shows if the run has none: file by the name of the
+run's table.
+"""
+OPTIONAL = (
+    "published",
+    "predictions",
+    "transfer",
+    "benchmark",
+    *KEPT,
+    *(f"kept_{name}" for name in KEPT),
+)
 """Optional names; without the file or files, the page has no such section."""
 
 
@@ -35,12 +55,16 @@ class Inputs:
         missing = sorted({*FILES, *LISTS} - set(files))
         unknown = sorted(set(files) - {*FILES, *LISTS, *OPTIONAL})
         if missing or unknown:
-            raise InputError(f"{source}: missing {missing}, unknown {unknown}, optional are {OPTIONAL}")
+            raise InputError(
+                f"{source}: missing {missing}, unknown {unknown}, optional are {OPTIONAL}"
+            )
         self.files = files
 
     @classmethod
     def read(cls, path: str | Path) -> "Inputs":
-        """Read a manifest. Raises: InputError where it is missing, no JSON, or as the constructor says."""
+        """Read a manifest. Raises: InputError where it is missing, no JSON, or as the constructor
+        says.
+        """
         text = text_of(path, "manifest")
         try:
             files = json.loads(text)
@@ -53,7 +77,9 @@ class Inputs:
         return name in self.files
 
     def own_or_kept(self, name: str) -> str | None:
-        """Return the manifest's name of this run's file, or else of the kept one; None where there is neither."""
+        """Return the manifest's name of this run's file, or else of the kept one; None where there
+        is neither.
+        """
         return next((known for known in (name, f"kept_{name}") if known in self), None)
 
     def path(self, name: str) -> Path:
@@ -65,5 +91,7 @@ class Inputs:
         return self.files.get(name, [])
 
     def table(self, name: str, *columns: str) -> list[dict[str, str]]:
-        """Return the rows of the table called `name`. Raises: InputError where it lacks one of `columns`."""
+        """Return the rows of the table called `name`. Raises: InputError where it lacks one of
+        `columns`.
+        """
         return read_csv(self.files[name], *columns)

@@ -1,4 +1,6 @@
-"""Assembles the page, one self-contained HTML file, from its sections; each is a module with its own template."""
+"""Assembles the page, one self-contained HTML file, from its sections; each is a module with its
+own template.
+"""
 
 from pathlib import Path
 from types import ModuleType
@@ -59,8 +61,8 @@ _MODULES = {_name(module): module for part in PARTS for module in part.sections}
 SECTIONS = tuple(_MODULES)
 """The names of the sections in the order of the page.
 
-Each module has `values(run)`. It returns the values that its template shows, or None where the run has no such section.
-The template has the name of its module and lies in the same folder.
+Each module has `values(run)`. It returns the values that its template shows, or None where the run
+has no such section. The template has the name of its module and lies in the same folder.
 """
 TEMPLATES = Path(__file__).parent
 
@@ -70,9 +72,13 @@ ADDED_TO = "results"
 
 
 def templates(folder: Path = TEMPLATES) -> jinja2.Environment:
-    """Return the template environment, which refuses undefined names and data that a browser cannot read."""
+    """Return the template environment, which refuses undefined names and data that a browser cannot
+    read.
+    """
     loader = jinja2.FileSystemLoader([folder, TEMPLATES])
-    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined
+    )
     environment.filters["plotted"] = plotted
     # JSON has no infinity and no NaN.
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "allow_nan": False}
@@ -81,7 +87,9 @@ def templates(folder: Path = TEMPLATES) -> jinja2.Environment:
 
 def rendered(name: str, values: dict | None) -> str:
     """Return the HTML of the section `name` with these values; None gives an empty text."""
-    return "" if values is None else templates().get_template(f"sections/{name}.html").render(values)
+    return (
+        "" if values is None else templates().get_template(f"sections/{name}.html").render(values)
+    )
 
 
 def assembled(title: str, parts: list[dict[str, str]]) -> str:
@@ -95,19 +103,25 @@ def section(run: ReportedRun, name: str) -> Section:
     Raises: InputError for a table that is missing or lacks a column.
     """
     values = _MODULES[name].values(run)
-    return Section(rendered(name, values), [value for value in (values or {}).values() if isinstance(value, Plot)])
+    return Section(
+        rendered(name, values),
+        [value for value in (values or {}).values() if isinstance(value, Plot)],
+    )
 
 
 def added_sections(run: ReportedRun) -> str:
     """Return the sections of extensions for which the run's manifest has the file, as HTML.
 
-    Raises: InputError for a file that is missing or damaged, or an extension without what it promises.
+    Raises: InputError for a file that is missing or damaged, or an extension without what it
+    promises.
     """
     pieces = []
     for name, module in offered("sections").items():
         if name in run.inputs:
             values = function_offered("sections", name, module, "values")(run)
-            file = Path(module_offered("sections", name, module).__file__ or "").with_suffix(".html")
+            file = Path(module_offered("sections", name, module).__file__ or "").with_suffix(
+                ".html"
+            )
             pieces.append(templates(file.parent).get_template(file.name).render(values))
     return "\n".join(pieces)
 

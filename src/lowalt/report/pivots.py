@@ -1,11 +1,15 @@
-"""Rearranges rows of the run's tables by protocol, scheme and SNR for the page; no drawing, no HTML."""
+"""Rearranges rows of the run's tables by protocol, scheme and SNR for the page; no drawing, no
+HTML.
+"""
 
 from collections import defaultdict
 from collections.abc import Iterable
 
 
 def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return accuracy in percent as protocol -> scheme -> SNR label -> value, in the order of the rows."""
+    """Return accuracy in percent as protocol -> scheme -> SNR label -> value, in the order of the
+    rows.
+    """
     result: dict = defaultdict(lambda: defaultdict(dict))
     for row in rows:
         result[row["protocol"]][row["scheme"]][row["snr_db"]] = float(row["accuracy_percent"])
@@ -23,26 +27,36 @@ def spreads(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
 
 
 def macro_f1(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
-    """Return macro F1 on average over the SNRs as protocol -> scheme -> "value (low to high)", in percent.
+    """Return macro F1 on average over the SNRs as protocol -> scheme -> "value (low to high)", in
+    percent.
 
     Tables of earlier versions have no such column; their schemes are left out.
     """
     result: dict = defaultdict(dict)
     for row in rows:
         if row["snr_db"] == "avg" and row.get("macro_f1_percent"):
-            value, low, high = (float(row[f"macro_f1_{name}"]) for name in ("percent", "low", "high"))
+            value, low, high = (
+                float(row[f"macro_f1_{name}"]) for name in ("percent", "low", "high")
+            )
             result[row["protocol"]][row["scheme"]] = f"{value:.1f} ({low:.1f} to {high:.1f})"
     return dict(result)
 
 
 def confusion(rows: Iterable[dict[str, str]]) -> dict[tuple[str, str], dict[tuple[str, str], int]]:
-    """Return counts over all SNRs as (protocol, scheme) -> (true category, predicted category) -> samples."""
+    """Return counts over all SNRs as (protocol, scheme) -> (true category, predicted category) ->
+    samples.
+    """
     result: dict = defaultdict(lambda: defaultdict(int))
     for row in rows:
-        result[row["protocol"], row["scheme"]][row["category"], row["predicted"]] += int(row["samples"])
+        result[row["protocol"], row["scheme"]][row["category"], row["predicted"]] += int(
+            row["samples"]
+        )
     return {key: dict(counts) for key, counts in result.items()}
 
 
 def best_schemes(accuracies: dict[str, dict[str, dict[str, float]]]) -> dict[str, str]:
     """Return the scheme of the highest average accuracy of each protocol, out of `by_scheme`."""
-    return {protocol: max(schemes, key=lambda name: schemes[name]["avg"]) for protocol, schemes in accuracies.items()}
+    return {
+        protocol: max(schemes, key=lambda name: schemes[name]["avg"])
+        for protocol, schemes in accuracies.items()
+    }

@@ -1,4 +1,6 @@
-"""Provenance of a run: revision of the code, changes of the configuration, checksums, and commands to repeat it."""
+"""Provenance of a run: revision of the code, changes of the configuration, checksums, and commands
+to repeat it.
+"""
 
 import hashlib
 import subprocess
@@ -17,7 +19,8 @@ COUNTED = (".py", ".smk", ".yaml")
 
 
 def revision(folder: Path = SHIPPED) -> str:
-    """Return the commit of the checkout in `folder` and how many of its tracked files differ from it, or "no checkout".
+    """Return the commit of the checkout in `folder` and how many of its tracked files differ from
+    it, or "no checkout".
 
     "no checkout" if the folder is not the root of a checkout, or git is not installed.
     """
@@ -25,9 +28,13 @@ def revision(folder: Path = SHIPPED) -> str:
         return "no checkout"
     git = ["git", "-C", str(folder)]
     try:
-        commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+        commit = subprocess.run(
+            [*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True
+        ).stdout.strip()
         state = [*git, "status", "--porcelain", "--untracked-files=no"]
-        changed = subprocess.run(state, capture_output=True, text=True, check=True).stdout.splitlines()
+        changed = subprocess.run(
+            state, capture_output=True, text=True, check=True
+        ).stdout.splitlines()
     except (OSError, subprocess.CalledProcessError):
         return "no checkout"
     files = f"{len(changed)} tracked file{'s' if len(changed) > 1 else ''}"
@@ -35,7 +42,8 @@ def revision(folder: Path = SHIPPED) -> str:
 
 
 def code_sum(folder: Path = PACKAGE) -> str:
-    """Return one SHA-256 of all source files of the package, by name and content, without using version control.
+    """Return one SHA-256 of all source files of the package, by name and content, without using
+    version control.
 
     Compiled files are excluded.
     """
@@ -47,10 +55,11 @@ def code_sum(folder: Path = PACKAGE) -> str:
 
 
 def changes(base: dict, config: dict) -> dict:
-    """Return the smallest overlay that turns the configuration `base` into `config` when it is laid over it.
+    """Return the smallest overlay that turns the configuration `base` into `config` when it is laid
+    over it.
 
-    A key that `config` lacks becomes null, which removes a station or a spectrum. Infinities are equal as numbers and
-    as the words that stand for them in JSON; the overlay has numbers.
+    A key that `config` lacks becomes null, which removes a station or a spectrum. Infinities are
+    equal as numbers and as the words that stand for them in JSON; the overlay has numbers.
     """
     found = _differing(plain(base), plain(config))
     return _numbers(found)
@@ -69,7 +78,8 @@ def _differing(base: dict, config: dict) -> dict:
     """The keys of `changes` with their values, infinities as words."""
     differing = {}
     for key in [*config, *(key for key in base if key not in config)]:
-        value, base_value = config.get(key), base.get(key)
+        value = config.get(key)
+        base_value = base.get(key)
         if isinstance(value, dict) and isinstance(base_value, dict):
             inner = _differing(base_value, value)
             if inner:
@@ -80,13 +90,21 @@ def _differing(base: dict, config: dict) -> dict:
 
 
 def checksums(files: dict[str, str | list[str]]) -> list[dict]:
-    """Return path, bytes and SHA-256 of every file of a manifest except those of benchmarks and of the kept reference.
+    """Return path, bytes and SHA-256 of every file of a manifest except those of benchmarks and of
+    the kept reference.
 
     files: path or list of paths by name. Files with several names are listed once.
     """
     named = [name for name in files if name != "benchmarks" and not name.startswith("kept_")]
-    paths = [path for name in named for path in ([files[name]] if isinstance(files[name], str) else files[name])]
-    return [{"path": path, "bytes": Path(path).stat().st_size, "sha256": sha256(path)} for path in dict.fromkeys(paths)]
+    paths = [
+        path
+        for name in named
+        for path in ([files[name]] if isinstance(files[name], str) else files[name])
+    ]
+    return [
+        {"path": path, "bytes": Path(path).stat().st_size, "sha256": sha256(path)}
+        for path in dict.fromkeys(paths)
+    ]
 
 
 def commands(commit: str, overlay: dict) -> tuple[str, str]:
@@ -97,5 +115,9 @@ def commands(commit: str, overlay: dict) -> tuple[str, str]:
     lines = [] if commit == "no checkout" else [f"git checkout {commit.partition(',')[0]}"]
     text = yaml.safe_dump(overlay, sort_keys=False, allow_unicode=True) if overlay else ""
     return "\n".join(
-        [*lines, "make .venv/set-up" if overlay else "make", *([".venv/bin/lowalt run again.yaml"] if overlay else [])]
+        [
+            *lines,
+            "make .venv/set-up" if overlay else "make",
+            *([".venv/bin/lowalt run again.yaml"] if overlay else []),
+        ]
     ), text

@@ -10,8 +10,12 @@ class ReportedRun:
     """The run that a page shows."""
 
     def __init__(self, inputs: Inputs, config: dict, targets: dict[str, dict]) -> None:
-        """inputs: the run's files; config: its configuration; targets: row of the table of targets by subtype."""
-        self.inputs, self.config, self.targets = inputs, config, targets
+        """inputs: the run's files; config: its configuration; targets: row of the table of targets
+        by subtype.
+        """
+        self.inputs = inputs
+        self.config = config
+        self.targets = targets
         self.shards = ShardSet(inputs.path("index"))
 
     @property

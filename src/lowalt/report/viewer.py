@@ -1,6 +1,8 @@
-"""The samples in the viewer of the page: their choice, tiles with axes, echoes, probabilities and motion.
+"""The samples in the viewer of the page: their choice, tiles with axes, echoes, probabilities and
+motion.
 
-All are small: tiles are reduced to PIXELS a side, motion is kept as millimetres at FRAMES instants of one cycle.
+All are small: tiles are reduced to PIXELS a side, motion is kept as millimetres at FRAMES instants
+of one cycle.
 """
 
 import base64
@@ -41,10 +43,12 @@ KEY = re.compile(r"(.+)-(\d{6,})-snr.+")
 
 
 def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]:
-    """Return numbers of samples: of each class a seen and an unseen subtype, MODELS models each, SNRS SNRs each.
+    """Return numbers of samples: of each class a seen and an unseen subtype, MODELS models each,
+    SNRS SNRs each.
 
-    predicted: keys of samples with predictions, which go before others; unseen: slugs of subtypes held out. The order
-    is by rounds, a sample of every subtype in each, so that leaving out the last ones leaves out no subtype.
+    predicted: keys of samples with predictions, which go before others; unseen: slugs of subtypes
+    held out. The order is by rounds, a sample of every subtype in each, so that leaving out the
+    last ones leaves out no subtype.
     """
     keys = [key.decode() for key in shards.keys.tolist()]
     models: dict[tuple, dict[str, list[int]]] = {}
@@ -54,7 +58,9 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
         group.setdefault(name, []).append(number)
     picks: list[tuple[int, int]] = []
     for _, subtypes in sorted(models.items()):
-        known = [name for name in sorted(subtypes) if any(keys[n] in predicted for n in subtypes[name])]
+        known = [
+            name for name in sorted(subtypes) if any(keys[n] in predicted for n in subtypes[name])
+        ]
         of_model: dict[tuple, list[int]] = {}
         for number in subtypes[(known or sorted(subtypes))[0]]:
             model = int(KEY.fullmatch(keys[number])[2])
@@ -62,7 +68,9 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
         for place, (_, numbers) in enumerate(sorted(of_model.items())[:MODELS]):
             levels = sorted(numbers, key=lambda number: shards.snrs_db[number])
             steps_shown = dict.fromkeys([len(levels) - 1, 0, len(levels) // 2][:SNRS])
-            picks += [(step * MODELS + place, levels[level]) for step, level in enumerate(steps_shown)]
+            picks += [
+                (step * MODELS + place, levels[level]) for step, level in enumerate(steps_shown)
+            ]
     return [number for _, number in sorted(picks, key=lambda pick: pick[0])]
 
 
@@ -75,9 +83,15 @@ def predicted_keys(paths: Iterable[str | Path]) -> set[str]:
     return keys
 
 
-def probabilities(paths: Iterable[str | Path], keys: set[str], classes: tuple[str, ...]) -> dict[str, dict]:
-    """Return class probabilities as key -> "protocol scheme" -> list; the first file per protocol and scheme."""
-    columns, first, of_samples = predictions.probability_columns(classes), {}, {}
+def probabilities(
+    paths: Iterable[str | Path], keys: set[str], classes: tuple[str, ...]
+) -> dict[str, dict]:
+    """Return class probabilities as key -> "protocol scheme" -> list; the first file per protocol
+    and scheme.
+    """
+    columns = predictions.probability_columns(classes)
+    first = {}
+    of_samples = {}
     for path in paths:
         first.setdefault(Path(path).parent, Path(path))
     for path in first.values():
@@ -92,7 +106,9 @@ def probabilities(paths: Iterable[str | Path], keys: set[str], classes: tuple[st
 
 
 def motion(cloud: Cloud, row: dict) -> dict:
-    """Return one cycle of a target's own motion for the page: seconds, shape, parts, points in mm (base64, int16)."""
+    """Return one cycle of a target's own motion for the page: seconds, shape, parts, points in mm
+    (base64, int16).
+    """
     moves = len(cloud.track) or row["rate_hz"] > 0
     seconds = cycle_s(cloud, row) if moves else 1.0
     points = positions(cloud, still_row(row), np.arange(FRAMES) / FRAMES * seconds)
@@ -102,7 +118,14 @@ def motion(cloud: Cloud, row: dict) -> dict:
     scale = max(float(abs(points).max()), 1e-9)
     data = base64.b64encode((points / scale * 32767).round().astype("<i2").tobytes()).decode()
     part = cloud.part[some].tolist() if len(cloud.part) == len(cloud.points) else [0] * len(some)
-    return {"seconds": seconds, "count": len(some), "frames": FRAMES, "scale_m": scale, "part": part, "points": data}
+    return {
+        "seconds": seconds,
+        "count": len(some),
+        "frames": FRAMES,
+        "scale_m": scale,
+        "part": part,
+        "points": data,
+    }
 
 
 def panels(renderer: Renderer) -> list[dict]:
@@ -115,57 +138,105 @@ def panels(renderer: Renderer) -> list[dict]:
             (across, left, right), (upwards, first, last) = axes
             folds = renderer.network.largest_mps(station)
             ticks = {
-                key: [float(f"{t:g}") for t in MaxNLocator(4).tick_values(*ends) if ends[0] <= t <= ends[1]]
+                key: [
+                    float(f"{t:g}")
+                    for t in MaxNLocator(4).tick_values(*ends)
+                    if ends[0] <= t <= ends[1]
+                ]
                 for key, ends in (("x", (left, right)), ("y", (low, high)))
             }
             entries.append(
-                {"row": row, "column": column, "station": station.name, "title": spectrum(name).TITLE, "low": low,
-                 "high": high, "left": left, "right": right, "across": across, "upwards": upwards.partition("\n")[0],
-                 "turned": first > last,
-                 "folds": folds, **ticks}
-            )  # fmt: skip
+                {
+                    "row": row,
+                    "column": column,
+                    "station": station.name,
+                    "title": spectrum(name).TITLE,
+                    "low": low,
+                    "high": high,
+                    "left": left,
+                    "right": right,
+                    "across": across,
+                    "upwards": upwards.partition("\n")[0],
+                    "turned": first > last,
+                    "folds": folds,
+                    **ticks,
+                }
+            )
     return entries
 
 
 def reduced(tile: np.ndarray, spectra: int, pixels: int, palette: np.ndarray) -> str:
-    """Return a tile (rows, columns) uint8 as an embedded PNG whose images have at most `pixels` a side."""
+    """Return a tile (rows, columns) uint8 as an embedded PNG whose images have at most `pixels` a
+    side.
+    """
     images = split(tile, spectra)
     images = resize(images, pixels) if images.shape[-1] > pixels else images
     return embedded(encode(join(images, spectra), palette))
 
 
 def samples(
-    shards: ShardSet, remaker: Remaker | None, clouds: dict[str, Cloud], files: list[str], groups: dict[str, str],
+    shards: ShardSet,
+    remaker: Remaker | None,
+    clouds: dict[str, Cloud],
+    files: list[str],
+    groups: dict[str, str],
     pixels: int,
-) -> dict:  # fmt: skip
+) -> dict:
     """Return the viewer's samples: {"samples": [...], "motions": {...}}.
 
-    remaker: makes signals again, None for a data set that does not say how; clouds: by subtype; files: prediction
-    files; groups: "seen" or "unseen" by subtype; pixels: side of an image as the networks see it.
+    remaker: makes signals again, None for a data set that does not say how; clouds: by subtype;
+    files: prediction files; groups: "seen" or "unseen" by subtype; pixels: side of an image as the
+    networks see it.
     """
     unseen = {slug(name) for name, group in groups.items() if group == "unseen"}
     numbers = chosen(shards, predicted_keys(files), unseen)
-    shares = probabilities(files, {shards.keys[number].decode() for number in numbers}, shards.classes)
+    shares = probabilities(
+        files, {shards.keys[number].decode() for number in numbers}, shards.classes
+    )
     names = [station.name for station in shards.renderer.network.stations]
-    spectra, motions, total = len(shards.spectra), {}, 0
+    spectra = len(shards.spectra)
+    motions = {}
+    total = 0
     kept: list[tuple[float, dict]] = []
     for number in numbers:
-        whole, record = shards.tile(number), shards.record(number)
+        whole = shards.tile(number)
+        record = shards.record(number)
         tile = reduced(whole, spectra, PIXELS, shards.palette)
         total += len(tile)
         if kept and total > BUDGET:
             break
         name = f"{record['subtype']} {record['model']}"
-        if name not in motions and record["subtype"] in clouds and record["motion"].get("x_m") is not None:
+        if (
+            name not in motions
+            and record["subtype"] in clouds
+            and record["motion"].get("x_m") is not None
+        ):
             motions[name] = motion(clouds[record["subtype"]], row_of(record)[0])
-        heard = echoes(remaker.signal(record), record["geometry"], remaker.network) if remaker else []
+        heard = (
+            echoes(remaker.signal(record), record["geometry"], remaker.network) if remaker else []
+        )
         snr = f"{record['snr_db']:g} dB" if record["noise"] else "no noise"
-        kept.append((record["snr_db"], {
-            "subtype": record["subtype"], "category": record["category"], "model": record["model"],
-            "group": groups.get(record["subtype"], ""), "snr": snr, "tile": tile,
-            "network": reduced(whole, spectra, pixels, shards.palette), "echoes": heard,
-            "probabilities": shares.get(record["key"], {}),
-        }))  # fmt: skip
+        kept.append(
+            (
+                record["snr_db"],
+                {
+                    "subtype": record["subtype"],
+                    "category": record["category"],
+                    "model": record["model"],
+                    "group": groups.get(record["subtype"], ""),
+                    "snr": snr,
+                    "tile": tile,
+                    "network": reduced(whole, spectra, pixels, shards.palette),
+                    "echoes": heard,
+                    "probabilities": shares.get(record["key"], {}),
+                },
+            )
+        )
     # The clearest sample of a motion model first, as the page lists them.
     clearest = [sample for _, sample in sorted(kept, key=lambda pair: -pair[0])]
-    return {"samples": clearest, "motions": motions, "classes": list(shards.classes), "stations": names}
+    return {
+        "samples": clearest,
+        "motions": motions,
+        "classes": list(shards.classes),
+        "stations": names,
+    }

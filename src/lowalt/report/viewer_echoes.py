@@ -1,6 +1,8 @@
-"""The echoes of the viewer's samples: power and phase of each station over slow time, and the speed that is shown.
+"""The echoes of the viewer's samples: power and phase of each station over slow time, and the speed
+that is shown.
 
-Both curves are kept as bytes, 0.8 kB per station: the eye sees no finer step in a panel 70 pixels high.
+Both curves are kept as bytes, 0.8 kB per station: the eye sees no finer step in a panel 70 pixels
+high.
 """
 
 import base64
@@ -11,7 +13,9 @@ import numpy as np
 from lowalt.config.network import Network
 
 FLOOR_DB = 40.0
-"""Powers this far below a station's largest one, or further, stand on the lower edge of their panel."""
+"""Powers this far below a station's largest one, or further, stand on the lower edge of their
+panel.
+"""
 
 
 def _bytes(values: np.ndarray) -> str:
@@ -20,7 +24,8 @@ def _bytes(values: np.ndarray) -> str:
 
 
 def power(signal: np.ndarray) -> str:
-    """Return 255 (1 + dB / FLOOR_DB) of each symbol of one station's signal, (symbols,) complex, as base64 of uint8.
+    """Return 255 (1 + dB / FLOOR_DB) of each symbol of one station's signal, (symbols,) complex, as
+    base64 of uint8.
 
     dB is the power over the station's largest one; a signal of zeros gives zeros.
     """
@@ -33,14 +38,20 @@ def power(signal: np.ndarray) -> str:
 
 
 def phase(signal: np.ndarray) -> str:
-    """Return the phase of each symbol of a station's signal, (symbols,) complex, in 1/256 turns, base64 of uint8."""
+    """Return the phase of each symbol of a station's signal, (symbols,) complex, in 1/256 turns,
+    base64 of uint8.
+    """
     return _bytes(np.round(np.angle(signal) / (2 * math.pi) * 256).astype(int) % 256)
 
 
-def echoes(signals: np.ndarray, geometry: dict[str, dict[str, float]], network: Network) -> list[dict]:
-    """Return the page's entries of a sample's signals (stations, symbols) complex, station by station.
+def echoes(
+    signals: np.ndarray, geometry: dict[str, dict[str, float]], network: Network
+) -> list[dict]:
+    """Return the page's entries of a sample's signals (stations, symbols) complex, station by
+    station.
 
-    geometry: of the sample's record, with `radial_mps` of each station, receding positive; None where it has no place.
+    geometry: of the sample's record, with `radial_mps` of each station, receding positive; None
+    where it has no place.
     """
     entries = []
     for station, signal in zip(network.stations, signals, strict=True):

@@ -1,1 +1,3 @@
-"""What a station receives of a target in a scene: signal = detect(receive(transmit(sum of responses)))."""
+"""What a station receives of a target in a scene: signal = detect(receive(transmit(sum of
+responses))).
+"""

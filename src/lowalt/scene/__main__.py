@@ -1,4 +1,6 @@
-"""Command line of the echo stage in a scene with effects: motion table and clouds -> signals and reference powers."""
+"""Command line of the echo stage in a scene with effects: motion table and clouds -> signals and
+reference powers.
+"""
 
 import sys
 
@@ -19,9 +21,15 @@ def main(arguments: list[str]) -> None:
     """Compute one chunk's signals under the scene's effects and write two array files per station."""
     options = parser("lowalt.scene", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
-    options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
-    options.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes")
-    options.add_argument("--station", nargs="+", required=True, help="names of the stations that listen")
+    options.add_argument(
+        "--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes"
+    )
+    options.add_argument(
+        "--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes"
+    )
+    options.add_argument(
+        "--station", nargs="+", required=True, help="names of the stations that listen"
+    )
     options.add_argument(
         "--out",
         nargs="+",
@@ -29,15 +37,22 @@ def main(arguments: list[str]) -> None:
         help="signals to write (.npy), one file per station: complex64 (models, N), or (models, snrs, N)",
     )
     options.add_argument(
-        "--power", nargs="+", required=True, help="the echoes' own mean powers to write (.npy), likewise: (models,) W"
+        "--power",
+        nargs="+",
+        required=True,
+        help="the echoes' own mean powers to write (.npy), likewise: (models,) W",
     )
     asked = options.parse_args(arguments)
     for name, files in (("--out", asked.out), ("--power", asked.power)):
         if len(files) != len(asked.station):
-            raise InputError(f"{name}: {len(files)} files, expected one for each of the stations {asked.station}")
+            raise InputError(
+                f"{name}: {len(files)} files, expected one for each of the stations {asked.station}"
+            )
     snrs = asked.settings.pop("snr_db", None)
     snrs = None if snrs is None else [float(snr) for snr in snrs]
-    seed, block, tolerance, effects = pick(asked.settings, "seed", "network", "tolerance", "effects")
+    seed, block, tolerance, effects = pick(
+        asked.settings, "seed", "network", "tolerance", "effects"
+    )
     scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
     clouds = {cloud.subtype: cloud for cloud in map(read, asked.clouds)}
     occluders = {}
@@ -47,7 +62,9 @@ def main(arguments: list[str]) -> None:
         occluders = read_all(asked.occluders)
     rows = read_table(asked.motion)
     for station, *paths in zip(asked.station, asked.out, asked.power, strict=True):
-        for path, values in zip(paths, scene_signals(scene, station, clouds, rows, occluders, snrs), strict=True):
+        for path, values in zip(
+            paths, scene_signals(scene, station, clouds, rows, occluders, snrs), strict=True
+        ):
             with replacing(path) as temporary:
                 np.save(temporary, values)
             print(f"{path}: {len(values)} models", file=sys.stderr)

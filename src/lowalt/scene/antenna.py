@@ -11,7 +11,9 @@ from lowalt.numerics.portable import TANGENT
 
 
 class Element(NamedTuple):
-    """An element: largest gain (dBi), 3 dB width (degrees), depth of back and side lobes (dB), downtilt (degrees)."""
+    """An element: largest gain (dBi), 3 dB width (degrees), depth of back and side lobes (dB),
+    downtilt (degrees).
+    """
 
     gain_dbi: float = 8.0
     width_deg: float = 65.0
@@ -25,15 +27,19 @@ _ARCTANGENT = (1.0, *(-coefficient for coefficient in TANGENT))
 _A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7, _A8, _A9, _A10, _A11 = _ARCTANGENT
 
 
-_SCALAR = kernel(forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})
+_SCALAR = kernel(
+    forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"}
+)
 """As VECTOR, and copied into the loop that calls it."""
 
 
 @_SCALAR
 def _angle(y, x):
     """The angle (rad) of x + j y to rounding, 0 where both are 0."""
-    a, b = abs(x), abs(y)
-    small, large = min(a, b), max(max(a, b), 1e-300)
+    a = abs(x)
+    b = abs(y)
+    small = min(a, b)
+    large = max(max(a, b), 1e-300)
     # From tan(pi / 8) on, pi / 4 minus the angle is computed.
     far = small > _EIGHTH * large
     t = (large - small) / (large + small) if far else small / large
@@ -48,7 +54,8 @@ def _angle(y, x):
 
 @_SCALAR
 def pattern_db(element, azimuth_deg, zenith_deg):
-    """Return the gain (dBi) at an azimuth and a zenith angle from the element's own boresight (0, 90).
+    """Return the gain (dBi) at an azimuth and a zenith angle from the element's own boresight (0,
+    90).
 
     Source: 3GPP TR 38.901, Table 7.3-1.
     """
@@ -59,14 +66,21 @@ def pattern_db(element, azimuth_deg, zenith_deg):
 
 @VECTOR
 def _gains_db(element, station, across, tilt, places, result):
-    """Fill result (N, L) with the gains (dBi) toward places (N, 3, L) m; across: the array's axis; tilt: (cos, sin)."""
+    """Fill result (N, L) with the gains (dBi) toward places (N, 3, L) m; across: the array's axis;
+    tilt: (cos, sin).
+    """
     degrees = 180.0 / math.pi
     for n in range(len(places)):
-        xs, ys, zs, row = places[n, 0], places[n, 1], places[n, 2], result[n]
+        xs = places[n, 0]
+        ys = places[n, 1]
+        zs = places[n, 2]
+        row = result[n]
         for i in range(np.uint64(len(row))):
             x, y, z = xs[i] - station[0], ys[i] - station[1], zs[i] - station[2]
-            front, side = across[1] * x - across[0] * y, across[0] * x + across[1] * y
-            ahead, up = tilt[0] * front - tilt[1] * z, tilt[1] * front + tilt[0] * z
+            front = across[1] * x - across[0] * y
+            side = across[0] * x + across[1] * y
+            ahead = tilt[0] * front - tilt[1] * z
+            up = tilt[1] * front + tilt[0] * z
             zenith = _angle(np.sqrt(ahead * ahead + side * side), up)
             row[i] = pattern_db(element, degrees * _angle(side, ahead), degrees * zenith)
 
@@ -78,16 +92,22 @@ def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
     """
     places = np.asarray(places, np.float64)
     points = places if places.ndim == 3 else places.reshape(1, -1, 3)
-    tilt, result = np.radians(element.downtilt_deg), np.empty(points.shape[:2])
+    tilt = np.radians(element.downtilt_deg)
+    result = np.empty(points.shape[:2])
     _gains_db(
-        Element(*map(float, element)), np.array(station.position_m, np.float64), station.horizontal,
-        (np.cos(tilt), np.sin(tilt)), np.ascontiguousarray(points.swapaxes(1, 2)), result,
-    )  # fmt: skip
+        Element(*map(float, element)),
+        np.array(station.position_m, np.float64),
+        station.horizontal,
+        (np.cos(tilt), np.sin(tilt)),
+        np.ascontiguousarray(points.swapaxes(1, 2)),
+        result,
+    )
     return np.exp(np.log(10.0) / 10.0 * result).reshape(places.shape[:-1])
 
 
 def array_sum(count: int, x: np.ndarray) -> np.ndarray:
-    """Return the sum (...) of `count` elements in a line, half a wavelength apart, counted from the first.
+    """Return the sum (...) of `count` elements in a line, half a wavelength apart, counted from the
+    first.
 
     x: direction cosine off the beam times the frequency over the carrier, any shape.
     """

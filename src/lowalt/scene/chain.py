@@ -1,8 +1,10 @@
-"""The signal of one sample at one station of a scene: detect(receive(transmit(sum of frequency responses))).
+"""The signal of one sample at one station of a scene: detect(receive(transmit(sum of frequency
+responses))).
 
-The chain asks the scene's effects for functions (`contract`) and names no effect. Effects of one place act in the order
-of `effects.LISTED`. A step that no effect needs is skipped: the echo engine computes scenes whose effects change the
-motion only, and time samples are made only where an effect acts on them.
+The chain asks the scene's effects for functions (`contract`) and names no effect. Effects of one
+place act in the order of `effects.LISTED`. A step that no effect needs is skipped: the echo engine
+computes scenes whose effects change the motion only, and time samples are made only where an effect
+acts on them.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -31,9 +33,9 @@ from lowalt.targets.cloud import Cloud, cloud_of
 class Received(NamedTuple):
     """The signal of one target at one station.
 
-    signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells, -1 where no symbol was received; power: the mean
-    |Y_bin|^2 (W) of the target's own echo on the direct path, with occlusion, aspect and fluctuation. The SNRs of the
-    configuration refer to this power.
+    signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells, -1 where no symbol was received;
+    power: the mean |Y_bin|^2 (W) of the target's own echo on the direct path, with occlusion,
+    aspect and fluctuation. The SNRs of the configuration refer to this power.
     """
 
     signal: np.ndarray
@@ -44,22 +46,40 @@ class Received(NamedTuple):
 class SceneSample:
     """One motion model as one station of a scene receives it; each method is a step of the chain."""
 
-    def __init__(self, scene: Scene, view: View, clouds: Mapping[str, Cloud] | None = None, power: float | None = None):
-        """Take the scene, the sample's view in it (`observe`), and the clouds of all subtypes, for companions.
+    def __init__(
+        self,
+        scene: Scene,
+        view: View,
+        clouds: Mapping[str, Cloud] | None = None,
+        power: float | None = None,
+    ):
+        """Take the scene, the sample's view in it (`observe`), and the clouds of all subtypes, for
+        companions.
 
-        power: the reference of the configuration's SNRs (W), None for the power of the target's own echo.
+        power: the reference of the configuration's SNRs (W), None for the power of the target's own
+        echo.
         """
-        self.scene, self.view, self.clouds, self._power = scene, view, clouds or {}, power
+        self.scene = scene
+        self.view = view
+        self.clouds = clouds or {}
+        self._power = power
         self.draws = partial(scene.drawn, view.row, view.station)
-        self.only, self.all = partial(only, scene.effects), partial(every, scene.effects)
+        self.only = partial(only, scene.effects)
+        self.all = partial(every, scene.effects)
         self.detection = [effect for effect in scene.effects if effect.place == "detection"]
-        self._waves = {key: value for waves in self.all("waves").values() for key, value in waves().items()}
+        self._waves = {
+            key: value for waves in self.all("waves").values() for key, value in waves().items()
+        }
         self._factors: dict[tuple[View, str], np.ndarray] = {}
 
-    def weight(self, view: View, names: Collection[str] | None = None, but: Collection[str] = ()) -> np.ndarray:
-        """Return the product (N, L) of the amplitude factors that effects put on the points of a view.
+    def weight(
+        self, view: View, names: Collection[str] | None = None, but: Collection[str] = ()
+    ) -> np.ndarray:
+        """Return the product (N, L) of the amplitude factors that effects put on the points of a
+        view.
 
-        names: effects to include, None for all; but: effects to leave out. Raises: InputError for a wrong shape.
+        names: effects to include, None for all; but: effects to leave out. Raises: InputError for a
+        wrong shape.
         """
         result = np.ones(view.places.shape[:2])
         one_way = self.all("visible_one_way")
@@ -67,30 +87,50 @@ class SceneSample:
             if name in but or (names is not None and name not in names):
                 continue
             if (view, name) not in self._factors:
-                ends = [(end, end.station) for end in view.ends()] if name in one_way else [(view, self.view.station)]
-                function, shapes = "visible_one_way" if name in one_way else "visible", [result.shape, (len(result), 1)]
+                ends = (
+                    [(end, end.station) for end in view.ends()]
+                    if name in one_way
+                    else [(view, self.view.station)]
+                )
+                function = "visible_one_way" if name in one_way else "visible"
+                shapes = [result.shape, (len(result), 1)]
                 factors = [
-                    numbers(name, function, visible(end, self.scene.drawn(view.row, station, name)), shapes, real=True)
+                    numbers(
+                        name,
+                        function,
+                        visible(end, self.scene.drawn(view.row, station, name)),
+                        shapes,
+                        real=True,
+                    )
                     for end, station in ends
                 ]
                 if len(factors) == 2 and (factors[0] * factors[1] < 0).any():
-                    raise InputError(f"{name}: factors of unlike signs at both ends of a link, expected none below 0")
-                self._factors[view, name] = factors[0] if len(factors) == 1 else np.sqrt(factors[0] * factors[1])
+                    raise InputError(
+                        f"{name}: factors of unlike signs at both ends of a link, expected none below 0"
+                    )
+                self._factors[view, name] = (
+                    factors[0] if len(factors) == 1 else np.sqrt(factors[0] * factors[1])
+                )
             result *= self._factors[view, name]
         return result
 
     def paths(self, view: View) -> list[ImagePath]:
-        """Return all paths but the direct one; on a link, those of the receiver, each with the sender's of its kind."""
+        """Return all paths but the direct one; on a link, those of the receiver, each with the
+        sender's of its kind.
+        """
         adding = self.all("paths").values()
         ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
         if len(ends) == 1:
             return ends[0]
-        # In a town the ends of a link may see different numbers of paths: pad the shorter list with paths of factor 0.
+        # In a town the ends of a link may see different numbers of paths: pad the shorter list with
+        # paths of factor 0.
         none = ImagePath(view.places, 0.0)
         return [there._replace(sender=here) for here, there in zip_longest(*ends, fillvalue=none)]
 
     def routes(self, view: View, paths: list[ImagePath]) -> np.ndarray:
-        """Return the amplitude factor of each point, (N, L), or (R, R, N, L) where it depends on the route."""
+        """Return the amplitude factor of each point, (N, L), or (R, R, N, L) where it depends on
+        the route.
+        """
         routes = self.only("routes")
         return routes(view, paths, self.weight) if routes and paths else self.weight(view)
 
@@ -100,46 +140,68 @@ class SceneSample:
         view, result = self.view, [self.view]
         for name, companions in self.all("companions").items():
             cloud = self.clouds.get(view.cloud.subtype, view.cloud)
-            for other, row in companions(cloud, view.row, self.clouds, self.scene.stream(name, view.row)):
+            for other, row in companions(
+                cloud, view.row, self.clouds, self.scene.stream(name, view.row)
+            ):
                 occluders = view.occluders if other is cloud else None
                 result.append(observe(self.scene, view.station, other, row, occluders, beside=view))
         return result
 
     @cached_property
     def direct(self) -> np.ndarray:
-        """The target's frequency response (N, M) on the direct path, with plane waves and no beam squint."""
+        """The target's frequency response (N, M) on the direct path, with plane waves and no beam
+        squint.
+        """
         return response(self.view, (), self.weight(self.view))
 
     @cached_property
     def power(self) -> float:
-        """The reference of the configuration's SNRs: mean |Y_bin|^2 (W) of the target's own echo on the direct path."""
+        """The reference of the configuration's SNRs: mean |Y_bin|^2 (W) of the target's own echo on
+        the direct path.
+        """
         if self._power is not None:
             return self._power
         cells = waveform.range_cells(self.direct)
-        return arriving_power(np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0])
+        return arriving_power(
+            np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0]
+        )
 
     def direct_echo(self, view: View) -> np.ndarray:
-        """Return the target's frequency response (N, M) on the direct path, with the scene's physics of arrays."""
+        """Return the target's frequency response (N, M) on the direct path, with the scene's
+        physics of arrays.
+        """
         return response(view, (), self.weight(view), **self._waves)
 
     def echo(self, view: View) -> np.ndarray:
-        """Return the frequency response (N, M) on all paths of a view's target, which stands still within a symbol."""
-        # Most facades reflect nothing during a look, so their paths are left out. On a link, waves that leave on a path
-        # may return on any other, so a path counts where either end uses it.
-        paths = [path for path in self.paths(view) if np.any(path.coefficient) or np.any(path.outward.coefficient)]
+        """Return the frequency response (N, M) on all paths of a view's target, which stands still
+        within a symbol.
+        """
+        # Most facades reflect nothing during a look, so their paths are left out. On a link, waves
+        # that leave on a path may return on any other, so a path counts where either end uses it.
+        paths = [
+            path
+            for path in self.paths(view)
+            if np.any(path.coefficient) or np.any(path.outward.coefficient)
+        ]
         if view is self.view and not paths and not self._waves:
             return self.direct
         return response(view, paths, self.routes(view, paths), **self._waves)
 
     def _samples(self, view: View) -> np.ndarray:
-        """Time samples (N, M) of a target that moves within symbols, or whose echo is later than the cyclic prefix."""
-        delays_s, weights = np.zeros(1), np.ones((1, self.scene.network.subcarriers))
+        """Time samples (N, M) of a target that moves within symbols, or whose echo is later than
+        the cyclic prefix.
+        """
+        delays_s = np.zeros(1)
+        weights = np.ones((1, self.scene.network.subcarriers))
         if instants := self.only("instants"):
             delays_s, weights = instants(view)
-        # Each instant of a symbol is computed as a separate symbol; the instants of one symbol are consecutive.
+        # Each instant of a symbol is computed as a separate symbol; the instants of one symbol are
+        # consecutive.
         moved = view.at((view.times_s[:, None] + delays_s).reshape(-1))
-        factor, paths = self.routes(view, self.paths(view)), self.paths(moved)
-        late, network = np.zeros(view.places.shape[:2], np.int64), self.scene.network
+        factor = self.routes(view, self.paths(view))
+        paths = self.paths(moved)
+        late = np.zeros(view.places.shape[:2], np.int64)
+        network = self.scene.network
         if late_samples := self.only("late_samples"):
             late = late_samples(view)
 
@@ -155,7 +217,9 @@ class SceneSample:
             some = np.repeat(factor * (late == lost), len(delays_s), axis=-2)
             echo = response(moved, paths, some, **self._waves)
             samples += waveform.windowed(network, self.prefix_s, echo, lost, on_air)
-        return np.einsum("nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), -1), weights)
+        return np.einsum(
+            "nqm,qm->nm", samples.reshape(len(view.times_s), len(delays_s), -1), weights
+        )
 
     def _standing(self, still: Still) -> np.ndarray:
         """Time samples (N, M) of echoes that do not move within a symbol."""
@@ -164,9 +228,11 @@ class SceneSample:
         return waveform.transmit(still.response, self.on_air("waveform"))
 
     def arrived(self) -> np.ndarray:
-        """Return the frequency response (N, M) that the receiver measures: after its effects, divided by the sent data.
+        """Return the frequency response (N, M) that the receiver measures: after its effects,
+        divided by the sent data.
 
-        Without an effect on time samples, the responses of all echoes are added and no samples are made.
+        Without an effect on time samples, the responses of all echoes are added and no samples are
+        made.
         """
         from_sender = self.only("from_sender")
         still = [from_sender(self.view)] if from_sender else []
@@ -174,7 +240,10 @@ class SceneSample:
         for name, scatter in self.all("scatter").items():
             found = scatter(self.view, self.draws(name))
             still.append(found._replace(response=numbers(name, "scatter", found.response, [shape])))
-        unknown = [numbers(name, "heard", heard(self), [shape]) for name, heard in self.all("heard").items()]
+        unknown = [
+            numbers(name, "heard", heard(self), [shape])
+            for name, heard in self.all("heard").items()
+        ]
         if self.only("instants") or self.only("late_samples"):
             samples = sum(map(self._standing, still), sum(map(self._samples, self.targets)))
         else:
@@ -184,15 +253,21 @@ class SceneSample:
             samples = waveform.transmit(total, self.look.aired)
         samples = sum(unknown, samples)
         for name, receive in self.all("receive").items():
-            samples = numbers(name, "receive", receive(samples, self.look, self.draws(name)), [samples.shape])
+            samples = numbers(
+                name, "receive", receive(samples, self.look, self.draws(name)), [samples.shape]
+            )
         return waveform.demodulate(samples, self.look.data)
 
     @cached_property
     def look(self) -> waveform.Look:
-        """What the receiver and the detection know of the coherent processing interval (our "look")."""
+        """What the receiver and the detection know of the coherent processing interval (our
+        "look").
+        """
         view, delay_s = self.view, float(self.view.ways_m(self.view.aim_m)) / SPEED_OF_LIGHT
         data = self._data("waveform"), self.on_air("waveform")
-        return waveform.Look(self.scene.network, view.station, *data, view.times_s, self.power, delay_s)
+        return waveform.Look(
+            self.scene.network, view.station, *data, view.times_s, self.power, delay_s
+        )
 
     @cached_property
     def cells(self) -> np.ndarray:
@@ -208,7 +283,9 @@ class SceneSample:
         return cells
 
     def chosen(self, detection: Sequence[NamedEffect], cells: np.ndarray) -> np.ndarray:
-        """Return the range cell (N,) that these detection effects choose per symbol; without any, the strongest."""
+        """Return the range cell (N,) that these detection effects choose per symbol; without any,
+        the strongest.
+        """
         result = abs(cells).argmax(axis=1)
         for name, choose in every(detection, "choose").items():
             result = choose(result, cells, self.look, self.draws(name))
@@ -217,12 +294,19 @@ class SceneSample:
     def received(self) -> Received:
         """Return the sample's signal, the chosen range cells and the reference power."""
         view, sampling = self.view, self.view.sampling
-        beyond = [effect for effect in self.scene.effects if not hasattr(effect.module, "cross_sections")]
+        beyond = [
+            effect for effect in self.scene.effects if not hasattr(effect.module, "cross_sections")
+        ]
         if view.station.transmitter is None and all(effect.place == "motion" for effect in beyond):
             echo = echo_signal(
-                self.scene.network, view.station, view.motion, view.cloud.rcs_m2, view.aim_m, self.scene.tolerance,
+                self.scene.network,
+                view.station,
+                view.motion,
+                view.cloud.rcs_m2,
+                view.aim_m,
+                self.scene.tolerance,
                 sample=self.name,
-            )  # fmt: skip
+            )
             return Received(echo.signal, echo.cell, arriving_power(echo.signal))
         cells = self.filtered(self.detection)
         chosen = self.chosen(self.detection, cells)
@@ -236,25 +320,36 @@ class SceneSample:
         return Received(signal, chosen, self.power)
 
     def without_target(self) -> "SceneSample":
-        """Return the same sample with a target that reflects nothing; draws and noise level stay the same."""
+        """Return the same sample with a target that reflects nothing; draws and noise level stay
+        the same.
+        """
         dark = replace(self.view.cloud, rcs_m2=np.zeros_like(self.view.cloud.rcs_m2))
         return SceneSample(self.scene, replace(self.view, cloud=dark), self.clouds, self.power)
 
     def true_cell(self, view: View) -> np.ndarray:
-        """Return the range cell (K,) of the middle of a view's target at each received symbol: the geometric truth."""
+        """Return the range cell (K,) of the middle of a view's target at each received symbol: the
+        geometric truth.
+        """
         ways_m = view.ways_m(view.places.mean(axis=1))
-        cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
+        cells = (
+            np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
+        )
         return self._present(cells)
 
     def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the echo of the middle of a view's target appears on the direct path: the range cell (K,), with
-        its fraction, at each received symbol, and the folded speed (N,) m/s at each symbol."""
-        displacements = [displaced(view, self.draws(name)) for name, displaced in self.all("displaced").items()]
+        """Return where the echo of the middle of a view's target appears on the direct path: the
+        range cell (K,), with its fraction, at each received symbol, and the folded speed (N,) m/s
+        at each symbol."""
+        displacements = [
+            displaced(view, self.draws(name)) for name, displaced in self.all("displaced").items()
+        ]
         cell, speed_mps = truth.observed(view, displacements, self.cells.shape[1])
         return self._present(cell), speed_mps
 
     def observed_cell(self, view: View) -> np.ndarray:
-        """Return the range cell (K,) nearest to where the echo of a view's target appears at each received symbol."""
+        """Return the range cell (K,) nearest to where the echo of a view's target appears at each
+        received symbol.
+        """
         return np.rint(self.observed(view)[0]).astype(np.int64) % self.cells.shape[1]
 
     def _present(self, symbols: np.ndarray) -> np.ndarray:
@@ -263,7 +358,9 @@ class SceneSample:
 
     @property
     def prefix_s(self) -> float:
-        """The length of the cyclic prefix (s): NR's normal prefix, or the length that an effect states."""
+        """The length of the cyclic prefix (s): NR's normal prefix, or the length that an effect
+        states.
+        """
         prefix_s = self.only("prefix_s") or partial(waveform.prefix_length_s, None)
         return prefix_s(self.scene.network)
 
@@ -274,7 +371,9 @@ class SceneSample:
         return f"{row['subtype']}, model {row['model']}, station {self.view.station.name}"
 
     def _data(self, name: str) -> np.ndarray | None:
-        """The data (N, M) that the random stream of this name gives, QPSK by default; None for waveforms but OFDM."""
+        """The data (N, M) that the random stream of this name gives, QPSK by default; None for
+        waveforms but OFDM.
+        """
         network = self.scene.network
         if network.waveform != "ofdm":
             return None
@@ -285,8 +384,8 @@ class SceneSample:
     def on_air(self, name: str) -> np.ndarray | None:
         """Return the subcarriers (N, M) on the air for the data of a random stream.
 
-        name: "waveform" for the symbol itself, "previous waveform" and "next waveform" for the symbols beside it, or a
-        stream of another station.
+        name: "waveform" for the symbol itself, "previous waveform" and "next waveform" for the
+        symbols beside it, or a stream of another station.
         """
         data = self._data(name)
         for aired in self.all("aired").values():
@@ -296,42 +395,59 @@ class SceneSample:
 
 @one_blas_thread()
 def received_signal(
-    scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: Mapping[str, dict] | None = None,
+    scene: Scene,
+    station: Station,
+    cloud: Cloud,
+    row: dict,
+    occluders: Mapping[str, dict] | None = None,
     clouds: Mapping[str, Cloud] | None = None,
-) -> Received:  # fmt: skip
-    """Return the signal of the motion model `row` (motion table) at `station`, with the scene's effects.
+) -> Received:
+    """Return the signal of the motion model `row` (motion table) at `station`, with the scene's
+    effects.
 
-    occluders: the target's surfaces, for self-occlusion; clouds: the clouds of all subtypes, for companions.
+    occluders: the target's surfaces, for self-occlusion; clouds: the clouds of all subtypes, for
+    companions.
     Raises: InputError naming the sample that cannot be computed.
     """
     return SceneSample(scene, observe(scene, station, cloud, row, occluders), clouds).received()
 
 
 def scene_signals(
-    scene: Scene, name: str, clouds: Mapping[str, Cloud], rows: list[dict], occluders: Mapping[str, dict] | None = None,
+    scene: Scene,
+    name: str,
+    clouds: Mapping[str, Cloud],
+    rows: list[dict],
+    occluders: Mapping[str, dict] | None = None,
     snrs: list[float] | None = None,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W
+    of the motion table.
 
-    clouds: by subtype, companions included; occluders: each subtype's surfaces, needed for self-occlusion; snrs (dB):
-    given if the scene itself adds noise at set SNRs; the result has one signal per SNR, (models, snrs, N).
+    clouds: by subtype, companions included; occluders: each subtype's surfaces, needed for
+    self-occlusion; snrs (dB): given if the scene itself adds noise at set SNRs; the result has one
+    signal per SNR, (models, snrs, N).
     Raises: InputError naming the sample whose subtype has no cloud, or that cannot be computed.
     """
-    station, occluders = scene.network.station(name), occluders or {}
+    station = scene.network.station(name)
+    occluders = occluders or {}
     levels = [scene] if snrs is None else [scene.at_snr(snr) for snr in snrs]
     result = np.empty((len(rows), len(levels), scene.network.symbols), np.complex64)
     power = np.empty(len(rows))
     for index, row in enumerate(reported(rows, len(rows), "models")):
-        cloud, surfaces = cloud_of(clouds, row), occluders.get(row["subtype"])
+        cloud = cloud_of(clouds, row)
+        surfaces = occluders.get(row["subtype"])
         for place, level in enumerate(levels):
             received = received_signal(level, station, cloud, row, surfaces, clouds)
-            result[index, place], power[index] = received.signal, received.power
+            result[index, place] = received.signal
+            power[index] = received.power
     return result[:, 0] if snrs is None else result, power
 
 
 def arriving_power(signal: np.ndarray) -> float:
-    """Return the mean |Y_bin|^2 (W) of a signal (N,) that is rounded to complex64, as the echo stage rounds it.
+    """Return the mean |Y_bin|^2 (W) of a signal (N,) that is rounded to complex64, as the echo
+    stage rounds it.
 
-    Without this rounding, the noise level of a scene without effects would differ from that of the noise stage.
+    Without this rounding, the noise level of a scene without effects would differ from that of the
+    noise stage.
     """
     return rms(signal.astype(np.complex64)) ** 2

@@ -1,4 +1,6 @@
-"""Checks of a scene before any job starts: whether its effects fit its network, its noise and each other."""
+"""Checks of a scene before any job starts: whether its effects fit its network, its noise and each
+other.
+"""
 
 from collections.abc import Collection, Mapping
 from types import ModuleType
@@ -13,8 +15,8 @@ from lowalt.scene.effects import PLACES, called, every, module_of
 class CheckedScene(NamedTuple):
     """The part of a scene's configuration that an effect's `check` may look at.
 
-    effects, modules: the complete settings and the module of every effect that is not idle, by name; snr_db: the set
-    SNRs; known_times: whether spectra use the instants of received symbols.
+    effects, modules: the complete settings and the module of every effect that is not idle, by
+    name; snr_db: the set SNRs; known_times: whether spectra use the instants of received symbols.
     """
 
     network: Network
@@ -48,7 +50,8 @@ def check(config: dict) -> CheckedScene:
     coloured += every(effects, "filtered")
     if scene.noisy and coloured and config.get("shards", {}).get("kind") == "recipe":
         raise InputError(
-            "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or 'signal' in a scene with "
+            "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or "
+            "'signal' in a scene with "
             f"effects {coloured}"
         )
     for effect in effects:
@@ -58,15 +61,26 @@ def check(config: dict) -> CheckedScene:
 
 
 def refuse_missing(network: Network, named: Collection[ModuleType]) -> None:
-    """Raise InputError where none of the named effects, idle ones included, offers what the network's signals need."""
-    links, guard = links_of(network), network.guard_subcarriers
-    needed = {"from_sender": f"network.stations: {links} are links between two stations"} if links else {}
+    """Raise InputError where none of the named effects, idle ones included, offers what the
+    network's signals need.
+    """
+    links = links_of(network)
+    guard = network.guard_subcarriers
+    needed = (
+        {"from_sender": f"network.stations: {links} are links between two stations"}
+        if links
+        else {}
+    )
     if guard < 0:
         needed["heard"] = f"network.guard_subcarriers: {guard}, sub-bands overlap"
     for function, said in needed.items():
         if not any(hasattr(module, function) for module in named):
-            fit = " or ".join(f"effects.{name}" for name in PLACES if hasattr(module_of(name), function))
-            raise InputError(f"{said}, expected {fit} in the same scene, or an own effect that offers {function}")
+            fit = " or ".join(
+                f"effects.{name}" for name in PLACES if hasattr(module_of(name), function)
+            )
+            raise InputError(
+                f"{said}, expected {fit} in the same scene, or an own effect that offers {function}"
+            )
 
 
 def links_of(network: Network) -> list[str]:
@@ -75,12 +89,20 @@ def links_of(network: Network) -> list[str]:
 
 
 def refuse_unmodelled(network: Network, modules: Mapping[str, ModuleType]) -> None:
-    """Raise InputError for effects, modules by name, that are not modelled with the network's waveform or links."""
-    cases = {network.waveform: f"with network.waveform of kind {network.waveform!r}, expected none of them"}
+    """Raise InputError for effects, modules by name, that are not modelled with the network's
+    waveform or links.
+    """
+    cases = {
+        network.waveform: f"with network.waveform of kind {network.waveform!r}, expected none of them"
+    }
     if links := links_of(network):
-        cases["links"] = f"between two stations, expected none of them in a network with the links {links}"
+        cases["links"] = (
+            f"between two stations, expected none of them in a network with the links {links}"
+        )
     for case, said in cases.items():
-        refused = [name for name, module in modules.items() if case in getattr(module, "UNMODELLED", ())]
+        refused = [
+            name for name, module in modules.items() if case in getattr(module, "UNMODELLED", ())
+        ]
         if refused:
             raise InputError(f"effects: {refused} are not modelled {said}")
 

@@ -1,18 +1,26 @@
-"""The contract of effects: the functions that an effect may offer, each with its place, arguments, result and owners.
+"""The contract of effects: the functions that an effect may offer, each with its place, arguments,
+result and owners.
 
-An effect is a module `effects/PLACE/NAME.py`, or a file of the user's own that a configuration names by its path. It
-defines SOURCE, where its law comes from; DEFAULTS, every parameter with its value; and one or more of the functions
-`OFFERS`. Each takes `settings`, which hold every key of DEFAULTS, and then the arguments that `takes` lists.
-It may also define
+An effect is a module `effects/PLACE/NAME.py`, or a file of the user's own that a configuration
+names by its path. It defines SOURCE, where its law comes from; DEFAULTS, every parameter with its
+value; and one or more of the functions `OFFERS`. Each takes `settings`, which hold every key of
+DEFAULTS, and then the arguments that `takes` lists. It may also define
 
-- IDLE, a list of settings that change nothing: where all values of an entry are set, the effect is dropped;
-- `check(settings, scene)`, which raises InputError where settings contradict the rest of a `checks.CheckedScene`;
-- UNMODELLED, what the effect is not modelled with: "links" between two stations, the waveforms "fmcw" and "cw";
+- IDLE, a list of settings that change nothing: where all values of an entry are set, the effect is
+  dropped;
+- `check(settings, scene)`, which raises InputError where settings contradict the rest of a
+  `checks.CheckedScene`;
+- UNMODELLED, what the effect is not modelled with: "links" between two stations, the waveforms
+  "fmcw" and "cw";
 - STILL, whether it adds echoes that stand still, which a canceller removes;
-- SET_SNR, the setting that holds an SNR of noise.snr_db: where it is null, the echo stage makes a signal for each SNR;
-- STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the same numbers;
-- PARTS, settings that leave out a part of the effect, by the part's name: `lowalt explain` measures each;
-- DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of a link's stations.
+- SET_SNR, the setting that holds an SNR of noise.snr_db: where it is null, the echo stage makes a
+  signal for each SNR;
+- STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the
+  same numbers;
+- PARTS, settings that leave out a part of the effect, by the part's name: `lowalt explain` measures
+  each;
+- DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of
+  a link's stations.
 
 N symbols, M subcarriers or range cells, L points of a target; arrays are float64 or complex128.
 """
@@ -54,15 +62,19 @@ ARGUMENTS = {
 """What functions take, with shapes and units."""
 
 
-def numbers(name: str, function: str, values: object, shapes: list[tuple[int, ...]], real: bool = False) -> np.ndarray:
+def numbers(
+    name: str, function: str, values: object, shapes: list[tuple[int, ...]], real: bool = False
+) -> np.ndarray:
     """Return what a function of an effect gave as an array; real: whether it must not be complex.
 
-    Raises: InputError naming the effect and its function for another shape than `shapes`, complex numbers in place of
-    real ones, and NaN or infinity.
+    Raises: InputError naming the effect and its function for another shape than `shapes`, complex
+    numbers in place of real ones, and NaN or infinity.
     """
     found = np.asarray(values)
     if found.shape not in shapes:
-        raise InputError(f"{name}: {function} gives an array of shape {found.shape}, expected {shapes[0]}")
+        raise InputError(
+            f"{name}: {function} gives an array of shape {found.shape}, expected {shapes[0]}"
+        )
     if found.dtype.kind not in ("biuf" if real else "biufc"):
         kind = "real numbers" if real else "numbers"
         raise InputError(f"{name}: {function} gives an array of {found.dtype}, expected {kind}")
@@ -74,8 +86,9 @@ def numbers(name: str, function: str, values: object, shapes: list[tuple[int, ..
 class Offer(NamedTuple):
     """A function that an effect may offer.
 
-    place: where effects that offer it act, "" for any place; one: whether a scene has one owner at most, else many act
-    in the order of the chain; takes: names of ARGUMENTS behind `settings`; returns: its result.
+    place: where effects that offer it act, "" for any place; one: whether a scene has one owner at
+    most, else many act in the order of the chain; takes: names of ARGUMENTS behind `settings`;
+    returns: its result.
     """
 
     place: str
@@ -84,48 +97,119 @@ class Offer(NamedTuple):
     returns: str
 
 
-ONE, MANY = True, False
+ONE = True
+MANY = False
 OFFERS = {
-    "perturb": Offer("motion", MANY, ("cloud", "row", "times_s", "rng"), "`Perturbation` of the motion at these times"),
-    "sampling": Offer("transmitter", ONE, ("network", "rng"), "`Sampling`: when symbols are sent, which are received"),
-    "regridded": Offer("transmitter", ONE, ("signal", "timing", "network"), "(N,) evenly spaced signal"),
-    "data": Offer("transmitter", ONE, ("symbols", "subcarriers", "rng"), "(N, M) data of mean power one"),
-    "aired": Offer("transmitter", MANY, ("sent",), "(N, M) subcarriers on the air"),
-    "range_cells": Offer("transmitter", ONE, ("response",), "(N, cells) of a response whose pilots alone are known"),
-    "beams": Offer("channel", ONE, ("view", "rng"), "`Beams`: where both beams of a station point, and from when on"),
-    "element": Offer("channel", ONE, (), "`Element` of the antennas"),
-    "cross_sections": Offer("channel", MANY, ("cloud", "wavelength_m"), "(L,) m2, mean cross section of each point"),
-    "visible": Offer("channel", MANY, ("view", "rng"), "(N, L) or (N, 1), real factor on two-way amplitudes"),
-    "visible_one_way": Offer(
-        "channel", MANY, ("view", "rng"),
-        "as `visible` for a station; on a link asked for at both ends, and the factor is the root of their product",
+    "perturb": Offer(
+        "motion",
+        MANY,
+        ("cloud", "row", "times_s", "rng"),
+        "`Perturbation` of the motion at these times",
     ),
-    "paths": Offer("channel", MANY, ("view",), "list of `ImagePath`: waves go out by any path and come back by any"),
+    "sampling": Offer(
+        "transmitter",
+        ONE,
+        ("network", "rng"),
+        "`Sampling`: when symbols are sent, which are received",
+    ),
+    "regridded": Offer(
+        "transmitter", ONE, ("signal", "timing", "network"), "(N,) evenly spaced signal"
+    ),
+    "data": Offer(
+        "transmitter", ONE, ("symbols", "subcarriers", "rng"), "(N, M) data of mean power one"
+    ),
+    "aired": Offer("transmitter", MANY, ("sent",), "(N, M) subcarriers on the air"),
+    "range_cells": Offer(
+        "transmitter", ONE, ("response",), "(N, cells) of a response whose pilots alone are known"
+    ),
+    "beams": Offer(
+        "channel",
+        ONE,
+        ("view", "rng"),
+        "`Beams`: where both beams of a station point, and from when on",
+    ),
+    "element": Offer("channel", ONE, (), "`Element` of the antennas"),
+    "cross_sections": Offer(
+        "channel", MANY, ("cloud", "wavelength_m"), "(L,) m2, mean cross section of each point"
+    ),
+    "visible": Offer(
+        "channel", MANY, ("view", "rng"), "(N, L) or (N, 1), real factor on two-way amplitudes"
+    ),
+    "visible_one_way": Offer(
+        "channel",
+        MANY,
+        ("view", "rng"),
+        "as `visible` for a station; on a link asked for at both ends, and the factor is the root "
+        "of their product",
+    ),
+    "paths": Offer(
+        "channel",
+        MANY,
+        ("view",),
+        "list of `ImagePath`: waves go out by any path and come back by any",
+    ),
     "routes": Offer(
-        "channel", ONE, ("view", "paths", "weight"),
+        "channel",
+        ONE,
+        ("view", "paths", "weight"),
         "(P + 1, P + 1, N, L) factors by the way out and the way back, the direct one first",
     ),
-    "waves": Offer("channel", MANY, (), "keywords of `response.response`, the physics of arrays, each with True"),
+    "waves": Offer(
+        "channel",
+        MANY,
+        (),
+        "keywords of `response.response`, the physics of arrays, each with True",
+    ),
     "companions": Offer(
-        "channel", MANY, ("cloud", "row", "clouds", "rng"), "(cloud, row) of each other target, alike for all stations"
+        "channel",
+        MANY,
+        ("cloud", "row", "clouds", "rng"),
+        "(cloud, row) of each other target, alike for all stations",
     ),
-    "instants": Offer("channel", ONE, ("view",), "(Q,) s within a symbol, and their weights (Q, M) in its samples"),
+    "instants": Offer(
+        "channel", ONE, ("view",), "(Q,) s within a symbol, and their weights (Q, M) in its samples"
+    ),
     "prefix_s": Offer("channel", ONE, ("network",), "length of the cyclic prefix (s)"),
-    "late_samples": Offer("channel", ONE, ("view",), "(N, L) int64, samples of a point that are the previous symbol's"),
+    "late_samples": Offer(
+        "channel", ONE, ("view",), "(N, L) int64, samples of a point that are the previous symbol's"
+    ),
     "convolved": Offer(
-        "channel", ONE, ("network", "response", "on_air", "offset_cells"), "(N, M) time samples of still echoes"
+        "channel",
+        ONE,
+        ("network", "response", "on_air", "offset_cells"),
+        "(N, M) time samples of still echoes",
     ),
-    "scatter": Offer("channel", MANY, ("view", "rng"), "`Still`: the echoes of something other than a target"),
-    "from_sender": Offer("channel", ONE, ("view",), "`Still`: what a link hears of its sender directly"),
-    "heard": Offer("channel", MANY, ("sample",), "(N, M) time samples of signals that the receiver does not know"),
-    "displaced": Offer("", MANY, ("view", "rng"), "`Displacement` of the target's echo by the effect"),
-    "noise_w": Offer("receiver", ONE, ("network",), "mean power (W) of the receiver's noise in a subcarrier"),
+    "scatter": Offer(
+        "channel", MANY, ("view", "rng"), "`Still`: the echoes of something other than a target"
+    ),
+    "from_sender": Offer(
+        "channel", ONE, ("view",), "`Still`: what a link hears of its sender directly"
+    ),
+    "heard": Offer(
+        "channel",
+        MANY,
+        ("sample",),
+        "(N, M) time samples of signals that the receiver does not know",
+    ),
+    "displaced": Offer(
+        "", MANY, ("view", "rng"), "`Displacement` of the target's echo by the effect"
+    ),
+    "noise_w": Offer(
+        "receiver", ONE, ("network",), "mean power (W) of the receiver's noise in a subcarrier"
+    ),
     "levels": Offer(
-        "", MANY, ("view",),
-        'list of lines of the link budget, (name, value, unit): a power in "W", or a ratio of powers, unit "1"',
+        "",
+        MANY,
+        ("view",),
+        'list of lines of the link budget, (name, value, unit): a power in "W", or a ratio of '
+        'powers, unit "1"',
     ),
-    "receive": Offer("receiver", MANY, ("samples", "look", "rng"), "(N, M) time samples after the effect"),
+    "receive": Offer(
+        "receiver", MANY, ("samples", "look", "rng"), "(N, M) time samples after the effect"
+    ),
     "filtered": Offer("detection", MANY, ("cells",), "(N, M) range cells behind a linear filter"),
-    "choose": Offer("detection", MANY, ("chosen", "cells", "look", "rng"), "(N,) chosen range cells"),
-}  # fmt: skip
+    "choose": Offer(
+        "detection", MANY, ("chosen", "cells", "look", "rng"), "(N,) chosen range cells"
+    ),
+}
 """All functions by name, in the order in which the chain asks for them."""

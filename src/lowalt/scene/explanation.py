@@ -1,8 +1,10 @@
-"""What a scene does to the signals of a few samples: whether the target's cell is found, and what each effect changes.
+"""What a scene does to the signals of a few samples: whether the target's cell is found, and what
+each effect changes.
 
-An effect is priced by leaving it out of the scene, or by adding it with its defaults where the scene does not name it.
-`commands.explain` prints it all. It passes in a function that says what a change does to images and to the answers of a
-trained network, since a scene may not import those packages.
+An effect is priced by leaving it out of the scene, or by adding it with its defaults where the
+scene does not name it. `commands.explain` prints it all. It passes in a function that says what a
+change does to images and to the answers of a trained network, since a scene may not import those
+packages.
 """
 
 import math
@@ -33,9 +35,12 @@ from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 
 CANCELLERS = (
-    ("none", {"kind": "none"}), ("mean", {"kind": "mean"}), ("pulse, order 1", {"kind": "pulse", "order": 1}),
-    ("pulse, order 2", {"kind": "pulse", "order": 2}), ("clutter", {"kind": "clutter"}),
-)  # fmt: skip
+    ("none", {"kind": "none"}),
+    ("mean", {"kind": "mean"}),
+    ("pulse, order 1", {"kind": "pulse", "order": 1}),
+    ("pulse, order 2", {"kind": "pulse", "order": 2}),
+    ("clutter", {"kind": "clutter"}),
+)
 """Cancellers that a verdict compares."""
 CLOSE_CELLS = 1
 """A chosen range cell is right if it lies at most this many cells from the target's."""
@@ -56,10 +61,11 @@ class ExplainedSample(NamedTuple):
 class Finding(NamedTuple):
     """One sample at one station.
 
-    radial_mps: mean rate of the target's range over the look (m/s); right: share of symbols whose chosen cell is within
-    one of the target's; over_db: power of the target in its cell over the mean power of the loudest cell of everything
-    else, behind the filters (dB, inf without anything else); otherwise: the share `right` with other detection: with
-    each of CANCELLERS if the scene has one, with and without a detector.
+    radial_mps: mean rate of the target's range over the look (m/s); right: share of symbols whose
+    chosen cell is within one of the target's; over_db: power of the target in its cell over the
+    mean power of the loudest cell of everything else, behind the filters (dB, inf without anything
+    else); otherwise: the share `right` with other detection: with each of CANCELLERS if the scene
+    has one, with and without a detector.
     """
 
     category: str
@@ -77,11 +83,12 @@ class Finding(NamedTuple):
 class Change(NamedTuple):
     """What leaving an effect out, or adding it, changes.
 
-    signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
-    more: share of the pixels, or of a network's answers, that differ; ms: processor time of the effect per sample and
-    station, a median; spread_ms: standard deviation of that time over samples and stations; also: a further change
-    without which the scene would be refused; refused: why the effect was not tried; part: the part of the effect that
-    was left out, "" for the whole.
+    signal: root mean square of the signal's change over the signal's; cells: share of symbols with
+    another range cell;
+    more: share of the pixels, or of a network's answers, that differ; ms: processor time of the
+    effect per sample and station, a median; spread_ms: standard deviation of that time over samples
+    and stations; also: a further change without which the scene would be refused; refused: why the
+    effect was not tried; part: the part of the effect that was left out, "" for the whole.
     """
 
     effect: str
@@ -97,33 +104,44 @@ class Change(NamedTuple):
     part: str = ""
 
 
-def samples(config: dict, inputs: Path | None, asked: list[tuple[str, int]]) -> list[ExplainedSample]:
-    """Return the motion models `asked` for (subtype, number), or the first model of each category's first subtype.
+def samples(
+    config: dict, inputs: Path | None, asked: list[tuple[str, int]]
+) -> list[ExplainedSample]:
+    """Return the motion models `asked` for (subtype, number), or the first model of each category's
+    first subtype.
 
-    Clouds and motion are made as the workflow makes them, so a sample is the one the data set holds.
+    Clouds and motion are made as the workflow makes them, so a sample is the one the data set
+    holds.
     Raises: InputError for a subtype the scene does not have.
     """
-    records, select = records_of(config["targets"], inputs), config["targets"]["select"]
+    records = records_of(config["targets"], inputs)
+    select = config["targets"]["select"]
     records = {name: record for name, record in records.items() if not select or name in select}
     unknown = [name for name, _ in asked if name not in records]
     if unknown:
-        raise InputError(f"--sample: {unknown}, expected subtypes of the scene such as {next(iter(records))!r}")
+        raise InputError(
+            f"--sample: {unknown}, expected subtypes of the scene such as {next(iter(records))!r}"
+        )
     firsts: dict[str, tuple[str, int]] = {}
     for name, record in records.items():
         firsts.setdefault(record["published"]["category"], (name, 0))
     masts = np.array(masts_m(config["network"]), dtype=float)
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
-    motion, result = motion_block(config), []
+    motion = motion_block(config)
+    result = []
     path = path_of(motion, corners, masts)
     for name, model in asked or firsts.values():
         record = records[name]
         cloud = make(record, inputs, config["seed"])
         track, look = divmod(model, motion.get("looks", 1))
-        row = model_rows(config["seed"], cloud, record["published"], masts, corners, motion, track, path)[look]
+        row = model_rows(
+            config["seed"], cloud, record["published"], masts, corners, motion, track, path
+        )[look]
         try:
             surfaces = occluders.make(record, inputs, config["seed"]) | {"subtype": name}
         except InputError:
-            # A target without surfaces is refused where the scene, or a trial, hides points behind them.
+            # A target without surfaces is refused where the scene, or a trial, hides points behind
+            # them.
             surfaces = None
         row = {**row, "group": record["published"]["unseen_protocol"], "model": model}
         result.append(ExplainedSample(cloud, row, surfaces))
@@ -131,52 +149,80 @@ def samples(config: dict, inputs: Path | None, asked: list[tuple[str, int]]) -> 
 
 
 def scene_of(config: dict) -> Scene:
-    """Return the checked scene of a whole configuration, with noise at its middle SNR where the effects add that.
+    """Return the checked scene of a whole configuration, with noise at its middle SNR where the
+    effects add that.
 
     Raises: InputError where effects contradict each other.
     """
     check(config)
-    network, effects = Network.from_settings(config["network"]), tuple(called(config["effects"]))
+    network = Network.from_settings(config["network"])
+    effects = tuple(called(config["effects"]))
     snrs = sorted(float(snr) for snr in config["noise"]["snr_db"])
-    return Scene(network, config["seed"], config["echo"]["tolerance"], effects).at_snr(snrs[(len(snrs) - 1) // 2])
+    return Scene(network, config["seed"], config["echo"]["tolerance"], effects).at_snr(
+        snrs[(len(snrs) - 1) // 2]
+    )
 
 
 def finding(
-    scene: Scene, station: Station, explained: ExplainedSample, clouds: dict[str, Cloud], listed: bool = False
+    scene: Scene,
+    station: Station,
+    explained: ExplainedSample,
+    clouds: dict[str, Cloud],
+    listed: bool = False,
 ) -> Finding:
-    """Return whether a sample's target is found at a station, how loud it is against all else, and its levels if asked.
+    """Return whether a sample's target is found at a station, how loud it is against all else, and
+    its levels if asked.
 
     listed: whether levels are wanted, which take as long as a sample.
     """
     cloud, row, surfaces = explained
     sample = SceneSample(scene, observe(scene, station, cloud, row, surfaces), clouds)
-    target_cell, empty = sample.observed_cell(sample.view), sample.without_target()
-    received, background = sample.filtered(sample.detection), empty.filtered(sample.detection)
+    target_cell = sample.observed_cell(sample.view)
+    empty = sample.without_target()
+    received = sample.filtered(sample.detection)
+    background = empty.filtered(sample.detection)
     at_target = (received - background)[np.arange(len(target_cell)), target_cell]
     loudest = float((abs(background) ** 2).mean(axis=0).max())
     with np.errstate(divide="ignore"):
         over_db = 10 * np.log10(np.mean(abs(at_target) ** 2) / loudest) if loudest > 0 else np.inf
-    named, otherwise = {effect.name for effect in sample.detection}, {}
+    named = {effect.name for effect in sample.detection}
+    otherwise = {}
     for kind, changed in CANCELLERS if "canceller" in named else (("", {}),):
         detection = [
-            effect._replace(settings=effect.settings | changed) if effect.name == "canceller" else effect
+            effect._replace(settings=effect.settings | changed)
+            if effect.name == "canceller"
+            else effect
             for effect in sample.detection
         ]
         for added in ("",) if "detector" in named else ("", "detector"):
             label = " and ".join(filter(None, (kind and f"canceller {kind}", added))) or "the same"
-            otherwise[label] = _right(sample, detection + called({added: {}} if added else {}), target_cell)
-    view, range_m = sample.view, float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m)))
+            otherwise[label] = _right(
+                sample, detection + called({added: {}} if added else {}), target_cell
+            )
+    view, range_m = (
+        sample.view,
+        float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m))),
+    )
     ways_m = view.ways_m(view.places.mean(axis=1))
     radial_mps = float((ways_m[-1] - ways_m[0]) / (2 * (view.times_s[-1] - view.times_s[0])))
     return Finding(
-        row["category"], row["subtype"], row["model"], station.name, range_m, radial_mps,
-        _right(sample, sample.detection, target_cell), float(over_db), otherwise,
+        row["category"],
+        row["subtype"],
+        row["model"],
+        station.name,
+        range_m,
+        radial_mps,
+        _right(sample, sample.detection, target_cell),
+        float(over_db),
+        otherwise,
         levels(sample.view, scene.effects, sample.power) if listed else [],
-    )  # fmt: skip
+    )
 
 
 def _right(sample: SceneSample, detection: Sequence[NamedEffect], target_cell: np.ndarray) -> float:
-    """Share of symbols whose chosen cell is close to the target's, cells wrapping around as ranges do."""
+    """Share of symbols whose chosen cell is close to the target's, cells wrapping around as ranges
+    do.
+    """
     acting = [effect for effect in detection if not effect.idle]
     cells = sample.filtered(acting)
     off = abs(sample.chosen(acting, cells) - target_cell)
@@ -184,28 +230,35 @@ def _right(sample: SceneSample, detection: Sequence[NamedEffect], target_cell: n
 
 
 def changes(
-    config: dict, chosen: list[ExplainedSample], station_names: Sequence[str],
+    config: dict,
+    chosen: list[ExplainedSample],
+    station_names: Sequence[str],
     shown: Callable[[np.ndarray], dict[str, np.ndarray]],
-) -> list[Change]:  # fmt: skip
-    """Return what each effect changes at some stations; the effects that the scene names come first.
+) -> list[Change]:
+    """Return what each effect changes at some stations; the effects that the scene names come
+    first.
 
-    shown: turns the signals (K, stations, N) of all samples into what is compared, by name: pixels of images, answers
-    of a network.
+    shown: turns the signals (K, stations, N) of all samples into what is compared, by name: pixels
+    of images, answers of a network.
     """
     places = {effect.name: effect.place for effect in scene_of(config).effects}
     named = list(places)
-    # The first call of a kernel compiles it, so the scene itself is computed twice. So is a single sample with each
-    # effect, whose time is no median of several.
+    # The first call of a kernel compiles it, so the scene itself is computed twice. So is a single
+    # sample with each effect, whose time is no median of several.
     passes = 2 if len(chosen) * len(station_names) == 1 else 1
     signals, cells, times_ms = _received(config, station_names, chosen, 2)
-    before, result = shown(signals), []
+    before = shown(signals)
+    result = []
     parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
     others = [name for name in PLACES if name not in config["effects"]]
     tried = [*((name, "") for name in named), *parts, *((name, "") for name in others)]
     for name, part in reported(tried, len(tried), "effects"):
-        place, inside = places.get(name) or PLACES[name], name in named
+        place = places.get(name) or PLACES[name]
+        inside = name in named
         try:
-            changed, also = (_without_part(config, name, part), "") if part else _changed(config, name)
+            changed, also = (
+                (_without_part(config, name, part), "") if part else _changed(config, name)
+            )
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
         except InputError as error:
             result.append(Change(name, place, inside, refused=str(error)))
@@ -233,7 +286,8 @@ def _differing(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def _changed(config: dict, name: str) -> tuple[dict, str]:
-    """The configuration without an effect that it names, or with one that it does not, and the further change needed.
+    """The configuration without an effect that it names, or with one that it does not, and the
+    further change needed.
 
     Raises: InputError where no single further change makes the scene fit.
     """
@@ -246,7 +300,10 @@ def _changed(config: dict, name: str) -> tuple[dict, str]:
             choices.append((config | {"effects": fewer}, f"and without {other}"))
     else:
         added = config | {"effects": effects | {name: {}}}
-        choices = [(added, ""), (added | {"noise": config["noise"] | {"snr_db": [np.inf]}}, "at no set SNR")]
+        choices = [
+            (added, ""),
+            (added | {"noise": config["noise"] | {"snr_db": [np.inf]}}, "at no set SNR"),
+        ]
     faults = []
     for changed, also in choices:
         try:
@@ -260,32 +317,57 @@ def _changed(config: dict, name: str) -> tuple[dict, str]:
 def _received(
     config: dict, station_names: Sequence[str], chosen: list[ExplainedSample], passes: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Signals and cells (K, stations, N) of the chosen samples, and the processor times (K, stations) ms of the last
-    pass."""
-    scene, clouds = scene_of(config), {explained.cloud.subtype: explained.cloud for explained in chosen}
+    """Signals and cells (K, stations, N) of the chosen samples, and the processor times (K,
+    stations) ms of the last pass."""
+    scene = scene_of(config)
+    clouds = {explained.cloud.subtype: explained.cloud for explained in chosen}
     for _ in range(passes):
-        received, times_s = [], [time.process_time()]
+        received = []
+        times_s = [time.process_time()]
         for explained in chosen:
             for name in station_names:
-                received.append(received_signal(scene, scene.network.station(name), *explained, clouds))
+                received.append(
+                    received_signal(scene, scene.network.station(name), *explained, clouds)
+                )
                 times_s.append(time.process_time())
     shape = len(chosen), len(station_names)
-    signals, cells = (np.array([result[k] for result in received]).reshape(*shape, -1) for k in range(2))
+    signals, cells = (
+        np.array([result[k] for result in received]).reshape(*shape, -1) for k in range(2)
+    )
     return signals, cells, 1e3 * np.diff(times_s).reshape(shape)
 
 
 def verdict(findings: Sequence[Finding]) -> list[str]:
-    """Return sentences that say whether the receiver finds its targets, and what would find more of them."""
+    """Return sentences that say whether the receiver finds its targets, and what would find more of
+    them.
+    """
     share = fmean([finding.right for finding in findings])
     classes = list(dict.fromkeys(finding.category for finding in findings))
-    of_class = {name: [finding for finding in findings if finding.category == name] for name in classes}
-    shares = ", ".join(f"{name} {fmean([finding.right for finding in mine]):.0%}" for name, mine in of_class.items())
-    lines = [f"The target's range cell, or one next to it, is chosen in {share:.0%} of the symbols: {shares}."]
-    over_db = {name: fmean([finding.over_db for finding in mine]) for name, mine in of_class.items()}
+    of_class = {
+        name: [finding for finding in findings if finding.category == name] for name in classes
+    }
+    shares = ", ".join(
+        f"{name} {fmean([finding.right for finding in mine]):.0%}"
+        for name, mine in of_class.items()
+    )
+    lines = [
+        f"The target's range cell, or one next to it, is chosen in {share:.0%} of the symbols: {shares}."
+    ]
+    over_db = {
+        name: fmean([finding.over_db for finding in mine]) for name, mine in of_class.items()
+    }
     if any(math.isfinite(level) for level in over_db.values()):
-        texts = (f"{name} {abs(level):.1f} dB {'above' if level >= 0 else 'below'}" for name, level in over_db.items())
-        lines.append(f"Behind the filters the target is, against the loudest cell of all else: {', '.join(texts)} it.")
-    better = {name: fmean([finding.otherwise[name] for finding in findings]) for name in findings[0].otherwise}
+        texts = (
+            f"{name} {abs(level):.1f} dB {'above' if level >= 0 else 'below'}"
+            for name, level in over_db.items()
+        )
+        lines.append(
+            f"Behind the filters the target is, against the loudest cell of all else: {', '.join(texts)} it."
+        )
+    better = {
+        name: fmean([finding.otherwise[name] for finding in findings])
+        for name in findings[0].otherwise
+    }
     best = max(better, key=better.__getitem__)
     if share < FOUND and better[best] > share + 0.05:
         lines.append(f"With {best} it would be {better[best]:.0%}.")
@@ -293,7 +375,9 @@ def verdict(findings: Sequence[Finding]) -> list[str]:
 
 
 def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
-    """Return one line per effect: by how much it changes signals, range cells and images, and its time."""
+    """Return one line per effect: by how much it changes signals, range cells and images, and its
+    time.
+    """
     more = list(dict.fromkeys(key for change in changes for key in change.more))
     columns = "".join(f"{key:>9}" for key in more)
     lines = [f"{'effect':<20} {'':<7} {'signal':>8} {'cells':>7} {columns}{'ms':>9}"]
@@ -304,41 +388,62 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
             continue
         shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
         cells = f"{_signal_text(change):>8} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
-        lines.append(f"{head}{cells}  {change.also}{f'its {change.part} left out' * bool(change.part)}".rstrip())
+        lines.append(
+            f"{head}{cells}  {change.also}{f'its {change.part} left out' * bool(change.part)}".rstrip()
+        )
     lines.append(
-        "named: without it; added: with it and its defaults. Shares of the signal's rms, of symbols, of pixels; "
-        "dB: how much the effect weakens (-) or strengthens (+) a signal that changes more than tenfold; "
+        "named: without it; added: with it and its defaults. Shares of the signal's rms, of "
+        "symbols, of pixels; "
+        "dB: how much the effect weakens (-) or strengthens (+) a signal that changes more than "
+        "tenfold; "
         "<: a time that the measurement cannot tell from zero."
     )
     if sources:
-        lines += [f"{change.effect}: {module_of(change.effect).SOURCE}" for change in changes if not change.part]
+        lines += [
+            f"{change.effect}: {module_of(change.effect).SOURCE}"
+            for change in changes
+            if not change.part
+        ]
     return lines
 
 
 def _signal_text(change: Change) -> str:
-    """The change of the signal as a share of it, or in dB where an effect hides or drowns nearly all of it."""
+    """The change of the signal as a share of it, or in dB where an effect hides or drowns nearly
+    all of it.
+    """
     if change.signal < 10:
         return f"{change.signal:.1%}"
     return f"{20 * math.log10(change.signal) * (-1 if change.named else 1):+.0f} dB"
 
 
 def cost_text(ms: float, spread_ms: float) -> str:
-    """Return a cost in ms; if it is negative or below its spread, the larger of both magnitudes behind a `<`."""
+    """Return a cost in ms; if it is negative or below its spread, the larger of both magnitudes
+    behind a `<`.
+    """
     return f"{ms:.1f}" if ms > spread_ms else f"<{max(spread_ms, -ms):.1f}"
 
 
 def suggested(overlay: dict, changes: Sequence[Change], least: float) -> str:
-    """Return a scene as YAML with those of its effects that change a signal by more than `least`, each with its share.
+    """Return a scene as YAML with those of its effects that change a signal by more than `least`,
+    each with its share.
 
     overlay: the scene's own blocks.
     """
     others = {key: value for key, value in overlay.items() if key != "effects"}
     lines = [yaml.safe_dump(others, sort_keys=False).rstrip()] if others else []
-    kept = [change for change in changes if change.named and not change.part and not change.signal <= least]
-    lines.append(f"# Effects that change a signal by more than {least:g} of its root mean square, and by how much.")
+    kept = [
+        change
+        for change in changes
+        if change.named and not change.part and not change.signal <= least
+    ]
+    lines.append(
+        f"# Effects that change a signal by more than {least:g} of its root mean square, and by how much."
+    )
     lines.append("effects:" if kept else "effects: {}")
     for change in kept:
-        block = yaml.safe_dump(overlay["effects"][change.effect] or {}, default_flow_style=True, width=1000)
+        block = yaml.safe_dump(
+            overlay["effects"][change.effect] or {}, default_flow_style=True, width=1000
+        )
         lines.append(f"  {change.effect}: {block.strip()}  # {change.signal:.2g}")
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,6 @@
-"""How late the symbols of a sample are, drawn again from its name: for spectra that know the instants."""
+"""How late the symbols of a sample are, drawn again from its name: for spectra that know the
+instants.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +13,9 @@ from lowalt.scene.effects import called, offering, only
 
 
 def late_effects(config: Mapping[str, Any]) -> dict[str, dict]:
-    """Return the part of a configuration's `effects` that sets the instants of symbols, if its spectra know them."""
+    """Return the part of a configuration's `effects` that sets the instants of symbols, if its
+    spectra know them.
+    """
     known = config["spectra"].get("times") == "known"
     return offering(config["effects"], "transmitter", "sampling") if known else {}
 
@@ -19,17 +23,21 @@ def late_effects(config: Mapping[str, Any]) -> dict[str, dict]:
 def lateness(
     spectra: Mapping[str, Any], effects: Mapping[str, Any], network: Network, seed: int, row: dict
 ) -> np.ndarray | None:
-    """Return how many symbol intervals each symbol came after its nominal instant, (stations, N); None for on time.
+    """Return how many symbol intervals each symbol came after its nominal instant, (stations, N);
+    None for on time.
 
-    spectra, effects: blocks of the configuration; row: motion table (subtype and model). None too where the spectra do
-    not ask for instants. The draws are those of the effect, so nothing has to be stored with the signals.
+    spectra, effects: blocks of the configuration; row: motion table (subtype and model). None too
+    where the spectra do not ask for instants. The draws are those of the effect, so nothing has to
+    be stored with the signals.
     """
     named = called(late_effects({"spectra": spectra, "effects": effects}))
     sampling = only(named, "sampling")
     if sampling is None:
         return None
     (effect,) = named
-    names = [(effect.name, row["subtype"], row["model"], station.name) for station in network.stations]
+    names = [
+        (effect.name, row["subtype"], row["model"], station.name) for station in network.stations
+    ]
     times_s = np.stack([sampling(network, stream(seed, "effect", *name)).times_s for name in names])
     late = (times_s - network.times_s) / network.symbol_interval_s
     return late if late.any() else None

@@ -1,7 +1,9 @@
-"""The levels of one sample at one station, as a link budget lists them: watts and gains in decibels.
+"""The levels of one sample at one station, as a link budget lists them: watts and gains in
+decibels.
 
-Powers are those of one subcarrier, or of one sample of an FMCW sweep, as the echo's amplitudes are. A range cell is the
-mean of M of them, so an echo keeps its level in its cell, while noise falls by 10 lg M.
+Powers are those of one subcarrier, or of one sample of an FMCW sweep, as the echo's amplitudes are.
+A range cell is the mean of M of them, so an echo keeps its level in its cell, while noise falls by
+10 lg M.
 """
 
 import math
@@ -38,32 +40,47 @@ def dbm(power_w: float) -> float:
 def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Level]:
     """Return the levels of a sample.
 
-    view: the sample, with the cross sections that the scene gives; effects: the scene's; echo_w: mean |Y_bin|^2 of the
-    target's echo as it arrives (W). The expected echo is the mean over aspects and motion in mid-beam and in the middle
-    of a range cell.
-    Source: radar equation, spec: alpha and a0; Skolnik, Introduction to Radar Systems, 3rd ed. 2001, ch. 1.
+    view: the sample, with the cross sections that the scene gives; effects: the scene's; echo_w:
+    mean |Y_bin|^2 of the target's echo as it arrives (W). The expected echo is the mean over
+    aspects and motion in mid-beam and in the middle of a range cell.
+    Source: radar equation, spec: alpha and a0; Skolnik, Introduction to Radar Systems, 3rd ed.
+    2001, ch. 1.
     """
-    network, link = view.network, view.station.transmitter is not None
+    network = view.network
+    link = view.station.transmitter is not None
     wavelength_m = SPEED_OF_LIGHT / network.carrier_hz
     out_m, back_m = (float(np.linalg.norm(view.origin_m - mast_m)) for mast_m in view.masts_m)
     ends = {"toward the target, each way": view.station}
     if link:
         ends = {"of the sender": view.station.transmitter, "of the receiver": view.station}
     gains = [
-        1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m)) for end in ends.values()
+        1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m))
+        for end in ends.values()
     ]
     budget = [
         Level(f"transmit power, {network.bin_name}", dbm(network.power), "dBm"),
         Level("transmit array", decibels(math.prod(network.transmit)), "dB"),
         Level("receive array", decibels(math.prod(network.receive)), "dB"),
-        *(Level(f"element {name}", decibels(gain), "dBi") for name, gain in zip(ends, gains, strict=True)),
-        Level(f"path, {out_m:.1f} m and {back_m:.1f} m, 1 m2" if link else f"path out and back, {out_m:.1f} m, 1 m2",
-              decibels(wavelength_m**2 / ((4 * math.pi) ** 3 * out_m**2 * back_m**2)), "dB"),
+        *(
+            Level(f"element {name}", decibels(gain), "dBi")
+            for name, gain in zip(ends, gains, strict=True)
+        ),
+        Level(
+            f"path, {out_m:.1f} m and {back_m:.1f} m, 1 m2"
+            if link
+            else f"path out and back, {out_m:.1f} m, 1 m2",
+            decibels(wavelength_m**2 / ((4 * math.pi) ** 3 * out_m**2 * back_m**2)),
+            "dB",
+        ),
         Level("mean cross section", decibels(mean_cross_section(view.cloud, wavelength_m)), "dBsm"),
-    ]  # fmt: skip
+    ]
     # A station's element counts twice.
     expected_dbm = sum(level.value for level in budget) + (0.0 if link else decibels(gains[0]))
-    whole = Level(f"transmit power, {network.subcarriers} subcarriers", dbm(network.power * network.subcarriers), "dBm")
+    whole = Level(
+        f"transmit power, {network.subcarriers} subcarriers",
+        dbm(network.power * network.subcarriers),
+        "dBm",
+    )
     return [
         *([whole] if network.waveform == "ofdm" else []),
         *budget,
@@ -75,10 +92,15 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
 
 def _beside(view: View, effects: Sequence[NamedEffect], expected_dbm: float) -> list[Level]:
     """Levels of what a scene adds to the target's echo, and the noise."""
-    network, result = view.network, []
+    network = view.network
+    result = []
     for lines in every(effects, "levels").values():
         for name, value, unit in lines(view):
-            result.append(Level(name, dbm(value), "dBm") if unit == "W" else Level(name, decibels(value), "dB"))
+            result.append(
+                Level(name, dbm(value), "dBm")
+                if unit == "W"
+                else Level(name, decibels(value), "dB")
+            )
     if noise_w := only(effects, "noise_w"):
         noise_dbm = dbm(noise_w(network))
         cell_dbm = noise_dbm - decibels(network.subcarriers)

@@ -16,7 +16,9 @@ from lowalt.targets.cloud import Cloud
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene: its network, seed, the echo engine's tolerance, and its effects in the chain's order."""
+    """A scene: its network, seed, the echo engine's tolerance, and its effects in the chain's
+    order.
+    """
 
     network: Network
     seed: int
@@ -29,25 +31,43 @@ class Scene:
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
         # Each SNR has a stream of its own, so its noise does not depend on the other SNRs.
-        levels = [effect.snr_db for effect in self.effects if effect.name == name and effect.snr_db is not None]
+        levels = [
+            effect.snr_db
+            for effect in self.effects
+            if effect.name == name and effect.snr_db is not None
+        ]
         # The stream of a user's own effect has the name of its file, wherever that lies.
-        return stream(self.seed, "effect", name.rpartition("/")[2], row["subtype"], row["model"], *ends, *levels)
+        return stream(
+            self.seed,
+            "effect",
+            name.rpartition("/")[2],
+            row["subtype"],
+            row["model"],
+            *ends,
+            *levels,
+        )
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
         """Return the random stream of an effect, or of another name, at a station, from its start.
 
-        An effect may share it (`contract`: STREAM) or draw for the whole look or the pair of a link's stations (DRAWN).
+        An effect may share it (`contract`: STREAM) or draw for the whole look or the pair of a
+        link's stations (DRAWN).
         """
         module = next((effect.module for effect in self.effects if effect.name == name), None)
-        name, drawn = getattr(module, "STREAM", name), getattr(module, "DRAWN", "station")
+        name = getattr(module, "STREAM", name)
+        drawn = getattr(module, "DRAWN", "station")
         if drawn == "look":
             return self.stream(name, row)
         if drawn == "pair" and station.transmitter is not None:
-            return self.stream(name, row, *sorted((station.transmitter.name, station.receiver.name)))
+            return self.stream(
+                name, row, *sorted((station.transmitter.name, station.receiver.name))
+            )
         return self.stream(name, row, station.name)
 
     def at_snr(self, snr_db: float) -> "Scene":
-        """Return the scene with noise in all range cells at this SNR (dB), instead of at each of noise.snr_db."""
+        """Return the scene with noise in all range cells at this SNR (dB), instead of at each of
+        noise.snr_db.
+        """
         changed = [effect.at_snr(snr_db) for effect in self.effects]
         return replace(self, effects=tuple(effect for effect in changed if not effect.idle))
 
@@ -56,31 +76,60 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     """Return the cloud with the cross sections that the scene gives its points."""
     wavelength_m = SPEED_OF_LIGHT / scene.network.carrier_hz
     for name, cross_sections in every(scene.effects, "cross_sections").items():
-        rcs_m2 = numbers(name, "cross_sections", cross_sections(cloud, wavelength_m), [cloud.rcs_m2.shape], real=True)
+        rcs_m2 = numbers(
+            name,
+            "cross_sections",
+            cross_sections(cloud, wavelength_m),
+            [cloud.rcs_m2.shape],
+            real=True,
+        )
         if (rcs_m2 < 0).any():
-            raise InputError(f"{name}: cross_sections gives {rcs_m2.min():g} m2, expected no number below 0")
+            raise InputError(
+                f"{name}: cross_sections gives {rcs_m2.min():g} m2, expected no number below 0"
+            )
         cloud = replace(cloud, rcs_m2=rcs_m2)
     return cloud
 
 
 def observe(
-    scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None, beside: View | None = None
+    scene: Scene,
+    station: Station,
+    cloud: Cloud,
+    row: dict,
+    occluders: dict | None = None,
+    beside: View | None = None,
 ) -> View:
-    """Return the view of a sample from a station, with the motion effects of the scene, which all stations share.
+    """Return the view of a sample from a station, with the motion effects of the scene, which all
+    stations share.
 
-    The view's cloud has the cross sections that the scene gives its points. occluders: the target's surfaces; beside:
-    of a companion, the view of the labelled target, whose instants and beams it shares.
+    The view's cloud has the cross sections that the scene gives its points. occluders: the target's
+    surfaces; beside: of a companion, the view of the labelled target, whose instants and beams it
+    shares.
     """
-    network, cloud = scene.network, with_cross_sections(scene, cloud)
+    network = scene.network
+    cloud = with_cross_sections(scene, cloud)
     grid_s = np.append(network.times_s, len(network.times_s) * network.symbol_interval_s)
     perturbing = every(scene.effects, "perturb")
     moved = Perturbations(
-        grid_s, tuple(perturb(cloud, row, grid_s, scene.stream(name, row)) for name, perturb in perturbing.items())
+        grid_s,
+        tuple(
+            perturb(cloud, row, grid_s, scene.stream(name, row))
+            for name, perturb in perturbing.items()
+        ),
     )
     if beside is not None:
         motion, places = located(cloud, row, beside.times_s, moved)
-        return replace(beside, cloud=cloud, row=row, motion=motion, places=places, moved=moved, occluders=occluders)
-    times_s, sampling = network.times_s, None
+        return replace(
+            beside,
+            cloud=cloud,
+            row=row,
+            motion=motion,
+            places=places,
+            moved=moved,
+            occluders=occluders,
+        )
+    times_s = network.times_s
+    sampling = None
     for name, sample in every(scene.effects, "sampling").items():
         sampling = sample(network, scene.stream(name, row, station.name))
         times_s = sampling.times_s
@@ -88,11 +137,23 @@ def observe(
     element = only(scene.effects, "element")
     origin_m = np.array([row["x_m"], row["y_m"], row["z_m"]])
     view = View(
-        network, station, cloud, row, times_s, motion, places, moved, origin_m, element=element() if element else None,
-        occluders=occluders, sampling=sampling,
-    )  # fmt: skip
+        network,
+        station,
+        cloud,
+        row,
+        times_s,
+        motion,
+        places,
+        moved,
+        origin_m,
+        element=element() if element else None,
+        occluders=occluders,
+        sampling=sampling,
+    )
     stations = [end for end in network.stations if end.transmitter is None]
     for name, beams in every(scene.effects, "beams").items():
-        drawn = {end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations}
+        drawn = {
+            end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations
+        }
         view = replace(view, beams=drawn)
     return view

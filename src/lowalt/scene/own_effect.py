@@ -1,8 +1,9 @@
-"""An effect of the user's own: a Python file that an overlay names by its path, `effects: {path/to/rain.py: {...}}`.
+"""An effect of the user's own: a Python file that an overlay names by its path, `effects:
+{path/to/rain.py: {...}}`.
 
-The file keeps the contract of effects (`lowalt.scene.contract`); its place is that of the functions that it offers, and
-it acts behind the shipped effects of that place. It runs with the rights of the user, so an overlay alone may name it
-(`lowalt.config.named_code`).
+The file keeps the contract of effects (`lowalt.scene.contract`); its place is that of the functions
+that it offers, and it acts behind the shipped effects of that place. It runs with the rights of the
+user, so an overlay alone may name it (`lowalt.config.named_code`).
 """
 
 import functools
@@ -19,7 +20,8 @@ from lowalt.scene.contract import OFFERS
 def loaded(name: str) -> ModuleType:
     """Return the module of the effect's file, run once for each of its contents.
 
-    Raises: InputError where there is no such file, it ends in an error, or it does not keep the contract.
+    Raises: InputError where there is no such file, it ends in an error, or it does not keep the
+    contract.
     """
     path = Path(name)
     if not path.is_file():
@@ -40,12 +42,18 @@ def _run(name: str, source: bytes) -> ModuleType:
 
 
 def kept_contract(name: str, module: ModuleType) -> ModuleType:
-    """Return the module of an effect from outside of the core. Raises: InputError where it breaks the contract."""
+    """Return the module of an effect from outside of the core. Raises: InputError where it breaks
+    the contract.
+    """
     defaults = getattr(module, "DEFAULTS", None)
     if not isinstance(defaults, dict) or not all(isinstance(key, str) for key in defaults):
-        raise InputError(f"effects: {name}: DEFAULTS is {str(defaults)[:100]}, expected every parameter with its value")
+        raise InputError(
+            f"effects: {name}: DEFAULTS is {str(defaults)[:100]}, expected every parameter with its value"
+        )
     if not isinstance(getattr(module, "SOURCE", None), str):
-        raise InputError(f"effects: {name}: no SOURCE, expected a text that says where its law comes from")
+        raise InputError(
+            f"effects: {name}: no SOURCE, expected a text that says where its law comes from"
+        )
     place_of(name, module)
     return module
 
@@ -53,9 +61,14 @@ def kept_contract(name: str, module: ModuleType) -> ModuleType:
 def place_of(name: str, module: ModuleType) -> str:
     """Return the place of an effect by the functions that it offers.
 
-    Raises: InputError where it offers none, functions of several places, or one with other arguments.
+    Raises: InputError where it offers none, functions of several places, or one with other
+    arguments.
     """
-    offered = {function: getattr(module, function) for function in OFFERS if callable(getattr(module, function, None))}
+    offered = {
+        function: getattr(module, function)
+        for function in OFFERS
+        if callable(getattr(module, function, None))
+    }
     places = {OFFERS[function].place for function in offered} - {""}
     if len(places) > 1 or not offered:
         raise InputError(
@@ -64,27 +77,37 @@ def place_of(name: str, module: ModuleType) -> str:
     for function, found in offered.items():
         takes = ("settings", *OFFERS[function].takes)
         if tuple(inspect.signature(found).parameters) != takes:
-            raise InputError(f"effects: {name}: expected {function}({', '.join(takes)}), as lowalt.scene.contract says")
+            raise InputError(
+                f"effects: {name}: expected {function}({', '.join(takes)}), as lowalt.scene.contract says"
+            )
     return places.pop() if places else "channel"
 
 
 def _kind(value: object) -> str:
     """The type of a value as sentences name it."""
-    for kinds, word in ((bool, "true or false"), ((int, float), "a number"), (str, "a text"), (list, "a list"),
-                        (dict, "a block")):  # fmt: skip
+    for kinds, word in (
+        (bool, "true or false"),
+        ((int, float), "a number"),
+        (str, "a text"),
+        (list, "a list"),
+        (dict, "a block"),
+    ):
         if isinstance(value, kinds):
             return word
     return "null"
 
 
 def checked(name: str, module: ModuleType, changed: dict) -> dict:
-    """Return the settings of an effect whose values have the types of its DEFAULTS; a default of None takes any.
+    """Return the settings of an effect whose values have the types of its DEFAULTS; a default of
+    None takes any.
 
     Raises: InputError naming the key and its value.
     """
     changed = {
         key: float(value)
-        if isinstance(value, str) and _kind(module.DEFAULTS.get(key)) == "a number" and NUMBER.fullmatch(value)
+        if isinstance(value, str)
+        and _kind(module.DEFAULTS.get(key)) == "a number"
+        and NUMBER.fullmatch(value)
         else value
         for key, value in changed.items()
     }

@@ -1,8 +1,10 @@
-"""Which points of a target a station cannot see: straight rays to the station against the target's moving triangles.
+"""Which points of a target a station cannot see: straight rays to the station against the target's
+moving triangles.
 
-In a part's own frame its triangles stand still, in a tree of boxes that is made once. The rays of a point in successive
-symbols differ little, so they traverse the tree together (`rays_loops`). Seen from a rotating part, the station circles
-the part's axis, so symbols are sorted by its azimuth first.
+In a part's own frame its triangles stand still, in a tree of boxes that is made once. The rays of a
+point in successive symbols differ little, so they traverse the tree together (`rays_loops`). Seen
+from a rotating part, the station circles the part's axis, so symbols are sorted by its azimuth
+first.
 """
 
 from collections.abc import Collection
@@ -21,7 +23,9 @@ LEAF = 4
 
 
 class Tree(NamedTuple):
-    """A part's triangles (F, 9), a corner and both edges, in a tree of boxes (2 B, 6) as `rays_loops` walks it."""
+    """A part's triangles (F, 9), a corner and both edges, in a tree of boxes (2 B, 6) as
+    `rays_loops` walks it.
+    """
 
     boxes: np.ndarray
     triangles: np.ndarray
@@ -41,24 +45,30 @@ class _Same(NamedTuple):
 
 
 def tree(corners: np.ndarray, closed: bool) -> Tree:
-    """Return the tree of triangles with `corners` (F, 3, 3) m: each node is split in halves along its longest side."""
+    """Return the tree of triangles with `corners` (F, 3, 3) m: each node is split in halves along
+    its longest side.
+    """
     leaves = 1
     while leaves * LEAF < len(corners):
         leaves *= 2
     # Incomplete leaves repeat the last triangle.
     whole = leaves * -(-len(corners) // leaves)
-    order, middles = np.minimum(np.arange(whole), len(corners) - 1)[None], corners.mean(axis=1)
+    order = np.minimum(np.arange(whole), len(corners) - 1)[None]
+    middles = corners.mean(axis=1)
     while len(order) < leaves:
         held = middles[order]
         side = np.ptp(held, axis=1).argmax(axis=1)[:, None, None]
         along = np.take_along_axis(held, side, axis=2)[..., 0]
         order = np.take_along_axis(order, along.argsort(axis=1), axis=1).reshape(2 * len(order), -1)
     corners = corners[order]
-    low, high = corners.min(axis=(1, 2)) - rays_loops.ROOM_M, corners.max(axis=(1, 2)) + rays_loops.ROOM_M
+    low = corners.min(axis=(1, 2)) - rays_loops.ROOM_M
+    high = corners.max(axis=(1, 2)) + rays_loops.ROOM_M
     boxes = np.empty((2 * leaves, 6))
     while leaves:
         boxes[leaves : 2 * leaves, :3], boxes[leaves : 2 * leaves, 3:] = low, high
-        low, high, leaves = low[::2], high[::2], leaves // 2
+        low = low[::2]
+        high = high[::2]
+        leaves = leaves // 2
         if leaves:
             low = np.minimum(low, boxes[2 * leaves + 1 : 4 * leaves : 2, :3])
             high = np.maximum(high, boxes[2 * leaves + 1 : 4 * leaves : 2, 3:])
@@ -72,51 +82,76 @@ def _trees(same: _Same) -> dict[int, Tree]:
     surfaces = same.surfaces
     corners = np.asarray(surfaces["vertices"], np.float64)[surfaces["faces"]]
     owner = surfaces["vertex_part"][surfaces["faces"][:, 0]]
-    return {int(part): tree(corners[owner == part], bool(surfaces["closed"][part])) for part in np.unique(owner)}
+    return {
+        int(part): tree(corners[owner == part], bool(surfaces["closed"][part]))
+        for part in np.unique(owner)
+    }
 
 
 def _around(axis: np.ndarray, rotation: np.ndarray, toward: np.ndarray) -> np.ndarray:
-    """Symbols (N,), sorted by the azimuth of the station, in direction `toward` (N, 3), around a part's axis (3,)."""
+    """Symbols (N,), sorted by the azimuth of the station, in direction `toward` (N, 3), around a
+    part's axis (3,).
+    """
     seen = portable.applied(rotation.swapaxes(1, 2), toward)
     right = np.cross(axis, np.eye(3)[abs(axis).argmin()])
     right /= portable.norm(right)
-    along, across = portable.dot(seen, right), portable.dot(seen, np.cross(axis, right))
+    along = portable.dot(seen, right)
+    across = portable.dot(seen, np.cross(axis, right))
     return portable.arctan2(across, along).argsort(kind="stable")
 
 
 def hidden_by(
-    surfaces: dict, place_m: np.ndarray, motion: Rigid, axes: np.ndarray, toward: np.ndarray, casts: Collection[int],
+    surfaces: dict,
+    place_m: np.ndarray,
+    motion: Rigid,
+    axes: np.ndarray,
+    toward: np.ndarray,
+    casts: Collection[int],
     hidden: np.ndarray,
-) -> None:  # fmt: skip
-    """Set hidden (N, L) where a triangle of the parts `casts` stands between a point and the station at place_m (3,).
+) -> None:
+    """Set hidden (N, L) where a triangle of the parts `casts` stands between a point and the
+    station at place_m (3,).
 
-    motion: poses, and points (L, 3) moved off their own surface, in their parts' frames (m); axes (P, 3): rotation axes
-    in the parts' frames, NaN for parts that do not rotate; toward (L,): the share of the way to the station by which a
-    point without a normal is moved instead. Points that are already hidden are skipped. The normals of a closed surface
-    point outward, and only its faces turned to the station hide anything.
+    motion: poses, and points (L, 3) moved off their own surface, in their parts' frames (m); axes
+    (P, 3): rotation axes in the parts' frames, NaN for parts that do not rotate; toward (L,): the
+    share of the way to the station by which a point without a normal is moved instead. Points that
+    are already hidden are skipped. The normals of a closed surface point outward, and only its
+    faces turned to the station hide anything.
     """
     rotation, translation, points, part = map(np.ascontiguousarray, motion)
-    moved, strip = (rotation, translation, points, part.astype(np.int64)), rays_loops.STRIP
+    moved = (rotation, translation, points, part.astype(np.int64))
+    strip = rays_loops.STRIP
     turns = np.isfinite(axes).all(axis=1)
     orders = [
-        _around(axes[p], rotation[:, p], place_m - translation[:, p]) if turns[p] else np.arange(len(rotation))
+        _around(axes[p], rotation[:, p], place_m - translation[:, p])
+        if turns[p]
+        else np.arange(len(rotation))
         for p in range(len(axes))
     ]
     # The last strip is padded with its last symbol.
-    strips = [np.pad(order, (0, -len(order) % strip), "edge").reshape(-1, strip) for order in orders]
-    count, result = len(strips[0]), np.ascontiguousarray(hidden.T)
+    strips = [
+        np.pad(order, (0, -len(order) % strip), "edge").reshape(-1, strip) for order in orders
+    ]
+    count = len(strips[0])
+    result = np.ascontiguousarray(hidden.T)
     work = tuple(map(np.empty, ((count, 15, strip), (9, strip), 12, strip)))
     trees = {p: held for p, held in _trees(_Same(surfaces)).items() if p in casts}
     # A point's own part, which hides it most often, comes first.
     for p, q in sorted(product(trees, range(len(axes))), key=lambda pair: pair[0] != pair[1]):
-        rays_loops.cast(trees[p], moved, place_m, strips[p if turns[p] else q], (p, q), toward, work, result)
+        rays_loops.cast(
+            trees[p], moved, place_m, strips[p if turns[p] else q], (p, q), toward, work, result
+        )
     hidden[:] = result.T
 
 
-def hidden_by_bones(surfaces: dict, place_m: np.ndarray, nodes: np.ndarray, hidden: np.ndarray) -> None:
-    """Set hidden (N, L) where a capsule around a bone stands between a node of nodes (N, L, 3) m and the station.
+def hidden_by_bones(
+    surfaces: dict, place_m: np.ndarray, nodes: np.ndarray, hidden: np.ndarray
+) -> None:
+    """Set hidden (N, L) where a capsule around a bone stands between a node of nodes (N, L, 3) m
+    and the station.
 
-    place_m: the station's place (3,). A capsule hides neither nodes inside it nor the ends of its bone.
+    place_m: the station's place (3,). A capsule hides neither nodes inside it nor the ends of its
+    bone.
     """
     result = np.ascontiguousarray(hidden.T)
     apart = np.ascontiguousarray(nodes.transpose(1, 2, 0))

@@ -1,7 +1,8 @@
-"""The compiled loops of `rays`: the rays of one point in many symbols traverse a part's tree of boxes together.
+"""The compiled loops of `rays`: the rays of one point in many symbols traverse a part's tree of
+boxes together.
 
-A bundle is the rays of one point in STRIP symbols. Boxes that none of its rays can meet are skipped; leaves and
-triangles are tested against all its rays at once, in vector instructions.
+A bundle is the rays of one point in STRIP symbols. Boxes that none of its rays can meet are
+skipped; leaves and triangles are tested against all its rays at once, in vector instructions.
 """
 
 import math
@@ -20,35 +21,57 @@ FLAT = 1e-12
 
 @INNER_ORDERED
 def _relative(rotation, translation, place, symbols, pair, pose):
-    """Fill pose (15, STRIP) for some symbols: turn and shift of part q as part p sees it, and the station there."""
+    """Fill pose (15, STRIP) for some symbols: turn and shift of part q as part p sees it, and the
+    station there.
+    """
     p, q = pair
     for k in range(STRIP):
-        turn_p, turn_q, from_p = rotation[symbols[k], p], rotation[symbols[k], q], translation[symbols[k], p]
+        turn_p = rotation[symbols[k], p]
+        turn_q = rotation[symbols[k], q]
+        from_p = translation[symbols[k], p]
         from_q = translation[symbols[k], q]
         # A pose's matrix is a rotation: its inverse is its transpose.
         for i in range(3):
-            a, b, c = turn_p[0, i], turn_p[1, i], turn_p[2, i]
+            a = turn_p[0, i]
+            b = turn_p[1, i]
+            c = turn_p[2, i]
             for j in range(3):
                 pose[3 * i + j, k] = a * turn_q[0, j] + b * turn_q[1, j] + c * turn_q[2, j]
-            pose[9 + i, k] = a * (from_q[0] - from_p[0]) + b * (from_q[1] - from_p[1]) + c * (from_q[2] - from_p[2])
-            pose[12 + i, k] = a * (place[0] - from_p[0]) + b * (place[1] - from_p[1]) + c * (place[2] - from_p[2])
+            pose[9 + i, k] = (
+                a * (from_q[0] - from_p[0])
+                + b * (from_q[1] - from_p[1])
+                + c * (from_q[2] - from_p[2])
+            )
+            pose[12 + i, k] = (
+                a * (place[0] - from_p[0]) + b * (place[1] - from_p[1]) + c * (place[2] - from_p[2])
+            )
 
 
 @INNER_ORDERED
 def _span(values):
     """Return the middle of values and their largest distance from it, with the margin."""
-    low, high = np.inf, -np.inf
+    low = np.inf
+    high = -np.inf
     for k in range(STRIP):
-        low, high = min(low, values[k]), max(high, values[k])
+        low = min(low, values[k])
+        high = max(high, values[k])
     return 0.5 * (low + high), 0.5 * (high - low) + ROOM_M
 
 
 @INNER_ORDERED
 def _sent(pose, point, toward, ray, bundle):
-    """Fill ray (9, STRIP) with starts, ways to the station and their inverses; and bundle (12,), boxes around them."""
+    """Fill ray (9, STRIP) with starts, ways to the station and their inverses; and bundle (12,),
+    boxes around them.
+    """
     for i in range(3):
-        r0, r1, r2, t, s = pose[3 * i], pose[3 * i + 1], pose[3 * i + 2], pose[9 + i], pose[12 + i]
-        start, way, over = ray[i], ray[3 + i], ray[6 + i]
+        r0 = pose[3 * i]
+        r1 = pose[3 * i + 1]
+        r2 = pose[3 * i + 2]
+        t = pose[9 + i]
+        s = pose[12 + i]
+        start = ray[i]
+        way = ray[3 + i]
+        over = ray[6 + i]
         for k in range(STRIP):
             at = r0[k] * point[0] + r1[k] * point[1] + r2[k] * point[2] + t[k]
             start[k] = at + toward * (s[k] - at)
@@ -60,15 +83,33 @@ def _sent(pose, point, toward, ray, bundle):
 
 @INNER_ORDERED
 def can_meet(bundle, box):
-    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along it separates them.
+    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along
+    it separates them.
 
-    Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by the spread of the rays.
+    Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by the
+    spread of the rays.
     """
-    u, v, w, f, g, h = bundle[3], bundle[4], bundle[5], bundle[9], bundle[10], bundle[11]
-    i, j, k = 0.5 * (box[3] - box[0]), 0.5 * (box[4] - box[1]), 0.5 * (box[5] - box[2])
-    a, b, c = box[0] + i - bundle[0], box[1] + j - bundle[1], box[2] + k - bundle[2]
-    i, j, k = i + bundle[6], j + bundle[7], k + bundle[8]
-    p, q, r, x, y, z = abs(u) + f, abs(v) + g, abs(w) + h, abs(a), abs(b), abs(c)
+    u = bundle[3]
+    v = bundle[4]
+    w = bundle[5]
+    f = bundle[9]
+    g = bundle[10]
+    h = bundle[11]
+    i = 0.5 * (box[3] - box[0])
+    j = 0.5 * (box[4] - box[1])
+    k = 0.5 * (box[5] - box[2])
+    a = box[0] + i - bundle[0]
+    b = box[1] + j - bundle[1]
+    c = box[2] + k - bundle[2]
+    i = i + bundle[6]
+    j = j + bundle[7]
+    k = k + bundle[8]
+    p = abs(u) + f
+    q = abs(v) + g
+    r = abs(w) + h
+    x = abs(a)
+    y = abs(b)
+    z = abs(c)
     return (
         abs(b * w - c * v) <= j * r + k * q + y * h + z * g
         and abs(c * u - a * w) <= k * p + i * r + z * f + x * h
@@ -79,14 +120,29 @@ def can_meet(bundle, box):
 
 @INNER_ORDERED
 def _meets(ray, free, box):
-    """Whether a free ray meets a box (6,) between its start and the station: it is in all three slabs at once."""
-    x, y, z, u, v, w = ray[0], ray[1], ray[2], ray[6], ray[7], ray[8]
-    a, b, c, d, e, f = box[0], box[1], box[2], box[3], box[4], box[5]
+    """Whether a free ray meets a box (6,) between its start and the station: it is in all three
+    slabs at once.
+    """
+    x = ray[0]
+    y = ray[1]
+    z = ray[2]
+    u = ray[6]
+    v = ray[7]
+    w = ray[8]
+    a = box[0]
+    b = box[1]
+    c = box[2]
+    d = box[3]
+    e = box[4]
+    f = box[5]
     most = 0.0
     for k in range(STRIP):
-        a0, a1 = (a - x[k]) * u[k], (d - x[k]) * u[k]
-        b0, b1 = (b - y[k]) * v[k], (e - y[k]) * v[k]
-        c0, c1 = (c - z[k]) * w[k], (f - z[k]) * w[k]
+        a0 = (a - x[k]) * u[k]
+        a1 = (d - x[k]) * u[k]
+        b0 = (b - y[k]) * v[k]
+        b1 = (e - y[k]) * v[k]
+        c0 = (c - z[k]) * w[k]
+        c1 = (f - z[k]) * w[k]
         enters = max(max(min(a0, a1), min(b0, b1)), max(min(c0, c1), 0.0))
         leaves = min(min(max(a0, a1), max(b0, b1)), min(max(c0, c1), 1.0))
         most = max(most, free[k] if enters <= leaves else 0.0)
@@ -95,21 +151,45 @@ def _meets(ray, free, box):
 
 @INNER_ORDERED
 def _shadow(triangle, closed, ray, free):
-    """Set free (STRIP,) to 0 where rays meet a triangle (9,): a corner and both edges; Moeller & Trumbore 1997.
+    """Set free (STRIP,) to 0 where rays meet a triangle (9,): a corner and both edges; Moeller &
+    Trumbore 1997.
 
     Of a closed surface with outward normals, only faces turned to the station hide anything.
     """
-    a0, a1, a2, d0, d1, d2 = triangle[0], triangle[1], triangle[2], triangle[3], triangle[4], triangle[5]
-    e0, e1, e2, largest = triangle[6], triangle[7], triangle[8], 0.0 if closed else np.inf
-    x, y, z, us, vs, ws = ray[0], ray[1], ray[2], ray[3], ray[4], ray[5]
+    a0 = triangle[0]
+    a1 = triangle[1]
+    a2 = triangle[2]
+    d0 = triangle[3]
+    d1 = triangle[4]
+    d2 = triangle[5]
+    e0 = triangle[6]
+    e1 = triangle[7]
+    e2 = triangle[8]
+    largest = 0.0 if closed else np.inf
+    x = ray[0]
+    y = ray[1]
+    z = ray[2]
+    us = ray[3]
+    vs = ray[4]
+    ws = ray[5]
     for k in range(STRIP):
-        u, v, w, o0, o1, o2 = us[k], vs[k], ws[k], x[k] - a0, y[k] - a1, z[k] - a2
-        h0, h1, h2 = v * e2 - w * e1, w * e0 - u * e2, u * e1 - v * e0
-        q0, q1, q2 = o1 * d2 - o2 * d1, o2 * d0 - o0 * d2, o0 * d1 - o1 * d0
+        u = us[k]
+        v = vs[k]
+        w = ws[k]
+        o0 = x[k] - a0
+        o1 = y[k] - a1
+        o2 = z[k] - a2
+        h0 = v * e2 - w * e1
+        h1 = w * e0 - u * e2
+        h2 = u * e1 - v * e0
+        q0 = o1 * d2 - o2 * d1
+        q1 = o2 * d0 - o0 * d2
+        q2 = o0 * d1 - o1 * d0
         turned = d0 * h0 + d1 * h1 + d2 * h2
         sign = 1.0 if turned > 0.0 else -1.0
         whole = sign * turned
-        first, second = sign * (o0 * h0 + o1 * h1 + o2 * h2), sign * (u * q0 + v * q1 + w * q2)
+        first = sign * (o0 * h0 + o1 * h1 + o2 * h2)
+        second = sign * (u * q0 + v * q1 + w * q2)
         way = sign * (e0 * q0 + e1 * q1 + e2 * q2)
         # A ray in the triangle's plane has turned = 0, and then `way` is not between 0 and it.
         met = (turned <= largest) & (first >= 0.0) & (second >= 0.0) & (first + second <= whole)
@@ -129,13 +209,15 @@ def _left(triangles, first, count, closed, ray, free):
 
 @INNER_ORDERED
 def _walk(boxes, triangles, closed, ray, bundle, free, last):
-    """Set free (STRIP,) to 0 where rays meet a part's triangles; return the leaf that hid the last one, 0 for none.
+    """Set free (STRIP,) to 0 where rays meet a part's triangles; return the leaf that hid the last
+    one, 0 for none.
 
-    boxes (2 B, 6): node k holds nodes 2 k and 2 k + 1, the root is node 1, and nodes from B on are the leaves, whose
-    triangles (F, 9) follow each other. last: the leaf to begin with, 0 for none.
+    boxes (2 B, 6): node k holds nodes 2 k and 2 k + 1, the root is node 1, and nodes from B on are
+    the leaves, whose triangles (F, 9) follow each other. last: the leaf to begin with, 0 for none.
     """
     leaves = len(boxes) // 2
-    size, node = len(triangles) // leaves, 1
+    size = len(triangles) // leaves
+    node = 1
     if last > 0 and not _left(triangles, (last - leaves) * size, size, closed, ray, free):
         return last
     while True:
@@ -143,7 +225,9 @@ def _walk(boxes, triangles, closed, ray, bundle, free, last):
             if node < leaves:
                 node *= 2
                 continue
-            if _meets(ray, free, boxes[node]) and not _left(triangles, (node - leaves) * size, size, closed, ray, free):
+            if _meets(ray, free, boxes[node]) and not _left(
+                triangles, (node - leaves) * size, size, closed, ray, free
+            ):
                 return node
         # The next node that is not inside this one.
         node += 1
@@ -155,11 +239,13 @@ def _walk(boxes, triangles, closed, ray, bundle, free, last):
 
 @ORDERED
 def cast(tree, motion, place, order, pair, toward, work, hidden):
-    """Set hidden (L, N) where triangles of part p stand between points of part q and the station at `place` (3,).
+    """Set hidden (L, N) where triangles of part p stand between points of part q and the station at
+    `place` (3,).
 
     tree: `rays.Tree` of p; motion: as in `rays.hidden_by`; order (strips, STRIP):
-    symbols of each bundle, where one may come twice; pair: (p, q); toward (L,): as in `rays.hidden_by`; work: poses
-    (strips, 15, STRIP), ray (9, STRIP), bundle (12,) and free (STRIP,).
+    symbols of each bundle, where one may come twice; pair: (p, q); toward (L,): as in
+    `rays.hidden_by`; work: poses (strips, 15, STRIP), ray (9, STRIP), bundle (12,) and free
+    (STRIP,).
     """
     (boxes, triangles, closed), (rotation, translation, points, part) = tree, motion
     poses, ray, bundle, free = work
@@ -168,7 +254,8 @@ def cast(tree, motion, place, order, pair, toward, work, hidden):
     for l in range(len(points)):  # noqa: E741
         last = 0
         for strip in range(len(order) if part[l] == pair[1] else 0):
-            symbols, left = order[strip], 0.0
+            symbols = order[strip]
+            left = 0.0
             for k in range(STRIP):
                 free[k] = 0.0 if hidden[l, symbols[k]] else 1.0
                 left += free[k]
@@ -182,22 +269,41 @@ def cast(tree, motion, place, order, pair, toward, work, hidden):
 
 @INNER_ORDERED
 def _capsule(node, first, second, place, square, hidden):
-    """Set hidden (N,) where the rays p + s d, s > 0, from nodes (3, N) come within a capsule round a bone, a + t e.
+    """Set hidden (N,) where the rays p + s d, s > 0, from nodes (3, N) come within a capsule round
+    a bone, a + t e.
 
-    first, second (3, N): the bone's ends; square (m^2): of its radius. A node inside the capsule is not hidden by it.
+    first, second (3, N): the bone's ends; square (m^2): of its radius. A node inside the capsule is
+    not hidden by it.
     """
-    p0, p1, p2, a0, a1, a2 = node[0], node[1], node[2], first[0], first[1], first[2]
+    p0 = node[0]
+    p1 = node[1]
+    p2 = node[2]
+    a0 = first[0]
+    a1 = first[1]
+    a2 = first[2]
     for n in range(np.uint64(len(hidden))):
-        d0, d1, d2 = place[0] - p0[n], place[1] - p1[n], place[2] - p2[n]
+        d0 = place[0] - p0[n]
+        d1 = place[1] - p1[n]
+        d2 = place[2] - p2[n]
         length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-        d0, d1, d2 = d0 / length, d1 / length, d2 / length
-        e0, e1, e2 = second[0, n] - a0[n], second[1, n] - a1[n], second[2, n] - a2[n]
-        w0, w1, w2 = a0[n] - p0[n], a1[n] - p1[n], a2[n] - p2[n]
-        ee, ww = e0 * e0 + e1 * e1 + e2 * e2, w0 * w0 + w1 * w1 + w2 * w2
-        de, dw, ew = d0 * e0 + d1 * e1 + d2 * e2, d0 * w0 + d1 * w1 + d2 * w2, e0 * w0 + e1 * w1 + e2 * w2
+        d0 = d0 / length
+        d1 = d1 / length
+        d2 = d2 / length
+        e0 = second[0, n] - a0[n]
+        e1 = second[1, n] - a1[n]
+        e2 = second[2, n] - a2[n]
+        w0 = a0[n] - p0[n]
+        w1 = a1[n] - p1[n]
+        w2 = a2[n] - p2[n]
+        ee = e0 * e0 + e1 * e1 + e2 * e2
+        ww = w0 * w0 + w1 * w1 + w2 * w2
+        de = d0 * e0 + d1 * e1 + d2 * e2
+        dw = d0 * w0 + d1 * w1 + d2 * w2
+        ew = e0 * w0 + e1 * w1 + e2 * w2
         near = min(max(-ew / ee, 0.0), 1.0) if ee > 0.0 else 0.0
         inside = ww + near * (2.0 * ew + near * ee) <= square
-        # With the best s for each t the distance is a convex function of t, so the best t is its minimum or an end.
+        # With the best s for each t the distance is a convex function of t, so the best t is its
+        # minimum or an end.
         across = ee - de * de
         t = min(max((de * dw - ew) / across, 0.0), 1.0) if across > FLAT * ee else near
         s = dw + t * de
@@ -207,13 +313,22 @@ def _capsule(node, first, second, place, square, hidden):
 
 @ORDERED
 def capsules(place, nodes, bones, radius_m, hidden):
-    """Set hidden (L, N) where a capsule round a bone stands between a node, nodes (L, 3, N) m, and the station.
+    """Set hidden (L, N) where a capsule round a bone stands between a node, nodes (L, 3, N) m, and
+    the station.
 
-    bones (B, 2): nodes at the ends of each; radius_m (B,). A node stands for the skin around it: a capsule hides
-    neither nodes inside it nor the ends of its bone.
+    bones (B, 2): nodes at the ends of each; radius_m (B,). A node stands for the skin around it: a
+    capsule hides neither nodes inside it nor the ends of its bone.
     """
     for l in range(len(nodes)):  # noqa: E741
         for b in range(len(bones)):
-            first, second = bones[b, 0], bones[b, 1]
+            first = bones[b, 0]
+            second = bones[b, 1]
             if l not in (first, second):
-                _capsule(nodes[l], nodes[first], nodes[second], place, radius_m[b] * radius_m[b], hidden[l])
+                _capsule(
+                    nodes[l],
+                    nodes[first],
+                    nodes[second],
+                    place,
+                    radius_m[b] * radius_m[b],
+                    hidden[l],
+                )

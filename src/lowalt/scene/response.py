@@ -1,9 +1,10 @@
-"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths; squint and spherical waves on request.
+"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths; squint and spherical
+waves on request.
 
-A target fills few range cells, so its response is a smooth function of frequency. In each symbol, the excess ranges of
-the points are summed into Chebyshev moments, at one frequency of the band or, where array sums depend on frequency, at
-a few. Two matrix products turn the moments into all M subcarriers, so that no array of symbols x points x subcarriers
-is needed:
+A target fills few range cells, so its response is a smooth function of frequency. In each symbol,
+the excess ranges of the points are summed into Chebyshev moments, at one frequency of the band or,
+where array sums depend on frequency, at a few. Two matrix products turn the moments into all M
+subcarriers, so that no array of symbols x points x subcarriers is needed:
 
     exp(-j B x u) = sum over p of eps_p (-j)^p J_p(B x) T_p(u),   |u| <= 1.
 """
@@ -28,9 +29,11 @@ ERROR = 1e-11
 class ImagePath(NamedTuple):
     """A one-way propagation path between a station and every point, given by the points' images.
 
-    places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's complex factor in
-    addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image, where the points see the station;
-    sender: on a link, the path of the same kind between the sender and the points, None where both are alike.
+    places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's
+    complex factor in addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image,
+    where the points see the station;
+    sender: on a link, the path of the same kind between the sender and the points, None where both
+    are alike.
     """
 
     places: np.ndarray
@@ -45,26 +48,39 @@ class ImagePath(NamedTuple):
 
 
 def response(
-    view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float = 1.0, *, squint: bool = False,
+    view: View,
+    paths: Sequence[ImagePath] = (),
+    factor: np.ndarray | float = 1.0,
+    *,
+    squint: bool = False,
     wavefront: bool = False,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return the subcarriers Y (N, M) complex128 of a view's target, the known symbol removed.
 
-    paths: all but the direct one; waves go out on any path and return on any; factor: real factor on each point's
-    two-way amplitude, (N, L), or (R, R, N, L) by outward and return path, the direct path first; squint: array phases
-    follow the frequency of each subcarrier, beam weights do not; wavefront: elements see spherical waves. On a link,
-    waves leave from the transmitter's array and return to the receiver's.
-    Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger expansion; Willis,
-    Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
+    paths: all but the direct one; waves go out on any path and return on any; factor: real factor
+    on each point's two-way amplitude, (N, L), or (R, R, N, L) by outward and return path, the
+    direct path first; squint: array phases follow the frequency of each subcarrier, beam weights do
+    not; wavefront: elements see spherical waves. On a link, waves leave from the transmitter's
+    array and return to the receiver's.
+    Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger
+    expansion; Willis, Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
-    network, station = view.network, view.station
-    every, strength = [ImagePath(view.places), *paths], _amplitudes(view, factor)
+    network = view.network
+    station = view.station
+    every = [ImagePath(view.places), *paths]
+    strength = _amplitudes(view, factor)
     ends = [_end(view, station, network.receive, every, (squint, wavefront))]
     same = station.transmitter is None and network.transmit == network.receive
     if not same:
         outward = [path.outward for path in every]
-        ends.insert(0, _end(view, station.transmitter or station, network.transmit, outward, (squint, wavefront)))
-    out, back = ends[0], ends[-1]
+        ends.insert(
+            0,
+            _end(
+                view, station.transmitter or station, network.transmit, outward, (squint, wavefront)
+            ),
+        )
+    out = ends[0]
+    back = ends[-1]
     points = back.places[0]
     reach = float(np.sqrt(np.square(points - points.mean(axis=2, keepdims=True)).sum(axis=1).max()))
     if squint:
@@ -90,15 +106,25 @@ def response(
         weight = 2.0 if same and a != b else 1.0
         bands = over_band(weight * result[a, b].reshape(len(view.times_s), -1), tables)
         range_m = out.centre[a] + back.centre[b]
-        response_loops.add_turned(bands, -out.turns * range_m, -range_m * band_m / network.subcarriers, total)
+        response_loops.add_turned(
+            bands, -out.turns * range_m, -range_m * band_m / network.subcarriers, total
+        )
     return total
 
 
 def _amplitudes(view: View, factor: np.ndarray | float) -> np.ndarray:
-    """Amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance, a0 lambda sqrt(sigma) / (4 pi)^1.5."""
-    strength = radar(view.network, view.station).scale * np.sqrt(view.cloud.rcs_m2) * np.asarray(factor, np.float64)
+    """Amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance, a0 lambda
+    sqrt(sigma) / (4 pi)^1.5.
+    """
+    strength = (
+        radar(view.network, view.station).scale
+        * np.sqrt(view.cloud.rcs_m2)
+        * np.asarray(factor, np.float64)
+    )
     strength = strength.reshape((1,) * (4 - strength.ndim) + strength.shape)
-    return np.ascontiguousarray(np.broadcast_to(strength, (*strength.shape[:2], *view.places.shape[:2])))
+    return np.ascontiguousarray(
+        np.broadcast_to(strength, (*strength.shape[:2], *view.places.shape[:2]))
+    )
 
 
 def _half_diagonal(counts: np.ndarray) -> float:
@@ -107,45 +133,72 @@ def _half_diagonal(counts: np.ndarray) -> float:
 
 
 def cosines(station: Station, places: np.ndarray) -> np.ndarray:
-    """Return the direction cosines (..., 2), across and up, of places (..., 3) m as a station's array sees them."""
+    """Return the direction cosines (..., 2), across and up, of places (..., 3) m as a station's
+    array sees them.
+    """
     away = places - np.asarray(station.position_m)
     across = portable.dot(away, station.horizontal)
     return np.stack([across, away[..., 2]], axis=-1) / portable.norm(away)[..., None]
 
 
 def _end(
-    view: View, station: Station, counts: tuple[int, int], paths: Sequence[ImagePath], physics: tuple[bool, bool]
+    view: View,
+    station: Station,
+    counts: tuple[int, int],
+    paths: Sequence[ImagePath],
+    physics: tuple[bool, bool],
 ) -> response_loops.End:
     """One end's array and paths as the loops take them; physics: squint and wavefront."""
     network, (squint, wavefront) = view.network, physics
     # On a link, all frequencies are those of the signal, which is the transmitter's.
-    radio, beams = radar(network, view.station), view.beams_of(station)
+    radio = radar(network, view.station)
+    beams = view.beams_of(station)
     # Rounding must not put the instant of a beam update before that update.
     current = np.searchsorted(beams.starts_s, view.times_s + 1e-9, side="right") - 1
-    images = np.stack([np.ascontiguousarray(path.places.swapaxes(1, 2), np.float64) for path in paths])
+    images = np.stack(
+        [np.ascontiguousarray(path.places.swapaxes(1, 2), np.float64) for path in paths]
+    )
     coefficient = np.stack(
-        [np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths]
+        [
+            np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2])
+            for path in paths
+        ]
     )
     mast_m = np.array(station.position_m, np.float64)
     end = response_loops.End(
-        mast_m, station.horizontal[:2].copy(), np.array(counts), SPEED_OF_LIGHT / (2.0 * network.carrier_hz),
-        radio.kappa, frequencies(network, view.station, squint), squint, radio.centre_hz / SPEED_OF_LIGHT,
-        cosines(station, beams.aims_m)[current], images, coefficient,
-        # Reflection keeps distances, so images lie around their mean as the points do around theirs.
-        portable.norm(images.mean(axis=3) - mast_m), np.empty((0, 0, 0, 0), np.complex128),
-    )  # fmt: skip
+        mast_m,
+        station.horizontal[:2].copy(),
+        np.array(counts),
+        SPEED_OF_LIGHT / (2.0 * network.carrier_hz),
+        radio.kappa,
+        frequencies(network, view.station, squint),
+        squint,
+        radio.centre_hz / SPEED_OF_LIGHT,
+        cosines(station, beams.aims_m)[current],
+        images,
+        coefficient,
+        # Reflection keeps distances, so images lie around their mean as the points do around
+        # theirs.
+        portable.norm(images.mean(axis=3) - mast_m),
+        np.empty((0, 0, 0, 0), np.complex128),
+    )
     return end._replace(gains=spherical.gains(end, ERROR)) if wavefront else end
 
 
 def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
-    """Return the frequencies (Q,), over the carrier, at which array sums are computed: Chebyshev points of the band.
+    """Return the frequencies (Q,), over the carrier, at which array sums are computed: Chebyshev
+    points of the band.
 
-    Their number follows from the elements' paths relative to the array's middle. Without squint, array sums are those
-    at the lowest subcarrier.
+    Their number follows from the elements' paths relative to the array's middle. Without squint,
+    array sums are those at the lowest subcarrier.
     """
     lowest = radar(network, station).kappa
     half = 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz / network.carrier_hz
     if not squint or half == 0.0:
         return np.array([lowest])
-    spread = np.pi * half * (_half_diagonal(np.array(network.transmit)) + _half_diagonal(np.array(network.receive)))
+    spread = (
+        np.pi
+        * half
+        * (_half_diagonal(np.array(network.transmit)) + _half_diagonal(np.array(network.receive)))
+    )
     return lowest + half + half * chebyshev_points(orders_of(spread, ERROR))

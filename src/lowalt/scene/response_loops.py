@@ -11,8 +11,8 @@ CHUNK = 128
 """Points per chunk, so few that their polynomials fit into the first-level cache."""
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 
-# cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2 on [-1/2, 1/2], to rounding; written out one by one, all steps
-# stay in registers.
+# cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2 on [-1/2, 1/2], to rounding; written out one
+# by one, all steps stay in registers.
 _C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10, _C11 = smooth("cosine", 11)[0].tolist()
 _S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11 = smooth("sine", 11)[0].tolist()
 
@@ -32,12 +32,14 @@ def phasor(turns):
 class End(NamedTuple):
     """One station's array and its R paths to L points at N symbols.
 
-    station: (3,) m; axes: (2,) horizontal axis (-sin Theta, cos Theta); counts: (2,) elements across and up;
-    spacing: between elements (m); beam: f_k / f0; kappas: (Q,) frequencies over the carrier at which array sums are
-    taken; squint: whether they also set the phase of the array's middle; turns: f_c / c, turns a metre of one way;
-    aims: (N, 2) direction cosines of the beam; places: (R, N, 3, L) m, images of the points; coefficient:
-    (R, N, L) complex; centre: (R, N) m, range to which excess ranges refer; gains: (R, N, Q, L) complex array sums of
-    spherical waves, without any entry for plane waves.
+    station: (3,) m; axes: (2,) horizontal axis (-sin Theta, cos Theta); counts: (2,) elements
+    across and up;
+    spacing: between elements (m); beam: f_k / f0; kappas: (Q,) frequencies over the carrier at
+    which array sums are taken; squint: whether they also set the phase of the array's middle;
+    turns: f_c / c, turns a metre of one way;
+    aims: (N, 2) direction cosines of the beam; places: (R, N, 3, L) m, images of the points;
+    coefficient: (R, N, L) complex; centre: (R, N) m, range to which excess ranges refer; gains: (R,
+    N, Q, L) complex array sums of spherical waves, without any entry for plane waves.
     """
 
     station: np.ndarray
@@ -57,14 +59,16 @@ class End(NamedTuple):
 
 @VECTOR
 def row_sum(cosine, kappa, beam, aim, count, gain):
-    """Multiply gain (L,) by the sum of `count` elements in a row about their middle, sin(N pi x / 2) / sin(pi x / 2).
+    """Multiply gain (L,) by the sum of `count` elements in a row about their middle, sin(N pi x /
+    2) / sin(pi x / 2).
 
-    x = kappa times the direction cosine (L,), less beam times that of the aim; elements are half a wavelength apart.
+    x = kappa times the direction cosine (L,), less beam times that of the aim; elements are half a
+    wavelength apart.
     """
     for i in range(np.uint64(len(gain))):
         turns = 0.25 * (kappa * cosine[i] - beam * aim)
-        # Both sines keep all their digits if the angle counts from the nearest grating lobe. In an even row every
-        # second lobe is negative.
+        # Both sines keep all their digits if the angle counts from the nearest grating lobe. In an
+        # even row every second lobe is negative.
         lobe = np.rint(2.0 * turns)
         sign = 1.0 - 2.0 * ((count - 1) % 2) * abs(lobe - 2.0 * np.rint(0.5 * lobe))
         off = turns - 0.5 * lobe
@@ -76,19 +80,27 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
 
 @INNER_VECTOR
 def _one_way(end, path, n, work, factors, excess):
-    """Fill factors (Q, 2, L) with coefficient, array sum, 1/r and half the two-way phase, and excess (L,) with metres.
+    """Fill factors (Q, 2, L) with coefficient, array sum, 1/r and half the two-way phase, and
+    excess (L,) with metres.
 
     work: (3, L). Returns whether every point stands away from the station.
     """
-    at, h, v = end.places[path, n], 0.5 * (end.counts[0] - 1), 0.5 * (end.counts[1] - 1)
-    first, aims, clear = end.aims[0], end.aims[n], True
-    across, up, weight = work[0], work[1], end.coefficient[path, n]
+    at = end.places[path, n]
+    h = 0.5 * (end.counts[0] - 1)
+    v = 0.5 * (end.counts[1] - 1)
+    first = end.aims[0]
+    aims = end.aims[n]
+    clear = True
+    across = work[0]
+    up = work[1]
+    weight = end.coefficient[path, n]
     for i in range(np.uint64(at.shape[1])):
         x, y, z = at[0, i] - end.station[0], at[1, i] - end.station[1], at[2, i] - end.station[2]
         r = np.sqrt(x * x + y * y + z * z)
         clear &= r > 0.0
         inverse = 1.0 / r
-        across[i], up[i] = (end.axes[0] * x + end.axes[1] * y) * inverse, z * inverse
+        across[i] = (end.axes[0] * x + end.axes[1] * y) * inverse
+        up[i] = z * inverse
         ahead = h * across[i] + v * up[i]
         excess[i] = r - end.centre[path, n]
         turns = 0.5 * end.beam * (ahead - h * first[0] - v * first[1])
@@ -96,15 +108,19 @@ def _one_way(end, path, n, work, factors, excess):
             excess[i] -= end.spacing * ahead
             turns = -0.5 * end.beam * (h * first[0] + v * first[1])
         c, s = phasor(turns - end.turns * excess[i])
-        re, im = weight[i].real * inverse, weight[i].imag * inverse
+        re = weight[i].real * inverse
+        im = weight[i].imag * inverse
         factors[0, 0, i], factors[0, 1, i] = re * c - im * s, re * s + im * c
     # Entry 0 holds the factor that all frequencies share, so it is overwritten last.
     for q in range(len(end.kappas) - 1, -1, -1):
-        real, imag, gain = factors[q, 0], factors[q, 1], work[2]
+        real = factors[q, 0]
+        imag = factors[q, 1]
+        gain = work[2]
         if len(end.gains) > 0:
             sums = end.gains[path, n, q]
             for i in range(np.uint64(len(gain))):
-                re, im = factors[0, 0, i], factors[0, 1, i]
+                re = factors[0, 0, i]
+                im = factors[0, 1, i]
                 real[i] = re * sums[i].real - im * sums[i].imag
                 imag[i] = re * sums[i].imag + im * sums[i].real
             continue
@@ -113,38 +129,62 @@ def _one_way(end, path, n, work, factors, excess):
         row_sum(across, end.kappas[q], end.beam, aims[0], end.counts[0], gain)
         row_sum(up, end.kappas[q], end.beam, aims[1], end.counts[1], gain)
         for i in range(np.uint64(len(gain))):
-            real[i], imag[i] = factors[0, 0, i] * gain[i], factors[0, 1, i] * gain[i]
+            real[i] = factors[0, 0, i] * gain[i]
+            imag[i] = factors[0, 1, i] * gain[i]
     return clear
 
 
 @INNER_VECTOR
 def _add_moments(factors, strength, excess, reach, table, parts, result):
-    """Add to result (Q, 2, P) the sums over points of strength x factors x T_p(u), u = excess / (2 reach).
+    """Add to result (Q, 2, P) the sums over points of strength x factors x T_p(u), u = excess / (2
+    reach).
 
-    factors, excess: of the way out and of the way back, whose factors (Q, 2, L) multiply and whose excess ranges (L,)
-    add; table (P, CHUNK) and parts (3, CHUNK): work space.
+    factors, excess: of the way out and of the way back, whose factors (Q, 2, L) multiply and whose
+    excess ranges (L,) add; table (P, CHUNK) and parts (3, CHUNK): work space.
     """
-    orders, scale, (out, back), (excess_out, excess_back) = result.shape[2], 0.5 / reach, factors, excess
+    orders, scale, (out, back), (excess_out, excess_back) = (
+        result.shape[2],
+        0.5 / reach,
+        factors,
+        excess,
+    )
     for first in range(0, len(strength), CHUNK):
         count = min(CHUNK, len(strength) - first)
-        u, real, imag = parts[0], parts[1], parts[2]
-        zero, linear = table[0], table[1]
+        u = parts[0]
+        real = parts[1]
+        imag = parts[2]
+        zero = table[0]
+        linear = table[1]
         for i in range(np.uint64(count)):
             u[i] = scale * (excess_out[first + i] + excess_back[first + i])
-            zero[i], linear[i] = 1.0, u[i]
+            zero[i] = 1.0
+            linear[i] = u[i]
         for p in range(2, orders):
-            older, old, new = table[p - 2], table[p - 1], table[p]
+            older = table[p - 2]
+            old = table[p - 1]
+            new = table[p]
             for i in range(np.uint64(count)):
                 new[i] = 2.0 * u[i] * old[i] - older[i]
         for q in range(len(out)):
-            out_re, out_im, back_re, back_im = out[q, 0], out[q, 1], back[q, 0], back[q, 1]
+            out_re = out[q, 0]
+            out_im = out[q, 1]
+            back_re = back[q, 0]
+            back_im = back[q, 1]
             for i in range(np.uint64(count)):
-                a, b, c, d = out_re[first + i], out_im[first + i], back_re[first + i], back_im[first + i]
-                real[i], imag[i] = strength[first + i] * (a * c - b * d), strength[first + i] * (a * d + b * c)
+                a = out_re[first + i]
+                b = out_im[first + i]
+                c = back_re[first + i]
+                d = back_im[first + i]
+                real[i] = strength[first + i] * (a * c - b * d)
+                imag[i] = strength[first + i] * (a * d + b * c)
             # Two orders share a pass over the points; an odd last order is paired with itself.
             for p in range(0, orders, 2):
-                even, odd = table[p], table[min(p + 1, orders - 1)]
-                a, b, c, d = 0.0, 0.0, 0.0, 0.0
+                even = table[p]
+                odd = table[min(p + 1, orders - 1)]
+                a = 0.0
+                b = 0.0
+                c = 0.0
+                d = 0.0
                 for i in range(np.uint64(count)):
                     a += even[i] * real[i]
                     b += even[i] * imag[i]
@@ -159,17 +199,23 @@ def _add_moments(factors, strength, excess, reach, table, parts, result):
 
 @LOOPS
 def moments(out, back, same, strength, reach, result):
-    """Fill result (A, B, N, Q, 2, P) with the moments of every way out by path a and back by path b.
+    """Fill result (A, B, N, Q, 2, P) with the moments of every way out by path a and back by path
+    b.
 
-    out, back: `End`; same: whether both are the same array; then a, b also stands for b, a, and only b >= a is filled;
-    strength: (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges. Returns 1 plus the
-    number of the first symbol with a point in a station, 0 for none.
+    out, back: `End`; same: whether both are the same array; then a, b also stands for b, a, and
+    only b >= a is filled;
+    strength: (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges.
+    Returns 1 plus the number of the first symbol with a point in a station, 0 for none.
     """
     ways_out, ways_back, symbols, nodes, _, orders = result.shape
     points = strength.shape[3]
-    there, home = np.empty((ways_out, nodes, 2, points)), np.empty((ways_back, nodes, 2, points))
-    excess_there, excess_home = np.empty((ways_out, points)), np.empty((ways_back, points))
-    work, table, parts = np.empty((3, points)), np.empty((max(orders, 2), CHUNK)), np.empty((3, CHUNK))
+    there = np.empty((ways_out, nodes, 2, points))
+    home = np.empty((ways_back, nodes, 2, points))
+    excess_there = np.empty((ways_out, points))
+    excess_home = np.empty((ways_back, points))
+    work = np.empty((3, points))
+    table = np.empty((max(orders, 2), CHUNK))
+    parts = np.empty((3, CHUNK))
     for n in range(symbols):
         for a in range(ways_out):
             if not _one_way(out, a, n, work, there[a], excess_there[a]):
@@ -179,23 +225,30 @@ def moments(out, back, same, strength, reach, result):
                 return n + 1
         for a in range(ways_out):
             for b in range(a if same else 0, ways_back):
-                homeward, excess = (there[b], excess_there[b]) if same else (home[b], excess_home[b])
+                homeward, excess = (
+                    (there[b], excess_there[b]) if same else (home[b], excess_home[b])
+                )
                 result[a, b, n] = 0.0
                 amplitudes = strength[a % strength.shape[0], b % strength.shape[1], n]
-                factors, ranges = (there[a], homeward), (excess_there[a], excess)
+                factors = (there[a], homeward)
+                ranges = (excess_there[a], excess)
                 _add_moments(factors, amplitudes, ranges, reach, table, parts, result[a, b, n])
     return 0
 
 
 @LOOPS
 def add_turned(values, start, step, result):
-    """Add values exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result (N, M).
+    """Add values exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result
+    (N, M).
 
     values: (N, 2, M), real and imaginary parts.
     """
     middle = 0.5 * (result.shape[1] - 1)
     for n in range(len(result)):
-        real, imag, out, first = values[n, 0], values[n, 1], result[n], start[n] - np.rint(start[n])
+        real = values[n, 0]
+        imag = values[n, 1]
+        out = result[n]
+        first = start[n] - np.rint(start[n])
         for m in range(np.uint64(result.shape[1])):
             c, s = phasor(first + (np.float64(m) - middle) * step[n])
             out[m] += complex(real[m] * c - imag[m] * s, real[m] * s + imag[m] * c)

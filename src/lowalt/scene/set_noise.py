@@ -1,4 +1,6 @@
-"""Noise at set SNRs in a scene: added in all range cells before compression, or later, behind the scene's filters."""
+"""Noise at set SNRs in a scene: added in all range cells before compression, or later, behind the
+scene's filters.
+"""
 
 from collections.abc import Mapping
 
@@ -13,20 +15,26 @@ def white(rng: np.random.Generator, variance: float, shape: tuple[int, ...]) -> 
 
 
 def in_all_cells(effects: Mapping[str, dict | None]) -> bool:
-    """Return whether a configuration's `effects` add the noise of noise.snr_db themselves, before range compression."""
+    """Return whether a configuration's `effects` add the noise of noise.snr_db themselves, before
+    range compression.
+    """
     return any(effect.snr_db is None for effect in called(offering(effects, "receiver", "SET_SNR")))
 
 
 def filters(effects: Mapping[str, dict | None]) -> dict[str, dict]:
-    """Return the part of a configuration's `effects` that filters range cells, and so the noise that is added later."""
+    """Return the part of a configuration's `effects` that filters range cells, and so the noise
+    that is added later.
+    """
     return offering(effects, "detection", "filtered")
 
 
 def behind(noise: np.ndarray, filters: Mapping[str, dict | None]) -> np.ndarray:
-    """Return noise (N,) of one range cell as these filters leave it: behind a canceller, its spectrum is not flat.
+    """Return noise (N,) of one range cell as these filters leave it: behind a canceller, its
+    spectrum is not flat.
 
-    Filters are linear and act on each range cell by itself, so this is the noise that the cell would hold if it had
-    been there before. A pulse canceller shapes it as |2 sin(pi f T_r)|^(2 k) over the noise gain C(2 k, k).
+    Filters are linear and act on each range cell by itself, so this is the noise that the cell
+    would hold if it had been there before. A pulse canceller shapes it as |2 sin(pi f T_r)|^(2 k)
+    over the noise gain C(2 k, k).
     Source: M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2.
     """
     for filtered in every(called(filters), "filtered").values():

@@ -1,7 +1,10 @@
-"""Array sums of spherical waves at many points, interpolated from exact sums at a few directions and ranges.
+"""Array sums of spherical waves at many points, interpolated from exact sums at a few directions
+and ranges.
 
-During a few symbols, a target fills a small box of direction cosines and inverse ranges. Over this box an array sum is
-smooth: a polynomial of a few dozen terms takes less time than a sum over all elements, each at its own distance.
+During a few symbols, a target fills a small box of direction cosines and inverse ranges. Over this
+box an array sum is
+smooth: a polynomial of a few dozen terms takes less time than a sum over all elements, each at its
+own distance.
 """
 
 from itertools import pairwise
@@ -19,9 +22,11 @@ SYMBOLS = 600
 
 
 def gains(end: End, error: float) -> np.ndarray:
-    """Return the array sums (R, N, Q, L) of spherical waves, without the factor 1/r and the middle's phase.
+    """Return the array sums (R, N, Q, L) of spherical waves, without the factor 1/r and the
+    middle's phase.
 
-    error: largest error relative to the number of elements. Source: Balanis, Antenna Theory, 4th ed. 2016, 4.4.1.
+    error: largest error relative to the number of elements. Source: Balanis, Antenna Theory, 4th
+    ed. 2016, 4.4.1.
     """
     paths, symbols, _, points = end.places.shape
     result = np.empty((paths, symbols, len(end.kappas), points), np.complex128)
@@ -32,7 +37,8 @@ def gains(end: End, error: float) -> np.ndarray:
             at = np.empty((last - first, 3, points))
             low, high = np.empty((2, 3))
             _directions(end, end.places[path, first:last], at, low, high)
-            middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-12 * np.array([1.0, 1.0, high[2]]))
+            middle = 0.5 * (low + high)
+            half = np.maximum(0.5 * (high - low), 1e-12 * np.array([1.0, 1.0, high[2]]))
             counts = _orders(end, middle, half, error)
             out = result[path, first:last]
             if counts is None or np.prod(counts) > at[:, 0].size:
@@ -57,11 +63,15 @@ def gains(end: End, error: float) -> np.ndarray:
     return result
 
 
-def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tuple[int, int, int] | None:
-    """Polynomials per axis (across, up, inverse range) that the sums in a box need; None if it is close to the array.
+def _orders(
+    end: End, middle: np.ndarray, half: np.ndarray, error: float
+) -> tuple[int, int, int] | None:
+    """Polynomials per axis (across, up, inverse range) that the sums in a box need; None if it is
+    close to the array.
 
-    The phase of an element at distance D from the array's corner changes by k D per unit of a direction cosine, and by
-    k D^2 / 2 per unit of inverse range. A third more allows for the mixed terms.
+    The phase of an element at distance D from the array's corner changes by k D per unit of a
+    direction cosine, and by k D^2 / 2 per unit of inverse range. A third more allows for the mixed
+    terms.
     """
     wide, tall = end.spacing * (end.counts - 1)
     diagonal = float(np.hypot(wide, tall))
@@ -69,14 +79,19 @@ def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tup
     if nearness > 0.25:
         return None
     wave = 2.0 * np.pi * 2.0 * end.turns
-    spread = wave * np.array([0.5 * wide + diagonal * nearness, 0.5 * tall + diagonal * nearness, 0.5 * diagonal**2])
+    spread = wave * np.array(
+        [0.5 * wide + diagonal * nearness, 0.5 * tall + diagonal * nearness, 0.5 * diagonal**2]
+    )
     return tuple(orders_of(argument, 0.1 * error) + 1 for argument in 1.33 * spread * half + 1e-6)
 
 
 @LOOPS
 def _directions(end, places, at, low, high):
-    """Fill at (K, 3, L) with direction cosines and inverse ranges of places (K, 3, L); low, high (3,): bounds."""
-    low[:], high[:] = np.inf, -np.inf
+    """Fill at (K, 3, L) with direction cosines and inverse ranges of places (K, 3, L); low, high
+    (3,): bounds.
+    """
+    low[:] = np.inf
+    high[:] = -np.inf
     for n in range(len(places)):
         for i in range(places.shape[2]):
             x, y = places[n, 0, i] - end.station[0], places[n, 1, i] - end.station[1]
@@ -90,25 +105,35 @@ def _directions(end, places, at, low, high):
 
 @LOOPS
 def _sums(end, symbol, at, result):
-    """Fill result (K, Q, L) with the sums over elements at directions and inverse ranges at (K, 3, L).
+    """Fill result (K, Q, L) with the sums over elements at directions and inverse ranges at (K, 3,
+    L).
 
-    An element at e from the corner is sqrt(r^2 - 2 r e.u + e^2) away. Its weight has the beam of `symbol`.
+    An element at e from the corner is sqrt(r^2 - 2 r e.u + e^2) away. Its weight has the beam of
+    `symbol`.
     """
-    h, v, aims = 0.5 * (end.counts[0] - 1), 0.5 * (end.counts[1] - 1), end.aims[symbol]
+    h = 0.5 * (end.counts[0] - 1)
+    v = 0.5 * (end.counts[1] - 1)
+    aims = end.aims[symbol]
     real, imag = np.empty((2, at.shape[2]))
     for n in range(len(at)):
-        across, up, inverse = at[n, 0], at[n, 1], at[n, 2]
+        across = at[n, 0]
+        up = at[n, 1]
+        inverse = at[n, 2]
         for q in range(len(end.kappas)):
-            real[:], imag[:] = 0.0, 0.0
+            real[:] = 0.0
+            imag[:] = 0.0
             for a in range(end.counts[0]):
                 for b in range(end.counts[1]):
                     x, y = end.spacing * a, end.spacing * b
                     beam = end.beam * ((a - h) * aims[0] + (b - v) * aims[1])
                     for i in range(np.uint64(len(real))):
                         # (distance - r) / r, without cancellation far away.
-                        square = inverse[i] * (inverse[i] * (x * x + y * y) - 2.0 * (x * across[i] + y * up[i]))
+                        square = inverse[i] * (
+                            inverse[i] * (x * x + y * y) - 2.0 * (x * across[i] + y * up[i])
+                        )
                         longer = square / (1.0 + np.sqrt(1.0 + square))
-                        # In spacings, without the path of the array's middle, which `response_loops` adds.
+                        # In spacings, without the path of the array's middle, which
+                        # `response_loops` adds.
                         away = longer / (inverse[i] * end.spacing) + h * across[i] + v * up[i]
                         c, s = phasor(-0.5 * (end.kappas[q] * away + beam))
                         real[i] += c / (1.0 + longer)
@@ -119,29 +144,38 @@ def _sums(end, symbol, at, result):
 
 @INNER_VECTOR
 def _scaled(values, middle, half, table):
-    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half; at most L values."""
+    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half; at most L
+    values.
+    """
     for i in range(np.uint64(len(values))):
         table[0, i] = 1.0
     if len(table) > 1:
         for i in range(np.uint64(len(values))):
             table[1, i] = (values[i] - middle) / half
     for p in range(2, len(table)):
-        older, old, new, linear = table[p - 2], table[p - 1], table[p], table[1]
+        older = table[p - 2]
+        old = table[p - 1]
+        new = table[p]
+        linear = table[1]
         for i in range(np.uint64(len(values))):
             new[i] = 2.0 * linear[i] * old[i] - older[i]
 
 
 @LOOPS
 def _polynomials(at, box, counts, powers, terms, result):
-    """Fill result (K, Q, L) with sums of polynomials of directions and inverse ranges at (K, 3, L), powers (T, 3).
+    """Fill result (K, Q, L) with sums of polynomials of directions and inverse ranges at (K, 3, L),
+    powers (T, 3).
 
     terms: (2 Q, T), the factors' real parts at every frequency, then their imaginary parts.
     """
     # Chunks of nearly equal size, because the last one is also computed at full size.
     chunks = (at.shape[2] + CHUNK - 1) // CHUNK
     size, (middle, half) = (at.shape[2] + chunks - 1) // chunks, box
-    across, up, near = np.zeros((counts[0], size)), np.zeros((counts[1], size)), np.zeros((counts[2], size))
-    table, sums = np.empty((len(powers), size)), np.empty((len(terms), size))
+    across = np.zeros((counts[0], size))
+    up = np.zeros((counts[1], size))
+    near = np.zeros((counts[2], size))
+    table = np.empty((len(powers), size))
+    sums = np.empty((len(terms), size))
     for n in range(len(at)):
         for first in range(0, at.shape[2], size):
             last = min(first + size, at.shape[2])
@@ -149,11 +183,16 @@ def _polynomials(at, box, counts, powers, terms, result):
             _scaled(at[n, 1, first:last], middle[1], half[1], up)
             _scaled(at[n, 2, first:last], middle[2], half[2], near)
             for t in range(len(powers)):
-                x, y, z, term = across[powers[t, 0]], up[powers[t, 1]], near[powers[t, 2]], table[t]
+                x = across[powers[t, 0]]
+                y = up[powers[t, 1]]
+                z = near[powers[t, 2]]
+                term = table[t]
                 for i in range(np.uint64(size)):
                     term[i] = x[i] * y[i] * z[i]
             multiply(terms, table, sums)
             for q in range(result.shape[1]):
-                real, imag, out = sums[q], sums[q + result.shape[1]], result[n, q]
+                real = sums[q]
+                imag = sums[q + result.shape[1]]
+                out = result[n, q]
                 for i in range(last - first):
                     out[first + i] = complex(real[i], imag[i])

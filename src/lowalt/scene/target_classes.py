@@ -6,9 +6,13 @@ import numpy as np
 
 from lowalt.targets.cloud import Cloud
 
-SMALL_UAV_M, LARGE_UAV_M = 0.4, 1.6
+SMALL_UAV_M = 0.4
+LARGE_UAV_M = 1.6
 """Largest dimensions of TR 38.901's two UAVs (Table 7.9.1-1)."""
-SMALL_UAV_DBSM, LARGE_UAV_DBSM, HUMAN_DBSM, VEHICLE_DBSM = -12.81, -5.85, -1.37, 11.25
+SMALL_UAV_DBSM = -12.81
+LARGE_UAV_DBSM = -5.85
+HUMAN_DBSM = -1.37
+VEHICLE_DBSM = 11.25
 """10 lg sigma_M of Tables 7.9.2.1-1, -2 and -4 (dBsm)."""
 
 
@@ -44,5 +48,7 @@ def size_m(cloud: Cloud) -> float:
 
 
 def large(cloud: Cloud) -> bool:
-    """Return whether a UAV counts as large: its body is longer than the geometric mean of the two sizes."""
+    """Return whether a UAV counts as large: its body is longer than the geometric mean of the two
+    sizes.
+    """
     return size_m(cloud) > np.sqrt(SMALL_UAV_M * LARGE_UAV_M)

@@ -1,8 +1,9 @@
-"""What is true of a target in a look: where it is (geometric truth) and where its echo appears (observed truth).
+"""What is true of a target in a look: where it is (geometric truth) and where its echo appears
+(observed truth).
 
-The echo of a target at range r turns by 2 f r / c at the effective carrier f, less the phase of the arrays' middles,
-since elements are counted from the one at the station's place. An effect that moves echoes in delay or in frequency
-offers `displaced`, which says by how much.
+The echo of a target at range r turns by 2 f r / c at the effective carrier f, less the phase of the
+arrays' middles, since elements are counted from the one at the station's place. An effect that
+moves echoes in delay or in frequency offers `displaced`, which says by how much.
 """
 
 from collections.abc import Iterable
@@ -16,34 +17,53 @@ from lowalt.scene.view import Displacement, View
 
 
 def geometric(view: View) -> np.ndarray:
-    """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each symbol, (N, 4)."""
-    station, middle = view.station, view.places.mean(axis=1)
+    """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each
+    symbol, (N, 4).
+    """
+    station = view.station
+    middle = view.places.mean(axis=1)
     moved = np.gradient(middle, view.times_s, axis=0, edge_order=2)
     ends = [station] if station.transmitter is None else [station, station.transmitter]
     ways = [middle - np.asarray(end.position_m) for end in ends]
     ranges = [portable.norm(way) for way in ways]
     speeds = [(way * moved).sum(axis=1) / length for way, length in zip(ways, ranges, strict=True)]
-    return np.column_stack([np.mean(ranges, axis=0), np.mean(speeds, axis=0), cosines(station, middle)])
+    return np.column_stack(
+        [np.mean(ranges, axis=0), np.mean(speeds, axis=0), cosines(station, middle)]
+    )
 
 
 def array_turns(view: View) -> np.ndarray:
-    """Return the turns (N,) of phase by which the arrays' middles hear a target's middle before their first elements.
+    """Return the turns (N,) of phase by which the arrays' middles hear a target's middle before
+    their first elements.
 
     Elements are half a wavelength of the carrier apart. Source: paper, Eq. 3 and 4.
     """
-    network, station, middle = view.network, view.station, view.places.mean(axis=1)
-    kappa, sender = station.frequency_hz / network.carrier_hz, station.transmitter or station
+    network = view.network
+    station = view.station
+    middle = view.places.mean(axis=1)
+    kappa = station.frequency_hz / network.carrier_hz
+    sender = station.transmitter or station
     ends = (sender, network.transmit), (station, network.receive)
-    return sum(0.25 * kappa * portable.dot(cosines(end, middle), np.array(shape) - 1.0) for end, shape in ends)
+    return sum(
+        0.25 * kappa * portable.dot(cosines(end, middle), np.array(shape) - 1.0)
+        for end, shape in ends
+    )
 
 
-def observed(view: View, displacements: Iterable[Displacement], cells: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the range cell (N,), 0 to `cells` with its fraction, and the folded speed (N,) m/s of an echo.
+def observed(
+    view: View, displacements: Iterable[Displacement], cells: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the range cell (N,), 0 to `cells` with its fraction, and the folded speed (N,) m/s of
+    an echo.
 
-    The echo is that of the middle of a view's target on the direct path, moved by the effects' displacements.
-    Source: paper, Eq. 3 to 7 (array phases); M. I. Skolnik, Introduction to Radar Systems, 3rd ed. 2001, 3.1.
+    The echo is that of the middle of a view's target on the direct path, moved by the effects'
+    displacements.
+    Source: paper, Eq. 3 to 7 (array phases); M. I. Skolnik, Introduction to Radar Systems, 3rd ed.
+    2001, 3.1.
     """
-    network, station, middle = view.network, view.station, view.places.mean(axis=1)
+    network = view.network
+    station = view.station
+    middle = view.places.mean(axis=1)
     wavelength_m = SPEED_OF_LIGHT / network.effective_hz(station)
     way_m = view.ways_m(middle)
     turns = array_turns(view) - way_m / wavelength_m
@@ -51,12 +71,15 @@ def observed(view: View, displacements: Iterable[Displacement], cells: int) -> t
     for displacement in displacements:
         way_m = way_m + SPEED_OF_LIGHT * displacement.delay_s
         doppler_hz = doppler_hz + displacement.rise_hz
-    return way_m / (2 * network.cell_m) % cells, network.folded_mps(-doppler_hz * wavelength_m / 2, station)
+    return way_m / (2 * network.cell_m) % cells, network.folded_mps(
+        -doppler_hz * wavelength_m / 2, station
+    )
 
 
 def of_parts(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the range (N, P) m of the middle of each of a target's parts, and the lowest and the highest radial speed
-    (N, P) m/s of its points at each symbol, not folded, positive away from the station.
+    """Return the range (N, P) m of the middle of each of a target's parts, and the lowest and the
+    highest radial speed (N, P) m/s of its points at each symbol, not folded, positive away from the
+    station.
 
     Rotors turn far between two symbols, so speeds are taken over two microseconds.
     """

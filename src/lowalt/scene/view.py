@@ -1,4 +1,6 @@
-"""One moving target as one station sees it: where its parts and points stand at each instant, where beams point."""
+"""One moving target as one station sees it: where its parts and points stand at each instant, where
+beams point.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,7 +19,9 @@ from lowalt.targets.cloud import Cloud
 
 
 class Beams(NamedTuple):
-    """Where a station's beams point: at aims_m (K, 3) m, each from starts_s (K,) s on, rising from 0."""
+    """Where a station's beams point: at aims_m (K, 3) m, each from starts_s (K,) s on, rising from
+    0.
+    """
 
     starts_s: np.ndarray
     aims_m: np.ndarray
@@ -31,7 +35,9 @@ class Sampling(NamedTuple):
 
 
 class Displacement(NamedTuple):
-    """Delay (s) and frequency shift (Hz) with which an effect lets an echo appear: a number, or one per symbol (N,)."""
+    """Delay (s) and frequency shift (Hz) with which an effect lets an echo appear: a number, or one
+    per symbol (N,).
+    """
 
     delay_s: np.ndarray | float = 0.0
     rise_hz: np.ndarray | float = 0.0
@@ -40,8 +46,8 @@ class Displacement(NamedTuple):
 class Still(NamedTuple):
     """Echoes of something other than a target, which do not move within a symbol.
 
-    response: (N, M) complex128, in sqrt(W) a subcarrier; offset_cells: how far the echoes stand beyond the centres of
-    their range cells, in cells.
+    response: (N, M) complex128, in sqrt(W) a subcarrier; offset_cells: how far the echoes stand
+    beyond the centres of their range cells, in cells.
     """
 
     response: np.ndarray
@@ -55,42 +61,56 @@ class Perturbations(NamedTuple):
     changes: tuple[Perturbation, ...]
 
     def at(self, times_s: np.ndarray) -> Perturbation | None:
-        """Return their sum at times_s (K,) s, linear between the instants given and exact on them; None for none."""
+        """Return their sum at times_s (K,) s, linear between the instants given and exact on them;
+        None for none.
+        """
         if not self.changes:
             return None
         angles: dict[int, np.ndarray] = {}
         for change in self.changes:
             for part, angle in (change.angle_rad or {}).items():
                 angles[part] = angles.get(part, 0.0) + np.interp(times_s, self.grid_s, angle)
-        return Perturbation(angles, self._total("offset_m", times_s), self._total("tilt_rad", times_s))
+        return Perturbation(
+            angles, self._total("offset_m", times_s), self._total("tilt_rad", times_s)
+        )
 
     def _total(self, name: str, times_s: np.ndarray) -> np.ndarray | None:
         """The sum (K, 3) of those of the changes' tables (G, 3) that there are, None for none."""
         tables = [table for change in self.changes if (table := getattr(change, name)) is not None]
-        interpolated = [[np.interp(times_s, self.grid_s, column) for column in table.T] for table in tables]
+        interpolated = [
+            [np.interp(times_s, self.grid_s, column) for column in table.T] for table in tables
+        ]
         return sum(np.stack(columns, axis=1) for columns in interpolated) if interpolated else None
 
 
 @VECTOR
 def _carry(rotation, translation, vectors, part, result):
-    """Fill result (N, 3, L) with rotation (N, P, 3, 3) times vectors (3, L) plus translation (N, P, 3), by part."""
+    """Fill result (N, 3, L) with rotation (N, P, 3, 3) times vectors (3, L) plus translation (N, P,
+    3), by part.
+    """
     # Points of a part stand next to each other.
     first = 0
     while first < len(part):
-        p, last = part[first], first + 1
+        p = part[first]
+        last = first + 1
         while last < len(part) and part[last] == p:
             last += 1
         for n in range(len(result)):
             for axis in range(3):
-                turn, row, shift = rotation[n, p, axis], result[n, axis], translation[n, p, axis]
-                a, b, c = turn[0], turn[1], turn[2]
+                turn = rotation[n, p, axis]
+                row = result[n, axis]
+                shift = translation[n, p, axis]
+                a = turn[0]
+                b = turn[1]
+                c = turn[2]
                 for i in range(np.uint64(first), np.uint64(last)):
                     row[i] = a * vectors[0, i] + b * vectors[1, i] + c * vectors[2, i] + shift
         first = last
 
 
 def _carried(vectors: np.ndarray, motion: Rigid, translation: np.ndarray) -> np.ndarray:
-    """Vectors (L, 3) of the parts' own frames in the global frame, moved by translation (N, P, 3) m: (N, L, 3).
+    """Vectors (L, 3) of the parts' own frames in the global frame, moved by translation (N, P, 3)
+    m: (N, L, 3).
 
     Coordinates of a symbol's points stand together in memory, (N, 3, L).
     """
@@ -100,10 +120,14 @@ def _carried(vectors: np.ndarray, motion: Rigid, translation: np.ndarray) -> np.
     return result.swapaxes(1, 2)
 
 
-def located(cloud: Cloud, row: dict, times_s: np.ndarray, moved: Perturbations) -> tuple[Rigid, np.ndarray]:
-    """Return the poses of a target's parts and the places (N, L, 3) m of its points at times_s (N,) s, global frame.
+def located(
+    cloud: Cloud, row: dict, times_s: np.ndarray, moved: Perturbations
+) -> tuple[Rigid, np.ndarray]:
+    """Return the poses of a target's parts and the places (N, L, 3) m of its points at times_s (N,)
+    s, global frame.
 
-    The nodes of a recording have places but no attitude. Raises: InputError as `lowalt.motion.poses.poses`.
+    The nodes of a recording have places but no attitude. Raises: InputError as
+    `lowalt.motion.poses.poses`.
     """
     motion = Rigid(*poses(cloud, row, times_s, moved.at(times_s)), cloud.points, cloud.part)
     if "node" in cloud.kinds:
@@ -123,13 +147,16 @@ class View:
     times_s: np.ndarray
     """(N,) s."""
     motion: Rigid
-    """Poses of all parts: rotation (N, P, 3, 3), translation (N, P, 3) m, with the cloud's points."""
+    """Poses of all parts: rotation (N, P, 3, 3), translation (N, P, 3) m, with the cloud's points.
+    """
     places: np.ndarray
     """Every point's place (N, L, 3) m, global frame."""
     moved: Perturbations
     """What the motion effects add to the target's motion."""
     origin_m: np.ndarray
-    """(3,) m, the labelled target's origin at the first symbol: beams point there, or as `beams` says."""
+    """(3,) m, the labelled target's origin at the first symbol: beams point there, or as `beams`
+    says.
+    """
     beams: Mapping[str, Beams] = field(default_factory=dict)
     """Where stations' beams point, by their names."""
     element: Element | None = None
@@ -157,7 +184,9 @@ class View:
 
     @property
     def aim_m(self) -> np.ndarray:
-        """Where the receiver's beams point at first, (3,) m: without pointing errors the target's origin."""
+        """Where the receiver's beams point at first, (3,) m: without pointing errors the target's
+        origin.
+        """
         return self.aim_of(self.station)
 
     @property
@@ -171,7 +200,9 @@ class View:
         return sum(portable.norm(places - mast_m) for mast_m in self.masts_m)
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
-        """Return the element's amplitude gain toward images (N, L, 3) over that toward the points, (N, L) or 1."""
+        """Return the element's amplitude gain toward images (N, L, 3) over that toward the points,
+        (N, L) or 1.
+        """
         if self.element is None:
             return 1.0
         return np.sqrt(gain(self.element, self.station, images) / self._gain)
@@ -187,22 +218,29 @@ class View:
         return replace(self, times_s=times_s, motion=motion, places=places)
 
     def of(self, station: Station) -> "View":
-        """Return the same target, at the same instants and under the same beams, as another station hears it."""
+        """Return the same target, at the same instants and under the same beams, as another station
+        hears it.
+        """
         return replace(self, station=station)
 
     def seen_from(self, place_m: np.ndarray, sender_m: np.ndarray | None = None) -> "View":
-        """Return the same target, at the same instants and under the same beams, seen from another place (3,) m.
+        """Return the same target, at the same instants and under the same beams, seen from another
+        place (3,) m.
 
         sender_m: (3,) m, on a link where its sender stands then, None for where it stands.
         """
         station = replace(self.station, position_m=tuple(float(value) for value in place_m))
         if sender_m is not None:
-            sender = replace(station.transmitter, position_m=tuple(float(value) for value in sender_m))
+            sender = replace(
+                station.transmitter, position_m=tuple(float(value) for value in sender_m)
+            )
             station = replace(station, transmitter=sender)
         return self.of(station)
 
     def ends(self) -> list["View"]:
-        """Return the target as the sender and as the receiver of a link see it alone; a station's own view is both."""
+        """Return the target as the sender and as the receiver of a link see it alone; a station's
+        own view is both.
+        """
         link = self.station
         if link.transmitter is None:
             return [self]

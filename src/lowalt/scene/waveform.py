@@ -1,8 +1,9 @@
 """The waveform of a look: the data sent, the samples received, and the receiver's view of both.
 
-Samples of OFDM are the complex baseband around the station's local oscillator, which stands at subcarrier M // 2 as in
-NR (3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept.
-Other radars send no data (None): they mix the echo with what they send, and subcarrier m of Eq. 24 is sample m.
+Samples of OFDM are the complex baseband around the station's local oscillator, which stands at
+subcarrier M // 2 as in NR (3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df.
+Only the useful part of each symbol is kept. Other radars send no data (None): they mix the echo
+with what they send, and subcarrier m of Eq. 24 is sample m.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,8 @@ NORMAL_PREFIX = 144 / 2048
 
 
 def qpsk(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray:
-    """Return random QPSK data (symbols, subcarriers) complex128 of unit modulus, all four values equally likely.
+    """Return random QPSK data (symbols, subcarriers) complex128 of unit modulus, all four values
+    equally likely.
 
     Source: paper, Eq. 5, whose data symbols have unit power; 3GPP TS 38.211, 5.1.3 (QPSK).
     """
@@ -32,10 +34,12 @@ def qpsk(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray
 
 
 def transmit(response: np.ndarray, data: np.ndarray | None) -> np.ndarray:
-    """Return the received time samples (N, M) of frequency responses (N, M) that carried `data` (N, M).
+    """Return the received time samples (N, M) of frequency responses (N, M) that carried `data` (N,
+    M).
 
-    Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
-    response's; without data it is response[i] / sqrt(M). Source: 3GPP TS 38.211, 5.3.1.
+    Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 /
+    sqrt(M) of the response's; without data it is response[i] / sqrt(M). Source: 3GPP TS 38.211,
+    5.3.1.
     """
     if data is None:
         return response / np.sqrt(response.shape[-1])
@@ -43,9 +47,11 @@ def transmit(response: np.ndarray, data: np.ndarray | None) -> np.ndarray:
 
 
 def demodulate(samples: np.ndarray, data: np.ndarray | None) -> np.ndarray:
-    """Return the responses (N, M) of time samples (N, M) that carried `data` (N, M): the inverse of `transmit`.
+    """Return the responses (N, M) of time samples (N, M) that carried `data` (N, M): the inverse of
+    `transmit`.
 
-    The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
+    The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response
+    alone remains.
     """
     if data is None:
         return samples * np.sqrt(samples.shape[-1])
@@ -53,7 +59,9 @@ def demodulate(samples: np.ndarray, data: np.ndarray | None) -> np.ndarray:
 
 
 def range_cells(response: np.ndarray) -> np.ndarray:
-    """Return the range cells (N, M) of frequency responses (N, M), the inverse transform over subcarriers."""
+    """Return the range cells (N, M) of frequency responses (N, M), the inverse transform over
+    subcarriers.
+    """
     return fft.ifft(response, axis=-1)
 
 
@@ -63,8 +71,12 @@ def prefix_length_s(prefix_s: float | None, network: Network) -> float:
 
 
 def baseband_hz(network: Network) -> np.ndarray:
-    """Return each subcarrier's frequency from the local oscillator, (m - M // 2) df (Hz), shape (M,)."""
-    return (np.arange(network.subcarriers) - network.subcarriers // 2) * network.subcarrier_spacing_hz
+    """Return each subcarrier's frequency from the local oscillator, (m - M // 2) df (Hz), shape
+    (M,).
+    """
+    return (
+        np.arange(network.subcarriers) - network.subcarriers // 2
+    ) * network.subcarrier_spacing_hz
 
 
 def oscillator_hz(network: Network, station: Station) -> float:
@@ -73,12 +85,18 @@ def oscillator_hz(network: Network, station: Station) -> float:
 
 
 def windowed(
-    network: Network, prefix_s: float, response: np.ndarray, late: int, on_air: Callable[[str], np.ndarray | None]
+    network: Network,
+    prefix_s: float,
+    response: np.ndarray,
+    late: int,
+    on_air: Callable[[str], np.ndarray | None],
 ) -> np.ndarray:
-    """Return the time samples (N, M) of a response (N, M) whose first `late` samples are still the previous symbol's.
+    """Return the time samples (N, M) of a response (N, M) whose first `late` samples are still the
+    previous symbol's.
 
-    late: negative where the last samples are the next symbol's already; on_air: subcarriers (N, M) on the air in the
-    "waveform", the "previous waveform" and the "next waveform". The previous symbol ends a prefix before the window.
+    late: negative where the last samples are the next symbol's already; on_air: subcarriers (N, M)
+    on the air in the "waveform", the "previous waveform" and the "next waveform". The previous
+    symbol ends a prefix before the window.
     """
     samples = transmit(response, on_air("waveform"))
     turn = np.exp(2j * np.pi * baseband_hz(network) * prefix_s)

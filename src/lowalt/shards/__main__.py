@@ -1,4 +1,5 @@
-"""`python -m lowalt.shards write | index`: pack samples into a shard, list the shards of a data set.
+"""`python -m lowalt.shards write | index`: pack samples into a shard, list the shards of a data
+set.
 
 `lowalt verify` and `lowalt remake` check what was packed.
 """
@@ -22,28 +23,56 @@ from lowalt.tiles.cubes import Cubes
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
-    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions and of a town in a scene that
-    has them, those of canceller for recipe shards, and echo {tolerance, effects} for cube shards.
+    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions and of a
+    town in a scene that has them, those of canceller for recipe shards, and echo {tolerance,
+    effects} for cube shards.
     """
     line = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     line.add_argument("--motion", required=True, help="the chunk's motion table")
-    line.add_argument("--signals", help="the chunk's noisy signals (.npy, complex64); all kinds but recipe")
+    line.add_argument(
+        "--signals", help="the chunk's noisy signals (.npy, complex64); all kinds but recipe"
+    )
     line.add_argument("--tiles", help="the chunk's tiles (.npz); image shards")
-    line.add_argument("--echoes", nargs="+", help="recipe shards: clean echoes (.npy), one file per station")
-    line.add_argument("--powers", nargs="+", help="recipe shards: powers for the SNRs (.npy), one file per station")
-    line.add_argument("--clouds", nargs="*", default=[], help="clouds of the chunk's subtypes; cube shards")
-    line.add_argument("--occluders", nargs="*", default=[], help="surfaces of the chunk's subtypes; cube shards")
+    line.add_argument(
+        "--echoes", nargs="+", help="recipe shards: clean echoes (.npy), one file per station"
+    )
+    line.add_argument(
+        "--powers",
+        nargs="+",
+        help="recipe shards: powers for the SNRs (.npy), one file per station",
+    )
+    line.add_argument(
+        "--clouds", nargs="*", default=[], help="clouds of the chunk's subtypes; cube shards"
+    )
+    line.add_argument(
+        "--occluders", nargs="*", default=[], help="surfaces of the chunk's subtypes; cube shards"
+    )
     line.add_argument("--fold", required=True, help="train, val or test")
-    line.add_argument("--piece", nargs=2, type=int, default=(0, 1), metavar=("NUMBER", "COUNT"),
-                      help="the shard's place among the shards of the fold")  # fmt: skip
-    line.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz next to it")
+    line.add_argument(
+        "--piece",
+        nargs=2,
+        type=int,
+        default=(0, 1),
+        metavar=("NUMBER", "COUNT"),
+        help="the shard's place among the shards of the fold",
+    )
+    line.add_argument(
+        "--out", required=True, help="shard to write (.tar); its table is the .npz next to it"
+    )
     options = line.parse_args(arguments)
     settings = options.settings
-    classes, canceller, echo = _classes(settings), settings.pop("canceller", None), settings.pop("echo", {})
+    classes = _classes(settings)
+    canceller = settings.pop("canceller", None)
+    echo = settings.pop("echo", {})
     company = {name: settings.pop(name) for name in ("companions", "town") if name in settings}
-    seed, network, snrs, split, shards = pick(settings, "seed", "network", "snr_db", "split", "shards")
+    seed, network, snrs, split, shards = pick(
+        settings, "seed", "network", "snr_db", "split", "shards"
+    )
     kind, _, cells = pick(
-        {"largest_mb": None, "cells": cell_type({"shards": shards}), **shards}, "kind", "largest_mb", "cells"
+        {"largest_mb": None, "cells": cell_type({"shards": shards}), **shards},
+        "kind",
+        "largest_mb",
+        "cells",
     )
     if not 0 <= options.piece[0] < options.piece[1]:
         raise InputError(f"--piece: {options.piece}, expected 0 <= NUMBER < COUNT")
@@ -51,23 +80,31 @@ def write(arguments: list[str]) -> None:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
     if cells not in CELL_BYTES:
         raise InputError(f"shards.cells is {cells!r}, expected one of {list(CELL_BYTES)}")
-    scene, powers = {"seed": seed, "network": network, **echo}, None
-    snrs, network = [float(snr) for snr in snrs], Network.from_settings(network)
+    scene = {"seed": seed, "network": network, **echo}
+    powers = None
+    snrs = [float(snr) for snr in snrs]
+    network = Network.from_settings(network)
     rows = [accompanied(row, company, seed, network) for row in read_table(options.motion)]
     if kind == "recipe":
         content, powers = clean_content(options.echoes, options.powers, network, len(rows))
     elif kind == "cube":
         clouds = {cloud.subtype: cloud for cloud in map(read_cloud, options.clouds)}
-        cubes = Cubes.from_settings(scene, clouds, read_all(options.occluders) if options.occluders else None)
+        cubes = Cubes.from_settings(
+            scene, clouds, read_all(options.occluders) if options.occluders else None
+        )
         content = cube_content(options.signals, cubes, rows, snrs, cells)
     else:
-        content = noisy_content(kind, options.signals, options.tiles, network, (len(rows), len(snrs)))
+        content = noisy_content(
+            kind, options.signals, options.tiles, network, (len(rows), len(snrs))
+        )
     samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, canceller)
     write_shard(options.out, samples, options.fold, kind, content, tuple(options.piece))
 
 
 def _classes(settings: dict) -> tuple[str, ...]:
-    """Remove the classes from a command's settings and return them: the published ones if the settings name none."""
+    """Remove the classes from a command's settings and return them: the published ones if the
+    settings name none.
+    """
     classes = stated(settings)
     settings.pop("classes", None)
     return classes
@@ -76,14 +113,18 @@ def _classes(settings: dict) -> tuple[str, ...]:
 def index(arguments: list[str]) -> None:
     """Write the index of shards.
 
-    Settings: network, spectra, images (how a loader renders signals), echo {tolerance, effects} where it is known, and
-    the classes in the order of their labels where they are not the published ones.
+    Settings: network, spectra, images (how a loader renders signals), echo {tolerance, effects}
+    where it is known, and the classes in the order of their labels where they are not the published
+    ones.
     """
     line = parser("lowalt.shards index", "List shards with counts and checksums.")
-    line.add_argument("--shards", nargs="+", required=True, help="shards (.tar), their tables next to them")
+    line.add_argument(
+        "--shards", nargs="+", required=True, help="shards (.tar), their tables next to them"
+    )
     line.add_argument("--out", required=True, help="index to write (.json)")
     options = line.parse_args(arguments)
-    echo, classes = options.settings.pop("echo", None), _classes(options.settings)
+    echo = options.settings.pop("echo", None)
+    classes = _classes(options.settings)
     pick(options.settings, "network", "spectra", "images")
     build(options.shards, options.settings, options.out, echo, classes)
 

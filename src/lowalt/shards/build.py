@@ -1,6 +1,8 @@
-"""Writes a whole data set from its configuration and clouds in one process, with the same bytes as the workflow.
+"""Writes a whole data set from its configuration and clouds in one process, with the same bytes as
+the workflow.
 
-`python -m lowalt.shards.build` writes clouds, motion tables and shards; echoes are only kept in memory.
+`python -m lowalt.shards.build` writes clouds, motion tables and shards; echoes are only kept in
+memory.
 """
 
 import argparse
@@ -23,13 +25,14 @@ from lowalt.targets.cloud import write as write_cloud
 
 
 def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = True) -> dict:
-    """Write the shards of all groups and folds of a data set, its motion tables and clouds below `folder`, as the
-    workflow does; return the index.
+    """Write the shards of all groups and folds of a data set, its motion tables and clouds below
+    `folder`, as the workflow does; return the index.
 
     kind: "image", "signal", "recipe" or "cube"; clouds: whether cloud files are written too.
     Raises: InputError naming the sample that cannot be computed.
     """
-    folder, plan = Path(folder), dataset.plan
+    folder = Path(folder)
+    plan = dataset.plan
     if clouds:
         for group in plan.groups.values():
             for subtype in group:
@@ -39,7 +42,9 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
         written += write_chunk(dataset, folder, chunk, kind)
         print(f"{chunk}: written", file=sys.stderr)
     render = {key: dataset.config[key] for key in ("network", "spectra", "images")}
-    return build(written, render, folder / "shards" / "index.json", dataset.maker.echo, dataset.classes)
+    return build(
+        written, render, folder / "shards" / "index.json", dataset.maker.echo, dataset.classes
+    )
 
 
 def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
@@ -55,29 +60,39 @@ def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
 
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
     """Write the motion table and the shards of one chunk; return the shards' paths."""
-    plan, maker, rows = dataset.plan, dataset.maker, rows_of(dataset, chunk)
+    plan = dataset.plan
+    maker = dataset.maker
+    rows = rows_of(dataset, chunk)
     cells = cell_type(dataset.config)
     levels = plan.chunk(chunk).snrs
     group, _, part = chunk.partition("-")
     if chunk in plan.sources:
         write_table(folder / "motion" / f"{chunk}.csv", rows)
-    # The samples of a shard are shuffled, so keep the echoes of all its motion models until it is written.
+    # The samples of a shard are shuffled, so keep the echoes of all its motion models until it is
+    # written.
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> tuple[bytes, dict]:
-        """Data of one sample (row `number` at SNR `level` of the chunk), and the part of its record about cubes."""
+        """Data of one sample (row `number` at SNR `level` of the chunk), and the part of its record
+        about cubes.
+        """
         if kind == "recipe":
             return npy(maker.received(rows[number])[0]), {}
-        return maker.data(kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], cells)
+        return maker.data(
+            kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], cells
+        )
 
-    powers, effects = None, maker.echo["effects"]
+    powers = None
+    effects = maker.echo["effects"]
     canceller = (effects["canceller"] or {}) if "canceller" in effects else None
     if kind == "recipe":
         refuse(effects)
     if kind == "recipe" and maker.echo["effects"]:
         powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
 
-    samples = ChunkSamples(rows, list(levels), plan.split, plan.seed, maker.network, dataset.classes, powers, canceller)
+    samples = ChunkSamples(
+        rows, list(levels), plan.split, plan.seed, maker.network, dataset.classes, powers, canceller
+    )
     paths = []
     for name in plan.folds(chunk):
         pieces = plan.pieces(chunk, name)
@@ -90,7 +105,12 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
 def main(arguments: list[str]) -> None:
     """Write clouds, motion tables and shards of a merged configuration."""
     line = argparse.ArgumentParser(prog="python -m lowalt.shards.build", description=main.__doc__)
-    line.add_argument("--config", required=True, nargs="+", help="merged configuration, or a base and its overlays")
+    line.add_argument(
+        "--config",
+        required=True,
+        nargs="+",
+        help="merged configuration, or a base and its overlays",
+    )
     line.add_argument("--inputs", help="folder of the meshes and recordings that the records name")
     line.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
     line.add_argument("--out", required=True, help="folder to write into")

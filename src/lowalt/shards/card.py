@@ -1,6 +1,8 @@
-"""The data card, which makes the folder of the index publishable: README.md, samples.csv, croissant.json, SHA256SUMS.
+"""The data card, which makes the folder of the index publishable: README.md, samples.csv,
+croissant.json, SHA256SUMS.
 
-`python -m lowalt.shards.card` is a separate command, so that a change of wording does not re-pack shards.
+`python -m lowalt.shards.card` is a separate command, so that a change of wording does not re-pack
+shards.
 """
 
 import argparse
@@ -32,7 +34,10 @@ FROZEN = re.compile(r"lowalt-\d+-v(\d+)")
 """Name of a run that makes the data set of a benchmark, which only a new version may change."""
 SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
-LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
+LICENSES = {
+    "MIT": "https://opensource.org/license/mit",
+    "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/",
+}
 
 TEMPLATE = Path(__file__).with_name("card.md.jinja")
 WHAT = {
@@ -62,7 +67,9 @@ def _slug(key: str) -> str:
 
 
 def _census(shards: ShardSet) -> tuple[dict[str, dict], Counter, Counter]:
-    """Return a record of each subtype by its slug, and the counts of samples by slug and by SNR (dB)."""
+    """Return a record of each subtype by its slug, and the counts of samples by slug and by SNR
+    (dB).
+    """
     first: dict[str, int] = {}
     subtypes: Counter = Counter()
     snrs: Counter = Counter()
@@ -82,11 +89,23 @@ def _counts(shards: ShardSet) -> str:
     places: Counter = Counter()
     for entry in shards.shards:
         places[entry["group"], entry["fold"]] += entry["samples"]
-    parts = [_table(("subtypes", "fold", "samples"), [(*place, number) for place, number in sorted(places.items())])]
+    parts = [
+        _table(
+            ("subtypes", "fold", "samples"),
+            [(*place, number) for place, number in sorted(places.items())],
+        )
+    ]
     records, counts, snrs = _census(shards)
-    rows = [(record["category"], record["subtype"], record["group"], counts[slug]) for slug, record in records.items()]
+    rows = [
+        (record["category"], record["subtype"], record["group"], counts[slug])
+        for slug, record in records.items()
+    ]
     parts.append(_table(("category", "subtype", "group", "samples"), sorted(rows)))
-    parts.append(_table(("SNR (dB)", "samples"), [(f"{snr:g}", number) for snr, number in sorted(snrs.items())]))
+    parts.append(
+        _table(
+            ("SNR (dB)", "samples"), [(f"{snr:g}", number) for snr, number in sorted(snrs.items())]
+        )
+    )
     sizes = [entry["bytes"] / 1e6 for entry in shards.shards]
     parts.append(
         f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, {sum(sizes) / 1e3:.3f} GB in all, "
@@ -105,9 +124,22 @@ def write_samples(shards: ShardSet, path: Path) -> None:
             columns = (table[name].tolist() for name in ("key", "label", "model", "snr_db"))
             for key, label, model, snr_db in zip(*columns, strict=True):
                 record = records[_slug(key.decode())]
-                row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
+                row = (
+                    key.decode(),
+                    label,
+                    record["category"],
+                    record["subtype"],
+                    entry["group"],
+                    entry["fold"],
+                )
                 name = key.decode().rpartition("-")[0] if shards.kind == "recipe" else key.decode()
-                yield (*row, model, f"{snr_db:g}", entry["name"], f"{name}.{EXTENSIONS[shards.kind]}")
+                yield (
+                    *row,
+                    model,
+                    f"{snr_db:g}",
+                    entry["name"],
+                    f"{name}.{EXTENSIONS[shards.kind]}",
+                )
 
     write_csv(path, tuple(FIELDS), rows())
 
@@ -119,8 +151,10 @@ def description(shards: ShardSet) -> str:
     return (
         f"Simulated echoes of low-altitude targets ({', '.join(map(plural, shards.classes))}) at the base stations "
         f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {contents}, "
-        "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target "
-        "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."
+        "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC "
+        "Enabled Target "
+        "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's "
+        "own."
     )
 
 
@@ -140,31 +174,49 @@ def identity(run_name: str, shards: ShardSet) -> tuple[str, str]:
 
 
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
-    """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
+    """Return the data card as Markdown with the metadata block that dataset hubs read; `config`:
+    the run's YAML.
+    """
     # Template blocks must not leave empty lines.
     templates = jinja2.Environment(
-        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
     )
     return templates.from_string(TEMPLATE.read_text()).render(
-        front=yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip(), name=name, kind=shards.kind,
-        description=description(shards), counts=_counts(shards), config=config.strip(), images=len(shards.columns()),
-        spectra=", ".join(spectrum.upper() for spectrum in shards.spectra), extension=EXTENSIONS[shards.kind],
-        example=shards.shards[0]["path"] if shards.shards else "SHARD.tar", license=license_name,
-        license_address=LICENSES[license_name], package=__version__, frozen=FROZEN.fullmatch(name),
+        front=yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip(),
+        name=name,
+        kind=shards.kind,
+        description=description(shards),
+        counts=_counts(shards),
+        config=config.strip(),
+        images=len(shards.columns()),
+        spectra=", ".join(spectrum.upper() for spectrum in shards.spectra),
+        extension=EXTENSIONS[shards.kind],
+        example=shards.shards[0]["path"] if shards.shards else "SHARD.tar",
+        license=license_name,
+        license_address=LICENSES[license_name],
+        package=__version__,
+        frozen=FROZEN.fullmatch(name),
         versions=_table(("rules of", "version"), [("lowalt", rules(shards))]),
-    )  # fmt: skip
+    )
 
 
-def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
-    """Write README.md, samples.csv and croissant.json next to an index, and the checksums of all of it.
+def write(
+    index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str
+) -> None:
+    """Write README.md, samples.csv and croissant.json next to an index, and the checksums of all of
+    it.
 
-    facts: further properties of the Croissant description, such as `url`; `datePublished` is the day (UTC) on which the
-    index was written where they name none.
+    facts: further properties of the Croissant description, such as `url`; `datePublished` is the
+    day (UTC) on which the index was written where they name none.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
     """
     if license_name not in LICENSES:
         raise InputError(f"--license: {license_name!r}, expected one of {sorted(LICENSES)}")
-    shards, config = ShardSet(index_path), text_of(config_path, "configuration")
+    shards = ShardSet(index_path)
+    config = text_of(config_path, "configuration")
     name, version = identity(yaml.safe_load(config)["run"], shards)
     folder = Path(index_path).parent
     write_file(folder / "README.md", readme(shards, config, name, license_name))
@@ -172,11 +224,17 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     write_samples(shards, samples)
     table = {"path": samples.name, "bytes": samples.stat().st_size, "sha256": sha256(samples)}
     known = {
-        "name": name, "description": description(shards), "version": version,
-        "license": LICENSES[license_name], "citeAs": PAPER,
-        "datePublished": f"{datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC):%Y-%m-%d}", **facts,
-    }  # fmt: skip
-    write_file(folder / "croissant.json", json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
+        "name": name,
+        "description": description(shards),
+        "version": version,
+        "license": LICENSES[license_name],
+        "citeAs": PAPER,
+        "datePublished": f"{datetime.fromtimestamp(Path(index_path).stat().st_mtime, UTC):%Y-%m-%d}",
+        **facts,
+    }
+    write_file(
+        folder / "croissant.json", json.dumps(metadata(shards.index, table, known), indent=1) + "\n"
+    )
     checksums.write(index_path, shards.index)
 
 
@@ -184,13 +242,25 @@ def main(arguments: list[str]) -> None:
     """Write the data card, the table of samples and the Croissant description next to the index."""
     line = argparse.ArgumentParser(prog="python -m lowalt.shards.card", description=main.__doc__)
     line.add_argument("--index", required=True, help="the data set's index")
-    line.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
-    line.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
+    line.add_argument(
+        "--config", required=True, help="the merged configuration that made it (.yaml)"
+    )
+    line.add_argument(
+        "--license",
+        default="MIT",
+        choices=sorted(LICENSES),
+        help="licence of the data (default MIT)",
+    )
     line.add_argument("--url", help="where the data set will be published")
     line.add_argument("--date", help="day of publication, YYYY-MM-DD (default: the index's own)")
     options = line.parse_args(arguments)
     facts = {"url": options.url, "datePublished": options.date}
-    write(options.index, options.config, options.license, **{key: text for key, text in facts.items() if text})
+    write(
+        options.index,
+        options.config,
+        options.license,
+        **{key: text for key, text in facts.items() if text},
+    )
 
 
 if __name__ == "__main__":

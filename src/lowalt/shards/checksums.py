@@ -1,7 +1,9 @@
-"""SHA256SUMS in the folder of the index: one line for every other file of a data set, in the form of `sha256sum`.
+"""SHA256SUMS in the folder of the index: one line for every other file of a data set, in the form
+of `sha256sum`.
 
-Checksums form a chain: those of samples are in their shard's table, those of tables and shards in the index, those of
-the index and the data card here. SHA256SUMS itself needs none: any changed byte of it contradicts one of the files.
+Checksums form a chain: those of samples are in their shard's table, those of tables and shards in
+the index, those of the index and the data card here. SHA256SUMS itself needs none: any changed byte
+of it contradicts one of the files.
 """
 
 import re
@@ -18,7 +20,9 @@ LINE = re.compile(r"([0-9a-f]{64})  ([^\n]+)\n")
 
 def _of_index(index: dict) -> dict[str, str]:
     """Checksums that the index already states: path relative to the index's folder -> SHA-256."""
-    tables = {table_path(entry["path"]).as_posix(): entry["table_sha256"] for entry in index["shards"]}
+    tables = {
+        table_path(entry["path"]).as_posix(): entry["table_sha256"] for entry in index["shards"]
+    }
     return {entry["path"]: entry["sha256"] for entry in index["shards"]} | tables
 
 
@@ -38,9 +42,11 @@ def write(index_path: str | Path, index: dict) -> None:
 
 
 def faults(index_path: str | Path, index: dict) -> Iterator[str]:
-    """Yield one line per fault in the index, the data card and SHA256SUMS, and per file that does not belong there.
+    """Yield one line per fault in the index, the data card and SHA256SUMS, and per file that does
+    not belong there.
 
-    The bytes of shards and tables are not read here; `verify.shard_faults` checks them against the index.
+    The bytes of shards and tables are not read here; `verify.shard_faults` checks them against the
+    index.
     """
     folder = Path(index_path).parent
     path = folder / NAME
@@ -51,7 +57,8 @@ def faults(index_path: str | Path, index: dict) -> Iterator[str]:
     listed = {name: checksum for checksum, name in LINE.findall(text)}
     if text != _text(listed):
         yield f"{NAME}: damaged, expected lines of a SHA-256, two spaces and a name, sorted by name"
-    stated, card = _of_index(index), {*CARD, Path(index_path).name}
+    stated = _of_index(index)
+    card = {*CARD, Path(index_path).name}
     for name in sorted({*stated, *card, *listed}):
         if name not in listed:
             yield f"{NAME}: no line for {name}"
@@ -64,5 +71,10 @@ def faults(index_path: str | Path, index: dict) -> Iterator[str]:
             yield f"{name}: missing"
         elif sha256(folder / name) != listed[name]:
             yield f"{name}: damaged (SHA-256 differs from its line in {NAME})"
-    present = {file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir()}
-    yield from (f"{name}: no part of the data set" for name in sorted(present - {*stated, *card, *listed, NAME}))
+    present = {
+        file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir()
+    }
+    yield from (
+        f"{name}: no part of the data set"
+        for name in sorted(present - {*stated, *card, *listed, NAME})
+    )

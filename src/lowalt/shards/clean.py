@@ -1,9 +1,10 @@
-"""Shards of kind `recipe`: the clean echoes of each motion model, and one record of all its SNRs. Readers add noise.
+"""Shards of kind `recipe`: the clean echoes of each motion model, and one record of all its SNRs.
+Readers add noise.
 
-A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without noise, and the record of
-the same key has lists at `snr_db` and `noise`. In a scene with effects the record also has the reference powers of
-the SNRs and the canceller that filters the noise. Record and signals of each sample are computed from these, with the
-same bytes as in a shard of signals.
+A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without
+noise, and the record of the same key has lists at `snr_db` and `noise`. In a scene with effects the
+record also has the reference powers of the SNRs and the canceller that filters the noise. Record
+and signals of each sample are computed from these, with the same bytes as in a shard of signals.
 """
 
 import functools
@@ -20,9 +21,13 @@ from lowalt.scene.set_noise import behind, in_all_cells
 from lowalt.shards.sample_record import encoded, sample_key
 
 POWER = "power_w"
-"""Field of the record: the power (W) that SNRs refer to, one number per station. Without it, the echoes' own power."""
+"""Field of the record: the power (W) that SNRs refer to, one number per station. Without it, the
+echoes' own power.
+"""
 CANCELLER = "canceller"
-"""Field of the record for the settings, as JSON text, of the canceller that the noise passes; absent without one."""
+"""Field of the record for the settings, as JSON text, of the canceller that the noise passes;
+absent without one.
+"""
 
 
 def refuse(effects: dict) -> None:
@@ -32,17 +37,22 @@ def refuse(effects: dict) -> None:
     """
     if in_all_cells(effects):
         raise InputError(
-            "shards.kind: 'recipe' with the effect 'cell_noise', whose echoes hold noise; expected signal or image"
+            "shards.kind: 'recipe' with the effect 'cell_noise', whose echoes hold noise; expected "
+            "signal or image"
         )
 
 
 def packed(
-    record: bytes, key: str, snrs_db: Iterable[float], power_w: Iterable[float] | None, canceller: dict | None
+    record: bytes,
+    key: str,
+    snrs_db: Iterable[float],
+    power_w: Iterable[float] | None,
+    canceller: dict | None,
 ) -> bytes:
     """Return the record of a motion model, made from the record of one of its samples.
 
-    key: the model's own; snrs_db: SNRs of its samples, +inf for no noise; power_w, canceller: see POWER and CANCELLER,
-    None where they are absent.
+    key: the model's own; snrs_db: SNRs of its samples, +inf for no noise; power_w, canceller: see
+    POWER and CANCELLER, None where they are absent.
     """
     snrs = [float(snr) for snr in snrs_db]
     entry = json.loads(record)
@@ -61,8 +71,13 @@ def sample_snrs(entry: dict) -> list[float]:
     Raises: InputError where the record is not one of a shard of kind `recipe`.
     """
     if not isinstance(entry.get("snr_db"), list):
-        raise InputError(f"record of {entry.get('key')}: one SNR, expected a list of them as recipe shards have")
-    return [snr if noisy else math.inf for snr, noisy in zip(entry["snr_db"], entry["noise"], strict=True)]
+        raise InputError(
+            f"record of {entry.get('key')}: one SNR, expected a list of them as recipe shards have"
+        )
+    return [
+        snr if noisy else math.inf
+        for snr, noisy in zip(entry["snr_db"], entry["noise"], strict=True)
+    ]
 
 
 def unpacked(entry: dict, snr_db: float) -> bytes:
@@ -71,41 +86,59 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
     Raises: InputError where the model has no sample of this SNR.
     """
     if snr_db not in sample_snrs(entry):
-        raise InputError(f"record of {entry['key']}: SNRs {sample_snrs(entry)} dB, expected {snr_db} dB among them")
+        raise InputError(
+            f"record of {entry['key']}: SNRs {sample_snrs(entry)} dB, expected {snr_db} dB among them"
+        )
     kept = {name: value for name, value in entry.items() if name not in (POWER, CANCELLER)}
-    kept |= {"key": sample_key(entry["subtype"], entry["model"], snr_db), "noise": not math.isinf(snr_db)}
+    kept |= {
+        "key": sample_key(entry["subtype"], entry["model"], snr_db),
+        "noise": not math.isinf(snr_db),
+    }
     kept["snr_db"] = snr_db
     return encoded(kept)
 
 
 def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) -> np.ndarray:
-    """Return the signals of one sample from a motion model's clean echoes, both (stations, symbols) complex64."""
+    """Return the signals of one sample from a motion model's clean echoes, both (stations, symbols)
+    complex64.
+    """
     powers = np.array(entry[POWER])[:, None] if POWER in entry else None
     filtered = None
     if CANCELLER in entry:
         filtered = functools.partial(behind, filters={"canceller": json.loads(entry[CANCELLER])})
-    return noisy_signals(clean[:, None], [entry], stations, [snr_db], entry["seed"], powers, filtered)[0, 0]
+    return noisy_signals(
+        clean[:, None], [entry], stations, [snr_db], entry["seed"], powers, filtered
+    )[0, 0]
 
 
 def complex_signals(stored: np.ndarray) -> np.ndarray:
-    """Return the signals of a stored array: (stations, symbols, 2) float32, or complex64 as version 0.1 wrote them."""
+    """Return the signals of a stored array: (stations, symbols, 2) float32, or complex64 as version
+    0.1 wrote them.
+    """
     if stored.dtype == np.complex64:
         return stored
     return np.ascontiguousarray(stored).view(np.complex64)[..., 0]
 
 
 def samples(models: Iterable[dict]) -> Iterator[dict]:
-    """Yield all samples, in the form of signal shards, from motion models that another tool reads from recipe shards.
+    """Yield all samples, in the form of signal shards, from motion models that another tool reads
+    from recipe shards.
 
-    models: dicts with `json` and `clean.npy`, as bytes or decoded, as in a pipeline of webdataset. Yields dicts
-    with `__key__`, `json` (parsed) and `npy`, (stations, symbols, 2) float32. For example
-    `webdataset.WebDataset(path, shardshuffle=False).compose(lowalt.shards.clean.samples)`.
+    models: dicts with `json` and `clean.npy`, as bytes or decoded, as in a pipeline of webdataset.
+    Yields dicts with `__key__`, `json` (parsed) and `npy`, (stations, symbols, 2) float32. For
+    example `webdataset.WebDataset(path, shardshuffle=False).compose(lowalt.shards.clean.samples)`.
     """
     for model in models:
-        entry, stored = model["json"], model["clean.npy"]
+        entry = model["json"]
+        stored = model["clean.npy"]
         entry = json.loads(entry) if isinstance(entry, (bytes, str)) else entry
-        stored = np.lib.format.read_array(io.BytesIO(stored)) if isinstance(stored, bytes) else np.asarray(stored)
-        clean, stations = complex_signals(stored), list(entry["geometry"])
+        stored = (
+            np.lib.format.read_array(io.BytesIO(stored))
+            if isinstance(stored, bytes)
+            else np.asarray(stored)
+        )
+        clean = complex_signals(stored)
+        stations = list(entry["geometry"])
         for snr_db in sample_snrs(entry):
             record = json.loads(unpacked(entry, snr_db))
             signal = noisy(entry, clean, stations, snr_db)

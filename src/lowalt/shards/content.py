@@ -1,4 +1,6 @@
-"""Turns the files of a chunk into a function from (motion model, SNR) to the bytes of a shard member."""
+"""Turns the files of a chunk into a function from (motion model, SNR) to the bytes of a shard
+member.
+"""
 
 from collections.abc import Sequence
 
@@ -19,17 +21,22 @@ from lowalt.tiles.tile_files import Tiles
 def _signals(kind: str, path: str | None, network: Network, shape: tuple[int, int]) -> np.ndarray:
     """The chunk's noisy signals (models, SNRs, stations, symbols).
 
-    Raises: InputError if the option is missing, or naming a file with another number of models or SNRs.
+    Raises: InputError if the option is missing, or naming a file with another number of models or
+    SNRs.
     """
     if path is None:
         raise InputError(f"--signals: missing, {kind} shards are packed from them")
     signals = load_signals(path, network)
     if signals.shape[:2] != shape:
-        raise InputError(f"{path}: shape {signals.shape}, expected {shape[0]} models and {shape[1]} SNRs")
+        raise InputError(
+            f"{path}: shape {signals.shape}, expected {shape[0]} models and {shape[1]} SNRs"
+        )
     return signals
 
 
-def noisy_content(kind: str, path: str | None, tiles: str | None, network: Network, shape: tuple[int, int]) -> Content:
+def noisy_content(
+    kind: str, path: str | None, tiles: str | None, network: Network, shape: tuple[int, int]
+) -> Content:
     """Return the content of image or signal shards from the chunk's files.
 
     path: of the noisy signals; shape: numbers of motion models and SNRs of the chunk.
@@ -49,7 +56,8 @@ def noisy_content(kind: str, path: str | None, tiles: str | None, network: Netwo
 def clean_content(
     paths: list[str] | None, powers: list[str] | None, network: Network, models: int
 ) -> tuple[Content, np.ndarray | None]:
-    """Return the content of recipe shards from the chunk's clean echoes, and the powers (stations, models) W or None.
+    """Return the content of recipe shards from the chunk's clean echoes, and the powers (stations,
+    models) W or None.
 
     Raises: InputError naming the option or file that is missing or does not fit.
     """
@@ -57,9 +65,12 @@ def clean_content(
         raise InputError("--echoes: missing, recipe shards are packed from them")
     stations = [station.name for station in network.stations]
     echoes = load_echoes(paths, stations, models)
-    wanted, first = (models, network.symbols), echoes[0]
+    wanted = (models, network.symbols)
+    first = echoes[0]
     if len(echoes) != len(stations) or first.shape != wanted or first.dtype != np.complex64:
-        raise InputError(f"{existing(paths[0], 'echo')}: {first.dtype} {first.shape}, expected complex64 {wanted}")
+        raise InputError(
+            f"{existing(paths[0], 'echo')}: {first.dtype} {first.shape}, expected complex64 {wanted}"
+        )
 
     def content(number: int, level: int) -> tuple[bytes, dict]:
         """The clean echoes of one motion model."""
@@ -82,7 +93,12 @@ def cube_content(
     def content(model: int, level: int) -> tuple[bytes, dict]:
         """The cubes of one sample and what its record says of them."""
         heard = zip(network.stations, signals[model, level], strict=True)
-        row, snr_db = rows[model], snrs[level]
-        return of_cubes([cubes.of(row, snr_db, station, signal) for station, signal in heard], network, cell_type)
+        row = rows[model]
+        snr_db = snrs[level]
+        return of_cubes(
+            [cubes.of(row, snr_db, station, signal) for station, signal in heard],
+            network,
+            cell_type,
+        )
 
     return content

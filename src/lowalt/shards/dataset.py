@@ -1,7 +1,8 @@
 """A data set that simulates each sample on access, with the same bytes as in the shards.
 
-Torch is not imported: `Dataset` has a length and indexed samples, as `torch.utils.data.DataLoader` expects, and
-`Endless` is an iterable. Both can be pickled, so the workers of any framework can make samples.
+Torch is not imported: `Dataset` has a length and indexed samples, as `torch.utils.data.DataLoader`
+expects, and `Endless` is an iterable. Both can be pickled, so the workers of any framework can make
+samples.
 """
 
 import functools
@@ -35,8 +36,8 @@ from lowalt.targets.records import missing_inputs, records_of
 
 
 class Sample(NamedTuple):
-    """One sample: `image` its tile of index values, (3 S, 3 S) uint8; `signal` (stations, symbols) complex64; `record`
-    a dict, as in the shards."""
+    """One sample: `image` its tile of index values, (3 S, 3 S) uint8; `signal` (stations, symbols)
+    complex64; `record` a dict, as in the shards."""
 
     image: np.ndarray
     signal: np.ndarray
@@ -55,13 +56,21 @@ class Place(NamedTuple):
 class MadeOnDemand(Mapping):
     """The result of `make` for each target's record, by subtype, computed on first access and kept."""
 
-    def __init__(self, make: Callable[..., Any], records: dict[str, dict], seed: int, inputs: Path | None) -> None:
-        """make: a function of (record, inputs, seed); inputs: the user's folder of meshes and recordings, or None."""
-        self._make, self._records, self._sources = make, records, (inputs, seed)
+    def __init__(
+        self, make: Callable[..., Any], records: dict[str, dict], seed: int, inputs: Path | None
+    ) -> None:
+        """make: a function of (record, inputs, seed); inputs: the user's folder of meshes and
+        recordings, or None.
+        """
+        self._make = make
+        self._records = records
+        self._sources = (inputs, seed)
         self._made: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
-        """The result for one target. Raises: KeyError for another; InputError where its record or input is wrong."""
+        """The result for one target. Raises: KeyError for another; InputError where its record or
+        input is wrong.
+        """
         if name not in self._made:
             self._made[name] = self._make(self._records[name], *self._sources)
         return self._made[name]
@@ -94,7 +103,8 @@ def made_surfaces(record: dict, inputs: Path | None, seed: int) -> dict:
 
 
 class Dataset:
-    """The samples of a configuration by number: group by group, model by model, subtype by subtype, SNR by SNR.
+    """The samples of a configuration by number: group by group, model by model, subtype by subtype,
+    SNR by SNR.
 
     A crow's first second, at 3 dB:
 
@@ -119,21 +129,28 @@ class Dataset:
         occluders: Mapping[str, dict] | None = None,
         published: dict[str, dict] | None = None,
     ) -> None:
-        """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and choose groups and folds.
+        """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and
+        choose groups and folds.
 
-        clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
-        that the configuration names and the folder `inputs` of meshes and recordings, each when it is first asked for.
-        occluders: each subtype's surfaces, for a scene with `occlusion`; by default made here if the clouds are.
-        published: the row of each subtype in the table of targets, which decides the classes; by default the records'.
+        clouds: the clouds by subtype, or the folder of their files; by default they are made here,
+        from the records that the configuration names and the folder `inputs` of meshes and
+        recordings, each when it is first asked for.
+        occluders: each subtype's surfaces, for a scene with `occlusion`; by default made here if
+        the clouds are.
+        published: the row of each subtype in the table of targets, which decides the classes; by
+        default the records'.
         Raises: InputError naming the key, value or file that is wrong.
         """
         if isinstance(config, (str, Path)):
-            path, config = config, check(load_yaml(config), shipped(SCHEMA))
+            path = config
+            config = check(load_yaml(config), shipped(SCHEMA))
             refuse_effects(config["effects"], path)
-        self.config, self.folds = config, tuple(folds)
+        self.config = config
+        self.folds = tuple(folds)
         records = {}
         if published is None or clouds is None:
-            # A run's configuration names tables and records as seen from the checkout it was made in.
+            # A run's configuration names tables and records as seen from the checkout it was made
+            # in.
             records = records_of(located(config)["targets"], inputs)
         self.published = published or {name: item["published"] for name, item in records.items()}
         self.classes = classes_of(self.published)
@@ -142,7 +159,9 @@ class Dataset:
         refuse_unknown(groups, self.folds)
         self.groups = tuple(name for name in self.plan.groups if name in groups)
         if clouds is None:
-            wanted = {name: records[name] for group in self.groups for name in self.plan.groups[group]}
+            wanted = {
+                name: records[name] for group in self.groups for name in self.plan.groups[group]
+            }
             sources = wanted, config["seed"], Path(inputs) if inputs else None
             if missing := missing_inputs(wanted, sources[-1]):
                 raise InputError("missing inputs:\n  " + "\n  ".join(missing))
@@ -165,15 +184,23 @@ class Dataset:
 
     @functools.cached_property
     def _numbers(self) -> np.ndarray | None:
-        """Numbers of the chosen folds' samples, counted over all folds; None if all folds are chosen."""
+        """Numbers of the chosen folds' samples, counted over all folds; None if all folds are
+        chosen.
+        """
         if set(self.folds) == set(FOLDS):
             return None
-        return np.array([n for n in range(self._all) if self._fold(self._place(n)) in self.folds], np.int64)
+        return np.array(
+            [n for n in range(self._all) if self._fold(self._place(n)) in self.folds], np.int64
+        )
 
     @property
     def _all(self) -> int:
         """Number of samples of the chosen groups in all folds."""
-        return sum(len(self.plan.groups[group]) for group in self.groups) * self.plan.models * len(self.plan.snrs)
+        return (
+            sum(len(self.plan.groups[group]) for group in self.groups)
+            * self.plan.models
+            * len(self.plan.snrs)
+        )
 
     def __len__(self) -> int:
         return self._all if self._numbers is None else len(self._numbers)
@@ -207,20 +234,39 @@ class Dataset:
         for group, members in self.plan.groups.items():
             if subtype in members:
                 return Place(group, subtype, model, snr_db)
-        raise InputError(f"subtype is {subtype!r}, expected one of {[*itertools.chain(*self.plan.groups.values())]}")
+        raise InputError(
+            f"subtype is {subtype!r}, expected one of {[*itertools.chain(*self.plan.groups.values())]}"
+        )
 
     def _fold(self, place: Place) -> str:
         """Fold of a sample."""
-        return fold(self.plan.split, self.plan.seed, place.subtype, place.model // self.plan.looks, place.snr_db)
+        return fold(
+            self.plan.split,
+            self.plan.seed,
+            place.subtype,
+            place.model // self.plan.looks,
+            place.snr_db,
+        )
 
     def row(self, place: Place) -> dict:
-        """Return the motion table's row of a sample; models beyond the configuration's count are drawn too."""
+        """Return the motion table's row of a sample; models beyond the configuration's count are
+        drawn too.
+        """
         track, look = divmod(place.model, self.plan.looks)
         name = place.subtype, track
-        # All looks of a track are drawn together and usually accessed in sequence, so keep the last track.
+        # All looks of a track are drawn together and usually accessed in sequence, so keep the last
+        # track.
         if self._drawn[0] != name:
-            sources = self.clouds[place.subtype], self.published[place.subtype], self._masts, self._corners
-            self._drawn = name, model_rows(self.plan.seed, *sources, self._motion, track, self._path)
+            sources = (
+                self.clouds[place.subtype],
+                self.published[place.subtype],
+                self._masts,
+                self._corners,
+            )
+            self._drawn = (
+                name,
+                model_rows(self.plan.seed, *sources, self._motion, track, self._path),
+            )
         row = {**self._drawn[1][look], "group": place.group, "model": place.model}
         return accompanied(row, self.config["effects"], self.plan.seed, self.maker.network)
 
@@ -253,8 +299,13 @@ class Dataset:
     @property
     def labels(self) -> np.ndarray:
         """Labels of all samples, (n,) int64 indices into `classes`; no sample is simulated."""
-        numbers = {name: label(self.classes, item | {"subtype": name}) for name, item in self.published.items()}
-        return np.array([numbers[self.place(number).subtype] for number in range(len(self))], np.int64)
+        numbers = {
+            name: label(self.classes, item | {"subtype": name})
+            for name, item in self.published.items()
+        }
+        return np.array(
+            [numbers[self.place(number).subtype] for number in range(len(self))], np.int64
+        )
 
     def signal(self, number: int) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""
@@ -265,15 +316,18 @@ class Dataset:
         return json.loads(self.made_record(self.place(number)))
 
     def members(self, number: int, kind: str) -> tuple[bytes, bytes]:
-        """Return record and data of a sample, byte for byte as a shard of a kind holds them ("image", "cube", or
-        "signal" and "recipe", which hold the same)."""
+        """Return record and data of a sample, byte for byte as a shard of a kind holds them
+        ("image", "cube", or "signal" and "recipe", which hold the same)."""
         place = self.place(number)
-        row, signal = self.row(place), self.made_signal(place)
+        row = self.row(place)
+        signal = self.made_signal(place)
         data, cubes = self.maker.data(kind, signal, row, place.snr_db, cell_type(self.config))
         return self.made_record(place, cubes), data
 
     def cubes(self, number: int) -> list[Cube]:
-        """Return the cube of each station of a sample: its noisy range cells, the chosen ones, and the truth."""
+        """Return the cube of each station of a sample: its noisy range cells, the chosen ones, and
+        the truth.
+        """
         place = self.place(number)
         return self.maker.cubes(self.row(place), place.snr_db, self.made_signal(place))
 
@@ -283,19 +337,25 @@ class Dataset:
 
 
 class Endless:
-    """An endless sequence of samples: all subtypes at all SNRs, for increasing numbers of the motion model.
+    """An endless sequence of samples: all subtypes at all SNRs, for increasing numbers of the
+    motion model.
 
-    With `parts` workers or ranks, number `part` takes every `parts`-th motion model, so that no sample is made twice.
+    With `parts` workers or ranks, number `part` takes every `parts`-th motion model, so that no
+    sample is made twice.
     """
 
-    def __init__(self, dataset: Dataset, first: int | None = None, part: int = 0, parts: int = 1) -> None:
+    def __init__(
+        self, dataset: Dataset, first: int | None = None, part: int = 0, parts: int = 1
+    ) -> None:
         """Begin at model `first`; the default is the first model after those of the configuration.
 
         Raises: InputError where the part is not below the number of parts.
         """
         if not 0 <= part < parts:
             raise InputError(f"part {part} of {parts}, expected 0 <= part < parts")
-        self.dataset, self.part, self.parts = dataset, part, parts
+        self.dataset = dataset
+        self.part = part
+        self.parts = parts
         self.first = dataset.plan.models if first is None else first
 
     def places(self) -> Iterator[Place]:

@@ -1,7 +1,9 @@
-"""The index of a data set: every shard with its group, fold, counts and checksums, and how signals are rendered.
+"""The index of a data set: every shard with its group, fold, counts and checksums, and how signals
+are rendered.
 
-It is made from the headers of the shards' tables, without reading the shards. Offsets and SHA-256 of samples are in the
-shards' tables, and the tables' SHA-256 in the index, so one checksum of the index covers everything.
+It is made from the headers of the shards' tables, without reading the shards. Offsets and SHA-256
+of samples are in the shards' tables, and the tables' SHA-256 in the index, so one checksum of the
+index covers everything.
 """
 
 import hashlib
@@ -19,18 +21,24 @@ from lowalt.shards.sample_table import read_header, table_path
 FORMAT = "lowalt-shards-2"
 WHAT = "an index of shards"
 READABLE = ("lowalt-shards-1", FORMAT)
-"""Readable formats. In the first, records contain nulls and an SNR of \"inf\", and signals are complex64."""
+"""Readable formats. In the first, records contain nulls and an SNR of \"inf\", and signals are
+complex64.
+"""
 
 
 def build(
-    shards: Sequence[str | Path], render: dict, out: str | Path, echo: dict | None = None,
+    shards: Sequence[str | Path],
+    render: dict,
+    out: str | Path,
+    echo: dict | None = None,
     classes: tuple[str, ...] = CATEGORIES,
-) -> dict:  # fmt: skip
+) -> dict:
     """Write the index of these shards to `out` and return it.
 
-    render: the settings that turn signals into tiles ({network, spectra, images}); echo: those that turn motion into
-    echoes ({tolerance, effects}), needed to remake samples; classes: in the order of their labels, stored only if they
-    are not the published ones. Paths in the index are relative to its folder.
+    render: the settings that turn signals into tiles ({network, spectra, images}); echo: those that
+    turn motion into echoes ({tolerance, effects}), needed to remake samples; classes: in the order
+    of their labels, stored only if they are not the published ones. Paths in the index are relative
+    to its folder.
     Raises: InputError where a table is missing, a name appears twice or the kinds differ.
     """
     entries = []
@@ -39,12 +47,18 @@ def build(
         header = read_header(table)
         existing(shard, "shard")
         if shard.stat().st_size != header["bytes"]:
-            raise InputError(f"{shard}: {shard.stat().st_size} bytes, its table says {header['bytes']}")
-        entries.append({**header, "path": _relative(shard, Path(out)), "table_sha256": sha256(table)})
+            raise InputError(
+                f"{shard}: {shard.stat().st_size} bytes, its table says {header['bytes']}"
+            )
+        entries.append(
+            {**header, "path": _relative(shard, Path(out)), "table_sha256": sha256(table)}
+        )
     names = [entry["name"] for entry in entries]
     kinds = sorted({entry["kind"] for entry in entries})
     if len(set(names)) < len(names) or len(kinds) != 1:
-        raise InputError(f"{out}: {len(names)} shards of kinds {kinds}, expected names once and one kind")
+        raise InputError(
+            f"{out}: {len(names)} shards of kinds {kinds}, expected names once and one kind"
+        )
     index = {
         "format": FORMAT,
         "kind": kinds[0],
@@ -75,13 +89,16 @@ def _relative(shard: Path, index: Path) -> str:
     try:
         return shard.resolve().relative_to(index.resolve().parent).as_posix()
     except ValueError:
-        raise InputError(f"{shard}: not below the folder of the index, {index.resolve().parent}") from None
+        raise InputError(
+            f"{shard}: not below the folder of the index, {index.resolve().parent}"
+        ) from None
 
 
 def load(path: str | Path) -> dict:
     """Return an index from disk.
 
-    Raises: InputError naming the file where it is missing or no index, or the setting in it that is wrong.
+    Raises: InputError naming the file where it is missing or no index, or the setting in it that is
+    wrong.
     """
     existing(path, "index")
     return checked(read_object(path, WHAT), path)
@@ -90,10 +107,13 @@ def load(path: str | Path) -> dict:
 def checked(index: dict, path: str | Path) -> dict:
     """Return an index that was read from `path`, after its check; no shard lies outside its folder.
 
-    Raises: InputError naming `path` where it is damaged or no index, or the setting in it that is wrong.
+    Raises: InputError naming `path` where it is damaged or no index, or the setting in it that is
+    wrong.
     """
     try:
-        written, stated, computed = index["format"], index["sha256"], _checksum(index)
+        written = index["format"]
+        stated = index["sha256"]
+        computed = _checksum(index)
     except KeyError as error:
         raise InputError(f"{path}: not an index of shards, it has no {error}") from None
     if written not in READABLE:

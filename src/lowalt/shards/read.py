@@ -1,6 +1,7 @@
 """Random access to the samples of shards; each access verifies the sample.
 
-Torch is not imported: `len` and one of the methods below are enough for a data set of any framework.
+Torch is not imported: `len` and one of the methods below are enough for a data set of any
+framework.
 """
 
 import functools
@@ -45,26 +46,35 @@ def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
 class ShardSet:
     """The samples of some groups and folds of a data set, numbered in the order of the index.
 
-    Of a data set on a web server, only the index, the tables of the shards in use and the samples asked for are read.
-    It can be pickled; each worker memory-maps the tables itself. Every access checks the sample's SHA-256, unless
-    `check` is False.
+    Of a data set on a web server, only the index, the tables of the shards in use and the samples
+    asked for are read. It can be pickled; each worker memory-maps the tables itself. Every access
+    checks the sample's SHA-256, unless `check` is False.
     """
 
     def __init__(
-        self, index_path: str | Path, groups: Iterable[str] = GROUPS, folds: Iterable[str] = FOLDS, check: bool = True
+        self,
+        index_path: str | Path,
+        groups: Iterable[str] = GROUPS,
+        folds: Iterable[str] = FOLDS,
+        check: bool = True,
     ) -> None:
         """Select the shards of these groups and folds.
 
         index_path: a file, or an address (http or https) on a server that sends byte ranges.
         Raises: InputError naming an unknown group or fold, or a file that is missing or damaged.
         """
-        self.remote, self._base = is_address(index_path), str(index_path)
+        self.remote = is_address(index_path)
+        self._base = str(index_path)
         self.index_path = self._base if self.remote else Path(index_path)
-        self.groups, self.folds, self.check = tuple(groups), tuple(folds), check
+        self.groups = tuple(groups)
+        self.folds = tuple(folds)
+        self.check = check
         refuse_unknown(self.groups, self.folds)
         self.index = self._fetched_index() if self.remote else load(index_path)
         self.kind, self.classes = self.index["kind"], stated(self.index)
-        self.shards = [s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds]
+        self.shards = [
+            s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds
+        ]
         self._ends = np.cumsum([0, *(shard["samples"] for shard in self.shards)])
         self._tables: dict[int, np.ndarray] = {}
 
@@ -86,8 +96,8 @@ class ShardSet:
         name = self.shards[shard]["path"]
         if self.remote:
             return span(beside(self._base, name), offset, size)
-        # Open the shard for each access: there may be more shards than allowed open files, and a memory map of a
-        # truncated file would crash the process.
+        # Open the shard for each access: there may be more shards than allowed open files, and a
+        # memory map of a truncated file would crash the process.
         with existing(Path(self.index_path).parent / name, "shard").open("rb") as file:
             file.seek(offset)
             return file.read(size)
@@ -103,7 +113,9 @@ class ShardSet:
                 place = fetched(beside(self._base, name.as_posix()), most)
             with place as path:
                 samples = map_samples(path)
-                if len(samples) != entry["samples"] or (self.check and sha256(path) != entry["table_sha256"]):
+                if len(samples) != entry["samples"] or (
+                    self.check and sha256(path) != entry["table_sha256"]
+                ):
                     raise InputError(
                         f"{path.name}: damaged or another table: {len(samples)} rows, expected {entry['samples']}, and "
                         "the SHA-256 that the index states"
@@ -112,9 +124,11 @@ class ShardSet:
         return self._tables[shard]
 
     def tables(self) -> Iterator[tuple[dict, np.ndarray]]:
-        """Yield each shard's entry of the index and its rows (`samples.map_samples`), of one shard at a time.
+        """Yield each shard's entry of the index and its rows (`samples.map_samples`), of one shard
+        at a time.
 
-        Memory does not grow with the number of shards. Raises: InputError naming a table that is missing or damaged.
+        Memory does not grow with the number of shards. Raises: InputError naming a table that is
+        missing or damaged.
         """
         for shard, entry in enumerate(self.shards):
             yield entry, self._table(shard)
@@ -135,11 +149,14 @@ class ShardSet:
         """
         shard, place = self._locate(number)
         row = self._table(shard)[place]
-        first, length = int(row[f"{member}_offset"]), int(row[f"{member}_size"])
+        first = int(row[f"{member}_offset"])
+        length = int(row[f"{member}_size"])
         # Without a check, read only the member: a record is about 1 % of its sample's bytes.
         offset, size = (int(row["offset"]), int(row["size"])) if self.check else (first, length)
         sample = self._read(shard, offset, size)
-        if len(sample) < size or (self.check and hashlib.sha256(sample).digest() != row["sha256"].tobytes()):
+        if len(sample) < size or (
+            self.check and hashlib.sha256(sample).digest() != row["sha256"].tobytes()
+        ):
             name = Path(self.shards[shard]["path"]).name
             raise InputError(f"{name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
         return sample[first - offset : first - offset + length]
@@ -151,8 +168,12 @@ class ShardSet:
 
     @functools.cached_property
     def renderer(self) -> Renderer:
-        """The renderer that turns the signals of these shards into tiles, with the settings of the index."""
-        return Renderer.from_settings({key: self.index["render"][key] for key in ("network", "spectra", "images")})
+        """The renderer that turns the signals of these shards into tiles, with the settings of the
+        index.
+        """
+        return Renderer.from_settings(
+            {key: self.index["render"][key] for key in ("network", "spectra", "images")}
+        )
 
     @property
     def spectra(self) -> tuple[str, ...]:
@@ -185,7 +206,8 @@ class ShardSet:
         return self._column("snr_db").astype(float)
 
     def members(self, number: int) -> tuple[bytes, bytes]:
-        """Return record and data of a sample as stored; for recipe shards, as a signal shard would store them.
+        """Return record and data of a sample as stored; for recipe shards, as a signal shard would
+        store them.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
@@ -201,7 +223,9 @@ class ShardSet:
     def _record(self, number: int) -> bytes:
         """The JSON record of a sample."""
         stored = self.stored(number, "record")
-        return unpacked(json.loads(stored), self._snr_db(number)) if self.kind == "recipe" else stored
+        return (
+            unpacked(json.loads(stored), self._snr_db(number)) if self.kind == "recipe" else stored
+        )
 
     def record(self, number: int) -> dict:
         """Return the JSON record of a sample.
@@ -213,15 +237,18 @@ class ShardSet:
     def png(self, number: int) -> bytes:
         """Return the PNG file of a sample of an image shard.
 
-        Raises: InputError where shards are of another kind, or naming shard and sample where it is damaged.
+        Raises: InputError where shards are of another kind, or naming shard and sample where it is
+        damaged.
         """
         self._need("image")
         return self.stored(number, "data")
 
     def signal(self, number: int) -> np.ndarray:
-        """Return the signals of a sample of a signal, recipe or cube shard, (stations, symbols) complex64.
+        """Return the signals of a sample of a signal, recipe or cube shard, (stations, symbols)
+        complex64.
 
-        Raises: InputError where these are image shards, or naming shard and sample where it is damaged.
+        Raises: InputError where these are image shards, or naming shard and sample where it is
+        damaged.
         """
         self._need("signal", "recipe", "cube")
         if self.kind == "cube":
@@ -230,12 +257,15 @@ class ShardSet:
         if self.kind == "signal":
             return stored
         stations = station_names(self.index["render"]["network"])
-        return noisy(json.loads(self.stored(number, "record")), stored, stations, self._snr_db(number))
+        return noisy(
+            json.loads(self.stored(number, "record")), stored, stations, self._snr_db(number)
+        )
 
     def cubes(self, number: int) -> list[Cube]:
         """Return the cube of each station of a sample of a cube shard.
 
-        Raises: InputError where shards are of another kind, or naming shard and sample where it is damaged.
+        Raises: InputError where shards are of another kind, or naming shard and sample where it is
+        damaged.
         """
         self._need("cube")
         return cubes_of(self.record(number), self._array(number))
@@ -249,20 +279,28 @@ class ShardSet:
         return self.cubes(number) if of_cells(self.spectra) else None
 
     def late(self, number: int) -> np.ndarray | None:
-        """Return the delays of a sample's symbols, (stations, symbols) intervals; None if images do not use them."""
-        render, effects = self.index["render"], (self.index.get("echo") or {}).get("effects", {})
+        """Return the delays of a sample's symbols, (stations, symbols) intervals; None if images do
+        not use them.
+        """
+        render = self.index["render"]
+        effects = (self.index.get("echo") or {}).get("effects", {})
         if render["spectra"].get("times") != "known":
             return None
         entry = self.record(number)
-        return lateness(render["spectra"], effects, self.renderer.network, entry["seed"], row_of(entry)[0])
+        return lateness(
+            render["spectra"], effects, self.renderer.network, entry["seed"], row_of(entry)[0]
+        )
 
     def tile(self, number: int) -> np.ndarray:
-        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered; all kinds of shards give the same pixels.
+        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered; all kinds of shards
+        give the same pixels.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
         if self.kind != "image":
-            return self.renderer.tile(self.signal(number), late=self.late(number), cubes=self._shown(number))
+            return self.renderer.tile(
+                self.signal(number), late=self.late(number), cubes=self._shown(number)
+            )
         return decode(self.png(number))[0]
 
     def images(
@@ -274,27 +312,41 @@ class ShardSet:
     ) -> np.ndarray:
         """Return the images of a sample, (stations spectra, S, S) uint8, station by station.
 
-        size: pixels per side, by the project's one resampling kernel; stations, views: names to keep, in their own
-        order (signal and recipe shards then compute nothing else).
-        Raises: InputError naming an unknown station or view, or shard and sample where it is damaged.
+        size: pixels per side, by the project's one resampling kernel; stations, views: names to
+        keep, in their own order (signal and recipe shards then compute nothing else).
+        Raises: InputError naming an unknown station or view, or shard and sample where it is
+        damaged.
         """
         numbers = self.columns(stations, views)
         if self.kind != "image":
-            images = self.renderer.some(self.signal(number), numbers, self.late(number), self._shown(number))
+            images = self.renderer.some(
+                self.signal(number), numbers, self.late(number), self._shown(number)
+            )
         else:
             images = split(self.tile(number), len(self.spectra))[numbers]
         return images if size in (None, images.shape[-1]) else resize(images, size)
 
-    def columns(self, stations: Iterable[str] | None = None, views: Iterable[str] | None = None) -> list[int]:
-        """Return the numbers, among all images of a sample, of some stations and views (all by default).
+    def columns(
+        self, stations: Iterable[str] | None = None, views: Iterable[str] | None = None
+    ) -> list[int]:
+        """Return the numbers, among all images of a sample, of some stations and views (all by
+        default).
 
         Raises: InputError naming an unknown one.
         """
-        known, spectra = station_names(self.index["render"]["network"]), self.spectra
-        stations, views = list(known if stations is None else stations), list(spectra if views is None else views)
+        known = station_names(self.index["render"]["network"])
+        spectra = self.spectra
+        stations = list(known if stations is None else stations)
+        views = list(spectra if views is None else views)
         if set(stations) - set(known) or set(views) - set(spectra):
-            raise InputError(f"stations {stations} and views {views}, expected some of {known} and of {list(spectra)}")
-        return [len(spectra) * known.index(station) + spectra.index(view) for station in stations for view in views]
+            raise InputError(
+                f"stations {stations} and views {views}, expected some of {known} and of {list(spectra)}"
+            )
+        return [
+            len(spectra) * known.index(station) + spectra.index(view)
+            for station in stations
+            for view in views
+        ]
 
     def _need(self, *kinds: str) -> None:
         """Raise InputError unless the shards are of one of these kinds."""

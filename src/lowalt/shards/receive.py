@@ -1,4 +1,6 @@
-"""The raw echo of one target at one station, at any place of the receiving chain, with its axes and the truth."""
+"""The raw echo of one target at one station, at any place of the receiving chain, with its axes and
+the truth.
+"""
 
 import copy
 import math
@@ -33,13 +35,16 @@ AT = ("subcarriers", "receiver", "cells", "canceller", "signal")
 class RawEcho:
     """The echo of one target at one station; NumPy takes it as its `values`.
 
-    values: (N, M) complex128 in sqrt(W), N symbols by M subcarriers or range cells; (N,) of the chosen signal.
-    times_s: (N,) start of each symbol. frequencies_hz: (M,) of the subcarriers, or of the samples of an FMCW sweep;
-    ranges_m: (M,) of the range cells; an axis that the values do not have is empty. speeds_mps: (N,) ascending, of a
-    Fourier transform over the symbols.
-    truth: what is true of the target's middle at each symbol, each (N,): range_m, radial_mps, psi, omega, cell,
-    observed_cell and observed_mps (`lowalt.spectra.cube.TRUTH`), and of each part, each (N, P): part_range_m of its
-    middle, part_low_mps and part_high_mps, the lowest and the highest radial speed of its points. parts: their names.
+    values: (N, M) complex128 in sqrt(W), N symbols by M subcarriers or range cells; (N,) of the
+    chosen signal.
+    times_s: (N,) start of each symbol. frequencies_hz: (M,) of the subcarriers, or of the samples
+    of an FMCW sweep;
+    ranges_m: (M,) of the range cells; an axis that the values do not have is empty. speeds_mps:
+    (N,) ascending, of a Fourier transform over the symbols.
+    truth: what is true of the target's middle at each symbol, each (N,): range_m, radial_mps, psi,
+    omega, cell, observed_cell and observed_mps (`lowalt.spectra.cube.TRUTH`), and of each part,
+    each (N, P): part_range_m of its middle, part_low_mps and part_high_mps, the lowest and the
+    highest radial speed of its points. parts: their names.
     """
 
     values: np.ndarray
@@ -60,38 +65,51 @@ class RawEcho:
         return np.array(self.values, dtype, copy=copy)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return everything by name, as a file holds it: the fields, and each entry of the truth by its own name."""
-        own = {field.name: np.asarray(getattr(self, field.name)) for field in fields(self) if field.name != "truth"}
+        """Return everything by name, as a file holds it: the fields, and each entry of the truth by
+        its own name.
+        """
+        own = {
+            field.name: np.asarray(getattr(self, field.name))
+            for field in fields(self)
+            if field.name != "truth"
+        }
         return own | self.truth
 
 
 @one_blas_thread()
 def receive(
-    configuration: Dataset | dict | str | Path | Iterable[str | Path | dict], subtype: str, model: int = 0,
-    station: str | None = None, at: str = "cells", snr_db: float = math.inf,
-) -> RawEcho:  # fmt: skip
-    """Return the echo of a motion model of a subtype at a station, at one place of the chain, in sqrt(W).
+    configuration: Dataset | dict | str | Path | Iterable[str | Path | dict],
+    subtype: str,
+    model: int = 0,
+    station: str | None = None,
+    at: str = "cells",
+    snr_db: float = math.inf,
+) -> RawEcho:
+    """Return the echo of a motion model of a subtype at a station, at one place of the chain, in
+    sqrt(W).
 
-    configuration: overlays on the embedded default, each a path or a dict, a whole configuration, or a `Dataset`, which
-    keeps the targets between calls; station: the first one by default. Only this target and its
-    companions in the scene are made. at:
-    "subcarriers": Y[n, m] of Eq. 24, the known symbol removed, as a receiver without faults or noise finds it;
-    "receiver": the same behind the receiver's effects and noise; "cells": range cells; "canceller": range cells behind
-    the clutter canceller; "signal": the chosen range cell of each symbol.
-    snr_db: without it there is no noise but that of the scene's own receiver; with it there is white noise from
-    "receiver" on, and "canceller" and "signal" are those of the data set.
+    configuration: overlays on the embedded default, each a path or a dict, a whole configuration,
+    or a `Dataset`, which keeps the targets between calls; station: the first one by default. Only
+    this target and its companions in the scene are made. at:
+    "subcarriers": Y[n, m] of Eq. 24, the known symbol removed, as a receiver without faults or
+    noise finds it; "receiver": the same behind the receiver's effects and noise; "cells": range
+    cells; "canceller": range cells behind the clutter canceller; "signal": the chosen range cell of
+    each symbol.
+    snr_db: without it there is no noise but that of the scene's own receiver; with it there is
+    white noise from "receiver" on, and "canceller" and "signal" are those of the data set.
 
-    Conventions: an echo of delay tau = 2 r / c is a exp(-j 2 pi f tau) at the frequency f, so it turns backwards from
-    symbol to symbol as the target recedes; radial speeds are positive away from the station. Range cells are
-    (1/M) sum_m Y[n, m] exp(+j 2 pi m r / M) (`numpy.fft.ifft`), cell r stands for the range c r / (2 M df); on a link
-    ranges are half the way. Values of symbols that are not received are 0 in range cells.
+    Conventions: an echo of delay tau = 2 r / c is a exp(-j 2 pi f tau) at the frequency f, so it
+    turns backwards from symbol to symbol as the target recedes; radial speeds are positive away
+    from the station. Range cells are (1/M) sum_m Y[n, m] exp(+j 2 pi m r / M) (`numpy.fft.ifft`),
+    cell r stands for the range c r / (2 M df); on a link ranges are half the way. Values of symbols
+    that are not received are 0 in range cells.
     Raises: InputError naming the key or value that is wrong. Source: paper, Eq. 7, 24 and 25.
 
     A range-Doppler map in ten lines, speeds upwards:
 
         import lowalt, numpy as np, matplotlib.pyplot as plt
-        echo = lowalt.receive("config/scenes/urban.yaml", "Crow", model=3, station="A", at="canceller")
-        window = np.hanning(len(echo.times_s))[:, None]
+        echo = lowalt.receive("config/scenes/urban.yaml", "Crow", model=3, station="A",
+        at="canceller") window = np.hanning(len(echo.times_s))[:, None]
         power = abs(np.fft.fftshift(np.fft.fft(window * echo.values, axis=0), axes=0)[::-1]) ** 2
         plt.pcolormesh(echo.ranges_m, echo.speeds_mps, 10 * np.log10(power))
         plt.plot(echo.truth["range_m"], echo.truth["observed_mps"], "rx")
@@ -129,9 +147,14 @@ def alone(configuration: dict | str | Path | Iterable[str | Path | dict], subtyp
 
 def _values(dataset: Dataset, sample: SceneSample, at: str, snr_db: float) -> np.ndarray:
     """The values at one place of the chain."""
-    scene, station, row, set_snr = sample.scene, sample.view.station, sample.view.row, math.isfinite(snr_db)
+    scene = sample.scene
+    station = sample.view.station
+    row = sample.view.row
+    set_snr = math.isfinite(snr_db)
     if at == "subcarriers":
-        ideal = tuple(effect for effect in scene.effects if effect.place not in ("receiver", "detection"))
+        ideal = tuple(
+            effect for effect in scene.effects if effect.place not in ("receiver", "detection")
+        )
         return SceneSample(replace(scene, effects=ideal), sample.view, sample.clouds).arrived()
     number = dataset.maker.network.stations.index(station)
     if set_snr and at in ("canceller", "signal"):
@@ -146,7 +169,9 @@ def _values(dataset: Dataset, sample: SceneSample, at: str, snr_db: float) -> np
     else:
         received = sample.cells if at == "cells" else sample.filtered(sample.detection)
         values = np.zeros((len(sample.view.times_s), received.shape[1]), np.complex128)
-        values[slice(None) if sample.view.sampling is None else sample.view.sampling.present] = received
+        values[slice(None) if sample.view.sampling is None else sample.view.sampling.present] = (
+            received
+        )
     if set_snr and not any(effect.name == "cell_noise" for effect in scene.effects):
         rng = stream(scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
         noise = add_noise(np.zeros(values.shape), snr_db, rng, sample.power)
@@ -154,27 +179,43 @@ def _values(dataset: Dataset, sample: SceneSample, at: str, snr_db: float) -> np
     return values
 
 
-def _described(values: np.ndarray, sample: SceneSample, network: Network, at: str, snr_db: float) -> RawEcho:
+def _described(
+    values: np.ndarray, sample: SceneSample, network: Network, at: str, snr_db: float
+) -> RawEcho:
     """The values with their axes and the truth."""
-    view, none = sample.view, np.empty(0)
+    view = sample.view
+    none = np.empty(0)
     station: Station = view.station
-    frequencies_hz = station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
+    frequencies_hz = (
+        station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
+    )
     columns = true_columns(sample, view)
     of_part = of_parts(view)
     truth = dict(zip(TRUTH, columns.T, strict=True))
     truth |= dict(zip(("part_range_m", "part_low_mps", "part_high_mps"), of_part, strict=True))
-    even = at == "signal" and not any(effect.settings.get("regrid") == "zero" for effect in sample.scene.effects)
+    even = at == "signal" and not any(
+        effect.settings.get("regrid") == "zero" for effect in sample.scene.effects
+    )
     return RawEcho(
-        values, network.times_s if even else view.times_s,
+        values,
+        network.times_s if even else view.times_s,
         frequencies_hz if at in ("subcarriers", "receiver") else none,
         np.arange(values.shape[1]) * network.cell_m if at in ("cells", "canceller") else none,
-        network.bin_speeds_mps(len(values), station), truth, view.cloud.names, view.row["subtype"],
-        int(view.row["model"]), station.name, at, snr_db,
-    )  # fmt: skip
+        network.bin_speeds_mps(len(values), station),
+        truth,
+        view.cloud.names,
+        view.row["subtype"],
+        int(view.row["model"]),
+        station.name,
+        at,
+        snr_db,
+    )
 
 
 def write(echo: RawEcho, path: Path) -> list[Path]:
-    """Write an echo's arrays by name as `path`.npz and, where h5py is installed, as `path`.h5; return the files."""
+    """Write an echo's arrays by name as `path`.npz and, where h5py is installed, as `path`.h5;
+    return the files.
+    """
     written = [path.with_name(f"{path.name}.npz")]
     with replacing(written[0]) as temporary:
         np.savez(temporary, **echo.arrays())  # type: ignore[arg-type]

@@ -1,4 +1,6 @@
-"""Recomputes a stored sample from its record, the index and the target's cloud, and compares every byte."""
+"""Recomputes a stored sample from its record, the index and the target's cloud, and compares every
+byte.
+"""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -47,10 +49,14 @@ class CloudFolder(Mapping):
 class Remaker:
     """Recomputes the samples of one data set."""
 
-    def __init__(self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None) -> None:
-        """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, for scenes with occlusion.
+    def __init__(
+        self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None
+    ) -> None:
+        """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, for
+        scenes with occlusion.
 
-        Raises: InputError where the index does not say how echoes were computed, or names code among the effects.
+        Raises: InputError where the index does not say how echoes were computed, or names code
+        among the effects.
         """
         if not shards.index.get("echo"):
             raise InputError(
@@ -58,7 +64,9 @@ class Remaker:
                 f"later wrote, found format {shards.index['format']}"
             )
         refuse_effects(shards.index["echo"]["effects"], shards.index_path)
-        self.shards, self.clouds, self.occluders = shards, clouds, occluders
+        self.shards = shards
+        self.clouds = clouds
+        self.occluders = occluders
         self.network = Network.from_settings(shards.index["render"]["network"])
         self._makers: dict[int, Maker] = {}
 
@@ -66,7 +74,9 @@ class Remaker:
         """The maker of samples with a random seed."""
         if seed not in self._makers:
             index = self.shards.index
-            self._makers[seed] = Maker(index["render"], index["echo"], seed, self.clouds, self.occluders)
+            self._makers[seed] = Maker(
+                index["render"], index["echo"], seed, self.clouds, self.occluders
+            )
         return self._makers[seed]
 
     def signal(self, entry: dict) -> np.ndarray:
@@ -84,10 +94,15 @@ class Remaker:
         Raises: InputError naming the sample whose record is too old or whose cloud is missing.
         """
         row, snr_db = row_of(entry)
-        seed, signal = entry["seed"], self.signal(entry)
-        data, cubes = self._maker(seed).data(self.shards.kind, signal, row, snr_db, cell_type_of(entry))
+        seed = entry["seed"]
+        signal = self.signal(entry)
+        data, cubes = self._maker(seed).data(
+            self.shards.kind, signal, row, snr_db, cell_type_of(entry)
+        )
         row = accompanied(row, self.shards.index["echo"]["effects"], seed, self.network)
-        return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes, cubes), data
+        return record(
+            row, snr_db, entry["fold"], seed, self.network, self.shards.classes, cubes
+        ), data
 
     def faults(self, number: int) -> list[str]:
         """Return one line for each member of a sample that differs from the stored one.
@@ -95,9 +110,14 @@ class Remaker:
         Raises: InputError as `made`, or where the stored sample is damaged.
         """
         stored, data = self.shards.members(number)
-        key, again = self.shards.keys[number].decode(), self.made(json.loads(stored))
+        key = self.shards.keys[number].decode()
+        again = self.made(json.loads(stored))
         members = zip(("record", self.shards.kind), (stored, data), again, strict=True)
-        return [f"sample {key}: its {name} comes out otherwise" for name, old, new in members if old != new]
+        return [
+            f"sample {key}: its {name} comes out otherwise"
+            for name, old, new in members
+            if old != new
+        ]
 
 
 def place_of(shards: ShardSet, key: str) -> int:
@@ -114,19 +134,25 @@ def place_of(shards: ShardSet, key: str) -> int:
 
 
 def some(shards: ShardSet, count: int) -> list[int]:
-    """Return the numbers of `count` samples drawn with the index's checksum as seed, or of all if there are fewer."""
+    """Return the numbers of `count` samples drawn with the index's checksum as seed, or of all if
+    there are fewer.
+    """
     draws = stream(0, "remake", shards.index["sha256"])
     return sorted(draws.choice(len(shards), min(count, len(shards)), replace=False).tolist())
 
 
-def opened(index: str | Path, clouds: str | Path | None = None, occluders: str | Path | None = None) -> Remaker:
+def opened(
+    index: str | Path, clouds: str | Path | None = None, occluders: str | Path | None = None
+) -> Remaker:
     """Return an object that makes the samples of a run's data set again.
 
-    clouds: folder of the run's clouds, by default `clouds` next to the folder of the index; occluders: folder of the
-    run's surfaces, by default `occluders` next to that of the clouds. Surfaces are read only if the scene hides points.
+    clouds: folder of the run's clouds, by default `clouds` next to the folder of the index;
+    occluders: folder of the run's surfaces, by default `occluders` next to that of the clouds.
+    Surfaces are read only if the scene hides points.
     Raises: InputError if the index or a surface cannot be read, or the index is too old.
     """
-    shards, surfaces = ShardSet(index), None
+    shards = ShardSet(index)
+    surfaces = None
     clouds = Path(clouds or Path(index).resolve().parent.parent / "clouds")
     if "occlusion" in (shards.index.get("echo") or {}).get("effects", {}):
         surfaces = read_all(sorted(Path(occluders or clouds.parent / "occluders").glob("*.npz")))

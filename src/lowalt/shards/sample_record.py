@@ -1,6 +1,8 @@
-"""The bytes of a sample: its key, its place in the shuffled order, its JSON record, its signals as an .npy file.
+"""The bytes of a sample: its key, its place in the shuffled order, its JSON record, its signals as
+an .npy file.
 
-Every field has one type in all records, and no value is missing, so that tables with typed columns (Arrow) hold them.
+Every field has one type in all records, and no value is missing, so that tables with typed columns
+(Arrow) hold them.
 """
 
 import json
@@ -19,14 +21,18 @@ from lowalt.tiles.tile_files import npy_header
 
 NAMES = ("subtype", "category", "group", "model")
 DATA_VERSION = "0.2.0"
-"""Version of the rules by which a configuration becomes bytes. A change of the default's bytes changes the rules.
+"""Version of the rules by which a configuration becomes bytes. A change of the default's bytes
+changes the rules.
 
-It is not the version of the package: a release that changes no rule makes the same shards as the release before it.
+It is not the version of the package: a release that changes no rule makes the same shards as the
+release before it.
 """
 
 
 def snr_label(snr_db: float) -> str:
-    """Return an SNR for a key: `snrinf`, `snr003`, `snr-60`, `snr003p5` (no dots, which end a key in a tar)."""
+    """Return an SNR for a key: `snrinf`, `snr003`, `snr-60`, `snr003p5` (no dots, which end a key
+    in a tar).
+    """
     if math.isinf(snr_db):
         return "snrinf"
     text = f"{int(snr_db):03d}" if float(snr_db).is_integer() else f"{snr_db:05.1f}"
@@ -41,7 +47,9 @@ def model_key(subtype: str, model: int) -> str:
 
 
 def sample_key(subtype: str, model: int, snr_db: float) -> str:
-    """Return the key of a sample, {slug}-{model, six digits}-{SNR}: unique, no dots, sorts by subtype and model."""
+    """Return the key of a sample, {slug}-{model, six digits}-{SNR}: unique, no dots, sorts by
+    subtype and model.
+    """
     return f"{model_key(subtype, model)}-{snr_label(snr_db)}"
 
 
@@ -51,7 +59,8 @@ def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:
 
 
 def encoded(content: dict) -> bytes:
-    """Return a record as JSON; an SNR of infinity is 1e999, a number by JSON's grammar that readers take as infinity.
+    """Return a record as JSON; an SNR of infinity is 1e999, a number by JSON's grammar that readers
+    take as infinity.
 
     Raises: ValueError for any other number that is not finite.
     """
@@ -61,18 +70,25 @@ def encoded(content: dict) -> bytes:
         return "1e999" if snr == math.inf else json.dumps(snr, allow_nan=False)
 
     snr_db = content["snr_db"]
-    texts = {name: json.dumps(value, separators=(",", ":"), allow_nan=False)
-             for name, value in content.items() if name != "snr_db"}  # fmt: skip
-    texts["snr_db"] = f"[{','.join(map(number, snr_db))}]" if isinstance(snr_db, list) else number(snr_db)
+    texts = {
+        name: json.dumps(value, separators=(",", ":"), allow_nan=False)
+        for name, value in content.items()
+        if name != "snr_db"
+    }
+    texts["snr_db"] = (
+        f"[{','.join(map(number, snr_db))}]" if isinstance(snr_db, list) else number(snr_db)
+    )
     return ("{" + ",".join(f'"{name}":{texts[name]}' for name in content) + "}").encode()
 
 
 def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
-    """Return range, direction and speed of the target's reference point from each station at the first symbol.
+    """Return range, direction and speed of the target's reference point from each station at the
+    first symbol.
 
-    range_m; psi and omega, the direction cosines along the array's horizontal and vertical axis; radial_mps,
-    positive receding; NaN where the row has no place, as a measured target's. A link has the means of both stations'
-    ranges and speeds, and the cosines of its receiver. Source: paper, Eq. 4, written with direction cosines.
+    range_m; psi and omega, the direction cosines along the array's horizontal and vertical axis;
+    radial_mps, positive receding; NaN where the row has no place, as a measured target's. A link
+    has the means of both stations' ranges and speeds, and the cosines of its receiver. Source:
+    paper, Eq. 4, written with direction cosines.
     """
     result = {}
     for station in network.stations:
@@ -99,21 +115,32 @@ def _seen(row: dict, station: Station) -> dict[str, float]:
 
 
 def record(
-    row: dict, snr_db: float, fold: str, seed: int, network: Network, classes: tuple[str, ...] = CATEGORIES,
+    row: dict,
+    snr_db: float,
+    fold: str,
+    seed: int,
+    network: Network,
+    classes: tuple[str, ...] = CATEGORIES,
     cubes: dict | None = None,
-) -> bytes:  # fmt: skip
-    """Return the JSON record of one sample: name, class, motion, geometry for each station, seed and versions.
+) -> bytes:
+    """Return the JSON record of one sample: name, class, motion, geometry for each station, seed
+    and versions.
 
-    row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
-    whether noise was added; where none was, `snr_db` is infinite. Numbers that are unknown are null, as for a
-    recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
-    targets in the beam, the record has it too; the label is the row's own target's. The same holds for `paths`, those
-    of each station to the target in a town. A row of a track adds its track and look. classes: in the order of their
-    labels; cubes: facts on each station's cube.
+    row: a row of the motion table; a number that does not apply to the target is NaN there and 0
+    here. `noise` says whether noise was added; where none was, `snr_db` is infinite. Numbers that
+    are unknown are null, as for a recorded target whose place was not recorded. Where `row` has the
+    key `companions`, the subtypes of the other targets in the beam, the record has it too; the
+    label is the row's own target's. The same holds for `paths`, those of each station to the target
+    in a town. A row of a track adds its track and look. classes: in the order of their labels;
+    cubes: facts on each station's cube.
     Raises: InputError where the row's category is no class.
     """
     names = NAMES + TRACK * (TRACK[0] in row)
-    motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions", "paths")}
+    motion = {
+        name: value
+        for name, value in row.items()
+        if name not in (*names, "fold", "companions", "paths")
+    }
     added = {"companions": list(row["companions"])} if "companions" in row else {}
     added |= {"paths": row["paths"]} if "paths" in row else {}
     blank = None if math.isnan(row["x_m"]) else 0.0
@@ -126,7 +153,9 @@ def record(
         "snr_db": float(snr_db),
         "noise": not math.isinf(snr_db),
         "seed": seed,
-        "motion": {name: blank if math.isnan(value) else float(value) for name, value in motion.items()},
+        "motion": {
+            name: blank if math.isnan(value) else float(value) for name, value in motion.items()
+        },
         "geometry": {
             station: {name: None if math.isnan(value) else value for name, value in seen.items()}
             for station, seen in geometry(row, network).items()
@@ -138,8 +167,8 @@ def record(
 
 
 def accompanied(row: dict, effects: dict, seed: int, network: Network) -> dict:
-    """Return the row with the subtypes that the scene's effects put next to its target, and with the paths to it in a
-    town; the row alone where the scene has neither."""
+    """Return the row with the subtypes that the scene's effects put next to its target, and with
+    the paths to it in a town; the row alone where the scene has neither."""
     # Most runs have no companions, so the module is loaded only for those that have.
     if "companions" in effects:
         from lowalt.scene.effects.channel.companions import listed
@@ -153,20 +182,24 @@ def accompanied(row: dict, effects: dict, seed: int, network: Network) -> dict:
 
 
 def row_of(entry: dict) -> tuple[dict, float]:
-    """Return the motion table's row (0 where a number does not apply) and the SNR (dB) that a record holds.
+    """Return the motion table's row (0 where a number does not apply) and the SNR (dB) that a
+    record holds.
 
     Raises: InputError naming the sample where the record is of an older format.
     """
     if "noise" not in entry:
         made_by = entry.get("versions", {}).get("lowalt", "an unknown version")
-        raise InputError(f"sample {entry.get('key')}: record of lowalt {made_by}, expected of 0.2 or later")
+        raise InputError(
+            f"sample {entry.get('key')}: record of lowalt {made_by}, expected of 0.2 or later"
+        )
     names = NAMES + TRACK * (TRACK[0] in entry)
     snr_db = entry["snr_db"] if entry["noise"] else math.inf
     return {**{name: entry[name] for name in names}, **entry["motion"]}, snr_db
 
 
 def npy(signals: np.ndarray) -> bytes:
-    """Return signals (stations, symbols) complex64 as the bytes of an .npy file of float32 (stations, symbols, 2).
+    """Return signals (stations, symbols) complex64 as the bytes of an .npy file of float32
+    (stations, symbols, 2).
 
     The last axis is real and imaginary part: Arrow, which many readers use, has no complex numbers.
     """
@@ -175,5 +208,7 @@ def npy(signals: np.ndarray) -> bytes:
 
 
 def parts_of(values: np.ndarray) -> np.ndarray:
-    """Return complex64 values (...) as float32 (..., 2), real and imaginary part, in the byte order of files."""
+    """Return complex64 values (...) as float32 (..., 2), real and imaginary part, in the byte order
+    of files.
+    """
     return np.ascontiguousarray(values, "<c8").view("<f4").reshape(*values.shape, 2)

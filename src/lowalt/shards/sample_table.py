@@ -1,4 +1,5 @@
-"""The sample table of a shard: `{shard}.npz` next to `{shard}.tar`, one row per sample, and the shard's own header.
+"""The sample table of a shard: `{shard}.npz` next to `{shard}.tar`, one row per sample, and the
+shard's own header.
 
     header    str, JSON: name, kind, group, fold, samples, bytes, sha256
     samples   (n,) structured, in the order of the tar (offsets and sizes in bytes)
@@ -36,8 +37,8 @@ SAMPLE = np.dtype(
 MOST_OVERHEAD_BYTES = 1 << 16
 """Most bytes of a table next to its rows: the header and what the archive adds."""
 KINDS = ("image", "signal", "recipe", "cube")
-"""Tiles as PNG files, noisy signals, clean echoes from which noisy signals are made (`lowalt.shards.clean`), or
-all range cells with noise."""
+"""Tiles as PNG files, noisy signals, clean echoes from which noisy signals are made
+(`lowalt.shards.clean`), or all range cells with noise."""
 EXTENSIONS = {"image": "png", "signal": "npy", "recipe": "clean.npy", "cube": "cube.npy"}
 """Of the member next to a sample's record."""
 
@@ -50,7 +51,9 @@ def table_path(shard: str | Path) -> Path:
 def write(path: str | Path, header: dict, samples: np.ndarray) -> None:
     """Write header and rows; equal content, equal bytes."""
     with replacing(path) as temporary:
-        write_arrays(temporary, {"header": np.array(json.dumps(header, sort_keys=True)), "samples": samples})
+        write_arrays(
+            temporary, {"header": np.array(json.dumps(header, sort_keys=True)), "samples": samples}
+        )
 
 
 def read_header(path: str | Path) -> dict:

@@ -1,8 +1,9 @@
-"""Cubes as a shard stores them: range cells as complex64, or as int16 times a step, and what the record tells of each.
+"""Cubes as a shard stores them: range cells as complex64, or as int16 times a step, and what the
+record tells of each.
 
-A step is a power of two, so that nothing but the rounding changes a value: real and imaginary part come back within
-half a step, exactly. The largest part of a station's cells has at least 16383 steps, so half a step is at least 90 dB
-weaker.
+A step is a power of two, so that nothing but the rounding changes a value: real and imaginary part
+come back within half a step, exactly. The largest part of a station's cells has at least 16383
+steps, so half a step is at least 90 dB weaker.
 """
 
 import math
@@ -23,10 +24,11 @@ LEAST_EXPONENT = -149
 
 
 def rounded(cells: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return cells (N, M) complex64 as whole numbers (N, M, 2) int16, real and imaginary part, and their step.
+    """Return cells (N, M) complex64 as whole numbers (N, M, 2) int16, real and imaginary part, and
+    their step.
 
-    The step is the smallest power of two that leaves every part within 32767 steps, 2**-15 where all are zero. Raises:
-    InputError for cells that are not finite.
+    The step is the smallest power of two that leaves every part within 32767 steps, 2**-15 where
+    all are zero. Raises: InputError for cells that are not finite.
     """
     parts = parts_of(cells).astype(float)
     largest = float(np.abs(parts).max(initial=0.0))
@@ -44,22 +46,28 @@ def restored(whole: np.ndarray, step: float) -> np.ndarray:
 
 
 def of_cubes(cubes: Sequence[Cube], network: Network, cell_type: str) -> tuple[bytes, dict]:
-    """Return the cubes of a sample as the bytes of an .npy file, (stations, symbols, cells, 2) float32 or int16, and
-    what its record tells of each station: the step of whole numbers, the chosen cells, and the truth of each symbol to
-    six decimals, of the target and of the others in the beam.
+    """Return the cubes of a sample as the bytes of an .npy file, (stations, symbols, cells, 2)
+    float32 or int16, and what its record tells of each station: the step of whole numbers, the
+    chosen cells, and the truth of each symbol to six decimals, of the target and of the others in
+    the beam.
 
     cell_type: "complex64" or "int16". Raises: InputError for cells that are not finite.
     """
     facts = {
         station.name: {
-            "chosen": cube.chosen.tolist(), **_columns(cube.truth), "others": [*map(_columns, cube.others)],
+            "chosen": cube.chosen.tolist(),
+            **_columns(cube.truth),
+            "others": [*map(_columns, cube.others)],
         }
         for station, cube in zip(network.stations, cubes, strict=True)
-    }  # fmt: skip
+    }
     if cell_type == "complex64":
         return npy(np.stack([cube.cells for cube in cubes])), facts
     whole, steps = zip(*(rounded(cube.cells) for cube in cubes), strict=True)
-    facts = {name: {"step": step, **block} for (name, block), step in zip(facts.items(), steps, strict=True)}
+    facts = {
+        name: {"step": step, **block}
+        for (name, block), step in zip(facts.items(), steps, strict=True)
+    }
     stored = np.stack(whole)
     return npy_header("<i2", stored.shape) + stored.tobytes(), facts
 
@@ -76,14 +84,18 @@ def _truth(columns: dict) -> np.ndarray:
 
 def cell_type_of(entry: dict) -> str:
     """Return how the cells of a record's sample are stored: "int16" or "complex64"."""
-    return "int16" if any("step" in block for block in entry.get("cube", {}).values()) else "complex64"
+    return (
+        "int16" if any("step" in block for block in entry.get("cube", {}).values()) else "complex64"
+    )
 
 
 def cubes_of(entry: dict, stored: np.ndarray) -> list[Cube]:
     """Return the cubes that a record and its array (stations, symbols, cells, 2) hold."""
     blocks = entry["cube"].values()
     if cell_type_of(entry) == "int16":
-        cells = [restored(whole, block["step"]) for whole, block in zip(stored, blocks, strict=True)]
+        cells = [
+            restored(whole, block["step"]) for whole, block in zip(stored, blocks, strict=True)
+        ]
     else:
         cells = [*complex_signals(stored)]
     return [

@@ -1,7 +1,9 @@
-"""Writes tar files: members have fixed owner, mode and time, so that equal samples give equal bytes.
+"""Writes tar files: members have fixed owner, mode and time, so that equal samples give equal
+bytes.
 
-The layout equals that of webdataset's `TarWriter(encoder=False, mtime=0)`: USTAR headers, members of a sample side
-by side in the order of their extensions, two empty blocks at the end, the file filled up to 10 240 bytes.
+The layout equals that of webdataset's `TarWriter(encoder=False, mtime=0)`: USTAR headers, members
+of a sample side by side in the order of their extensions, two empty blocks at the end, the file
+filled up to 10 240 bytes.
 """
 
 import hashlib
@@ -20,7 +22,9 @@ def member(name: str, data: bytes) -> bytes:
     Raises: InputError where the name is longer than a plain tar header holds.
     """
     info = tarfile.TarInfo(name)
-    info.size, info.mtime, info.mode = len(data), 0, 0o444
+    info.size = len(data)
+    info.mtime = 0
+    info.mode = 0o444
     info.uname = info.gname = "bigdata"
     if len(name.encode()) > 100:
         raise InputError(f"shard member {name!r}: longer than the 100 bytes of a tar header")
@@ -29,7 +33,9 @@ def member(name: str, data: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Span:
-    """Position of a sample in its shard (bytes): of the whole sample and of the data of its two members."""
+    """Position of a sample in its shard (bytes): of the whole sample and of the data of its two
+    members.
+    """
 
     offset: int
     size: int
@@ -42,7 +48,9 @@ class Writer:
     """Writes samples to an open file and keeps the running SHA-256 of the whole shard."""
 
     def __init__(self, file: BinaryIO) -> None:
-        self._file, self._hash, self.size = file, hashlib.sha256(), 0
+        self._file = file
+        self._hash = hashlib.sha256()
+        self.size = 0
 
     def _put(self, data: bytes) -> None:
         """Write bytes and count them in size and SHA-256."""
@@ -51,10 +59,13 @@ class Writer:
         self.size += len(data)
 
     def add(self, key: str, record: bytes, extension: str, data: bytes) -> Span:
-        """Append the members {key}.json and {key}.{extension}, in alphabetical order; return their position."""
+        """Append the members {key}.json and {key}.{extension}, in alphabetical order; return their
+        position.
+        """
         if "." in key or "/" in key:
             raise InputError(f"sample key {key!r}: expected no dot and no slash")
-        offset, places = self.size, {}
+        offset = self.size
+        places = {}
         parts: list[bytes] = []
         for name, content in sorted({"json": record, extension: data}.items()):
             start = offset + sum(map(len, parts)) + tarfile.BLOCKSIZE
@@ -62,7 +73,9 @@ class Writer:
             parts.append(member(f"{key}.{name}", content))
         span = b"".join(parts)
         self._put(span)
-        return Span(offset, len(span), places["json"], places[extension], hashlib.sha256(span).digest())
+        return Span(
+            offset, len(span), places["json"], places[extension], hashlib.sha256(span).digest()
+        )
 
     def close(self) -> str:
         """Write the end of the archive; return the SHA-256 of the whole file in hexadecimal."""

@@ -18,10 +18,12 @@ FROZEN = "clouds", "motion"
 
 
 def faults(index_path: str | Path) -> Iterator[str]:
-    """Yield one line per fault of a published data set: the file, the sample if it is in one, and what is wrong.
+    """Yield one line per fault of a published data set: the file, the sample if it is in one, and
+    what is wrong.
 
-    First the shards and their tables are checked against the index. Then come all other files of the folder, against
-    SHA256SUMS (a file without checksum is a fault), and the clouds and motion tables of the run, against `frozen`.
+    First the shards and their tables are checked against the index. Then come all other files of
+    the folder, against SHA256SUMS (a file without checksum is a fault), and the clouds and motion
+    tables of the run, against `frozen`.
     Raises: InputError where the index itself cannot be read.
     """
     index = load(index_path)
@@ -39,9 +41,11 @@ def faults(index_path: str | Path) -> Iterator[str]:
 
 
 def frozen(index_path: str | Path) -> dict[str, str]:
-    """Return the checksums, by file, of the clouds and motion tables of the run that contains the index.
+    """Return the checksums, by file, of the clouds and motion tables of the run that contains the
+    index.
 
-    The first training writes them into SHA256SUMS of the run's folder; without that file the result is empty.
+    The first training writes them into SHA256SUMS of the run's folder; without that file the result
+    is empty.
     """
     path = Path(index_path).resolve().parent.parent / checksums.NAME
     lines = checksums.LINE.findall(path.read_text(errors="replace")) if path.is_file() else []
@@ -76,7 +80,8 @@ def _locate(path: Path, samples: np.ndarray, expected: int) -> Iterator[str]:
     size = path.stat().st_size
     if size != expected:
         yield f"{size} bytes, expected {expected}"
-    end, named = 0, size != expected
+    end = 0
+    named = size != expected
     with path.open("rb") as file:
         for row in samples:
             # The samples of one motion model share their bytes in recipe shards.

@@ -1,4 +1,6 @@
-"""One shard: the samples of a chunk that belong to one fold, shuffled by their names, with their table."""
+"""One shard: the samples of a chunk that belong to one fold, shuffled by their names, with their
+table.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -23,9 +25,10 @@ Content = Callable[[int, int], tuple[bytes, dict]]
 class ChunkSamples(NamedTuple):
     """The samples of a chunk: every motion model at every SNR.
 
-    rows: the motion table; snrs: dB; split, seed: determine each sample's fold; classes: in the order of their labels;
-    powers: (stations, rows) W, reference powers of the SNRs, None for those of the echoes; canceller: settings of the
-    canceller that filters the noise (both for kind "recipe").
+    rows: the motion table; snrs: dB; split, seed: determine each sample's fold; classes: in the
+    order of their labels;
+    powers: (stations, rows) W, reference powers of the SNRs, None for those of the echoes;
+    canceller: settings of the canceller that filters the noise (both for kind "recipe").
     """
 
     rows: list[dict]
@@ -38,13 +41,19 @@ class ChunkSamples(NamedTuple):
     canceller: dict | None = None
 
 
-def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: str) -> list[tuple[int, int]]:
-    """Return (row, SNR index) of the samples of the fold `wanted`, in the shuffled order of the shard."""
+def select(
+    rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: str
+) -> list[tuple[int, int]]:
+    """Return (row, SNR index) of the samples of the fold `wanted`, in the shuffled order of the
+    shard.
+    """
     chosen = []
     for number, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
             # The row of a measured sample names its fold; that of a simulated sample is drawn.
-            dealt = row.get("fold") or fold(split, seed, row["subtype"], row.get("track", row["model"]), snr_db)
+            dealt = row.get("fold") or fold(
+                split, seed, row["subtype"], row.get("track", row["model"]), snr_db
+            )
             if dealt == wanted:
                 chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
     return [(number, level) for _, number, level in sorted(chosen)]
@@ -57,18 +66,28 @@ def _entry(key: str, number: int, model: int, snr_db: float, span: Span) -> tupl
 
 
 def write_shard(
-    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Content, piece: tuple[int, int] = (0, 1)
+    path: str | Path,
+    chunk: ChunkSamples,
+    wanted: str,
+    kind: str,
+    content: Content,
+    piece: tuple[int, int] = (0, 1),
 ) -> dict:
-    """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it; return the table's header.
+    """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it; return
+    the table's header.
 
-    content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind "image") or .npy, or of
-    the row's clean echoes (kind "recipe"), and the part of the record about cubes ({} for other kinds). A recipe shard
-    stores each motion model once, at the position of its first sample, to which all its samples refer.
-    piece: index and number of the pieces into which the fold is split; samples of a motion model stay together.
+    content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind
+    "image") or .npy, or of the row's clean echoes (kind "recipe"), and the part of the record about
+    cubes ({} for other kinds). A recipe shard stores each motion model once, at the position of its
+    first sample, to which all its samples refer.
+    piece: index and number of the pieces into which the fold is split; samples of a motion model
+    stay together.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
     if wanted not in FOLDS or kind not in KINDS:
-        raise InputError(f"{path}: fold {wanted!r} of kind {kind!r}, expected one of {FOLDS} and of {KINDS}")
+        raise InputError(
+            f"{path}: fold {wanted!r} of kind {kind!r}, expected one of {FOLDS} and of {KINDS}"
+        )
     rows, snrs, split, seed, network, classes, powers, canceller = chunk
     groups = sorted({row["group"] for row in rows})
     if len(groups) != 1:
@@ -87,12 +106,14 @@ def write_shard(
             tar = Writer(file)
             spans: dict[int, Span] = {}
             for place, (number, level) in enumerate(chosen):
-                row, snr_db = rows[number], snrs[level]
+                row = rows[number]
+                snr_db = snrs[level]
                 key = sample_key(row["subtype"], row["model"], snr_db)
                 span = spans.get(number)
                 if span is None:
                     data, cubes = content(number, level)
-                    name, text = key, record(row, snr_db, wanted, seed, network, classes, cubes)
+                    name = key
+                    text = record(row, snr_db, wanted, seed, network, classes, cubes)
                     if kind == "recipe":
                         name = model_key(row["subtype"], row["model"])
                         power_w = None if powers is None else powers[:, number]
@@ -105,10 +126,17 @@ def write_shard(
         keys, counts = np.unique(table["key"], return_counts=True)
         if (counts > 1).any():
             twice = keys[counts > 1][0].decode()
-            raise InputError(f"{path}: sample {twice!r} stands twice, expected each motion model of a subtype once")
+            raise InputError(
+                f"{path}: sample {twice!r} stands twice, expected each motion model of a subtype once"
+            )
         header = {
-            "name": Path(path).name, "kind": kind, "group": groups[0], "fold": wanted,
-            "samples": len(table), "bytes": tar.size, "sha256": checksum,
-        }  # fmt: skip
+            "name": Path(path).name,
+            "kind": kind,
+            "group": groups[0],
+            "fold": wanted,
+            "samples": len(table),
+            "bytes": tar.size,
+            "sha256": checksum,
+        }
         write_table(table_path(path), header, table)
     return header

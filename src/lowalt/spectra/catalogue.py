@@ -1,7 +1,8 @@
 """The catalogue of spectra, and the settings of those that a configuration names.
 
-A spectrum is a module of `lowalt.spectra.kinds` (`lowalt.spectra.interface`). The catalogue's order is that of the
-columns of a tile; a tile has a column for each spectrum in the configuration's block `spectra`.
+A spectrum is a module of `lowalt.spectra.kinds` (`lowalt.spectra.interface`). The catalogue's order
+is that of the columns of a tile; a tile has a column for each spectrum in the configuration's block
+`spectra`.
 """
 
 import functools
@@ -19,13 +20,17 @@ from lowalt.spectra.settings import windows
 
 LISTED = ("vrp", "trp", "vt")
 """The paper's three, in its order. Any other module comes after them, in alphabetical order."""
-_FOUND = sorted(path.stem for path in (Path(__file__).parent / "kinds").glob("*.py") if path.stem != "__init__")
+_FOUND = sorted(
+    path.stem for path in (Path(__file__).parent / "kinds").glob("*.py") if path.stem != "__init__"
+)
 ADDED: dict[str, str] = offered("spectra")
 """Modules of the spectra that extensions add, by name."""
 NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED), *ADDED)
 """Names of all spectra."""
 TIMES = "times"
-"""Key of the block `spectra` that is not a spectrum: whether spectra use the instants of received symbols."""
+"""Key of the block `spectra` that is not a spectrum: whether spectra use the instants of received
+symbols.
+"""
 INSTANTS = ("even", "known")
 
 
@@ -38,7 +43,8 @@ def module_name(name: str) -> str:
 def spectrum(name: str) -> Any:
     """Return the module of a spectrum.
 
-    Raises: InputError for a name that belongs to none, or a module that lacks a name of the interface.
+    Raises: InputError for a name that belongs to none, or a module that lacks a name of the
+    interface.
     """
     if name not in NAMES:
         raise InputError(f"spectra: unknown spectrum {name!r}, expected some of {list(NAMES)}")
@@ -47,7 +53,9 @@ def spectrum(name: str) -> Any:
     else:
         module = importlib.import_module(f"lowalt.spectra.kinds.{name}")
     if not isinstance(module, (Spectrum, OfCells)):
-        raise InputError(f"{module.__file__}: lacks a name of lowalt.spectra.interface, Spectrum or OfCells")
+        raise InputError(
+            f"{module.__file__}: lacks a name of lowalt.spectra.interface, Spectrum or OfCells"
+        )
     return module
 
 
@@ -76,16 +84,20 @@ def zero_index(name: str) -> int:
 
 
 MOST_VALUES = 2**26
-"""Limit on the values of a spectrum and of its tables for all stations; each takes about 16 bytes of memory."""
+"""Limit on the values of a spectrum and of its tables for all stations; each takes about 16 bytes
+of memory.
+"""
 
 
 class Spectra(Mapping[str, Any]):
     """The settings of a data set's spectra by name, in the order of the columns of its tiles."""
 
     def __init__(self, times: str = "even", **settings: Any) -> None:
-        """settings: a `Settings` for each spectrum; without any, the paper's three with their defaults.
+        """settings: a `Settings` for each spectrum; without any, the paper's three with their
+        defaults.
 
-        times: "even", symbols are taken as evenly spaced; "known", lines are fitted at the received symbols' instants.
+        times: "even", symbols are taken as evenly spaced; "known", lines are fitted at the received
+        symbols' instants.
         Raises: InputError for an unknown name, or for a spectrum that cannot use known instants.
         """
         if times not in INSTANTS:
@@ -95,11 +107,14 @@ class Spectra(Mapping[str, Any]):
         self._settings = {name: given[name] for name in named(given)}
         blind = [name for name in self._settings if not isinstance(spectrum(name), KnowsTimes)]
         if times == "known" and blind:
-            raise InputError(f"spectra.times is 'known', but {blind} know no instants, expected even")
+            raise InputError(
+                f"spectra.times is 'known', but {blind} know no instants, expected even"
+            )
 
     @classmethod
     def from_settings(cls, block: dict) -> "Spectra":
-        """Build from the configuration's `spectra` block, such as {vrp: {window, hop, points}, trp: ..., vt: ...}.
+        """Build from the configuration's `spectra` block, such as {vrp: {window, hop, points}, trp:
+        ..., vt: ...}.
 
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
@@ -125,9 +140,11 @@ class Spectra(Mapping[str, Any]):
         return len(self._settings)
 
     def check(self, symbols: int, stations: int = 1, subcarriers: int | None = None) -> None:
-        """Refuse signals that are too short for a window, spectra of gigabytes, and more range cells than the band has.
+        """Refuse signals that are too short for a window, spectra of gigabytes, and more range
+        cells than the band has.
 
-        Raises: InputError naming the spectrum whose window is no shorter than the signal, or that is too large.
+        Raises: InputError naming the spectrum whose window is no shorter than the signal, or that
+        is too large.
         """
         for name, settings in self.items():
             if isinstance(spectrum(name), OfCells):
@@ -140,4 +157,6 @@ class Spectra(Mapping[str, Any]):
                 windows(symbols, settings.window, settings.hop, name)
                 values = spectrum(name).rows(settings) * (symbols + stations * settings.window)
             if values > MOST_VALUES:
-                raise InputError(f"spectrum {name}: {values} values with its tables, expected at most {MOST_VALUES}")
+                raise InputError(
+                    f"spectrum {name}: {values} values with its tables, expected at most {MOST_VALUES}"
+                )

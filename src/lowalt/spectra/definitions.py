@@ -1,7 +1,8 @@
-"""The paper's three spectra by their definitions in float64, batched over signals: for analysis and for checks.
+"""The paper's three spectra by their definitions in float64, batched over signals: for analysis and
+for checks.
 
-Frequencies and speeds ascend along the row axis, time along the last axis. Images reverse the rows and
-use the single-pass kernels of `lowalt.spectra.sliding`, which compute the same values.
+Frequencies and speeds ascend along the row axis, time along the last axis. Images reverse the rows
+and use the single-pass kernels of `lowalt.spectra.sliding`, which compute the same values.
 """
 
 import numpy as np
@@ -10,7 +11,8 @@ from lowalt.spectra.catalogue import Spectra, spectrum
 
 
 def vrp(signals: np.ndarray, settings: Spectra | None = None) -> np.ndarray:
-    """Return the velocity-resolution-preferred spectrum, (..., symbols) -> (..., 256, 144) by default.
+    """Return the velocity-resolution-preferred spectrum, (..., symbols) -> (..., 256, 144) by
+    default.
 
     Raises: InputError where the signal is no longer than the window or is not finite.
     Source: paper, Eq. 28.
@@ -34,13 +36,18 @@ def trp(signals: np.ndarray, settings: Spectra | None = None) -> np.ndarray:
 
 
 def vt(
-    signals: np.ndarray, frequency_hz: float, symbol_interval_s: float, settings: Spectra | None = None
+    signals: np.ndarray,
+    frequency_hz: float,
+    symbol_interval_s: float,
+    settings: Spectra | None = None,
 ) -> np.ndarray:
     """Return the velocity-transfer spectrum, (..., symbols) -> (..., 123, 392) by default.
 
-    frequency_hz: f_k of the station that received the signals; symbol_interval_s: T_r. Rows are the matched
-    speeds (ascending, positive recedes); the unit is that of |signal|^2.
+    frequency_hz: f_k of the station that received the signals; symbol_interval_s: T_r. Rows are the
+    matched speeds (ascending, positive recedes); the unit is that of |signal|^2.
     Raises: InputError where the signal is no longer than the window or is not finite.
     Source: paper, Eq. 30 to 35.
     """
-    return spectrum("vt").definition(signals, (settings or Spectra())["vt"], "vt", frequency_hz, symbol_interval_s)
+    return spectrum("vt").definition(
+        signals, (settings or Spectra())["vt"], "vt", frequency_hz, symbol_interval_s
+    )

@@ -1,4 +1,6 @@
-"""Short-time Fourier spectra: the functions that VRP and TRP share, which differ only in their settings."""
+"""Short-time Fourier spectra: the functions that VRP and TRP share, which differ only in their
+settings.
+"""
 
 import numpy as np
 
@@ -13,17 +15,23 @@ ZERO_FIRST = True
 
 
 def segments(signals: np.ndarray, window: int, hop: int, name: str, extra: int = 0) -> np.ndarray:
-    """Return segments of `window + extra` symbols, one per window, complex128: shape (..., windows, window + extra).
+    """Return segments of `window + extra` symbols, one per window, complex128: shape (..., windows,
+    window + extra).
 
-    Raises: InputError naming the spectrum where the signal is no longer than the window or is not finite.
+    Raises: InputError naming the spectrum where the signal is no longer than the window or is not
+    finite.
     """
     signals = np.asarray(signals)
     if signals.ndim < 1:
-        raise InputError(f"spectrum {name}: signals has shape {signals.shape}, expected (..., symbols)")
+        raise InputError(
+            f"spectrum {name}: signals has shape {signals.shape}, expected (..., symbols)"
+        )
     if not np.isfinite(signals).all():
         raise InputError(f"spectrum {name}: signals has a NaN or infinite value")
     count = windows(signals.shape[-1], window, hop, name)
-    view = np.lib.stride_tricks.sliding_window_view(signals.astype(np.complex128), window + extra, axis=-1)
+    view = np.lib.stride_tricks.sliding_window_view(
+        signals.astype(np.complex128), window + extra, axis=-1
+    )
     return view[..., : (count - 1) * hop + 1 : hop, :]
 
 
@@ -33,7 +41,8 @@ def rows(settings: Fourier) -> int:
 
 
 def speeds(settings: Fourier, network: Network, station: Station) -> tuple[float, float]:
-    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`, folded.
+    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`,
+    folded.
 
     A positive Doppler frequency approaches, so the speed falls along the rows.
     """
@@ -44,11 +53,14 @@ def speeds(settings: Fourier, network: Network, station: Station) -> tuple[float
 def magnitudes(signals: np.ndarray, fourier: Fourier, name: str = "stft") -> np.ndarray:
     """Return |FFT| of every window, zero frequency in the middle; rectangular window.
 
-    signals: (..., symbols) complex. Result: (..., points, windows), float64, rows from -1/2T_r upwards.
+    signals: (..., symbols) complex. Result: (..., points, windows), float64, rows from -1/2T_r
+    upwards.
     Raises: InputError where the signal is no longer than the window or is not finite.
     Source: paper, Eq. 26, 27.
     """
-    spectra = np.fft.fft(segments(signals, fourier.window, fourier.hop, name), fourier.points, axis=-1)
+    spectra = np.fft.fft(
+        segments(signals, fourier.window, fourier.hop, name), fourier.points, axis=-1
+    )
     return np.swapaxes(np.abs(np.fft.fftshift(spectra, axes=-1)), -1, -2)
 
 
@@ -59,21 +71,33 @@ def definition(
     return magnitudes(signals, settings, name)
 
 
-def tables(settings: Fourier, frequency_hz: float, symbol_interval_s: float) -> tuple[np.ndarray, ...]:
-    """Return cosines and sines (points,) float32 of the transform; they are the same for every station."""
+def tables(
+    settings: Fourier, frequency_hz: float, symbol_interval_s: float
+) -> tuple[np.ndarray, ...]:
+    """Return cosines and sines (points,) float32 of the transform; they are the same for every
+    station.
+    """
     return turns(settings.points, np.float32)
 
 
 def fill(re: np.ndarray, im: np.ndarray, settings: Fourier, tables: tuple, out: np.ndarray) -> None:
-    """Fill out (points, starts) float32 with the spectrum of the windows that start at symbols 0 .. starts - 1."""
+    """Fill out (points, starts) float32 with the spectrum of the windows that start at symbols 0 ..
+    starts - 1.
+    """
     fourier_magnitudes(re, im, settings.window, settings.points, *tables, out)
 
 
 def fill_known(
-    signal: np.ndarray, times: np.ndarray, settings: Fourier, frequency_hz: float, symbol_interval_s: float,
+    signal: np.ndarray,
+    times: np.ndarray,
+    settings: Fourier,
+    frequency_hz: float,
+    symbol_interval_s: float,
     out: np.ndarray,
-) -> None:  # fmt: skip
-    """Fill out (points, starts) as `fill`, with the lines that fit a signal (N,) received at `times` (N,) intervals."""
+) -> None:
+    """Fill out (points, starts) as `fill`, with the lines that fit a signal (N,) received at
+    `times` (N,) intervals.
+    """
     starts = out.shape[1]
     sums = line_sums(signal, times, np.fft.fftfreq(settings.points), settings.window, starts)
     out[:] = np.abs(sums) * (settings.window * shares(signal, settings.window, starts))

@@ -1,7 +1,8 @@
 """The interface of a spectrum: the names that a module of `lowalt.spectra.kinds` defines.
 
-Axes: rows are Doppler frequencies or speeds, columns are windows in time. A window starts at every symbol in the fast
-path (`fill`); the images take those that the hop asks for. `isinstance(module, Spectrum)` checks a module.
+Axes: rows are Doppler frequencies or speeds, columns are windows in time. A window starts at every
+symbol in the fast path (`fill`); the images take those that the hop asks for. `isinstance(module,
+Spectrum)` checks a module.
 """
 
 from typing import Any, Protocol, runtime_checkable
@@ -23,9 +24,12 @@ class Spectrum(Protocol):
     SIGNED: bool
     """Whether values have a sign: zero then is index 128 of the image, else index 0."""
     ZERO_FIRST: bool
-    """Whether the rows of `fill` begin at frequency zero (FFT order) or at the most negative value."""
+    """Whether the rows of `fill` begin at frequency zero (FFT order) or at the most negative value.
+    """
     Settings: type
-    """Frozen dataclass of the settings, the keys of the configuration; it has `window` and `hop`, both in symbols."""
+    """Frozen dataclass of the settings, the keys of the configuration; it has `window` and `hop`,
+    both in symbols.
+    """
     DEFAULTS: Any
     """A `Settings`."""
 
@@ -41,32 +45,56 @@ class Spectrum(Protocol):
         ...
 
     def definition(
-        self, signals: np.ndarray, settings: Any, name: str, frequency_hz: float, symbol_interval_s: float
+        self,
+        signals: np.ndarray,
+        settings: Any,
+        name: str,
+        frequency_hz: float,
+        symbol_interval_s: float,
     ) -> np.ndarray:
-        """Return the spectrum in float64 by its definition, (..., symbols) -> (..., rows, windows), rows ascending.
+        """Return the spectrum in float64 by its definition, (..., symbols) -> (..., rows, windows),
+        rows ascending.
 
-        frequency_hz: f_k of the station; symbol_interval_s: T_r; name: how errors call the spectrum.
+        frequency_hz: f_k of the station; symbol_interval_s: T_r; name: how errors call the
+        spectrum.
         """
         ...
 
-    def tables(self, settings: Any, frequency_hz: float, symbol_interval_s: float) -> tuple[np.ndarray, ...]:
-        """Return float32 arrays that `fill` needs and that are the same for all signals of a station."""
+    def tables(
+        self, settings: Any, frequency_hz: float, symbol_interval_s: float
+    ) -> tuple[np.ndarray, ...]:
+        """Return float32 arrays that `fill` needs and that are the same for all signals of a
+        station.
+        """
         ...
 
-    def fill(self, re: np.ndarray, im: np.ndarray, settings: Any, tables: tuple, out: np.ndarray) -> None:
-        """Fill out (rows, starts) float32 with the windows of one signal (symbols,) that start at 0 .. starts - 1."""
+    def fill(
+        self, re: np.ndarray, im: np.ndarray, settings: Any, tables: tuple, out: np.ndarray
+    ) -> None:
+        """Fill out (rows, starts) float32 with the windows of one signal (symbols,) that start at 0
+        .. starts - 1.
+        """
         ...
 
 
 @runtime_checkable
 class KnowsTimes(Protocol):
-    """A spectrum that can use the instants at which symbols were received; needed with `times: known`."""
+    """A spectrum that can use the instants at which symbols were received; needed with `times:
+    known`.
+    """
 
     def fill_known(
-        self, signal: np.ndarray, times: np.ndarray, settings: Any, frequency_hz: float, symbol_interval_s: float,
+        self,
+        signal: np.ndarray,
+        times: np.ndarray,
+        settings: Any,
+        frequency_hz: float,
+        symbol_interval_s: float,
         out: np.ndarray,
-    ) -> None:  # fmt: skip
-        """Fill out as `fill` for a signal (N,), zero where no symbol was received; times: (N,) in symbol intervals."""
+    ) -> None:
+        """Fill out as `fill` for a signal (N,), zero where no symbol was received; times: (N,) in
+        symbol intervals.
+        """
         ...
 
 
@@ -89,7 +117,9 @@ class OfCells(Protocol):
         """Return the number of columns for a look of so many symbols."""
         ...
 
-    def axes(self, settings: Any, network: Network, station: Station) -> tuple[tuple[str, float, float], ...]:
+    def axes(
+        self, settings: Any, network: Network, station: Station
+    ) -> tuple[tuple[str, float, float], ...]:
         """Return name with unit, first and last value of the columns and of the rows."""
         ...
 

@@ -28,7 +28,9 @@ def _power_of_two(where: str, value: object, least: int) -> int:
 
 @dataclass(frozen=True)
 class Fourier:
-    """One short-time Fourier transform: `window` and `hop` in symbols, `points` of the zero-padded FFT."""
+    """One short-time Fourier transform: `window` and `hop` in symbols, `points` of the zero-padded
+    FFT.
+    """
 
     window: int
     hop: int
@@ -42,7 +44,9 @@ class Fourier:
 
 @dataclass(frozen=True)
 class Transfer:
-    """The velocity-transfer spectrum: `window` and `hop` in symbols, the grid of matched speeds in m/s."""
+    """The velocity-transfer spectrum: `window` and `hop` in symbols, the grid of matched speeds in
+    m/s.
+    """
 
     window: int
     hop: int
@@ -54,8 +58,14 @@ class Transfer:
         whole("window", self.window, 1)
         whole("hop", self.hop, 1)
         values = (self.speed_min_mps, self.speed_max_mps, self.speed_step_mps)
-        for name, value in zip(("speed_min_mps", "speed_max_mps", "speed_step_mps"), values, strict=True):
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        for name, value in zip(
+            ("speed_min_mps", "speed_max_mps", "speed_step_mps"), values, strict=True
+        ):
+            if (
+                isinstance(value, bool)
+                or not isinstance(value, (int, float))
+                or not np.isfinite(value)
+            ):
                 raise InputError(f"{name} is {value!r}, expected a finite speed in m/s")
         if self.speed_step_mps <= 0 or self.speed_max_mps <= self.speed_min_mps:
             raise InputError(f"speeds {values}, expected min < max and a positive step")
@@ -67,15 +77,18 @@ class Transfer:
     @property
     def speeds_mps(self) -> np.ndarray:
         """Matched speeds v_min : step : v_max (m/s), shape (speeds,), ascending; positive recedes."""
-        count = int(np.floor((self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps + 1e-9)) + 1
+        count = (
+            int(np.floor((self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps + 1e-9))
+            + 1
+        )
         last = self.speed_min_mps + (count - 1) * self.speed_step_mps
         return np.linspace(self.speed_min_mps, last, count)
 
 
 @dataclass(frozen=True)
 class RangeCells:
-    """A range profile over slow time: `window` and `hop` in symbols, a column averages the powers of a window; `cells`
-    of a profile, odd."""
+    """A range profile over slow time: `window` and `hop` in symbols, a column averages the powers
+    of a window; `cells` of a profile, odd."""
 
     window: int
     hop: int
@@ -85,12 +98,16 @@ class RangeCells:
         whole("window", self.window, 1)
         whole("hop", self.hop, 1)
         if whole("cells", self.cells, 3) % 2 == 0:
-            raise InputError(f"cells is {self.cells}, expected an odd number: the chosen one is the middle")
+            raise InputError(
+                f"cells is {self.cells}, expected an odd number: the chosen one is the middle"
+            )
 
 
 @dataclass(frozen=True)
 class Doppler:
-    """A range-Doppler map: `cells` of range, odd, and `points` of the zero-padded FFT over the symbols of a look."""
+    """A range-Doppler map: `cells` of range, odd, and `points` of the zero-padded FFT over the
+    symbols of a look.
+    """
 
     cells: int
     points: int
@@ -98,11 +115,14 @@ class Doppler:
     def __post_init__(self) -> None:
         whole("points", self.points, 2)
         if whole("cells", self.cells, 3) % 2 == 0:
-            raise InputError(f"cells is {self.cells}, expected an odd number: the chosen one is the middle")
+            raise InputError(
+                f"cells is {self.cells}, expected an odd number: the chosen one is the middle"
+            )
 
 
 def windows(symbols: int, window: int, hop: int, name: str) -> int:
-    """Return the number of windows, floor((N - L) / hop): one fewer than the usual count, as published.
+    """Return the number of windows, floor((N - L) / hop): one fewer than the usual count, as
+    published.
 
     Raises: InputError naming the spectrum where the signal is no longer than the window.
     Source: paper, section IV-B (G), and IV-E (G_transfer).

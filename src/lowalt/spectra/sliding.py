@@ -1,11 +1,13 @@
 """Compiled kernels of the three spectra for windows that slide by one symbol.
 
-Overlapping windows share sub-transforms. For a window of L = 2^a symbols, every level of the decimation in time needs
-only one new sub-transform per start,
-    A_0[q, t] = y[t],   A_{s+1}[q, t] = A_s[q, t] + exp(-j 2 pi q d / P) A_s[q, t + d],   d = L / 2^(s+1),
-so a window costs about 2 P butterflies, not P log2 L, and every loop runs over contiguous start times.
-Only additions, products and square roots are used, in a fixed order and never fused: results have the same bits on
-every machine with IEEE 754. The kernels work in the precision of their arguments.
+Overlapping windows share sub-transforms. For a window of L = 2^a symbols, every level of the
+decimation in time needs only one new sub-transform per start,
+    A_0[q, t] = y[t],   A_{s+1}[q, t] = A_s[q, t] + exp(-j 2 pi q d / P) A_s[q, t + d],   d = L /
+    2^(s+1),
+so a window costs about 2 P butterflies, not P log2 L, and every loop runs over contiguous start
+times. Only additions, products and square roots are used, in a fixed order and never fused: results
+have the same bits on every machine with IEEE 754. The kernels work in the precision of their
+arguments.
 """
 
 import numpy as np
@@ -22,9 +24,13 @@ def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:
 
 @PLAIN
 def _level(re, im, stride, cosine, sine, out_re, out_im):
-    """One level of decimation in time: out_re and out_im get twice as many sub-spectra, by start time."""
-    single, points = re.shape[0] == 1, cosine.size
-    rows, count = out_re.shape[0] // 2, out_re.shape[1]
+    """One level of decimation in time: out_re and out_im get twice as many sub-spectra, by start
+    time.
+    """
+    single = re.shape[0] == 1
+    points = cosine.size
+    rows = out_re.shape[0] // 2
+    count = out_re.shape[1]
     for q in range(rows):
         c = cosine[(q * stride) % points]
         s = sine[(q * stride) % points]
@@ -44,7 +50,8 @@ def _level(re, im, stride, cosine, sine, out_re, out_im):
 def _last(re, im, cosine, sine, out):
     """The last level (stride 1) straight to magnitudes."""
     single = re.shape[0] == 1
-    rows, count = out.shape[0] // 2, out.shape[1]
+    rows = out.shape[0] // 2
+    count = out.shape[1]
     for q in range(rows):
         c = cosine[q]
         s = sine[q]
@@ -68,8 +75,9 @@ def _last(re, im, cosine, sine, out):
 def fourier_magnitudes(re, im, window, points, cosine, sine, out):
     """Fill out (points, count) with |FFT| of the windows that start at symbols 0 .. count - 1.
 
-    re, im: (symbols,) parts of the signal, symbols >= count + window - 1; cosine, sine: `turns(points)`.
-    Rows are in FFT order (zero frequency first). Source: paper, Eq. 26; spec of the windows in the module.
+    re, im: (symbols,) parts of the signal, symbols >= count + window - 1; cosine, sine:
+    `turns(points)`. Rows are in FFT order (zero frequency first). Source: paper, Eq. 26; spec of
+    the windows in the module.
     """
     count = out.shape[1]
     stride = window // 2
@@ -81,7 +89,8 @@ def fourier_magnitudes(re, im, window, points, cosine, sine, out):
         b_re = np.empty((2 * rows, starts), re.dtype)
         b_im = np.empty((2 * rows, starts), re.dtype)
         _level(a_re, a_im, stride, cosine, sine, b_re, b_im)
-        a_re, a_im = b_re, b_im
+        a_re = b_re
+        a_im = b_im
         rows *= 2
         stride //= 2
     _last(a_re, a_im, cosine, sine, out)
@@ -89,9 +98,11 @@ def fourier_magnitudes(re, im, window, points, cosine, sine, out):
 
 @PLAIN
 def transfer(re, im, window, cosine, sine, share, out):
-    """Fill out (speeds, count) with the velocity-transfer spectrum of windows starting at 0 .. count - 1.
+    """Fill out (speeds, count) with the velocity-transfer spectrum of windows starting at 0 ..
+    count - 1.
 
-    re, im: (symbols,), symbols >= count + window; cosine, sine: (speeds, window + 1) of the conjugate dictionary;
+    re, im: (symbols,), symbols >= count + window; cosine, sine: (speeds, window + 1) of the
+    conjugate dictionary;
     share: (1,), (L / (L + 1))^2 in the working precision. Source: paper, Eq. 30 to 35.
     """
     speeds, count = out.shape

@@ -9,7 +9,9 @@ from lowalt.targets.cloud import write
 from lowalt.targets.make import make
 
 
-def options(module: str, description: str, arguments: list[str]) -> tuple[dict, Path | None, int, Path]:
+def options(
+    module: str, description: str, arguments: list[str]
+) -> tuple[dict, Path | None, int, Path]:
     """Return record, folder of inputs, seed and output file of a command line of this stage."""
     line = parser(module, description)
     help_text = f"folder of the meshes and recordings the record names (default: ${INPUTS})"

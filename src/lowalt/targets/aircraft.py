@@ -1,11 +1,14 @@
-"""Built-in aircraft beyond multirotors: planes, planes with lift propellers, helicopters and balloons.
+"""Built-in aircraft beyond multirotors: planes, planes with lift propellers, helicopters and
+balloons.
 
-Axes: front +y, right +x, up +z, metres. The origin lies at the wing's quarter chord, under the rotor's hub at mid
-cabin, or in the middle of the envelope. A plane's wing span, a helicopter's rotor diameter and a balloon's diameter are
-the published size. `records.schema.yaml` lists the figures of each layout: `wing_station` is where the quarter chord
-lies, in body lengths from the nose; `wing_height` its height over the body's middle, in body heights; `tail_arm` and
-`tail_rotor_arm` are how far tail plane and tail rotor lie behind the main rotor's hub, `tail_rotor_drop` how far
-the tail rotor lies below it. Plain factors below only round or join shells.
+Axes: front +y, right +x, up +z, metres. The origin lies at the wing's quarter chord, under the
+rotor's hub at mid cabin, or in the middle of the envelope. A plane's wing span, a helicopter's
+rotor diameter and a balloon's diameter are the published size. `records.schema.yaml` lists the
+figures of each layout: `wing_station` is where the quarter chord lies, in body lengths from the
+nose; `wing_height` its height over the body's middle, in body heights; `tail_arm` and
+`tail_rotor_arm` are how far tail plane and tail rotor lie behind the main rotor's hub,
+`tail_rotor_drop` how far the tail rotor lies below it. Plain factors below only round or join
+shells.
 """
 
 import numpy as np
@@ -30,7 +33,9 @@ def fault(record: dict) -> str | None:
     if "tip_chord" in f and not f["tip_chord"] <= f["root_chord"] < f["body_length"]:
         return f"figures.root_chord is {f['root_chord']:.4g} m, expected from the tip's chord to the body's length"
     if "wing_station" in f and not 0 < f["wing_station"] < 1:
-        return f"figures.wing_station is {f['wing_station']}, expected between 0 (nose) and 1 (tail)"
+        return (
+            f"figures.wing_station is {f['wing_station']}, expected between 0 (nose) and 1 (tail)"
+        )
     if f.get("boom_spacing", 0) >= record["published"]["size_m"]:
         span = record["published"]["size_m"]
         return f"figures.boom_spacing is {f['boom_spacing']:.4g} m, expected less than the span of {span} m"
@@ -43,16 +48,23 @@ def _both(shell: Surface) -> list[Surface]:
 
 
 def _propeller(
-    name: str, hub: tuple[float, float, float], size: tuple[float, float, float], facing: np.ndarray, sense: int = 1
+    name: str,
+    hub: tuple[float, float, float],
+    size: tuple[float, float, float],
+    facing: np.ndarray,
+    sense: int = 1,
 ) -> Part:
-    """A turning propeller of a `size` (diameter m, blade's chord m, blades) whose axis is facing @ (0, 0, 1).
+    """A turning propeller of a `size` (diameter m, blade's chord m, blades) whose axis is facing @
+    (0, 0, 1).
 
     Rotors share their points by the area of their blades.
     """
     diameter, chord, count = size
     axis = tuple(float(value) for value in sense * facing[:, 2])
     shells = (blade(diameter, chord, sense).mapped(facing).moved(hub),)
-    return Part(name, "rotor", shells, hub, axis, copies=int(count), weight=diameter * chord * count)
+    return Part(
+        name, "rotor", shells, hub, axis, copies=int(count), weight=diameter * chord * count
+    )
 
 
 def _main_size(f: dict) -> tuple[float, float, float]:
@@ -61,19 +73,34 @@ def _main_size(f: dict) -> tuple[float, float, float]:
 
 
 def _airframe(span: float, f: dict, booms: float = 0.0) -> list[Surface]:
-    """Fuselage, wing, tail plane and fin; with `booms` (m) the tail stands between two booms that far apart."""
+    """Fuselage, wing, tail plane and fin; with `booms` (m) the tail stands between two booms that
+    far apart.
+    """
     nose = f["wing_station"] * f["body_length"]
     middle = nose - f["body_length"] / 2
     height = f["wing_height"] * f["body_height"]
     body = fuselage(f, 0.25).moved((0, middle, -height))
-    root, tip = f["root_chord"], f["tip_chord"]
-    wing = foil([(0, 0, 0, root, 0.02), (0.25 * span, 0, 0.01 * span, (root + tip) / 2 + 0.2 * (root - tip), 0.02),
-                 (0.5 * span, 0, 0.02 * span, tip, 0.0)], 0.12)  # fmt: skip
+    root = f["root_chord"]
+    tip = f["tip_chord"]
+    wing = foil(
+        [
+            (0, 0, 0, root, 0.02),
+            (0.25 * span, 0, 0.01 * span, (root + tip) / 2 + 0.2 * (root - tip), 0.02),
+            (0.5 * span, 0, 0.02 * span, tip, 0.0),
+        ],
+        0.12,
+    )
     back = nose - f["body_length"] + 0.3 * f["tail_chord"]
-    chord, thin = f["tail_chord"], 0.09
+    chord = f["tail_chord"]
+    thin = 0.09
     level = -height if not booms else 0.0
-    tail = foil([(0, back, level, chord, 0), (f["tail_span"] / 2, back, level, 0.7 * chord, 0)], thin)
-    fin = foil([(0, back, 0, 1.1 * chord, 0), (f["fin_height"], back - 0.2 * chord, 0, 0.6 * chord, 0)], thin)
+    tail = foil(
+        [(0, back, level, chord, 0), (f["tail_span"] / 2, back, level, 0.7 * chord, 0)], thin
+    )
+    fin = foil(
+        [(0, back, 0, 1.1 * chord, 0), (f["fin_height"], back - 0.2 * chord, 0, 0.6 * chord, 0)],
+        thin,
+    )
     upright = fin.mapped(_UPRIGHT).moved((booms / 2, 0, level))
     return [body, *_both(wing), *_both(tail), *(_both(upright) if booms else [upright])]
 
@@ -81,22 +108,34 @@ def _airframe(span: float, f: dict, booms: float = 0.0) -> list[Surface]:
 def plane(record: dict, f: dict) -> list[Part]:
     """Return a plane with a tractor propeller at the nose."""
     shells = _airframe(record["published"]["size_m"], f)
-    hub = (0.0, f["wing_station"] * f["body_length"] + 0.02 * f["body_length"], -f["wing_height"] * f["body_height"])
-    return [Part("body", "body", tuple(shells)), _propeller("propeller", hub, _main_size(f), _AHEAD)]
+    hub = (
+        0.0,
+        f["wing_station"] * f["body_length"] + 0.02 * f["body_length"],
+        -f["wing_height"] * f["body_height"],
+    )
+    return [
+        Part("body", "body", tuple(shells)),
+        _propeller("propeller", hub, _main_size(f), _AHEAD),
+    ]
 
 
 def lift_and_cruise(record: dict, f: dict) -> list[Part]:
     """Return a plane with a pusher behind its body and four lift propellers on two booms.
 
-    With one rotor in the table of targets the lift propellers stand still along the booms; with five they turn.
+    With one rotor in the table of targets the lift propellers stand still along the booms; with
+    five they turn.
     """
     turn = record["published"]["n_rotors_or_wings"] == 5
     shells = _airframe(record["published"]["size_m"], f, f["boom_spacing"])
-    x, reach, radius = f["boom_spacing"] / 2, f["boom_length"], 0.03 * f["boom_length"] / 2
+    x = f["boom_spacing"] / 2
+    reach = f["boom_length"]
+    radius = 0.03 * f["boom_length"] / 2
     back = f["wing_station"] * f["body_length"] - f["body_length"]
     ahead = back + reach
     shells += _both(tube([(x, ahead, 0), (x, back, 0)], radius, 8))
-    lift, chord, lifting = f["lift_diameter"], 0.08 * f["lift_diameter"], []
+    lift = f["lift_diameter"]
+    chord = 0.08 * f["lift_diameter"]
+    lifting = []
     for sense, place, y in ((1, "front", ahead - 0.02 * reach), (-1, "rear", back + 0.25 * reach)):
         top = 2.5 * radius
         shells += _both(cylinder(1.5 * radius, (x, y, 0), (x, y, top), 10))
@@ -107,18 +146,33 @@ def lift_and_cruise(record: dict, f: dict) -> list[Part]:
         else:
             # A stopped lift propeller is held along its boom, where it resists least.
             shells += _both(box((chord, lift, 0.012 * lift), (x, y, top)))
-    hub = (0.0, back - 0.02 * f["body_length"] + 0.1 * f["tail_chord"], -f["wing_height"] * f["body_height"])
-    return [Part("body", "body", tuple(shells)), _propeller("propeller", hub, _main_size(f), _AHEAD), *lifting]
+    hub = (
+        0.0,
+        back - 0.02 * f["body_length"] + 0.1 * f["tail_chord"],
+        -f["wing_height"] * f["body_height"],
+    )
+    return [
+        Part("body", "body", tuple(shells)),
+        _propeller("propeller", hub, _main_size(f), _AHEAD),
+        *lifting,
+    ]
 
 
 def _cabin(f: dict) -> tuple[list[Surface], float, float]:
     """Egg-shaped cabin, mast and tail boom, the boom's end (m, to the front) and its height (m)."""
-    long, half, high = f["body_length"], f["body_width"] / 2, f["body_height"]
+    long = f["body_length"]
+    half = f["body_width"] / 2
+    high = f["body_height"]
     shape = ((0.5, 0.25, -0.25, 0.1), (0.4, 0.7, -0.42, 0.32), (0.15, 1, -0.5, 0.5), (-0.2, 0.95, -0.48, 0.5),
              (-0.42, 0.55, -0.2, 0.42), (-0.5, 0.35, 0.0, 0.36))  # fmt: skip
-    cabin = hull([(y * long, w * half, a * high, b * high) for y, w, a, b in shape], 2.4, bow=0.03 * long)
-    top, start = 0.5 * high + f["mast_height"], -0.4 * long
-    end, level, wide = start - f["boom_length"], 0.2 * high, f["boom_diameter"] / 2
+    cabin = hull(
+        [(y * long, w * half, a * high, b * high) for y, w, a, b in shape], 2.4, bow=0.03 * long
+    )
+    top = 0.5 * high + f["mast_height"]
+    start = -0.4 * long
+    end = start - f["boom_length"]
+    level = 0.2 * high
+    wide = f["boom_diameter"] / 2
     mast = cylinder(0.06 * half, (0, 0, 0.4 * high), (0, 0, top))
     return [cabin, mast, tube([(0, start, level), (0, end, level)], [wide, 0.7 * wide])], end, level
 
@@ -131,14 +185,23 @@ def _main_rotor(record: dict, f: dict) -> Part:
 
 
 def helicopter(record: dict, f: dict) -> list[Part]:
-    """Return a helicopter without a tail rotor: cabin, mast and main rotor, tail boom, two fins, skids."""
+    """Return a helicopter without a tail rotor: cabin, mast and main rotor, tail boom, two fins,
+    skids.
+    """
     shells, end, level = _cabin(f)
-    long, half, high = f["body_length"], f["body_width"] / 2, f["body_height"]
-    chord, reach = 0.45 * f["fin_height"], f["tail_span"] / 2
+    long = f["body_length"]
+    half = f["body_width"] / 2
+    high = f["body_height"]
+    chord = 0.45 * f["fin_height"]
+    reach = f["tail_span"] / 2
     shells += _both(foil([(0, end, level, chord, 0), (reach, end, level, chord, 0)], 0.1))
-    fin = foil([(-f["fin_height"] / 2, end, 0, chord, 0), (f["fin_height"] / 2, end, 0, chord, 0)], 0.1)
+    fin = foil(
+        [(-f["fin_height"] / 2, end, 0, chord, 0), (f["fin_height"] / 2, end, 0, chord, 0)], 0.1
+    )
     shells += _both(fin.mapped(_UPRIGHT).moved((reach, 0, level)))
-    foot, low, thin = f["skid_track"] / 2, -0.5 * high - f["skid_height"], 0.03 * half
+    foot = f["skid_track"] / 2
+    low = -0.5 * high - f["skid_height"]
+    thin = 0.03 * half
     shells += _both(tube([(foot, -0.45 * long, low), (foot, 0.4 * long, low)], 1.5 * thin, 8))
     for y in (-0.25 * long, 0.2 * long):
         shells += _both(tube([(0.4 * half, y, -0.4 * high), (foot, y, low)], thin, 8))
@@ -146,33 +209,55 @@ def helicopter(record: dict, f: dict) -> list[Part]:
 
 
 def tail_rotor(record: dict, f: dict) -> list[Part]:
-    """Return a helicopter with a tail rotor, its wheels drawn in: cabin, tail boom, tail plane, fin and two rotors."""
+    """Return a helicopter with a tail rotor, its wheels drawn in: cabin, tail boom, tail plane, fin
+    and two rotors.
+    """
     shells, end, level = _cabin(f)
     main = _main_rotor(record, f)
     chord = 0.35 * f["fin_height"]
     plane = foil(
-        [(0, -f["tail_arm"], level, chord, 0), (f["tail_span"] / 2, -f["tail_arm"], level, 0.8 * chord, 0)], 0.1
+        [
+            (0, -f["tail_arm"], level, chord, 0),
+            (f["tail_span"] / 2, -f["tail_arm"], level, 0.8 * chord, 0),
+        ],
+        0.1,
     )
-    fin = foil([(-0.4 * f["fin_height"], end - 0.3 * chord, 0, 0.6 * chord, 0), (0, end, 0, 1.2 * chord, 0),
-                (0.6 * f["fin_height"], end - 0.5 * chord, 0, 0.7 * chord, 0)], 0.1)  # fmt: skip
+    fin = foil(
+        [
+            (-0.4 * f["fin_height"], end - 0.3 * chord, 0, 0.6 * chord, 0),
+            (0, end, 0, 1.2 * chord, 0),
+            (0.6 * f["fin_height"], end - 0.5 * chord, 0, 0.7 * chord, 0),
+        ],
+        0.1,
+    )
     hub = (-0.6 * f["boom_diameter"], -f["tail_rotor_arm"], main.hinge[2] - f["tail_rotor_drop"])
     shells += [*_both(plane), fin.mapped(_UPRIGHT).moved((0, 0, level))]
     # The shaft from the fin to the tail rotor.
     shells.append(cylinder(0.1 * f["boom_diameter"], (0, hub[1], hub[2]), hub, 8))
     size = (f["tail_rotor_diameter"], f["tail_blade_chord"], f["tail_blade_count"])
-    return [Part("body", "body", tuple(shells)), main, _propeller("tail rotor", hub, size, _SIDEWAYS)]
+    return [
+        Part("body", "body", tuple(shells)),
+        main,
+        _propeller("tail rotor", hub, size, _SIDEWAYS),
+    ]
 
 
 def balloon(record: dict, f: dict) -> list[Part]:
     """Return a balloon: an envelope, a line and a box of instruments below it; nothing turns."""
-    half, high = record["published"]["size_m"] / 2, f["envelope_height"] / 2
+    half = record["published"]["size_m"] / 2
+    high = f["envelope_height"] / 2
     end = -high - f["line_length"]
-    load = box((f["load_width"], f["load_length"], f["load_height"]), (0, 0, end - f["load_height"] / 2))
+    load = box(
+        (f["load_width"], f["load_length"], f["load_height"]), (0, 0, end - f["load_height"] / 2)
+    )
     line = tube([(0, 0, -0.99 * high), (0, 0, end)], 0.004, 6)
     return [Part("body", "body", (ellipsoid((half, half, high), sides=24), line, load))]
 
 
 LAYOUTS = {
-    "plane": plane, "lift and cruise": lift_and_cruise, "helicopter": helicopter, "tail rotor": tail_rotor,
+    "plane": plane,
+    "lift and cruise": lift_and_cruise,
+    "helicopter": helicopter,
+    "tail rotor": tail_rotor,
     "balloon": balloon,
-}  # fmt: skip
+}

@@ -1,11 +1,12 @@
 """Built-in bird models: body with head, bill and tail, and two wings of two hinged segments each.
 
-Axes: front +y, right +x, up +z, metres; the origin lies half-way between bill tip and tail tip, wings flat.
-A positive angle about either hinge raises the wing's tip, on both sides. Of the figures `length` (bill tip to tail tip)
-and `span`, those of the living bird, only the ratio is used, since the published size sets the length. Ratios are
-relative to the length, with three exceptions: `wing_chord` is relative to half the span, `wrist` is the place of the
-second hinge along half the span, `tip_chord` is the chord at the tip over that at the root. `fingers` is the number of
-slotted primaries at the tip.
+Axes: front +y, right +x, up +z, metres; the origin lies half-way between bill tip and tail tip,
+wings flat. A positive angle about either hinge raises the wing's tip, on both sides. Of the figures
+`length` (bill tip to tail tip) and `span`, those of the living bird, only the ratio is used, since
+the published size sets the length. Ratios are relative to the length, with three exceptions:
+`wing_chord` is relative to half the span, `wrist` is the place of the second hinge along half the
+span, `tip_chord` is the chord at the tip over that at the root. `fingers` is the number of slotted
+primaries at the tip.
 """
 
 import math
@@ -16,7 +17,9 @@ from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import Surface, ellipsoid, foil, hull, loft, superellipse, tube
 
 FLAP = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fold_lag_deg": 90.0}
-"""Default wing beat: shoulder mean + amplitude cos(2 pi F t), outer segment fold_amplitude cos(2 pi F t - fold_lag)."""
+"""Default wing beat: shoulder mean + amplitude cos(2 pi F t), outer segment fold_amplitude cos(2 pi
+F t - fold_lag).
+"""
 
 MOVING_SHARE = 0.62
 
@@ -35,7 +38,9 @@ def fault(record: dict) -> str | None:
 
 
 def _bill(front: float, root: float, depth: float) -> Surface:
-    """The slightly hooked bill from y = `root` to its tip at y = `front`; `depth` is its height at the root."""
+    """The slightly hooked bill from y = `root` to its tip at y = `front`; `depth` is its height at
+    the root.
+    """
     sections = []
     for along, size, droop in ((0.0, 1.0, 0.0), (0.5, 0.85, 0.0), (0.88, 0.45, -0.12 * depth)):
         loop = superellipse(0.3 * size * depth, 0.5 * size * depth, 2.0, 12)
@@ -48,18 +53,44 @@ def _body(length: float, f: dict) -> tuple[Surface, ...]:
     """Bill, head, neck, trunk and tail fan: bill tip at +length/2, tail tip at -length/2."""
     front = length / 2
     bill, head, neck, tail = (f[name] * length for name in ("bill", "head", "neck", "tail"))
-    half, fan_half, thin = f["body_width"] * length / 2, f["tail_spread"] * length / 2, 0.03 * length
+    half = f["body_width"] * length / 2
+    fan_half = f["tail_spread"] * length / 2
+    thin = 0.03 * length
     skull_y = front - bill - 0.45 * head
     skull = ellipsoid((0.42 * head, 0.55 * head, 0.45 * head), (0, skull_y, 0))
-    shoulder, root = skull_y - neck - 0.25 * head, -front + tail
+    shoulder = skull_y - neck - 0.25 * head
+    root = -front + tail
     reach = shoulder - root
-    throat = tube([(0, skull_y, 0), (0, shoulder - 0.12 * reach, 0)], [0.36 * head, 0.6 * half + 0.1 * head])
-    shape = ((-0.04, 0.3), (0.05, 0.62), (0.2, 0.92), (0.4, 1.0), (0.65, 0.85), (0.85, 0.55), (1.0, 0.3))
-    trunk = hull([(shoulder - t * reach, w * half, -0.95 * w * half, 0.85 * w * half) for t, w in shape], exponent=2.0)
-    feathers = ((root + 0.3 * tail, 0.28 * half, 1.0), (root - 0.3 * tail, 0.5 * fan_half, 0.4),
-                (-front + 0.06 * tail, fan_half, 0.15), (-front, 0.86 * fan_half, 0.1))  # fmt: skip
+    throat = tube(
+        [(0, skull_y, 0), (0, shoulder - 0.12 * reach, 0)], [0.36 * head, 0.6 * half + 0.1 * head]
+    )
+    shape = (
+        (-0.04, 0.3),
+        (0.05, 0.62),
+        (0.2, 0.92),
+        (0.4, 1.0),
+        (0.65, 0.85),
+        (0.85, 0.55),
+        (1.0, 0.3),
+    )
+    trunk = hull(
+        [(shoulder - t * reach, w * half, -0.95 * w * half, 0.85 * w * half) for t, w in shape],
+        exponent=2.0,
+    )
+    feathers = (
+        (root + 0.3 * tail, 0.28 * half, 1.0),
+        (root - 0.3 * tail, 0.5 * fan_half, 0.4),
+        (-front + 0.06 * tail, fan_half, 0.15),
+        (-front, 0.86 * fan_half, 0.1),
+    )
     fan = hull([(y, w, -h * thin, h * thin) for y, w, h in feathers], exponent=3.0)
-    return _bill(front, front - bill - 0.2 * head, f["bill_depth"] * length), skull, throat, trunk, fan
+    return (
+        _bill(front, front - bill - 0.2 * head, f["bill_depth"] * length),
+        skull,
+        throat,
+        trunk,
+        fan,
+    )
 
 
 def _inner(shoulder: np.ndarray, wrist: np.ndarray, chord: float) -> Surface:
@@ -71,27 +102,51 @@ def _inner(shoulder: np.ndarray, wrist: np.ndarray, chord: float) -> Surface:
 
 
 def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[Surface, ...]:
-    """The outer segment of the right wing: pointed, or blunt with slotted primaries spread like fingers."""
+    """The outer segment of the right wing: pointed, or blunt with slotted primaries spread like
+    fingers.
+    """
     x, y, z = wrist
-    reach, back = half_span - x, 0.2 * chord
+    reach = half_span - x
+    back = 0.2 * chord
     fingers = int(f["fingers"])
     tip = f["tip_chord"] * chord
-    plan = [(0, 0.95), (0.35, 0.87), (0.62, 0.76)] if fingers else [(0, 0.95), (0.35, 0.81), (0.7, 0.57), (0.92, 0.28)]
-    rows = [(x + t * reach, y - back * t * math.sqrt(t), z, max(c * chord, c * tip), 0.03) for t, c in plan]
+    plan = (
+        [(0, 0.95), (0.35, 0.87), (0.62, 0.76)]
+        if fingers
+        else [(0, 0.95), (0.35, 0.81), (0.7, 0.57), (0.92, 0.28)]
+    )
+    rows = [
+        (x + t * reach, y - back * t * math.sqrt(t), z, max(c * chord, c * tip), 0.03)
+        for t, c in plan
+    ]
     if not fingers:
-        return (foil([*rows, (half_span, y - 1.1 * back, z, min(0.5 * tip, 0.25 * chord), 0.03)], 0.06),)
+        return (
+            foil([*rows, (half_span, y - 1.1 * back, z, min(0.5 * tip, 0.25 * chord), 0.03)], 0.06),
+        )
     shells = [foil(rows, 0.06)]
-    edge, width = rows[-1][1], 0.9 * chord / fingers
+    edge = rows[-1][1]
+    width = 0.9 * chord / fingers
     for spread in np.linspace(0, 1, fingers):
         start = np.array([x + 0.52 * reach, edge + (0.12 - 0.55 * spread) * chord, z])
-        end = np.array([half_span - 0.095 * spread * reach, start[1] + (0.12 - 0.55 * spread) * tip, z])
-        shells.append(foil([(*start, width, 0.02), (*(start + end) / 2, width, 0.02), (*end, 0.4 * width, 0.02)], 0.06))
+        end = np.array(
+            [half_span - 0.095 * spread * reach, start[1] + (0.12 - 0.55 * spread) * tip, z]
+        )
+        shells.append(
+            foil(
+                [
+                    (*start, width, 0.02),
+                    (*(start + end) / 2, width, 0.02),
+                    (*end, 0.4 * width, 0.02),
+                ],
+                0.06,
+            )
+        )
     return tuple(shells)
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the bird that a merged record describes, and the entries `flap` and `wing_span_m` for its
-    cloud's record."""
+    """Return the parts of the bird that a merged record describes, and the entries `flap` and
+    `wing_span_m` for its cloud's record."""
     f = {name: value["si"] for name, value in record["figures"].items()}
     length = record["published"]["size_m"]
     half_span = length * f["span"] / f["length"] / 2
@@ -106,10 +161,21 @@ def parts(record: dict) -> tuple[list[Part], dict]:
         place = np.diag([float(side), 1.0, 1.0])
         root = (side * shoulder[0], shoulder[1], shoulder[2])
         inner, outer = (tuple(shell.mapped(place) for shell in shells) for shells in segments)
-        # The hinge's axis is -y on the right and +y on the left, so that a positive angle lifts the tip.
+        # The hinge's axis is -y on the right and +y on the left, so that a positive angle lifts the
+        # tip.
         axis = (0.0, -float(side), 0.0)
         bend = (side * wrist[0], shoulder[1], shoulder[2])
         result.append(Part(f"{name} inner wing", "wing", inner, root, axis, weight=f["wrist"]))
         parent = len(result) - 1
-        result.append(Part(f"{name} outer wing", "wing", outer, bend, axis, parent=parent, weight=1 - f["wrist"]))
+        result.append(
+            Part(
+                f"{name} outer wing",
+                "wing",
+                outer,
+                bend,
+                axis,
+                parent=parent,
+                weight=1 - f["wrist"],
+            )
+        )
     return result, {"flap": FLAP | record.get("flap", {}), "wing_span_m": 2 * half_span}

@@ -1,4 +1,6 @@
-"""Built-in models: the check of a record's figures with their units and sources, and the step to its cloud."""
+"""Built-in models: the check of a record's figures with their units and sources, and the step to
+its cloud.
+"""
 
 import hashlib
 import json
@@ -17,15 +19,21 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "1": 1.0}
 
 def _figure(figure: list, kind: str, sources: dict, where: str) -> dict:
     """Return the figure [value, unit, source] as a record: value, unit, source and the value in SI."""
-    value, unit, source = figure[0], str(figure[1]), figure[2]
+    value = figure[0]
+    unit = str(figure[1])
+    source = figure[2]
     units = [name for name in UNITS if (name != "1") == (kind == "length")]
     if unit not in units:
         raise InputError(f"{where}: unit is {unit!r}, expected one of {units}")
     least = 0 if kind in ("whole", "offset") else 1e-9
     if not least <= value < 1e5 or (kind in ("count", "whole") and not float(value).is_integer()):
-        raise InputError(f"{where}: value is {value!r}, expected a positive number fit for a {kind}")
+        raise InputError(
+            f"{where}: value is {value!r}, expected a positive number fit for a {kind}"
+        )
     if source != "estimate" and source not in sources:
-        raise InputError(f"{where}: source is {source!r}, expected 'estimate' or one of {sorted(sources)}")
+        raise InputError(
+            f"{where}: source is {source!r}, expected 'estimate' or one of {sorted(sources)}"
+        )
     return {"value": value, "unit": unit, "source": source, "si": value * UNITS[unit]}
 
 
@@ -34,29 +42,52 @@ def check_record(merged: dict, where: str) -> dict:
 
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    category, name = like(merged), merged["model"]
-    models = {known: model for known, model in record_schema.schema()["models"].items() if model["like"] == category}
+    category = like(merged)
+    name = merged["model"]
+    models = {
+        known: model
+        for known, model in record_schema.schema()["models"].items()
+        if model["like"] == category
+    }
     if not models:
-        raise InputError(f"{where}: source is 'builtin', which has no {category} model; expected gait or mocap")
+        raise InputError(
+            f"{where}: source is 'builtin', which has no {category} model; expected gait or mocap"
+        )
     if name not in models:
         raise InputError(f"{where}: model is {name!r}, expected one of {sorted(models)}")
-    model, rotors = models[name], merged["published"]["n_rotors_or_wings"]
-    if others := sorted({"coaxial", "flap", "wheel_size"} & set(merged) - set(model.get("keys", []))):
-        raise InputError(f"{where}: {others} are not for model {name}, expected {model.get('keys', [])} at most")
-    size_is, possible = merged["size_is"], model["size_is"]
+    model = models[name]
+    rotors = merged["published"]["n_rotors_or_wings"]
+    if others := sorted(
+        {"coaxial", "flap", "wheel_size"} & set(merged) - set(model.get("keys", []))
+    ):
+        raise InputError(
+            f"{where}: {others} are not for model {name}, expected {model.get('keys', [])} at most"
+        )
+    size_is = merged["size_is"]
+    possible = model["size_is"]
     if size_is not in possible:
-        raise InputError(f"{where}: size_is is {size_is!r}, expected one of {possible} with model {name}")
+        raise InputError(
+            f"{where}: size_is is {size_is!r}, expected one of {possible} with model {name}"
+        )
     if rotors not in model.get("rotors", [rotors]):
         number = " or ".join(map(str, model["rotors"]))
-        raise InputError(f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not {rotors}")
-    kinds, figures = record_schema.figures(name), merged.get("figures", {})
+        raise InputError(
+            f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not {rotors}"
+        )
+    kinds = record_schema.figures(name)
+    figures = merged.get("figures", {})
     if size_is == "body diagonal":
         kinds = kinds | {"motor_diagonal": "length"}
     if wrong := sorted(set(kinds) ^ set(figures)):
-        raise InputError(f"{where}: figures {wrong} missing or unknown, expected exactly {sorted(kinds)}")
-    sources, share = merged.get("sources", {}), merged.get("moving_share", MODULES[category].MOVING_SHARE)
-    resolved = {name: _figure(figure, kinds[name], sources, f"{where}: figures.{name}")
-                for name, figure in figures.items()}  # fmt: skip
+        raise InputError(
+            f"{where}: figures {wrong} missing or unknown, expected exactly {sorted(kinds)}"
+        )
+    sources = merged.get("sources", {})
+    share = merged.get("moving_share", MODULES[category].MOVING_SHARE)
+    resolved = {
+        name: _figure(figure, kinds[name], sources, f"{where}: figures.{name}")
+        for name, figure in figures.items()
+    }
     result = merged | {"figures": resolved, "moving_share": share}
     if fault := MODULES[category].fault(result):
         raise InputError(f"{where}: {fault}")
@@ -65,12 +96,17 @@ def check_record(merged: dict, where: str) -> dict:
 
 
 def checksum(record: dict) -> str:
-    """Return the SHA-256 of a record's canonical JSON (sorted keys, no spaces), 64 hexadecimal digits."""
-    return hashlib.sha256(json.dumps(record, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    """Return the SHA-256 of a record's canonical JSON (sorted keys, no spaces), 64 hexadecimal
+    digits.
+    """
+    return hashlib.sha256(
+        json.dumps(record, sort_keys=True, separators=(",", ":")).encode()
+    ).hexdigest()
 
 
 def builtin_cloud(record: dict, seed: int) -> Cloud:
-    """Return the cloud of a merged record whose source is `builtin`; equal record and seed give equal points.
+    """Return the cloud of a merged record whose source is `builtin`; equal record and seed give
+    equal points.
 
     Raises: InputError where the record asks for fewer points than its parts need.
     """

@@ -1,8 +1,9 @@
-"""The calibration point cloud (CPC): the one file that passes from targets to motion, and what it must hold.
+"""The calibration point cloud (CPC): the one file that passes from targets to motion, and what it
+must hold.
 
-A cloud is a NumPy archive (.npz): it keeps float64 exactly, holds several arrays of different shape in one
-file, and NumPy, MATLAB (scipy.io) and Julia open it without our code. Frame: metres, body-centred, front +y,
-up +z. Every point belongs to one part; every part except the body moves.
+A cloud is a NumPy archive (.npz): it keeps float64 exactly, holds several arrays of different shape
+in one file, and NumPy, MATLAB (scipy.io) and Julia open it without our code. Frame: metres,
+body-centred, front +y, up +z. Every point belongs to one part; every part except the body moves.
 
     points      (L, 3)  float64  m
     normals     (L, 3)  float64  outward unit vectors, NaN where the source has none
@@ -10,11 +11,12 @@ up +z. Every point belongs to one part; every part except the body moves.
     part        (L,)    int64    index of the point's part
     kinds       (P,)    str      body | rotor | wing | wheel | node
     names       (P,)    str      one name a part, unique in the cloud
-    parents     (P,)    int64    the part that this part's hinge moves with (an outer wing: its inner wing), -1 for none
-    hinges      (P, 3)  float64  m, a point on the part's axis (NaN for body and node)
-    axes        (P, 3)  float64  unit vector of the axis; its sign is a rotor's sense (NaN for body and node)
-    track       (F, L, 3) float64 m, a cyclic recording of all points (F = 0 unless the parts are nodes)
-    record      str     JSON: subtype, category, source, checksum, track_rate_hz, rate_factors, sizes, ...
+    parents     (P,)    int64    the part that this part's hinge moves with (an outer wing: its
+    inner wing), -1 for none hinges      (P, 3)  float64  m, a point on the part's axis (NaN for
+    body and node) axes        (P, 3)  float64  unit vector of the axis; its sign is a rotor's sense
+    (NaN for body and node) track       (F, L, 3) float64 m, a cyclic recording of all points (F = 0
+    unless the parts are nodes) record      str     JSON: subtype, category, source, checksum,
+    track_rate_hz, rate_factors, sizes, ...
 """
 
 import json
@@ -34,11 +36,16 @@ from lowalt.files.json_objects import json_object
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
-"""Most rotors or wheels of a cloud, each with a phase of its own (EH216-S flown as coaxial pairs has 16 rotors)."""
+"""Most rotors or wheels of a cloud, each with a phase of its own (EH216-S flown as coaxial pairs
+has 16 rotors).
+"""
 
 LARGEST_RATE_FACTOR = 100
-LARGEST_M, LARGEST_RCS_M2 = 1e3, 1e9
-"""Bounds of coordinates and cross sections: far more than any target has, and far less than what overflows."""
+LARGEST_M = 1e3
+LARGEST_RCS_M2 = 1e9
+"""Bounds of coordinates and cross sections: far more than any target has, and far less than what
+overflows.
+"""
 
 
 @dataclass(frozen=True)
@@ -74,7 +81,9 @@ class Cloud:
 
     @property
     def rate_factors(self) -> np.ndarray:
-        """Rate of each part (P,) divided by the rate of its motion model; 1 unless the record states it."""
+        """Rate of each part (P,) divided by the rate of its motion model; 1 unless the record
+        states it.
+        """
         factors = self.record.get("rate_factors", {})
         return np.array([float(factors.get(name, 1.0)) for name in self.names])
 
@@ -101,15 +110,29 @@ def _near(places: np.ndarray) -> bool:
 
 
 def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Return whether each array has its shape and numbers in range, and otherwise the fault in words."""
-    count, parts = len(cloud.points), len(cloud.kinds)
+    """Return whether each array has its shape and numbers in range, and otherwise the fault in
+    words.
+    """
+    count = len(cloud.points)
+    parts = len(cloud.kinds)
     yield count > 0, "points is empty, expected at least one point"
-    shapes = {"points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
-              "parents": (parts,), "hinges": (parts, 3), "axes": (parts, 3)}  # fmt: skip
+    shapes = {
+        "points": (count, 3),
+        "normals": (count, 3),
+        "rcs_m2": (count,),
+        "part": (count,),
+        "parents": (parts,),
+        "hinges": (parts, 3),
+        "axes": (parts, 3),
+    }
     for name, shape in shapes.items():
-        array, numbers = getattr(cloud, name), "iu" if name in ("part", "parents") else "iuf"
+        array = getattr(cloud, name)
+        numbers = "iu" if name in ("part", "parents") else "iuf"
         yield np.shape(array) == shape, f"{name} has shape {np.shape(array)}, expected {shape}"
-        yield array.dtype.kind in numbers, f"{name} has values of type {array.dtype}, expected numbers"
+        yield (
+            array.dtype.kind in numbers,
+            f"{name} has values of type {array.dtype}, expected numbers",
+        )
     yield _near(cloud.points), f"points has a coordinate that is no number within {LARGEST_M:g} m"
     good_rcs = (cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)
     yield good_rcs.all(), f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2"
@@ -119,59 +142,100 @@ def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 
 
 def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Return whether name, kind, parent, hinge and axis of each part are right, and otherwise the fault in words."""
+    """Return whether name, kind, parent, hinge and axis of each part are right, and otherwise the
+    fault in words.
+    """
     count = len(cloud.kinds)
     unique = len(set(cloud.names)) == count == len(cloud.names)
     yield unique, f"names {cloud.names}, expected {count} unique names"
     yield set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}"
-    yield cloud.part.min() >= 0 and cloud.part.max() < count, f"part names a part outside 0..{count - 1}"
-    for index, (kind, name, parent) in enumerate(zip(cloud.kinds, cloud.names, cloud.parents, strict=True)):
+    yield (
+        cloud.part.min() >= 0 and cloud.part.max() < count,
+        f"part names a part outside 0..{count - 1}",
+    )
+    for index, (kind, name, parent) in enumerate(
+        zip(cloud.kinds, cloud.names, cloud.parents, strict=True)
+    ):
         yield -1 <= parent < index, f"parents[{index}] is {parent}, expected an earlier part or -1"
         if kind in ("rotor", "wing", "wheel"):
             length = np.linalg.norm(cloud.axes[index])
             yield abs(length - 1) < 1e-12, f"axes[{index}] ({name}) has length {length}, expected 1"
-            yield _near(cloud.hinges[index]), f"hinges[{index}] ({name}) is no place within {LARGEST_M:g} m"
+            yield (
+                _near(cloud.hinges[index]),
+                f"hinges[{index}] ({name}) is no place within {LARGEST_M:g} m",
+            )
 
 
 def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
-    """Return whether the record has all required keys and a track fits its nodes, and otherwise the fault in words."""
+    """Return whether the record has all required keys and a track fits its nodes, and otherwise the
+    fault in words.
+    """
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     yield not missing, f"record lacks {sorted(missing)}"
     classes.like(cloud.record)
     factors = cloud.record.get("rate_factors", {})
-    yield isinstance(factors, dict), f"rate_factors: {factors!r}, expected numbers by the parts' names"
-    turning = [name for name, kind in zip(cloud.names, cloud.kinds, strict=True) if kind in ("rotor", "wheel")]
+    yield (
+        isinstance(factors, dict),
+        f"rate_factors: {factors!r}, expected numbers by the parts' names",
+    )
+    turning = [
+        name
+        for name, kind in zip(cloud.names, cloud.kinds, strict=True)
+        if kind in ("rotor", "wheel")
+    ]
     strange = sorted(set(factors) - set(turning))
     yield not strange, f"rate_factors: {strange} are no parts that turn, expected some of {turning}"
-    good = all(isinstance(value, (int, float)) and 0 <= value <= LARGEST_RATE_FACTOR for value in factors.values())
+    good = all(
+        isinstance(value, (int, float)) and 0 <= value <= LARGEST_RATE_FACTOR
+        for value in factors.values()
+    )
     yield good, f"rate_factors: {factors}, expected numbers from 0 to {LARGEST_RATE_FACTOR}"
     if "node" in cloud.kinds:
-        count, shape = len(cloud.points), cloud.track.shape
+        count = len(cloud.points)
+        shape = cloud.track.shape
         fits = len(shape) == 3 and shape[1:] == (count, 3) and shape[0] >= 2
         yield fits, f"track has shape {shape}, expected (frames >= 2, {count}, 3)"
         yield _near(cloud.track), f"track has a coordinate that is no number within {LARGEST_M:g} m"
-        yield cloud.record.get("track_rate_hz", 0) > 0, "record.track_rate_hz is missing, expected a positive rate"
-        yield list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node"
+        yield (
+            cloud.record.get("track_rate_hz", 0) > 0,
+            "record.track_rate_hz is missing, expected a positive rate",
+        )
+        yield (
+            list(cloud.part) == list(range(count)),
+            "part of a node cloud must be 0..L-1, one part a node",
+        )
 
 
 def extent(cloud: Cloud) -> float:
-    """Return the longest side (m) of the box around a cloud's points, or around all places of a recording's points."""
+    """Return the longest side (m) of the box around a cloud's points, or around all places of a
+    recording's points.
+    """
     places = cloud.track.reshape(-1, 3) if len(cloud.track) else cloud.points
     return float((places.max(axis=0) - places.min(axis=0)).max())
 
 
 def scaled(cloud: Cloud, factor: float) -> Cloud:
-    """Return a cloud `factor` times as large in every direction; cross sections and turning rates stay."""
-    return replace(cloud, points=factor * cloud.points, hinges=factor * cloud.hinges, track=factor * cloud.track)
+    """Return a cloud `factor` times as large in every direction; cross sections and turning rates
+    stay.
+    """
+    return replace(
+        cloud,
+        points=factor * cloud.points,
+        hinges=factor * cloud.hinges,
+        track=factor * cloud.track,
+    )
 
 
 def cloud_of(clouds: Mapping[str, Cloud], row: dict) -> Cloud:
-    """Return the cloud of a motion table's row among `clouds`, by subtype, at the row's own size where it has one.
+    """Return the cloud of a motion table's row among `clouds`, by subtype, at the row's own size
+    where it has one.
 
     Raises: InputError naming the sample where there is none.
     """
     if row["subtype"] not in clouds:
-        raise InputError(f"{row['subtype']}, model {row['model']}: no cloud of this subtype among {sorted(clouds)}")
+        raise InputError(
+            f"{row['subtype']}, model {row['model']}: no cloud of this subtype among {sorted(clouds)}"
+        )
     cloud = clouds[row["subtype"]]
     return scaled(cloud, row["scale"]) if "scale" in row else cloud
 
@@ -183,12 +247,22 @@ def write(path: str | Path, cloud: Cloud) -> None:
     """
     check(cloud, str(path))
     with replacing(path) as temporary:
-        write_arrays(temporary, dict(
-            points=cloud.points, normals=cloud.normals, rcs_m2=cloud.rcs_m2, part=cloud.part.astype(np.int64),
-            kinds=np.array(cloud.kinds), names=np.array(cloud.names), parents=cloud.parents.astype(np.int64),
-            hinges=cloud.hinges, axes=cloud.axes, track=cloud.track,
-            record=np.array(json.dumps(cloud.record, sort_keys=True)),
-        ))  # fmt: skip
+        write_arrays(
+            temporary,
+            dict(
+                points=cloud.points,
+                normals=cloud.normals,
+                rcs_m2=cloud.rcs_m2,
+                part=cloud.part.astype(np.int64),
+                kinds=np.array(cloud.kinds),
+                names=np.array(cloud.names),
+                parents=cloud.parents.astype(np.int64),
+                hinges=cloud.hinges,
+                axes=cloud.axes,
+                track=cloud.track,
+                record=np.array(json.dumps(cloud.record, sort_keys=True)),
+            ),
+        )
 
 
 def read(path: str | Path) -> Cloud:

@@ -1,8 +1,10 @@
-"""The built-in pedestrian: a parametric walk or run that drives the 31 nodes, where no recording is given.
+"""The built-in pedestrian: a parametric walk or run that drives the 31 nodes, where no recording is
+given.
 
-The modules `cyclist` and `quadruped` make a cyclist and a dog in the same way, from nodes of their own. This module
-holds the human body: the lengths of its segments, the rotations of its bones by the curves of `gait_walk` and
-`gait_run`, and the cloud. Axes: x right, y front, z up, metres; the root's mean position is the origin.
+The modules `cyclist` and `quadruped` make a cyclist and a dog in the same way, from nodes of their
+own. This module holds the human body: the lengths of its segments, the rotations of its bones by
+the curves of `gait_walk` and `gait_run`, and the cloud. Axes: x right, y front, z up, metres; the
+root's mean position is the origin.
 """
 
 import hashlib
@@ -19,9 +21,12 @@ from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation
 
 HIP_HEIGHT = 0.530
-"""Hip (greater trochanter) above ground, in statures. Source: Drillis and Contini 1966, in Winter's handbook."""
+"""Hip (greater trochanter) above ground, in statures. Source: Drillis and Contini 1966, in Winter's
+handbook.
+"""
 
-# Segment lengths are Winter's. The division of spine, neck, hand and foot among CMU's bones is an estimate.
+# Segment lengths are Winter's. The division of spine, neck, hand and foot among CMU's bones is an
+# estimate.
 _RIGHT = {
     "hipjoint": (0.0955, 0, -0.045), "femur": (0, 0, -0.245), "tibia": (0, 0, -0.246),
     "foot": (0, 0.077, -0.035), "toes": (0, 0.035, -0.004),
@@ -32,11 +37,20 @@ _MIDDLE = {
     "lowerback": (0, 0, 0.081), "upperback": (0, 0, 0.081), "thorax": (0, 0, 0.081),
     "lowerneck": (0, 0, 0.026), "upperneck": (0, 0, 0.026), "head": (0, 0, 0.130),
 }  # fmt: skip
-_TRUNK_SHARE = {"lowerback": 1 / 3, "upperback": 2 / 3, "thorax": 1, "lowerneck": 2 / 3, "upperneck": 1 / 3, "head": 0}
+_TRUNK_SHARE = {
+    "lowerback": 1 / 3,
+    "upperback": 2 / 3,
+    "thorax": 1,
+    "lowerneck": 2 / 3,
+    "upperneck": 1 / 3,
+    "head": 0,
+}
 
 
 def bones_m(stature_m: float) -> np.ndarray:
-    """Return the bones (31, 3) of an average adult in metres, standing, arms down; `stature_m` in metres."""
+    """Return the bones (31, 3) of an average adult in metres, standing, arms down; `stature_m` in
+    metres.
+    """
     result = np.zeros((len(NODES), 3))
     for index, name in enumerate(NODES[1:], start=1):
         if name in _MIDDLE:
@@ -47,19 +61,27 @@ def bones_m(stature_m: float) -> np.ndarray:
 
 
 def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
-    """The toes' pitch (rad): that of the foot while it points up, about a third of it where the heel is lifted."""
-    # The ball of the foot bends at push-off, else the toes would enter the ground. A smooth estimate.
-    down, width = np.minimum(foot_rad, 0), np.radians(5)
+    """The toes' pitch (rad): that of the foot while it points up, about a third of it where the
+    heel is lifted.
+    """
+    # The ball of the foot bends at push-off, else the toes would enter the ground. A smooth
+    # estimate.
+    down = np.minimum(foot_rad, 0)
+    width = np.radians(5)
     return np.maximum(foot_rad, 0) + 0.35 * down + 0.65 * width * (portable.exp(down / width) - 1)
 
 
 def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.ndarray:
-    """Return every bone's global rotation (F, 31, 3, 3); `leg(phase)` and `arm(phase)` give the right side's."""
+    """Return every bone's global rotation (F, 31, 3, 3); `leg(phase)` and `arm(phase)` give the
+    right side's.
+    """
     pelvis = product(rotation("z", trunk["turn"]), rotation("y", trunk["list"]))
     chest = product(rotation("z", trunk["twist"]), rotation("x", -trunk["lean"]))
     turned = {"root": pelvis}
     for name, share in _TRUNK_SHARE.items():
-        below = 1 - share if name in ("lowerback", "upperback") else 0  # along the neck, the yaw falls to zero
+        below = (
+            1 - share if name in ("lowerback", "upperback") else 0
+        )  # along the neck, the yaw falls to zero
         yaw = share * trunk["twist"] + below * trunk["turn"]
         turned[name] = product(rotation("z", yaw), rotation("x", -share * trunk["lean"]))
         turned[name] = product(turned[name], rotation("y", below * trunk["list"]))
@@ -67,8 +89,9 @@ def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.
         hip, knee, ankle = leg((phase + later) % 1.0)
         shoulder, elbow = arm((phase + later) % 1.0)
         turned[side + "hipjoint"] = pelvis
-        # The hips move with the pelvis, but the legs swing in planes along the path. A walker abducts and turns the
-        # hip against the pelvis; otherwise the feet would move sideways at 1 m/s while they carry the body.
+        # The hips move with the pelvis, but the legs swing in planes along the path. A walker
+        # abducts and turns the hip against the pelvis; otherwise the feet would move sideways at 1
+        # m/s while they carry the body.
         turned[side + "femur"] = rotation("x", hip)
         turned[side + "tibia"] = rotation("x", hip - knee)
         turned[side + "foot"] = rotation("x", hip - knee + ankle)
@@ -80,11 +103,15 @@ def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.
     return np.stack([turned[name] for name in NODES], axis=1)
 
 
-def cycle_m(kind: str, stature_m: float, speed_mps: float, frames: int) -> tuple[np.ndarray, float, float]:
-    """Return one cycle (frames, 31, 3) in metres, its duration (s) and the distance it covers on the ground (m).
+def cycle_m(
+    kind: str, stature_m: float, speed_mps: float, frames: int
+) -> tuple[np.ndarray, float, float]:
+    """Return one cycle (frames, 31, 3) in metres, its duration (s) and the distance it covers on
+    the ground (m).
 
-    `kind` "walk" follows Boulic et al. 1990 at `speed_mps`; "run" follows `gait_run`, whose stride rate is fixed,
-    so that the stride grows with the speed. Horizontal progress is left out; the root's mean is the origin.
+    `kind` "walk" follows Boulic et al. 1990 at `speed_mps`; "run" follows `gait_run`, whose stride
+    rate is fixed, so that the stride grows with the speed. Horizontal progress is left out; the
+    root's mean is the origin.
     Raises: InputError where the kind is unknown or the speed outside the model.
     """
     phase = np.arange(frames) / frames
@@ -93,25 +120,40 @@ def cycle_m(kind: str, stature_m: float, speed_mps: float, frames: int) -> tuple
         rv = speed_mps / hip_m
         length, duration, _ = gait_walk.timing(rv)
         turned = _rotations(
-            phase, lambda at: gait_walk.leg(rv, at), lambda at: gait_walk.arm(rv, at), gait_walk.trunk(rv, phase)
+            phase,
+            lambda at: gait_walk.leg(rv, at),
+            lambda at: gait_walk.arm(rv, at),
+            gait_walk.trunk(rv, phase),
         )
-        root, stride = gait_walk.shift(rv, phase) * hip_m, length * hip_m
+        root = gait_walk.shift(rv, phase) * hip_m
+        stride = length * hip_m
     elif kind == "run":
         duration = 1 / gait_run.STRIDES_PER_SECOND
         turned = _rotations(phase, gait_run.leg, gait_run.arm, gait_run.trunk(phase))
-        root, stride = gait_run.shift_m(phase), speed_mps * duration
+        root = gait_run.shift_m(phase)
+        stride = speed_mps * duration
     else:
         raise InputError(f"gait: {kind!r}, expected walk or run")
-    return forward_kinematics(root - portable.mean(root, 0), turned, bones_m(stature_m)), duration, stride
+    return (
+        forward_kinematics(root - portable.mean(root, 0), turned, bones_m(stature_m)),
+        duration,
+        stride,
+    )
 
 
 def stance_speed_mps(
-    cycle: np.ndarray, rate_hz: float, speed_mps: float, height_m: float = 0.02, feet: list[int] = FEET
+    cycle: np.ndarray,
+    rate_hz: float,
+    speed_mps: float,
+    height_m: float = 0.02,
+    feet: list[int] = FEET,
 ) -> float:
-    """Return the mean ground speed (m/s) of the lowest foot node while it is within `height_m` of the ground.
+    """Return the mean ground speed (m/s) of the lowest foot node while it is within `height_m` of
+    the ground.
 
-    `cycle` (F, L, 3) cyclic, `feet` the numbers of the foot nodes, front +y, horizontal progress left out; `speed_mps`
-    is added back. A foot that stands still has the speed zero. The ground is the feet's lowest point.
+    `cycle` (F, L, 3) cyclic, `feet` the numbers of the foot nodes, front +y, horizontal progress
+    left out; `speed_mps` is added back. A foot that stands still has the speed zero. The ground is
+    the feet's lowest point.
     """
     places = cycle[:, feet]
     velocity = (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)) * rate_hz / 2
@@ -123,8 +165,12 @@ def stance_speed_mps(
 
 
 def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], float, float]:
-    """One cycle (frames, L, 3) in metres, the nodes' names, its duration (s) and the distance it covers (m)."""
-    kind, stature, speed = record.get("gait"), record["stature_m"], record["speed_mps"]
+    """One cycle (frames, L, 3) in metres, the nodes' names, its duration (s) and the distance it
+    covers (m).
+    """
+    kind = record.get("gait")
+    stature = record["stature_m"]
+    speed = record["speed_mps"]
     if kind not in ("cycle", "trot"):
         if stature < 0.5:
             raise InputError(f"gait: stature_m is {stature}, expected 0.5 m or more of a person")
@@ -136,24 +182,30 @@ def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], floa
         track, names, stride = cyclist.cycle_m(stature, frames)
         duration = stride / speed
     else:
-        track, names, duration, stride = quadruped.cycle_m(stature, record["mass_kg"], speed, frames)
+        track, names, duration, stride = quadruped.cycle_m(
+            stature, record["mass_kg"], speed, frames
+        )
     middle = (track[..., 2].max() + track[..., 2].min()) / 2
     return track - [0, 0, middle], names, duration, stride
 
 
 def check_record(merged: dict, where: str) -> dict:
-    """Return the merged record of a built-in walk or run, checked, with the defaults of `stature_m` (the published
-    height), `rate_hz` (400 frames per second) and `points` (one per node).
+    """Return the merged record of a built-in walk or run, checked, with the defaults of `stature_m`
+    (the published height), `rate_hz` (400 frames per second) and `points` (one per node).
 
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
     if like(merged) != "Pedestrian":
-        raise InputError(f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or mesh")
+        raise InputError(
+            f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or mesh"
+        )
     result = {"stature_m": merged["published"]["hgt_m"], "rate_hz": 400, **merged}
     if result.get("gait") == "trot":
         result = {"mass_kg": 30, **result}
     elif "mass_kg" in result:
-        raise InputError(f"{where}: mass_kg is given with gait {result.get('gait')!r}, expected it with trot alone")
+        raise InputError(
+            f"{where}: mass_kg is given with gait {result.get('gait')!r}, expected it with trot alone"
+        )
     try:
         names = _cycle(result, 8)[1]
     except InputError as error:
@@ -164,22 +216,33 @@ def check_record(merged: dict, where: str) -> dict:
 def gait_cloud(record: dict, seed: int) -> Cloud:
     """Return the cloud of a built-in pedestrian, cyclist or dog: one cycle of its nodes.
 
-    `record` is a merged record that `check_record` has passed. The cloud's record gets cycle (s), stride (m), cadence,
-    height of the origin above ground (m) and foot speed in stance (m/s). The model draws no random numbers; `seed` is
-    only written into the record.
+    `record` is a merged record that `check_record` has passed. The cloud's record gets cycle (s),
+    stride (m), cadence, height of the origin above ground (m) and foot speed in stance (m/s). The
+    model draws no random numbers; `seed` is only written into the record.
     """
     duration = _cycle(record, 2)[2]
-    # A cycle has a whole number of frames and keeps its duration, so the frame rate is adjusted a little.
+    # A cycle has a whole number of frames and keeps its duration, so the frame rate is adjusted a
+    # little.
     track, names, duration, stride = _cycle(record, max(2, round(duration * record["rate_hz"])))
-    rate, speed = len(track) / duration, stride / duration
+    rate = len(track) / duration
+    speed = stride / duration
     facts = {
-        "track_rate_hz": rate, "cycle_s": duration, "stride_m": stride, "track_speed_mps": speed,
-        "cadence_steps_per_min": 120 / duration, "origin_height_m": float(-track[..., 2].min()),
-        "checksum": hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest(), "seed": seed,
-    }  # fmt: skip
+        "track_rate_hz": rate,
+        "cycle_s": duration,
+        "stride_m": stride,
+        "track_speed_mps": speed,
+        "cadence_steps_per_min": 120 / duration,
+        "origin_height_m": float(-track[..., 2].min()),
+        "checksum": hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest(),
+        "seed": seed,
+    }
     if record["gait"] == "cycle":
         facts["cadence"] = "tied"  # wheels turn with the speed whatever `motion.cadence` is
     else:
-        feet = FEET if names == NODES else [number for number, name in enumerate(names) if name.endswith("paw")]
+        feet = (
+            FEET
+            if names == NODES
+            else [number for number, name in enumerate(names) if name.endswith("paw")]
+        )
         facts["stance_foot_speed_mps"] = stance_speed_mps(track, rate, speed, feet=feet)
     return node_cloud(track, record | facts, names)

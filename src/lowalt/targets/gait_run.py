@@ -1,13 +1,14 @@
 """Running angles over one cycle at about 3 m/s, and where each figure comes from.
 
-Phase 0 is the right foot's first contact. Control points are joined by the same monotone periodic curves as those of
-the walk. The tables are in degrees, the functions return radians; flexion is positive. Sources:
-[H] Heiderscheit et al. 2011, Med Sci Sports Exerc 43(2) 296-302, table 3, preferred step rate;
-[L] Lieberman et al. 2015, J Exp Biol 218, 3406-3414: 84.8 strides a minute at 3.0 m/s;
-[N] Novacheck 1998, "The biomechanics of running", Gait and Posture 7, 77-95: toe-off at 39 % of the cycle, swing
-knee about 90 degrees, ankle from about 25 degrees up in mid-stance to 20 down at toe-off (read from curves);
-[E] estimate; estimates for the leg are fitted so that at 3 m/s the foot stays on the ground and slides least.
-Hip angles are those of the thigh against the vertical: [H] minus 1 degree, which is fitted to the pelvis.
+Phase 0 is the right foot's first contact. Control points are joined by the same monotone periodic
+curves as those of the walk. The tables are in degrees, the functions return radians; flexion is
+positive. Sources: [H] Heiderscheit et al. 2011, Med Sci Sports Exerc 43(2) 296-302, table 3,
+preferred step rate; [L] Lieberman et al. 2015, J Exp Biol 218, 3406-3414: 84.8 strides a minute at
+3.0 m/s; [N] Novacheck 1998, "The biomechanics of running", Gait and Posture 7, 77-95: toe-off at 39
+% of the cycle, swing knee about 90 degrees, ankle from about 25 degrees up in mid-stance to 20 down
+at toe-off (read from curves); [E] estimate; estimates for the leg are fitted so that at 3 m/s the
+foot stays on the ground and slides least. Hip angles are those of the thigh against the vertical:
+[H] minus 1 degree, which is fitted to the pelvis.
 """
 
 import numpy as np
@@ -30,9 +31,13 @@ KNEE = ((0.0, 17.8), (0.15, 46.3), (0.40, 27.0), (0.68, 90.0), (0.95, 16.0))
 ANKLE = ((0.0, 1.0), (0.20, 26.0), (0.46, -20.0), (0.70, 0.0))
 """[N] stance and toe-off; [E] the rest."""
 
-ELBOW_DEG, ELBOW_SWING_DEG = 90.0, 12.0
-SHOULDER_DEG, SHOULDER_SWING_DEG = -15.0, 27.0
-TURN_DEG, TWIST_DEG, LEAN_DEG = 8.0, 14.0, 7.0
+ELBOW_DEG = 90.0
+ELBOW_SWING_DEG = 12.0
+SHOULDER_DEG = -15.0
+SHOULDER_SWING_DEG = 27.0
+TURN_DEG = 8.0
+TWIST_DEG = 14.0
+LEAN_DEG = 7.0
 BOB_M = 0.035
 """All [E]; `BOB_M` is half the range of the bob."""
 
@@ -50,7 +55,9 @@ def arm(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the trunk's rotations (rad) by name, as `gait_walk.trunk` does; each shaped like `phase`."""
+    """Return the trunk's rotations (rad) by name, as `gait_walk.trunk` does; each shaped like
+    `phase`.
+    """
     swing = sine_cosine_turns(phase)[1]
     angles = {
         "list": np.zeros_like(swing),
@@ -62,6 +69,8 @@ def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def shift_m(phase: np.ndarray) -> np.ndarray:
-    """Return the root's periodic translation (..., 3) in metres: lowest in each mid-stance, highest in flight."""
+    """Return the root's periodic translation (..., 3) in metres: lowest in each mid-stance, highest
+    in flight.
+    """
     up = -BOB_M * sine_cosine_turns(2 * np.asarray(phase) - SUPPORT)[1]
     return np.stack([np.zeros_like(up), np.zeros_like(up), up], axis=-1)

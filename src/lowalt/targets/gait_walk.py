@@ -1,8 +1,9 @@
 """Walking angles over one cycle: the curves of Boulic, Magnenat-Thalmann and Thalmann.
 
-Source: "A global human walking model with real-time kinematic personification", The Visual Computer 6 (1990)
-344-358. Everything depends on the relative speed rv = v / (hip height), 0 < rv <= 3, and on the phase in [0, 1),
-0 at the right heel strike. The paper has degrees, the functions return radians; flexion is positive.
+Source: "A global human walking model with real-time kinematic personification", The Visual Computer
+6 (1990) 344-358. Everything depends on the relative speed rv = v / (hip height), 0 < rv <= 3, and
+on the phase in [0, 1), 0 at the right heel strike. The paper has degrees, the functions return
+radians; flexion is positive.
 """
 
 import numpy as np
@@ -12,34 +13,48 @@ from lowalt.numerics.portable import sine_cosine_turns
 
 
 def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
-    """Return a periodic, continuously differentiable curve through (phase, value) control points, at `phase`.
+    """Return a periodic, continuously differentiable curve through (phase, value) control points,
+    at `phase`.
 
-    The curve is monotone between control points (Fritsch and Carlson 1980), so it does not overshoot. `phase` may
-    have any values.
+    The curve is monotone between control points (Fritsch and Carlson 1980), so it does not
+    overshoot. `phase` may have any values.
     """
     times, values = np.array(sorted((time % 1.0, value) for time, value in points)).T
     phase = np.asarray(phase) % 1.0
-    width, rise = np.diff(times, append=times[0] + 1), np.diff(values, append=values[0])
-    steep, before, earlier = rise / width, np.roll(width, 1), np.roll(rise / width, 1)
+    width = np.diff(times, append=times[0] + 1)
+    rise = np.diff(values, append=values[0])
+    steep = rise / width
+    before = np.roll(width, 1)
+    earlier = np.roll(rise / width, 1)
     # The weighted harmonic mean of the slopes on both sides, 0 at a peak or a dip.
     same = steep * earlier > 0
-    safe, first, second = np.where(same, steep * earlier, 1.0), 2 * width + before, width + 2 * before
-    slope = np.where(same, (first + second) * safe / (first * np.where(same, steep, 1.0) + second * earlier), 0.0)
+    safe = np.where(same, steep * earlier, 1.0)
+    first = 2 * width + before
+    second = width + 2 * before
+    slope = np.where(
+        same, (first + second) * safe / (first * np.where(same, steep, 1.0) + second * earlier), 0.0
+    )
     left = np.searchsorted(times, phase, side="right") - 1
     along = np.where(left < 0, phase + 1, phase) - times[left]
-    near, far, long = slope[left], np.roll(slope, -1)[left], width[left]
-    share, mean = along / long, steep[left]
+    near = slope[left]
+    far = np.roll(slope, -1)[left]
+    long = width[left]
+    share = along / long
+    mean = steep[left]
     square = along * (3 * mean - 2 * near - far) / long
     return values[left] + along * (near + square - share * share * (2 * mean - near - far))
 
 
 def timing(rv: float) -> tuple[float, float, float]:
-    """Return (cycle length / hip height, cycle duration in s, share of support in the cycle) at relative speed rv.
+    """Return (cycle length / hip height, cycle duration in s, share of support in the cycle) at
+    relative speed rv.
 
     Raises: InputError where rv is outside the model's 0 < rv <= 3.
     """
     if not 0 < rv <= 3:
-        raise InputError(f"gait: relative speed {rv:.3g} hip heights a second, expected more than 0 and at most 3")
+        raise InputError(
+            f"gait: relative speed {rv:.3g} hip heights a second, expected more than 0 and at most 3"
+        )
     length = 1.346 * np.sqrt(rv)
     duration = length / rv
     return float(length), float(duration), float((0.752 * duration - 0.143) / duration)
@@ -48,11 +63,12 @@ def timing(rv: float) -> tuple[float, float, float]:
 def leg(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return flexion (rad) of hip, knee and ankle of the right leg, each shaped like `phase`.
 
-    The left leg is half a cycle later. There are three ranges of relative speed: the amplitudes grow up to 0.5, stay
-    constant up to 1.3, and change a little up to 3.
+    The left leg is half a cycle later. There are three ranges of relative speed: the amplitudes
+    grow up to 0.5, stay constant up to 1.3, and change a little up to 3.
     """
     _, _, support = timing(rv)
-    slow, fast = min(rv, 0.5) / 0.5, max(rv - 1.3, 0) / 1.7
+    slow = min(rv, 0.5) / 0.5
+    fast = max(rv - 1.3, 0) / 1.7
     hip = [(0.2 * fast - 0.1, 25 * slow + 5 * fast), (0.5, -15 * slow), (0.9, 25 * slow + 6 * fast)]
     if fast == 0:
         hip = hip[1:]  # the first control point is the last one, a cycle earlier
@@ -76,7 +92,9 @@ def arm(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return flexion (rad) of shoulder and elbow of the right arm, each shaped like `phase`."""
     swing = 9.88 * rv
     shoulder = 3 - swing / 2 - swing * sine_cosine_turns(phase)[1]
-    slow, middle, fast = min(rv, 0.5), min(max(rv - 0.5, 0) / 0.8, 1), max(rv - 1.3, 0) / 1.7
+    slow = min(rv, 0.5)
+    middle = min(max(rv - 0.5, 0) / 0.8, 1)
+    fast = max(rv - 1.3, 0) / 1.7
     elbow = [
         (0.05, 3 + 6 * slow + 8 * middle - 6 * fast),
         (0.5 + 0.01 * middle + 0.04 * fast, 3 + 34 * slow + 24 * middle + 26 * fast),
@@ -88,12 +106,13 @@ def arm(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def trunk(rv: float, phase: np.ndarray) -> dict[str, np.ndarray]:
     """Return the trunk's rotations (rad), each shaped like `phase`.
 
-    `list` lowers the swinging side (positive lowers the right hip), `turn` brings the right hip forward, `lean`
-    tilts the trunk forward, `twist` brings the right shoulder forward.
+    `list` lowers the swinging side (positive lowers the right hip), `turn` brings the right hip
+    forward, `lean` tilts the trunk forward, `twist` brings the right shoulder forward.
     """
     phase = np.asarray(phase) % 1.0
     drop = 1.66 * rv
-    first, second = phase < 0.15, phase < 0.5
+    first = phase < 0.15
+    second = phase < 0.5
     third = phase < 0.65
     sway = np.select(
         [first, second, third],
@@ -106,20 +125,29 @@ def trunk(rv: float, phase: np.ndarray) -> dict[str, np.ndarray]:
     )
     tilt = -8 * rv * rv + 8 * rv if rv < 0.5 else 2.0
     lean = tilt - tilt * sine_cosine_turns(2 * phase - 0.1)[0]
-    twist = through([(0.1, -4 / 3 * rv), (0.4, 1.5 * rv), (0.6, 4 / 3 * rv), (0.9, -1.5 * rv)], phase)
-    angles = {"list": sway, "turn": 4 * rv * sine_cosine_turns(phase)[1], "lean": lean, "twist": twist}
+    twist = through(
+        [(0.1, -4 / 3 * rv), (0.4, 1.5 * rv), (0.6, 4 / 3 * rv), (0.9, -1.5 * rv)], phase
+    )
+    angles = {
+        "list": sway,
+        "turn": 4 * rv * sine_cosine_turns(phase)[1],
+        "lean": lean,
+        "twist": twist,
+    }
     return {name: np.radians(value) for name, value in angles.items()}
 
 
 def shift(rv: float, phase: np.ndarray) -> np.ndarray:
     """Return the root's periodic translation (..., 3): right, front, up, in hip heights.
 
-    To the right over the right foot's support, forward in both double supports, lowest in double support.
+    To the right over the right foot's support, forward in both double supports, lowest in double
+    support.
     """
     _, _, support = timing(rv)
     side = 0.128 * rv * (1 - rv) if rv < 0.5 else 0.032
     along = -0.084 * rv * (1 - rv) if rv < 0.5 else -0.021
-    phase, up = np.asarray(phase), 0.015 * rv
+    phase = np.asarray(phase)
+    up = 0.015 * rv
     return np.stack(
         [
             side * sine_cosine_turns(phase - 0.1)[0],

@@ -7,11 +7,15 @@ from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, check
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
-"""The sources of clouds. The module of a source defines `check_record(merged, where)` and `SOURCE_cloud`."""
+"""The sources of clouds. The module of a source defines `check_record(merged, where)` and
+`SOURCE_cloud`.
+"""
 
 
 def source_module(source: str) -> ModuleType:
-    """Return the module of one of SOURCES, imported at the call: a built-in cloud waits for no reader of files."""
+    """Return the module of one of SOURCES, imported at the call: a built-in cloud waits for no
+    reader of files.
+    """
     if source == "mesh":
         from lowalt.targets import mesh
 
@@ -38,13 +42,17 @@ def refuse_source(record: dict, inputs: Path | None) -> None:
     if source not in SOURCES:
         raise InputError(f"settings: record.source is {source!r}, expected one of {SOURCES}")
     if source in ("mesh", "mocap") and inputs is None:
-        raise InputError(f"{record['subtype']}: source {source} needs the folder of real inputs, expected --inputs DIR")
+        raise InputError(
+            f"{record['subtype']}: source {source} needs the folder of real inputs, expected --inputs DIR"
+        )
 
 
 def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
-    """Return the cloud of a merged record from the source it names; `inputs` is the folder of meshes and recordings.
+    """Return the cloud of a merged record from the source it names; `inputs` is the folder of
+    meshes and recordings.
 
-    Raises: InputError where the record or an input is wrong, or a folder is needed and none is given.
+    Raises: InputError where the record or an input is wrong, or a folder is needed and none is
+    given.
     """
     refuse_source(record, inputs)
     source = record["source"]

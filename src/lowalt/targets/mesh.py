@@ -1,8 +1,9 @@
-"""Turn a user's mesh into a calibration point cloud: load, repair, cut into parts, scale to the published size, thin.
+"""Turn a user's mesh into a calibration point cloud: load, repair, cut into parts, scale to the
+published size, thin.
 
-These are the steps of the paper's Fig. 4. `mesh_files` reads files, `mesh_parts` cuts parts, `mesh_record` checks
-records and `mesh_size` scales; this module calls them in order and thins each part to its number of points. Body axes:
-x right, y front, z up, metres.
+These are the steps of the paper's Fig. 4. `mesh_files` reads files, `mesh_parts` cuts parts,
+`mesh_record` checks records and `mesh_size` scales; this module calls them in order and thins each
+part to its number of points. Body axes: x right, y front, z up, metres.
 """
 
 import warnings
@@ -30,23 +31,34 @@ from lowalt.targets.surfaces import thin
 __all__ = ["check_record", "mesh_cloud"]
 
 DENSE = 200
-"""Number of dense surface samples per point of the cloud, before regions are cut out and the rest is thinned."""
+"""Number of dense surface samples per point of the cloud, before regions are cut out and the rest
+is thinned.
+"""
 
 THINNED = 25
-"""Largest number of samples per point of the cloud that are thinned; the time grows with samples x points."""
+"""Largest number of samples per point of the cloud that are thinned; the time grows with samples x
+points.
+"""
 
 FEWEST_SAMPLES = 100
 """Least number of samples of a wheel that the record describes by its diameter and width."""
 
 
-def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dict[str, Pool], float]:
-    """Return the pool of every part by name, in body axes and the mesh's own size, and the closed share of the body.
+def pools(
+    record: dict, inputs_dir: Path, rng: np.random.Generator
+) -> tuple[dict[str, Pool], float]:
+    """Return the pool of every part by name, in body axes and the mesh's own size, and the closed
+    share of the body.
 
-    `record` is a checked mesh record. The closed share is that of the triangles in watertight components.
+    `record` is a checked mesh record. The closed share is that of the triangles in watertight
+    components.
     Raises: InputError naming the file, or the part whose region holds nothing.
     """
-    frame, where, parts = body_axes(record["front"], record["up"]), record["subtype"], record["parts"]
-    dense, in_wheel = DENSE * record["points"], max(FEWEST_SAMPLES, round(record["points"] * record["moving_share"]))
+    frame = body_axes(record["front"], record["up"])
+    where = record["subtype"]
+    parts = record["parts"]
+    dense = DENSE * record["points"]
+    in_wheel = max(FEWEST_SAMPLES, round(record["points"] * record["moving_share"]))
 
     def sampled(mesh: Mesh, is_body: bool) -> Pool:
         """The dense samples of a mesh."""
@@ -64,16 +76,29 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
     for name, part in parts.items():
         if part["kind"] != "body":
             cut[name] = hinged(cut[name], part, frame[2], frame[1], f"{where}: parts.{name}")
-    turned = {name: replace(pool, **{key: portable.applied(frame, getattr(pool, key))
-                                     for key in ("points", "normals", "hinge", "axis")})
-              for name, pool in cut.items()}  # fmt: skip
+    turned = {
+        name: replace(
+            pool,
+            **{
+                key: portable.applied(frame, getattr(pool, key))
+                for key in ("points", "normals", "hinge", "axis")
+            },
+        )
+        for name, pool in cut.items()
+    }
     return turned, float(np.count_nonzero(mesh.closed[mesh.component]) / len(mesh.component))
 
 
-def _thinned(pool: Pool, count: int, where: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Return a part's points and normals (count, 3): those that bound it, then others spread evenly by `thin`."""
+def _thinned(
+    pool: Pool, count: int, where: str, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a part's points and normals (count, 3): those that bound it, then others spread evenly
+    by `thin`.
+    """
     if len(pool.points) < count:
-        raise InputError(f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a larger part")
+        raise InputError(
+            f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a larger part"
+        )
     pick = np.arange(len(pool.points))
     if len(pick) > pool.corners + THINNED * count:
         pick = pool.corners + rng.choice(len(pick) - pool.corners, THINNED * count, replace=False)
@@ -83,19 +108,27 @@ def _thinned(pool: Pool, count: int, where: str, rng: np.random.Generator) -> tu
 
 
 def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
-    """Return the cloud of a user's mesh: exactly record["points"] points, parts and hinges, at the published size.
+    """Return the cloud of a user's mesh: exactly record["points"] points, parts and hinges, at the
+    published size.
 
-    `record` is a merged record that `check_record` has passed; its files are relative to `inputs_dir`. Moving parts
-    share record["moving_share"] of the points by area. Equal record, files and seed give equal points.
+    `record` is a merged record that `check_record` has passed; its files are relative to
+    `inputs_dir`. Moving parts share record["moving_share"] of the points by area. Equal record,
+    files and seed give equal points.
     Raises: InputError naming the file or the part and the reason.
     """
     return cloud_and_pools(record, inputs_dir, seed)[0]
 
 
-def cloud_and_pools(record: dict, inputs_dir: str | Path, seed: int) -> tuple[Cloud, dict[str, Pool], dict[str, Pool]]:
-    """Return the cloud as `mesh_cloud`, and every part's dense samples by name, as in the mesh and as in the cloud."""
-    where, category = record["subtype"], like(record)
-    rng, files = stream(seed, "cloud", where), record_files(record)
+def cloud_and_pools(
+    record: dict, inputs_dir: str | Path, seed: int
+) -> tuple[Cloud, dict[str, Pool], dict[str, Pool]]:
+    """Return the cloud as `mesh_cloud`, and every part's dense samples by name, as in the mesh and
+    as in the cloud.
+    """
+    where = record["subtype"]
+    category = like(record)
+    rng = stream(seed, "cloud", where)
+    files = record_files(record)
     record = record | {"parts": ordered_parts(record["parts"])}
     kinds = {name: part["kind"] for name, part in record["parts"].items()}
     parents = {name: part["parent"] for name, part in record["parts"].items() if "parent" in part}
@@ -107,14 +140,38 @@ def cloud_and_pools(record: dict, inputs_dir: str | Path, seed: int) -> tuple[Cl
     scaled, facts = sized(record, raw, kinds, category)
     for warning in caught:
         warnings.warn(warning.message, warning.category, stacklevel=3)
-    doubts = list(dict.fromkeys(str(warning.message) for warning in caught if warning.category is InputWarning))
+    doubts = list(
+        dict.fromkeys(
+            str(warning.message) for warning in caught if warning.category is InputWarning
+        )
+    )
     names = list(scaled)
-    parts = [Part(name, kinds[name], (), tuple(pool.hinge), tuple(pool.axis), weight=pool.area,
-                  parent=names.index(parents[name]) if name in parents else -1)
-             for name, pool in scaled.items()]  # fmt: skip
+    parts = [
+        Part(
+            name,
+            kinds[name],
+            (),
+            tuple(pool.hinge),
+            tuple(pool.axis),
+            weight=pool.area,
+            parent=names.index(parents[name]) if name in parents else -1,
+        )
+        for name, pool in scaled.items()
+    ]
     counts = allot(parts, record["points"], record["moving_share"], where)
-    samples = [_thinned(pool, count, f"{where}: parts.{name}", rng)
-               for (name, pool), count in zip(scaled.items(), counts, strict=True)]  # fmt: skip
+    samples = [
+        _thinned(pool, count, f"{where}: parts.{name}", rng)
+        for (name, pool), count in zip(scaled.items(), counts, strict=True)
+    ]
     sums = {name: sha256(Path(inputs_dir) / name) for name in files}
-    facts |= {"closed_share": closed, "files_sha256": sums, "checksum": checksum(sums), "seed": seed}
-    return cloud_of_parts(parts, samples, record | facts | ({"warnings": doubts} if doubts else {})), raw, scaled
+    facts |= {
+        "closed_share": closed,
+        "files_sha256": sums,
+        "checksum": checksum(sums),
+        "seed": seed,
+    }
+    return (
+        cloud_of_parts(parts, samples, record | facts | ({"warnings": doubts} if doubts else {})),
+        raw,
+        scaled,
+    )

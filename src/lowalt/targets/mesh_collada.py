@@ -1,5 +1,5 @@
-"""Prepare COLLADA files for trimesh's reader, which leaves out the stated unit, dented polygons, skins and whatever has
-a missing texture. Skins are refused.
+"""Prepare COLLADA files for trimesh's reader, which leaves out the stated unit, dented polygons,
+skins and whatever has a missing texture. Skins are refused.
 
 Source: Khronos, COLLADA 1.4.1, elements unit, polylist, polygons and instance_controller.
 """
@@ -27,8 +27,9 @@ class _Plain(ElementTree.TreeBuilder):
 
 
 def parsed(path: Path) -> ElementTree.Element:
-    """Return the root of an XML file; nothing that it names is opened, and entities of its own are refused. A prefix
-    that it does not declare, such as `gz:`, is part of the name, as Gazebo's own parser has it.
+    """Return the root of an XML file; nothing that it names is opened, and entities of its own are
+    refused. A prefix that it does not declare, such as `gz:`, is part of the name, as Gazebo's own
+    parser has it.
 
     Raises: InputError naming the file where it is no XML or declares a document type.
     """
@@ -51,7 +52,8 @@ def _name(element: ElementTree.Element) -> str:
 
 
 def stated_metres(path: Path) -> float | None:
-    """Return the metres of the unit that a COLLADA file states, None where it says nothing or no positive number.
+    """Return the metres of the unit that a COLLADA file states, None where it says nothing or no
+    positive number.
 
     Raises: InputError where the file is no XML.
     """
@@ -70,27 +72,35 @@ def stated_up(path: Path) -> str | None:
 
     Raises: InputError where the file is no XML.
     """
-    said = {(element.text or "").strip() for element in parsed(path).iter() if _name(element) == "up_axis"}
+    said = {
+        (element.text or "").strip()
+        for element in parsed(path).iter()
+        if _name(element) == "up_axis"
+    }
     return {"Y_UP": "y", "Z_UP": "z"}.get(said.pop()) if len(said) == 1 else None
 
 
 def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
-    """Return a COLLADA file whose polygons are triangles, cut as viewers cut them, and the names of its geometries by
-    their ids: those of the nodes that show them, and their own.
+    """Return a COLLADA file whose polygons are triangles, cut as viewers cut them, and the names of
+    its geometries by their ids: those of the nodes that show them, and their own.
 
-    Raises: InputError naming the file where it is no XML or has skins; other exceptions for a damaged file.
+    Raises: InputError naming the file where it is no XML or has skins; other exceptions for a
+    damaged file.
     """
     root = parsed(path)
     for parent in root.iter():
-        # pycollada leaves a surface out whose material names an image that it does not find; no material counts here.
+        # pycollada leaves a surface out whose material names an image that it does not find; no
+        # material counts here.
         parent.attrib.pop("material", None)
         for child in [child for child in parent if _name(child) in UNUSED]:
             parent.remove(child)
     elements = {element.get("id"): element for element in root.iter() if element.get("id")}
     for parent in root.iter():
         if _name(parent) == "instance_controller":
-            raise InputError(f"{path}: has a skin or morph (instance_controller), expected plain surfaces: apply it "
-                             "before exporting, or export GLB")  # fmt: skip
+            raise InputError(
+                f"{path}: has a skin or morph (instance_controller), expected plain surfaces: apply it "
+                "before exporting, or export GLB"
+            )
         if _name(parent) == "mesh":
             for element in parent:
                 if _name(element) in ("polylist", "polygons"):
@@ -98,9 +108,15 @@ def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     names: dict[str, list[str]] = {}
 
     def name(element: ElementTree.Element, above: list[str]) -> None:
-        """Name the geometries below an element by their node, or by the nearest above it that has a name."""
+        """Name the geometries below an element by their node, or by the nearest above it that has a
+        name.
+        """
         for child in element:
-            of_node = [child.get(key) for key in ("name", "id") if child.get(key)] if _name(child) == "node" else []
+            of_node = (
+                [child.get(key) for key in ("name", "id") if child.get(key)]
+                if _name(child) == "node"
+                else []
+            )
             if _name(child) == "instance_geometry":
                 key = child.get("url", "")[1:]
                 of_geometry = elements[key].get("name") if key in elements else None
@@ -116,17 +132,29 @@ def _cut(element: ElementTree.Element, elements: dict) -> None:
     inputs = [child for child in element if _name(child) == "input"]
     width = 1 + max(int(child.get("offset", 0)) for child in inputs)
     vertex = next(child for child in inputs if child.get("semantic") == "VERTEX")
-    source = next(child for child in elements[vertex.get("source")[1:]] if child.get("semantic") == "POSITION")
+    source = next(
+        child for child in elements[vertex.get("source")[1:]] if child.get("semantic") == "POSITION"
+    )
     source = elements[source.get("source")[1:]]
     numbers = next(child for child in source.iter() if _name(child) == "float_array")
-    stride = int(next((child.get("stride", 3) for child in source.iter() if _name(child) == "accessor"), 3))
+    stride = int(
+        next((child.get("stride", 3) for child in source.iter() if _name(child) == "accessor"), 3)
+    )
     vertices = np.array((numbers.text or "").split(), float).reshape(-1, stride)[:, :3]
-    lists = [np.array((child.text or "").split(), int).reshape(-1, width) for child in element if _name(child) == "p"]
+    lists = [
+        np.array((child.text or "").split(), int).reshape(-1, width)
+        for child in element
+        if _name(child) == "p"
+    ]
     rows = np.concatenate(lists)
     count = next((child for child in element if _name(child) == "vcount"), None)
-    counts = np.array([len(polygon) for polygon in lists] if count is None else (count.text or "").split(), int)
+    counts = np.array(
+        [len(polygon) for polygon in lists] if count is None else (count.text or "").split(), int
+    )
     # Corners, not vertices, so that their other numbers (normals, colours) go along.
-    faces, _ = triangulated(vertices[rows[:, int(vertex.get("offset", 0))]], counts, np.arange(len(rows)))
+    faces, _ = triangulated(
+        vertices[rows[:, int(vertex.get("offset", 0))]], counts, np.arange(len(rows))
+    )
     for child in [child for child in element if _name(child) in ("vcount", "p", "ph")]:
         element.remove(child)
     element.tag = element.tag.replace("polylist", "triangles").replace("polygons", "triangles")

@@ -1,8 +1,10 @@
-"""Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a target.
+"""Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a
+target.
 
-OBJ, PLY and GLB have readers of their own (`mesh_polygons`, `mesh_glb`), which say why; trimesh reads STL and DAE and
-places a scene's surfaces. pymeshlab repairs, since its filters keep two million triangles within seconds and a
-gigabyte; sampling is that of `surfaces`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
+OBJ, PLY and GLB have readers of their own (`mesh_polygons`, `mesh_glb`), which say why; trimesh
+reads STL and DAE and places a scene's surfaces. pymeshlab repairs, since its filters keep two
+million triangles within seconds and a gigabyte; sampling is that of `surfaces`, which is seeded
+(pymeshlab's sampling takes no seed and misses the count).
 """
 
 import io
@@ -34,8 +36,8 @@ SAME_UNIT = 1e-6
 
 @dataclass(frozen=True)
 class Mesh(Surface):
-    """A repaired surface in metres along the file's axes: `component` (F,) the number of each face's connected
-    component, `closed` (C,) whether it is watertight."""
+    """A repaired surface in metres along the file's axes: `component` (F,) the number of each
+    face's connected component, `closed` (C,) whether it is watertight."""
 
     component: np.ndarray
     closed: np.ndarray
@@ -43,9 +45,14 @@ class Mesh(Surface):
 
 def joined(meshes: list[Mesh]) -> Mesh:
     """Return several meshes as one, components numbered on."""
-    whole, first = merged(meshes), np.cumsum([0] + [len(mesh.closed) for mesh in meshes[:-1]])
-    component = np.concatenate([mesh.component + start for mesh, start in zip(meshes, first, strict=True)])
-    return Mesh(whole.vertices, whole.faces, component, np.concatenate([mesh.closed for mesh in meshes]))
+    whole = merged(meshes)
+    first = np.cumsum([0] + [len(mesh.closed) for mesh in meshes[:-1]])
+    component = np.concatenate(
+        [mesh.component + start for mesh, start in zip(meshes, first, strict=True)]
+    )
+    return Mesh(
+        whole.vertices, whole.faces, component, np.concatenate([mesh.closed for mesh in meshes])
+    )
 
 
 def metres(unit: str | float) -> float:
@@ -56,8 +63,8 @@ def metres(unit: str | float) -> float:
 def stated_unit_m(path: Path) -> float | None:
     """Return the metres that a mesh file says its unit has, None where it says nothing.
 
-    COLLADA states it (`<unit meter="...">`), an OBJ may in a comment; a GLB is in metres by its standard; STL and PLY
-    have no unit. Source: COLLADA 1.4.1, element unit; glTF 2.0, section 3.4.
+    COLLADA states it (`<unit meter="...">`), an OBJ may in a comment; a GLB is in metres by its
+    standard; STL and PLY have no unit. Source: COLLADA 1.4.1, element unit; glTF 2.0, section 3.4.
     Raises: InputError where a COLLADA file is no XML.
     """
     kind = path.suffix.lower()
@@ -67,7 +74,8 @@ def stated_unit_m(path: Path) -> float | None:
 
 
 def stated_up_axis(path: Path) -> str | None:
-    """Return the axis that a mesh file's format or its own statement says is up, None where neither says so.
+    """Return the axis that a mesh file's format or its own statement says is up, None where neither
+    says so.
 
     Source: glTF 2.0, section 3.4 (y up, z front); COLLADA 1.4.1, element up_axis.
     Raises: InputError where a COLLADA file is no XML.
@@ -80,21 +88,36 @@ def _scene(path: Path) -> list[Piece]:
     """The surfaces of an STL or DAE file, by trimesh."""
     import trimesh  # slow to import, and only records with a mesh need it
 
-    # trimesh logs a traceback of every optional reader that it cannot import; failures are raised below.
+    # trimesh logs a traceback of every optional reader that it cannot import; failures are raised
+    # below.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    source, names = {"file_obj": path}, {}
+    source = {"file_obj": path}
+    names = {}
     if path.suffix.lower() == ".dae":
         data, names = for_trimesh(path)
         source = {"file_obj": io.BytesIO(data), "file_type": "dae"}
-    scene, result = trimesh.load_scene(**source, process=False), []
+    scene = trimesh.load_scene(**source, process=False)
+    result = []
     for node in sorted(scene.graph.nodes_geometry):
         place, name = scene.graph[node]
         # A chain of transforms is multiplied by the machine's BLAS; its last bits are rounded away.
-        place, mesh = np.round(place, 12), scene.geometry[name]
+        place = np.round(place, 12)
+        mesh = scene.geometry[name]
         if not isinstance(mesh, trimesh.Trimesh):
             continue
-        more = next((named for key, named in names.items() if re.fullmatch(re.escape(key) + r"(_\d+)?", name)), [])
-        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), tuple(dict.fromkeys((str(node), name, *more))))
+        more = next(
+            (
+                named
+                for key, named in names.items()
+                if re.fullmatch(re.escape(key) + r"(_\d+)?", name)
+            ),
+            [],
+        )
+        piece = Piece(
+            np.asarray(mesh.vertices),
+            np.asarray(mesh.faces),
+            tuple(dict.fromkeys((str(node), name, *more))),
+        )
         # Values that are not finite are refused later, by name.
         with np.errstate(invalid="ignore"):
             result.append(piece.mapped(place[:3, :3]).moved(place[:3, 3]))
@@ -108,17 +131,21 @@ def _refuse_truncated(path: Path) -> None:
     """
     with path.open("rb") as file:
         head = file.read(1000)
-    stated, there = int.from_bytes(head[80:84], "little"), (path.stat().st_size - 84) // 50
+    stated = int.from_bytes(head[80:84], "little")
+    there = (path.stat().st_size - 84) // 50
     is_text = head.startswith(b"solid") and b"facet" in head
     if not is_text and len(head) >= 84 and there < stated:
-        raise InputError(f"{path}: the header states {stated} triangles and the file ends after {there}, expected the "
-                         "whole file: copy or export it again")  # fmt: skip
+        raise InputError(
+            f"{path}: the header states {stated} triangles and the file ends after {there}, expected the "
+            "whole file: copy or export it again"
+        )
 
 
 def pieces(path: Path) -> list[Piece]:
     """Return the pieces of a mesh file that have triangles.
 
-    Raises: InputError naming the file and the reason: no such file, another format, or it cannot be read.
+    Raises: InputError naming the file and the reason: no such file, another format, or it cannot be
+    read.
     """
     path = existing(path, "mesh")
     if path.suffix.lower() not in SUFFIXES:
@@ -140,14 +167,17 @@ def selected(path: Path, names: list[str] | None) -> list[Piece]:
         return present
     known = {name for piece in present for name in piece.names}
     if lacking := sorted(set(names) - known):
-        raise InputError(f"{path}: geometry {lacking} is not in it, expected some of {sorted(known)}")
+        raise InputError(
+            f"{path}: geometry {lacking} is not in it, expected some of {sorted(known)}"
+        )
     return [piece for piece in present if set(names) & set(piece.names)]
 
 
 def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the surface with identical vertices merged; STL stores every corner on its own.
 
-    Before pymeshlab, whose vertices take 150 bytes each: this keeps two million triangles near a gigabyte.
+    Before pymeshlab, whose vertices take 150 bytes each: this keeps two million triangles near a
+    gigabyte.
     """
     bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # adding 0 makes -0 equal to 0
     mixed = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
@@ -155,7 +185,9 @@ def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
         mixed ^= mixed >> np.uint64(29)
         mixed = (mixed + bits[:, column]) * np.uint64(0xBF58476D1CE4E5B9)
     _, first, inverse = np.unique(mixed, return_index=True, return_inverse=True)
-    if not np.array_equal(vertices[first][inverse], vertices):  # two different vertices with one hash: about never
+    if not np.array_equal(
+        vertices[first][inverse], vertices
+    ):  # two different vertices with one hash: about never
         _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     return vertices[first], inverse.reshape(-1)[faces]
 
@@ -185,7 +217,9 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the edges (E, 2) of triangles (F, 3) by their vertices, one triangle that each bounds, and how many do."""
+    """Return the edges (E, 2) of triangles (F, 3) by their vertices, one triangle that each bounds,
+    and how many do.
+    """
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     _, first, uses = np.unique(key, return_index=True, return_counts=True)
@@ -193,8 +227,8 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
-    """Return a surface with its connected components, faces that share a vertex being connected, and each closed
-    component turned outward."""
+    """Return a surface with its connected components, faces that share a vertex being connected,
+    and each closed component turned outward."""
     links = np.concatenate([faces[:, :2], faces[:, 1:]])
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(len(vertices), len(vertices)))
     label = connected_components(graph, directed=False)[1]
@@ -202,22 +236,26 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     closed = np.ones(int(component.max()) + 1, bool)
     _, face, uses = edges_of(faces)
     closed[component[face[uses != 2]]] = False
-    # About the middle: georeferenced coordinates of 1e6 m would drown the volume in rounding errors.
+    # About the middle: georeferenced coordinates of 1e6 m would drown the volume in rounding
+    # errors.
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     a, b, c = np.moveaxis(vertices[faces] - middle, 1, 0)
     volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=len(closed))
     inverted = closed & (volume < 0)
-    return Mesh(vertices, np.where(inverted[component][:, None], faces[:, ::-1], faces), component, closed)
+    return Mesh(
+        vertices, np.where(inverted[component][:, None], faces[:, ::-1], faces), component, closed
+    )
 
 
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
-    """Return the repaired mesh of an STL, OBJ, PLY, DAE or GLB file in metres along the file's own axes.
+    """Return the repaired mesh of an STL, OBJ, PLY, DAE or GLB file in metres along the file's own
+    axes.
 
-    `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry` the names of the
-    scene's geometries, instances, objects or groups to take (all by default). Open surfaces stay open: they are
-    sampled as triangle soup.
-    Raises: InputError naming the file and the reason: no such file, another format, unreadable, no or fewer than four
-    triangles, no area, NaN or infinite vertices, too many triangles.
+    `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry`
+    the names of the scene's geometries, instances, objects or groups to take (all by default). Open
+    surfaces stay open: they are sampled as triangle soup.
+    Raises: InputError naming the file and the reason: no such file, another format, unreadable, no
+    or fewer than four triangles, no area, NaN or infinite vertices, too many triangles.
     Warns: InputWarning where the file states another unit than `unit`.
     """
     path = Path(path)
@@ -225,7 +263,8 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     if not pieces:
         raise InputError(f"{path}: has no triangle, expected a surface")
     whole = merged(pieces)
-    vertices, faces = np.asarray(whole.vertices, float), np.asarray(whole.faces, np.int64)
+    vertices = np.asarray(whole.vertices, float)
+    faces = np.asarray(whole.faces, np.int64)
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
         text = f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record is followed"
@@ -235,9 +274,13 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     # One mark per vertex: a copy of millions of corners would double the memory.
     finite = np.isfinite(vertices).all(axis=1)
     if faces.min() < 0 or faces.max() >= len(vertices) or not finite[faces].all():
-        raise InputError(f"{path}: a triangle has a NaN, infinite or missing vertex, expected finite ones")
+        raise InputError(
+            f"{path}: a triangle has a NaN, infinite or missing vertex, expected finite ones"
+        )
     vertices *= metres(unit)
     vertices, faces = _repaired(vertices, faces)
     if len(faces) < 4:
-        raise InputError(f"{path}: {len(faces)} triangles with an area, expected a surface of at least 4")
+        raise InputError(
+            f"{path}: {len(faces)} triangles with an area, expected a surface of at least 4"
+        )
     return _mesh(vertices, faces)

@@ -1,7 +1,9 @@
-"""Reading GLB files as viewers show them: quantised, sparse and skinned surfaces, morphs at their weights, strips.
+"""Reading GLB files as viewers show them: quantised, sparse and skinned surfaces, morphs at their
+weights, strips.
 
-trimesh leaves normalised integers, skins and morphs out; pygltflib hands on the JSON and no arrays, pymeshlab's own
-reader ends the process on a skin. Source: Khronos, glTF 2.0 (sections 3.6, 3.7, 4.4) and KHR_mesh_quantization.
+trimesh leaves normalised integers, skins and morphs out; pygltflib hands on the JSON and no arrays,
+pymeshlab's own reader ends the process on a skin. Source: Khronos, glTF 2.0 (sections 3.6, 3.7,
+4.4) and KHR_mesh_quantization.
 """
 
 import base64
@@ -18,13 +20,18 @@ from lowalt.targets.mesh_polygons import Piece, stripped
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-COMPRESSED = {"KHR_draco_mesh_compression": "Draco", "EXT_meshopt_compression": "meshopt",
-              "KHR_meshopt_compression": "meshopt"}  # fmt: skip
+COMPRESSED = {
+    "KHR_draco_mesh_compression": "Draco",
+    "EXT_meshopt_compression": "meshopt",
+    "KHR_meshopt_compression": "meshopt",
+}
 MOST_VALUES = 200_000_000
 
 
 class _Glb:
-    """A GLB file's JSON and its arrays; a damaged one raises KeyError, IndexError, TypeError or ValueError."""
+    """A GLB file's JSON and its arrays; a damaged one raises KeyError, IndexError, TypeError or
+    ValueError.
+    """
 
     def __init__(self, data: bytes) -> None:
         magic, version, _, size, kind = struct.unpack_from("<4sII I4s", data)
@@ -46,15 +53,21 @@ class _Glb:
             if not head.startswith("data:"):
                 raise ValueError("its data lies in another file, expected all in one")
             data = base64.b64decode(text)
-        start, length = _natural(view.get("byteOffset", 0)), _natural(view["byteLength"])
-        data, size = data[start : start + length], np.dtype(kind).itemsize
+        start = _natural(view.get("byteOffset", 0))
+        length = _natural(view["byteLength"])
+        data = data[start : start + length]
+        size = np.dtype(kind).itemsize
         # NumPy refuses a shape that leaves the bytes of the view.
-        return np.ndarray((count, width), kind, data, offset, (view.get("byteStride") or size * width, size))
+        return np.ndarray(
+            (count, width), kind, data, offset, (view.get("byteStride") or size * width, size)
+        )
 
     def array(self, index: int) -> np.ndarray:
         """An accessor's numbers (count, width); normalised integers become fractions."""
         accessor = self.list("accessors")[_natural(index)]
-        kind, width, count = TYPES[accessor["componentType"]], WIDTHS[accessor["type"]], _natural(accessor["count"])
+        kind = TYPES[accessor["componentType"]]
+        width = WIDTHS[accessor["type"]]
+        count = _natural(accessor["count"])
         if count * width > MOST_VALUES:
             raise ValueError(f"an array of {count * width} numbers, expected at most {MOST_VALUES}")
         if "bufferView" in accessor:
@@ -63,17 +76,31 @@ class _Glb:
         else:
             values = np.zeros((count, width), kind)
         if sparse := accessor.get("sparse"):
-            at, new = sparse["indices"], sparse["values"]
-            rows = self._view(at["bufferView"], TYPES[at["componentType"]], 1, sparse["count"], at.get("byteOffset", 0))
-            values[rows[:, 0]] = self._view(new["bufferView"], kind, width, sparse["count"], new.get("byteOffset", 0))
+            at = sparse["indices"]
+            new = sparse["values"]
+            rows = self._view(
+                at["bufferView"],
+                TYPES[at["componentType"]],
+                1,
+                sparse["count"],
+                at.get("byteOffset", 0),
+            )
+            values[rows[:, 0]] = self._view(
+                new["bufferView"], kind, width, sparse["count"], new.get("byteOffset", 0)
+            )
         if accessor.get("normalized") and kind != "<f4":
             return np.maximum(values / np.iinfo(kind).max, -1.0)
         return values
 
     def placed(self) -> dict[int, np.ndarray]:
         """The place (4, 4) of each node of the scene shown, by its number."""
-        nodes, scenes = self.list("nodes"), self.list("scenes")
-        roots = scenes[_natural(self.json.get("scene", 0))].get("nodes", []) if scenes else range(len(nodes))
+        nodes = self.list("nodes")
+        scenes = self.list("scenes")
+        roots = (
+            scenes[_natural(self.json.get("scene", 0))].get("nodes", [])
+            if scenes
+            else range(len(nodes))
+        )
         inner = set() if scenes else {child for node in nodes for child in node.get("children", [])}
         places: dict[int, np.ndarray] = {}
         waiting = [(root, np.eye(4)) for root in roots if root not in inner]
@@ -86,34 +113,60 @@ class _Glb:
         return dict(sorted(places.items()))
 
     def vertices(self, primitive: dict, node: dict, weights: list) -> np.ndarray:
-        """A primitive's vertices (V, 3) before they are placed, morphed by the node's or the mesh's weights."""
+        """A primitive's vertices (V, 3) before they are placed, morphed by the node's or the mesh's
+        weights.
+        """
         points = self.array(primitive["attributes"]["POSITION"]).astype(float)
-        for target, weight in zip(primitive.get("targets", []), node.get("weights", weights), strict=False):
+        for target, weight in zip(
+            primitive.get("targets", []), node.get("weights", weights), strict=False
+        ):
             if weight and "POSITION" in target:
                 points = points + float(weight) * self.array(target["POSITION"])
         if points.shape[1] != 3:
             raise ValueError("places of other than three numbers")
         return points
 
-    def skinned(self, points: np.ndarray, primitive: dict, skin: dict, places: dict[int, np.ndarray]) -> np.ndarray:
-        """The vertices (V, 3) where the joints of a skin hold them; the place of the node itself does not count."""
-        joints, attributes = skin["joints"], primitive["attributes"]
+    def skinned(
+        self, points: np.ndarray, primitive: dict, skin: dict, places: dict[int, np.ndarray]
+    ) -> np.ndarray:
+        """The vertices (V, 3) where the joints of a skin hold them; the place of the node itself
+        does not count.
+        """
+        joints = skin["joints"]
+        attributes = primitive["attributes"]
         bind = np.tile(np.eye(4), (len(joints), 1, 1))
         if "inverseBindMatrices" in skin:
-            bind = self.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2).astype(float)
-        moves = np.stack([portable.product(places[joint], bind[row]) for row, joint in enumerate(joints)])
-        result, total = np.zeros_like(points), np.zeros(len(points))
+            bind = (
+                self.array(skin["inverseBindMatrices"])
+                .reshape(-1, 4, 4)
+                .swapaxes(1, 2)
+                .astype(float)
+            )
+        moves = np.stack(
+            [portable.product(places[joint], bind[row]) for row, joint in enumerate(joints)]
+        )
+        result = np.zeros_like(points)
+        total = np.zeros(len(points))
         for group in range(sum(name.startswith("JOINTS_") for name in attributes)):
-            which, weights = (self.array(attributes[f"{name}_{group}"]) for name in ("JOINTS", "WEIGHTS"))
+            which, weights = (
+                self.array(attributes[f"{name}_{group}"]) for name in ("JOINTS", "WEIGHTS")
+            )
             for column in range(which.shape[1]):
-                move, weight = moves[which[:, column].astype(int)], weights[:, column].astype(float)
-                result += weight[:, None] * (portable.applied(move[:, :3, :3], points) + move[:, :3, 3])
+                move = moves[which[:, column].astype(int)]
+                weight = weights[:, column].astype(float)
+                result += weight[:, None] * (
+                    portable.applied(move[:, :3, :3], points) + move[:, :3, 3]
+                )
                 total += weight
         return result / np.where(total > 0, total, 1.0)[:, None]
 
     def faces(self, primitive: dict, count: int) -> np.ndarray:
         """A primitive's triangles (F, 3); points and lines have none."""
-        order = self.array(primitive["indices"])[:, 0].astype(np.int64) if "indices" in primitive else np.arange(count)
+        order = (
+            self.array(primitive["indices"])[:, 0].astype(np.int64)
+            if "indices" in primitive
+            else np.arange(count)
+        )
         mode = primitive.get("mode", 4)
         if mode == 4:
             faces = order[: len(order) // 3 * 3].reshape(-1, 3)
@@ -121,7 +174,9 @@ class _Glb:
             faces = stripped(order)
         else:
             order = order if mode == 6 and len(order) > 2 else order[:0]
-            faces = np.stack([np.repeat(order[:1], max(0, len(order) - 2)), order[1:-1], order[2:]], axis=1)
+            faces = np.stack(
+                [np.repeat(order[:1], max(0, len(order) - 2)), order[1:-1], order[2:]], axis=1
+            )
         if len(faces) and faces.max() >= count:
             raise ValueError(f"a triangle has vertex {faces.max()} of {count}")
         return faces
@@ -140,39 +195,52 @@ def _local(node: dict) -> np.ndarray:
         return np.array(node["matrix"], float).reshape(4, 4).T
     place = np.eye(4)
     x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
-    turn = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
     place[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
     place[:3, 3] = node.get("translation", [0, 0, 0])
     return place
 
 
 def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
-    """Return the place (4, 4) of each instance of a node's mesh in the node, one at its own place where it names none.
+    """Return the place (4, 4) of each instance of a node's mesh in the node, one at its own place
+    where it names none.
 
     Source: glTF extension EXT_mesh_gpu_instancing.
     """
     attributes = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {}).get("attributes", {})
-    columns = {name.lower(): glb.array(index) for name, index in attributes.items()
-               if name in ("TRANSLATION", "ROTATION", "SCALE")}  # fmt: skip
+    columns = {
+        name.lower(): glb.array(index)
+        for name, index in attributes.items()
+        if name in ("TRANSLATION", "ROTATION", "SCALE")
+    }
     if not columns:
         return [np.eye(4)]
-    return [_local(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+    return [
+        _local(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
+    ]
 
 
 def read_glb(path: Path) -> list[Piece]:
     """Return each surface of the scene shown, by the names of its node and its mesh.
 
-    Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions for a damaged file.
+    Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions
+    for a damaged file.
     """
     glb = _Glb(path.read_bytes())
     for name, word in COMPRESSED.items():
         if name in glb.list("extensionsRequired"):
-            raise InputError(f"{path}: is compressed by {word}, expected a plain GLB: export it without compression")
-    places, pieces, taken = glb.placed(), [], set()
+            raise InputError(
+                f"{path}: is compressed by {word}, expected a plain GLB: export it without compression"
+            )
+    places = glb.placed()
+    pieces = []
+    taken = set()
     for index, place in places.items():
         node = glb.list("nodes")[index]
         if "mesh" not in node:
@@ -194,9 +262,13 @@ def read_glb(path: Path) -> list[Piece]:
                 continue
             instances = _instances(glb, node)
             if len(instances) * max(piece.faces.size, piece.vertices.size) > MOST_VALUES:
-                raise ValueError(f"{len(instances)} instances of {len(piece.faces)} triangles, expected fewer")
+                raise ValueError(
+                    f"{len(instances)} instances of {len(piece.faces)} triangles, expected fewer"
+                )
             for instance, within in enumerate(instances):
                 at = portable.product(place, within)
                 names = (f"{name} instance {instance}",) if len(instances) > 1 else ()
-                pieces.append(replace(piece.mapped(at[:3, :3]).moved(at[:3, 3]), names=(*names, *piece.names)))
+                pieces.append(
+                    replace(piece.mapped(at[:3, :3]).moved(at[:3, 3]), names=(*names, *piece.names))
+                )
     return pieces

@@ -1,7 +1,8 @@
-"""From repaired meshes to parts: placing, cutting regions, finding hinges. All in metres along the file's axes.
+"""From repaired meshes to parts: placing, cutting regions, finding hinges. All in metres along the
+file's axes.
 
-A part is a pool of dense samples of its surface. This module decides which samples belong to which part; `mesh_size`
-scales and moves the target later.
+A part is a pool of dense samples of its surface. This module decides which samples belong to which
+part; `mesh_size` scales and moves the target later.
 """
 
 from collections.abc import Callable
@@ -19,13 +20,15 @@ from lowalt.targets.skeleton import rotation
 from lowalt.targets.surfaces import face_normals, sample_faces
 
 SHARED_LIMIT = 0.01
-"""Largest share of samples that two regions may have in common; regions that touch share a border."""
+"""Largest share of samples that two regions may have in common; regions that touch share a border.
+"""
 
 
 @dataclass(frozen=True)
 class Pool:
-    """Dense samples of one part: `points` (N, 3) m, `normals` (N, 3), `component` (N,) of the mesh, the first
-    `corners` of them vertices that bound the surface, `area` in m2; `hinge` (3,) and `axis` (3,), NaN for a body."""
+    """Dense samples of one part: `points` (N, 3) m, `normals` (N, 3), `component` (N,) of the mesh,
+    the first `corners` of them vertices that bound the surface, `area` in m2; `hinge` (3,) and
+    `axis` (3,), NaN for a body."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -38,17 +41,26 @@ class Pool:
     def picked(self, mask: np.ndarray) -> "Pool":
         """Return the samples of a mask (N,), in their order."""
         return replace(
-            self, points=self.points[mask], normals=self.normals[mask], component=self.component[mask],
-            corners=int(mask[: self.corners].sum()), area=self.area * float(np.count_nonzero(mask) / max(1, len(mask))),
-        )  # fmt: skip
+            self,
+            points=self.points[mask],
+            normals=self.normals[mask],
+            component=self.component[mask],
+            corners=int(mask[: self.corners].sum()),
+            area=self.area * float(np.count_nonzero(mask) / max(1, len(mask))),
+        )
 
 
 def surface(part: dict, record: dict, inputs_dir: Path) -> Mesh:
-    """Return the meshes of a part's files as one, each mirrored, turned and moved as the record says, in that order."""
+    """Return the meshes of a part's files as one, each mirrored, turned and moved as the record
+    says, in that order.
+    """
     meshes = []
     for item in part["meshes"]:
-        mesh = read_mesh(inputs_dir / item["file"], item.get("unit", record["unit"]), item.get("geometry"))
-        matrix, turns = np.eye(3), item.get("turn", [])
+        mesh = read_mesh(
+            inputs_dir / item["file"], item.get("unit", record["unit"]), item.get("geometry")
+        )
+        matrix = np.eye(3)
+        turns = item.get("turn", [])
         if "mirror" in item:
             matrix["xyz".index(item["mirror"])] *= -1
         for turn in turns if isinstance(turns, list) else [turns]:
@@ -68,12 +80,15 @@ def pool_of(mesh: Mesh, count: int, rng: np.random.Generator) -> Pool:
     corners = np.unique(np.concatenate([along.argmin(axis=0), along.argmax(axis=0)]))
     face = np.concatenate([corners // 3, face])
     normals, areas = face_normals(mesh.vertices, mesh.faces)
-    points, area = np.concatenate([along[corners], points]), float(portable.total(areas))
+    points = np.concatenate([along[corners], points])
+    area = float(portable.total(areas))
     return Pool(points, normals[face], mesh.component[face], len(corners), area)
 
 
 def inside(points: np.ndarray, region: dict) -> np.ndarray:
-    """Return whether each point (N, 3) lies in a region's box or cylinder, borders included; shape (N,)."""
+    """Return whether each point (N, 3) lies in a region's box or cylinder, borders included; shape
+    (N,).
+    """
     if "box" in region:
         low, high = (
             np.array([limit if value is None else value for value in corner], float)
@@ -91,7 +106,8 @@ def inside(points: np.ndarray, region: dict) -> np.ndarray:
 def taken(pool: Pool, mesh: Mesh, region: dict) -> np.ndarray:
     """Return whether a region takes each sample (N,) of a body's pool.
 
-    With `whole: true` it takes only connected components of `mesh` (the body's) all of whose vertices are inside.
+    With `whole: true` it takes only connected components of `mesh` (the body's) all of whose
+    vertices are inside.
     """
     if not region.get("whole"):
         return inside(pool.points, region)
@@ -102,23 +118,32 @@ def taken(pool: Pool, mesh: Mesh, region: dict) -> np.ndarray:
 
 
 def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) -> None:
-    """Refuse regions (by part) that take the same surface, since the order of parts would decide which part gets it.
+    """Refuse regions (by part) that take the same surface, since the order of parts would decide
+    which part gets it.
 
     Two regions may touch: they may share SHARED_LIMIT of the samples of the smaller one.
     Raises: InputError naming `where` and the two parts.
     """
     masks = {name: taken(pool, mesh, region) for name, region in regions.items()}
     for (first, left), (second, right) in combinations(masks.items(), 2):
-        shared, smaller = int((left & right).sum()), min(int(left.sum()), int(right.sum()))
+        shared = int((left & right).sum())
+        smaller = min(int(left.sum()), int(right.sum()))
         if shared > SHARED_LIMIT * smaller:
-            raise InputError(f"{where}: the regions of parts {first!r} and {second!r} take the same surface ({shared} "
-                             f"of {smaller} samples), expected disjoint regions")  # fmt: skip
+            raise InputError(
+                f"{where}: the regions of parts {first!r} and {second!r} take the same surface ({shared} "
+                f"of {smaller} samples), expected disjoint regions"
+            )
 
 
 def _made_wheel(
-    size: tuple[float, float], hinge: np.ndarray, samples: tuple[np.ndarray, np.ndarray], frame: np.ndarray
+    size: tuple[float, float],
+    hinge: np.ndarray,
+    samples: tuple[np.ndarray, np.ndarray],
+    frame: np.ndarray,
 ) -> Pool:
-    """The pool of a made wheel of a diameter and a width at its hinge, in the file's axes, mirrored on the left."""
+    """The pool of a made wheel of a diameter and a width at its hinge, in the file's axes, mirrored
+    on the left.
+    """
     diameter, width = size
     side = np.array([np.sign(portable.dot(frame[0], hinge)) or 1.0, 1, 1])
     points, normals = (portable.applied(frame.T, array * side) for array in samples)
@@ -128,32 +153,47 @@ def _made_wheel(
 
 
 def cut_parts(
-    record: dict, inputs_dir: Path, frame: np.ndarray, sampled: Callable[[Mesh, bool], Pool],
+    record: dict,
+    inputs_dir: Path,
+    frame: np.ndarray,
+    sampled: Callable[[Mesh, bool], Pool],
     wheel: Callable[[float, float], tuple[np.ndarray, np.ndarray]],
-) -> tuple[dict[str, Pool], Mesh]:  # fmt: skip
-    """Return the pool of every part of a checked mesh record by name, the body first, and the mesh of the body.
+) -> tuple[dict[str, Pool], Mesh]:
+    """Return the pool of every part of a checked mesh record by name, the body first, and the mesh
+    of the body.
 
-    sampled: gives the pool of a mesh and whether it is the body; wheel: gives points and normals (N, 3) of a made right
-    wheel at the origin, in body axes, from its diameter and width (m); frame (3, 3): body axes in the file's.
+    sampled: gives the pool of a mesh and whether it is the body; wheel: gives points and normals
+    (N, 3) of a made right wheel at the origin, in body axes, from its diameter and width (m); frame
+    (3, 3): body axes in the file's.
     Raises: InputError naming the file, or the part whose region holds nothing.
     """
     where = record["subtype"]
     (body_name, body_part), *moving = record["parts"].items()
     mesh = surface(body_part, record, inputs_dir)
-    body, pools = sampled(mesh, True), {}
-    sizes = {name: (part["wheel"]["diameter_m"], part["wheel"]["width_m"]) for name, part in moving if "wheel" in part}
+    body = sampled(mesh, True)
+    pools = {}
+    sizes = {
+        name: (part["wheel"]["diameter_m"], part["wheel"]["width_m"])
+        for name, part in moving
+        if "wheel" in part
+    }
     made = {size: wheel(*size) for size in dict.fromkeys(sizes.values())}
     for name, part in moving:
         if "region" in part:
             mask = taken(body, mesh, part["region"])
-            pools[name], body = body.picked(mask), body.picked(~mask)
+            pools[name] = body.picked(mask)
+            body = body.picked(~mask)
         elif "wheel" in part:
-            pools[name] = _made_wheel(sizes[name], np.array(part["hinge"], float), made[sizes[name]], frame)
+            pools[name] = _made_wheel(
+                sizes[name], np.array(part["hinge"], float), made[sizes[name]], frame
+            )
         else:
             pools[name] = sampled(surface(part, record, inputs_dir), False)
         if not len(pools[name].points):
-            low, high = ([float(f"{value:.3g}") for value in limit]
-                         for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)))  # fmt: skip
+            low, high = (
+                [float(f"{value:.3g}") for value in limit]
+                for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
+            )
             raise InputError(
                 f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface, which "
                 f"reaches from {low} to {high} m; is the unit {record['unit']!r} right?"
@@ -166,28 +206,39 @@ def cut_parts(
 
 
 def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str) -> Pool:
-    """Return the pool with its hinge and unit axis, given by the record's part or found from its samples.
+    """Return the pool with its hinge and unit axis, given by the record's part or found from its
+    samples.
 
-    Where the record says "found", the hinge is the middle of a wheel's extents or the mean of a rotor's samples, and
-    the axis is the direction in which the samples are thinnest. Where it names no axis, that of a rotor is found, that
-    of a wheel points sideways, and that of a wing to the front. Signs: at positive angles a rotor turns anticlockwise
-    seen from above, a wheel rolls to the front and a wing rises; `sense: cw` reverses a rotor's axis. `up` and `front`
-    (3,) are the target's, in the file's axes.
+    Where the record says "found", the hinge is the middle of a wheel's extents or the mean of a
+    rotor's samples, and the axis is the direction in which the samples are thinnest. Where it names
+    no axis, that of a rotor is found, that of a wheel points sideways, and that of a wing to the
+    front. Signs: at positive angles a rotor turns anticlockwise seen from above, a wheel rolls to
+    the front and a wing rises; `sense: cw` reverses a rotor's axis. `up` and `front` (3,) are the
+    target's, in the file's axes.
     Raises: InputError naming `where` for too few samples to find an axis.
     """
-    right, kind = np.cross(front, up), part["kind"]
-    hinge, axis = part.get("hinge", "found"), part.get("axis", {"wheel": right, "wing": front}.get(kind, "found"))
+    right = np.cross(front, up)
+    kind = part["kind"]
+    hinge = part.get("hinge", "found")
+    axis = part.get("axis", {"wheel": right, "wing": front}.get(kind, "found"))
     centre = portable.mean(pool.points, 0)
     if isinstance(hinge, str):
-        hinge = (pool.points.min(axis=0) + pool.points.max(axis=0)) / 2 if kind == "wheel" else centre
+        hinge = (
+            (pool.points.min(axis=0) + pool.points.max(axis=0)) / 2 if kind == "wheel" else centre
+        )
     if isinstance(axis, str):
         if len(pool.points) < 4:
-            raise InputError(f"{where}: {len(pool.points)} samples, expected enough to find an axis")
+            raise InputError(
+                f"{where}: {len(pool.points)} samples, expected enough to find an axis"
+            )
         axis = thinnest(pool.points - centre)
-    hinge, axis = np.array(hinge, float), np.array(axis, float)
+    hinge = np.array(hinge, float)
+    axis = np.array(axis, float)
     axis = axis / portable.norm(axis)
     if kind == "rotor":
-        axis = axis * np.sign(portable.dot(axis, up) or 1) * (-1 if part.get("sense") == "cw" else 1)
+        axis = (
+            axis * np.sign(portable.dot(axis, up) or 1) * (-1 if part.get("sense") == "cw" else 1)
+        )
     elif kind == "wheel":
         axis = axis * -np.sign(portable.dot(axis, right) or 1)
     else:

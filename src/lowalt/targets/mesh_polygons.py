@@ -1,11 +1,13 @@
-"""Pieces of mesh files, and files of polygons, OBJ and PLY, as viewers show them: a polygon with a dent is cut by
-earcut, not as a fan; strips are triangles.
+"""Pieces of mesh files, and files of polygons, OBJ and PLY, as viewers show them: a polygon with a
+dent is cut by earcut, not as a fan; strips are triangles.
 
-Of OBJ files vertices, faces and the names of objects, groups and materials are read; of PLY files polygons of any and
-of mixed sizes, and strips, in text and in both binary orders. trimesh counts negative indices of OBJ from the file's
-end, cuts polygons as fans and splits by one kind of name at a time; it drops strips of PLY, and takes all faces of a
-binary file to be as long as its first (Blender writes mixed ones).
-Sources: Wavefront's Object Files (.obj), version 3.0; Greg Turk, The PLY Polygon File Format (1994).
+Of OBJ files vertices, faces and the names of objects, groups and materials are read; of PLY files
+polygons of any and of mixed sizes, and strips, in text and in both binary orders. trimesh counts
+negative indices of OBJ from the file's end, cuts polygons as fans and splits by one kind of name at
+a time; it drops strips of PLY, and takes all faces of a binary file to be as long as its first
+(Blender writes mixed ones).
+Sources: Wavefront's Object Files (.obj), version 3.0; Greg Turk, The PLY Polygon File Format
+(1994).
 """
 
 import re
@@ -21,30 +23,41 @@ from lowalt.targets.surfaces import Surface
 
 @dataclass(frozen=True)
 class Piece(Surface):
-    """A named surface as it stands in the file, `vertices` in file units. `names` are all those that it can be chosen
-    by, its own first: a place in the scene and the shape there, or the object, group and material of an OBJ file."""
+    """A named surface as it stands in the file, `vertices` in file units. `names` are all those
+    that it can be chosen by, its own first: a place in the scene and the shape there, or the
+    object, group and material of an OBJ file."""
 
     names: tuple[str, ...]
 
 
 FLAT = 1e-9
-"""A corner dents its polygon where its turn against the polygon's sense is more than this share of the area."""
+"""A corner dents its polygon where its turn against the polygon's sense is more than this share of
+the area.
+"""
 
 
-def triangulated(vertices: np.ndarray, counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def triangulated(
+    vertices: np.ndarray, counts: np.ndarray, corners: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangles (F, 3) of polygons and the number of the polygon (F,) that each is of.
 
-    vertices: (V, 3); counts: (P,) corners of each polygon; corners: the polygons' corners one after the other, indices
-    of vertices. Polygons of fewer than three corners have no triangle.
+    vertices: (V, 3); counts: (P,) corners of each polygon; corners: the polygons' corners one after
+    the other, indices of vertices. Polygons of fewer than three corners have no triangle.
     Raises: InputError where a corner is no vertex.
     """
-    if len(corners) != counts.sum() or (len(corners) and not 0 <= corners.min() <= corners.max() < len(vertices)):
+    if len(corners) != counts.sum() or (
+        len(corners) and not 0 <= corners.min() <= corners.max() < len(vertices)
+    ):
         raise InputError(f"a face has a corner that is none of the {len(vertices)} vertices")
-    starts, faces, owners = np.cumsum(counts) - counts, [np.zeros((0, 3), int)], [np.zeros(0, int)]
+    starts = np.cumsum(counts) - counts
+    faces = [np.zeros((0, 3), int)]
+    owners = [np.zeros(0, int)]
     for size in np.unique(counts[counts >= 3]):
         which = np.flatnonzero(counts == size)
         ring = corners[starts[which, None] + np.arange(size)]
-        fan = np.stack([np.repeat(ring[:, :1], size - 2, axis=1), ring[:, 1:-1], ring[:, 2:]], axis=2)
+        fan = np.stack(
+            [np.repeat(ring[:, :1], size - 2, axis=1), ring[:, 1:-1], ring[:, 2:]], axis=2
+        )
         for row in _dented(vertices[ring]) if size > 3 else ():
             fan[row] = _ears(vertices[ring[row]], ring[row], fan[row])
         faces.append(fan.reshape(-1, 3))
@@ -65,13 +78,19 @@ def _dented(around: np.ndarray) -> np.ndarray:
 
 
 def _ears(around: np.ndarray, ring: np.ndarray, fan: np.ndarray) -> np.ndarray:
-    """Return the triangles of one polygon cut by earcut, or `fan` where it has no area and cannot be cut."""
+    """Return the triangles of one polygon cut by earcut, or `fan` where it has no area and cannot
+    be cut.
+    """
     import mapbox_earcut  # viewers' own algorithm (three.js); only a polygon with a dent needs it
 
     from_first = around - around[0]
     normal = np.cross(from_first, np.roll(from_first, -1, axis=0)).sum(axis=0)
     flat = np.delete(from_first, np.abs(normal).argmax(), axis=1)
-    ears = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32)).reshape(-1, 3).astype(int)
+    ears = (
+        mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
+        .reshape(-1, 3)
+        .astype(int)
+    )
     if len(ears) != len(fan):
         return fan
     a, b, c = np.moveaxis(around[ears], 1, 0)
@@ -80,14 +99,19 @@ def _ears(around: np.ndarray, ring: np.ndarray, fan: np.ndarray) -> np.ndarray:
 
 
 def stripped(strip: np.ndarray) -> np.ndarray:
-    """Return the triangles (F, 3) of a strip of vertices; every second one is turned, -1 begins the strip anew.
+    """Return the triangles (F, 3) of a strip of vertices; every second one is turned, -1 begins the
+    strip anew.
 
     Source: glTF 2.0, section 3.7.2.1; the restart is PLY's.
     """
     result = []
     for part in np.split(strip, np.flatnonzero(strip < 0)):
         part = part[part >= 0]
-        faces = np.stack([part[:-2], part[1:-1], part[2:]], axis=1) if len(part) > 2 else np.zeros((0, 3), int)
+        faces = (
+            np.stack([part[:-2], part[1:-1], part[2:]], axis=1)
+            if len(part) > 2
+            else np.zeros((0, 3), int)
+        )
         faces[1::2] = faces[1::2, [1, 0, 2]]
         result.append(faces)
     faces = np.concatenate(result)
@@ -100,7 +124,8 @@ NAMES = ("o", "g", "usemtl")
 def read_obj(path: Path) -> list[Piece]:
     """Return the surface of each object, group and material of a file.
 
-    Raises: InputError naming the file and the line that cannot be read, or the face that has no such vertex.
+    Raises: InputError naming the file and the line that cannot be read, or the face that has no
+    such vertex.
     """
     places: list[list[float]] = []
     corners: list[int] = []
@@ -119,16 +144,22 @@ def read_obj(path: Path) -> list[Piece]:
             elif word == "f":
                 face = [int(corner.split("/", 1)[0]) for corner in values.split("#", 1)[0].split()]
                 # A negative index counts back from the vertices so far.
-                corners += [index - 1 if index > 0 else len(places) + index if index else -1 for index in face]
+                corners += [
+                    index - 1 if index > 0 else len(places) + index if index else -1
+                    for index in face
+                ]
                 counts.append(len(face))
                 owners.append(keys.setdefault(tuple(now.values()), len(keys)))
             elif word in NAMES:
                 now[word] = values.strip()
         except (ValueError, OverflowError) as error:
-            raise InputError(f"{path}: line {number}: {line.strip()[:60]!r} cannot be read ({error})") from None
+            raise InputError(
+                f"{path}: line {number}: {line.strip()[:60]!r} cannot be read ({error})"
+            ) from None
     vertices = np.array(places, float).reshape(-1, 3)
     faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
-    owner, pieces = np.array(owners, int)[polygon], []
+    owner = np.array(owners, int)[polygon]
+    pieces = []
     # trimesh's own names of materials, from the last to the first, which records may have.
     base = next((names[0] for names in keys if names[0]), path.name)
     materials = list(dict.fromkeys(names[2] for names in keys))[::-1]
@@ -136,21 +167,34 @@ def read_obj(path: Path) -> list[Piece]:
     for names, index in keys.items():
         used, inverse = np.unique(faces[owner == index], return_inverse=True)
         known = [name for name in names if name] or [path.name]
-        known += [older[names[2]]] if len(materials) > 1 and older[names[2]] not in {key[0] for key in keys} else []
+        known += (
+            [older[names[2]]]
+            if len(materials) > 1 and older[names[2]] not in {key[0] for key in keys}
+            else []
+        )
         pieces.append(Piece(vertices[used], inverse.reshape(-1, 3), tuple(dict.fromkeys(known))))
     return pieces
 
 
 def stated_unit(path: Path) -> str:
-    """Return the unit that a comment at the start of an OBJ file names, as a word of `UNITS_M`; "" where none does.
+    """Return the unit that a comment at the start of an OBJ file names, as a word of `UNITS_M`; ""
+    where none does.
 
-    Blender, SketchUp and others write such as "# File units = inches"; a comment names it after the word unit.
+    Blender, SketchUp and others write such as "# File units = inches"; a comment names it after the
+    word unit.
     """
-    words = {"m": "met(?:er|re)s?|m", "cm": "centimet(?:er|re)s?|cm", "mm": "millimet(?:er|re)s?|mm",
-             "in": "inch(?:es)?|in", "ft": "f(?:ee|oo)t|ft"}  # fmt: skip
+    words = {
+        "m": "met(?:er|re)s?|m",
+        "cm": "centimet(?:er|re)s?|cm",
+        "mm": "millimet(?:er|re)s?|mm",
+        "in": "inch(?:es)?|in",
+        "ft": "f(?:ee|oo)t|ft",
+    }
     with path.open(errors="replace") as file:
         for line, _ in zip(file, range(200), strict=False):
-            stated = re.match(r"\s*#.*\bunits?\b\W*(?:(?:in|is|are)\b)?\W*1?\W*([a-z]+)", line, re.IGNORECASE)
+            stated = re.match(
+                r"\s*#.*\bunits?\b\W*(?:(?:in|is|are)\b)?\W*1?\W*([a-z]+)", line, re.IGNORECASE
+            )
             for unit, pattern in words.items() if stated else ():
                 if re.fullmatch(pattern, stated[1], re.IGNORECASE):
                     return unit
@@ -158,10 +202,23 @@ def stated_unit(path: Path) -> str:
 
 
 TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
-    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
-    "double": "f8", "float64": "f8",
-}  # fmt: skip
+    "char": "i1",
+    "int8": "i1",
+    "uchar": "u1",
+    "uint8": "u1",
+    "short": "i2",
+    "int16": "i2",
+    "ushort": "u2",
+    "uint16": "u2",
+    "int": "i4",
+    "int32": "i4",
+    "uint": "u4",
+    "uint32": "u4",
+    "float": "f4",
+    "float32": "f4",
+    "double": "f8",
+    "float64": "f8",
+}
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -184,7 +241,8 @@ class _Ply:
                 self.elements[-1][2].append(words[1:])
         self.order = ORDERS[kind]
         if not self.order:  # the numbers of a text, as if they were stored one by one
-            self.data, self.at = np.array(data[self.at :].split(), float).tobytes(), 0
+            self.data = np.array(data[self.at :].split(), float).tobytes()
+            self.at = 0
 
     def dtype(self, word: str) -> np.dtype:
         """The type of a number as it is stored."""
@@ -203,12 +261,15 @@ class _Ply:
             raise ValueError(f"a list of {size} numbers")
         return size
 
-    def element(self, count: int, properties: list[list[str]]) -> dict[str, np.ndarray | list[np.ndarray]]:
-        """The values of an element's properties by name: at once where all lists of a property are as long as its first
-        one, else list by list."""
+    def element(
+        self, count: int, properties: list[list[str]]
+    ) -> dict[str, np.ndarray | list[np.ndarray]]:
+        """The values of an element's properties by name: at once where all lists of a property are
+        as long as its first one, else list by list."""
         if not count or not properties:
             return {}
-        start, fields = self.at, []
+        start = self.at
+        fields = []
         for number, words in enumerate(properties):
             kind = self.dtype(words[-2])
             if words[0] == "list":
@@ -217,12 +278,18 @@ class _Ply:
                 kind = np.dtype((kind, (size,)))
             fields.append((words[-1], kind))
             self.at = start + np.dtype(fields).itemsize
-        self.at, rows = start, np.dtype(fields)
+        self.at = start
+        rows = np.dtype(fields)
         if start + rows.itemsize * count <= len(self.data):
             table = self.take(rows, count)
-            if all((table[name] == table[name][0]).all() for name in table.dtype.names if name.startswith("size ")):
+            if all(
+                (table[name] == table[name][0]).all()
+                for name in table.dtype.names
+                if name.startswith("size ")
+            ):
                 return {words[-1]: table[words[-1]] for words in properties}
-        self.at, values = start, {words[-1]: [] for words in properties}
+        self.at = start
+        values = {words[-1]: [] for words in properties}
         for _ in range(count):
             for words in properties:
                 size = self.size(words) if words[0] == "list" else 1
@@ -235,12 +302,19 @@ def read_ply(path: Path) -> list[Piece]:
 
     Raises: exceptions of many types for a damaged file.
     """
-    ply, vertices, polygons, faces = _Ply(path.read_bytes()), np.zeros((0, 3)), [], []
+    ply = _Ply(path.read_bytes())
+    vertices = np.zeros((0, 3))
+    polygons = []
+    faces = []
     for name, count, properties in ply.elements:
         values = ply.element(count, properties)
-        lists = next((values[word] for word in ("vertex_indices", "vertex_index") if word in values), [])
+        lists = next(
+            (values[word] for word in ("vertex_indices", "vertex_index") if word in values), []
+        )
         if name == "vertex" and values:
-            vertices = np.stack([np.asarray(values[axis], float).reshape(-1) for axis in "xyz"], axis=1)
+            vertices = np.stack(
+                [np.asarray(values[axis], float).reshape(-1) for axis in "xyz"], axis=1
+            )
         elif name == "face":
             polygons = lists
         elif name.startswith("tristrip"):
@@ -248,4 +322,8 @@ def read_ply(path: Path) -> list[Piece]:
     if len(polygons):
         counts = np.array([len(polygon) for polygon in polygons])
         faces.append(triangulated(vertices, counts, np.concatenate(polygons).astype(np.int64))[0])
-    return [Piece(vertices, np.concatenate(faces) if faces else np.zeros((0, 3), np.int64), (path.name,))]
+    return [
+        Piece(
+            vertices, np.concatenate(faces) if faces else np.zeros((0, 3), np.int64), (path.name,)
+        )
+    ]

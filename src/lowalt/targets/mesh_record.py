@@ -1,7 +1,7 @@
 """The keys and values of a mesh record, checked before any file is opened.
 
-All places are along the axes of the mesh file, before scaling, in metres. The order of keys and parts changes nothing.
-`records.schema.yaml` lists the keys with their meaning.
+All places are along the axes of the mesh file, before scaling, in metres. The order of keys and
+parts changes nothing. `records.schema.yaml` lists the keys with their meaning.
 """
 
 import numpy as np
@@ -20,19 +20,22 @@ MOVING_KIND = {"UAV": "rotor", "Bird": "wing", "Vehicle": "wheel"}
 
 def body_axes(front: str, up: str) -> np.ndarray:
     """Return the unit vectors (3, 3) right, front and up, of the names of two axes such as "-y"."""
-    vectors = [np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1) for axis in (front, up)]
+    vectors = [
+        np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1) for axis in (front, up)
+    ]
     return np.stack([np.cross(*vectors), *vectors])
 
 
 def ordered_parts(parts: dict[str, dict]) -> dict[str, dict]:
-    """Return a record's parts in the one order that all stages use: the body, then the others by name, each part after
-    its parent.
+    """Return a record's parts in the one order that all stages use: the body, then the others by
+    name, each part after its parent.
 
-    A record loses the order of its keys on its way through the workflow's settings, so the order as written must not
-    matter. `parts` are those of a record that `check_record` has passed.
+    A record loses the order of its keys on its way through the workflow's settings, so the order as
+    written must not matter. `parts` are those of a record that `check_record` has passed.
     """
     body = [name for name, part in parts.items() if part["kind"] == "body"]
-    result, waiting = dict.fromkeys(body), sorted(set(parts) - set(body))
+    result = dict.fromkeys(body)
+    waiting = sorted(set(parts) - set(body))
     while waiting:
         ready = next(name for name in waiting if parts[name].get("parent") not in waiting)
         waiting.remove(ready)
@@ -44,7 +47,11 @@ def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) ->
     """Return the fault of a part whose form is right, or None."""
     kind = part["kind"]
     if kind == "body":
-        return None if "meshes" in part and len(part) == 2 else "a body has a kind and meshes, nothing else"
+        return (
+            None
+            if "meshes" in part and len(part) == 2
+            else "a body has a kind and meshes, nothing else"
+        )
     if kind != MOVING_KIND[category]:
         return f"kind is {kind}, expected {MOVING_KIND[category]} for a {category}"
     if "wheel" in part and (kind != "wheel" or part.get("hinge", "found") == "found"):
@@ -54,14 +61,21 @@ def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) ->
     if "sense" in part and kind != "rotor":
         return "sense is for rotors"
     if "parent" in part:
-        moving = sorted(other for other in parts if parts[other]["kind"] != "body" and other != name)
+        moving = sorted(
+            other for other in parts if parts[other]["kind"] != "body" and other != name
+        )
         if part["parent"] not in moving:
             return f"parent is {part['parent']!r}, expected one of {moving}"
         above = [part["parent"]]
-        while above[-1] != name and (parent := parts.get(above[-1], {}).get("parent")) not in (None, *above):
+        while above[-1] != name and (parent := parts.get(above[-1], {}).get("parent")) not in (
+            None,
+            *above,
+        ):
             above.append(parent)
         if name in above:
-            return f"parent is {part['parent']!r}, which hangs on {name!r} itself, expected no circle"
+            return (
+                f"parent is {part['parent']!r}, which hangs on {name!r} itself, expected no circle"
+            )
     if isinstance(part.get("axis"), list) and not any(part["axis"]):
         return "axis is zero, expected a direction"
     return None
@@ -76,20 +90,27 @@ def check_record(merged: dict, where: str) -> dict:
     if category not in MOVING_SHARE:
         raise InputError(f"{where}: source is 'mesh' for a {category}, expected mocap or gait")
     if merged["up"][-1] == merged["front"][-1]:
-        raise InputError(f"{where}: up {merged['up']} and front {merged['front']}, expected two different axes")
+        raise InputError(
+            f"{where}: up {merged['up']} and front {merged['front']}, expected two different axes"
+        )
     bodies = [name for name, part in merged["parts"].items() if part["kind"] == "body"]
     if len(bodies) != 1:
-        raise InputError(f"{where}: parts: {len(bodies)} of kind body {bodies}, expected exactly one body")
+        raise InputError(
+            f"{where}: parts: {len(bodies)} of kind body {bodies}, expected exactly one body"
+        )
     turning = sum(part["kind"] in ("rotor", "wheel") for part in merged["parts"].values())
     if turning > MOST_TURNING_PARTS:
-        raise InputError(f"{where}: parts: {turning} rotors or wheels, expected at most {MOST_TURNING_PARTS}")
+        raise InputError(
+            f"{where}: parts: {turning} rotors or wheels, expected at most {MOST_TURNING_PARTS}"
+        )
     for name, part in merged["parts"].items():
         if fault := _part_fault(name, part, merged["parts"], category):
             raise InputError(f"{where}: parts.{name}: {fault}")
     of_vehicle = {"size_is": ALL_AXES, "wheel_size": "published"} if category == "Vehicle" else {}
     result = DEFAULTS | {"moving_share": MOVING_SHARE[category]} | of_vehicle | merged
     result["parts"] = ordered_parts(merged["parts"])
-    size, sizes = result.get("size_is"), (ALL_AXES,) if of_vehicle else SIZES
+    size = result.get("size_is")
+    sizes = (ALL_AXES,) if of_vehicle else SIZES
     if size not in sizes:
         raise InputError(f"{where}: size_is is {size!r}, expected one of {sizes} for a {category}")
     return result

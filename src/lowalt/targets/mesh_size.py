@@ -1,7 +1,9 @@
-"""The shape and size of a user's mesh: whether its parts fit their kinds and its unit the published size, and scaling.
+"""The shape and size of a user's mesh: whether its parts fit their kinds and its unit the published
+size, and scaling.
 
-A wrong direction, unit or hinge still gives a cloud, but the geometry of the parts shows the mistake: wheels lie below
-a car, and a hub lies in the middle of its blades. Body axes: x right, y front, z up, metres.
+A wrong direction, unit or hinge still gives a cloud, but the geometry of the parts shows the
+mistake: wheels lie below a car, and a hub lies in the middle of its blades. Body axes: x right, y
+front, z up, metres.
 """
 
 from collections.abc import Iterator
@@ -17,71 +19,101 @@ from lowalt.targets.mesh_parts import Pool
 from lowalt.targets.mesh_record import ALL_AXES
 
 SMALLEST_PART = 25
-"""A moving part that is smaller than the whole mesh by more than this factor is refused; its unit must be wrong."""
+"""A moving part that is smaller than the whole mesh by more than this factor is refused; its unit
+must be wrong.
+"""
 
 SMALLEST_ROTOR_M = 0.01
-"""Least diameter (m) of a rotor at the final size of the target. The smallest craft sold have propellers of 25 mm."""
+"""Least diameter (m) of a rotor at the final size of the target. The smallest craft sold have
+propellers of 25 mm.
+"""
 
 
 ACROSS = np.cos(np.radians(20.0))
-"""Least cosine of the angle between a wheel's axle and the car's width. Models have their front wheels straight."""
+"""Least cosine of the angle between a wheel's axle and the car's width. Models have their front
+wheels straight.
+"""
 ROUND = 1.1
 """Largest ratio of a wheel's width to the smaller of its two extents across the axis."""
 OFF_HUB = 1.0
-"""Largest distance between a rotor's hub and the middle of its surface, as a share of the rotor's largest extent: that
-of a single blade without its hub."""
+"""Largest distance between a rotor's hub and the middle of its surface, as a share of the rotor's
+largest extent: that of a single blade without its hub."""
 FEWEST_WHEELS = 3
 OFF_MIDDLE = 0.1
 """A part stands on one side where it is farther from the middle than this share of its own size."""
 SPANS = (0.7, 6.0)
-"""Least and largest wing span of a bird in parts of its published length, which measures 1.2 to 5.5 in the table."""
+"""Least and largest wing span of a bird in parts of its published length, which measures 1.2 to 5.5
+in the table.
+"""
 
 
 def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
-    """Return the first cause why a part's place, axis or shape is not that of its kind, "" where there is none.
+    """Return the first cause why a part's place, axis or shape is not that of its kind, "" where
+    there is none.
 
-    body (2, 3): the lowest and highest corner of the body, m. A wrong axis also makes a wheel wide and a wrong `up`
-    turns its axis, so only the cause is named and not what follows from it.
+    body (2, 3): the lowest and highest corner of the body, m. A wrong axis also makes a wheel wide
+    and a wrong `up` turns its axis, so only the cause is named and not what follows from it.
     """
-    low, high = pool.points.min(axis=0), pool.points.max(axis=0)
+    low = pool.points.min(axis=0)
+    high = pool.points.max(axis=0)
     middle, (width, length, height) = (low + high) / 2, high - low
     if kind == "wheel":
         below, above = body[:, 2]
         if abs(pool.axis[0]) < ACROSS:
             way = ("right", "front", "up")[int(np.abs(pool.axis).argmax())]
             along = np.round(np.abs(pool.axis), 3).tolist()
-            return (f"axle points {way}, {along} (right, front, up), expected right or left: is `front` (--front) or "
-                    "`up` (--up) another axis, or is it no wheel that rolls?")  # fmt: skip
+            return (
+                f"axle points {way}, {along} (right, front, up), expected right or left: is `front` (--front) or "
+                "`up` (--up) another axis, or is it no wheel that rolls?"
+            )
         if middle[2] > (below + above) / 2:
-            return (f"centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
-                    "high, expected the lower half: is `up` (--up) reversed?")  # fmt: skip
+            return (
+                f"centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
+                "high, expected the lower half: is `up` (--up) reversed?"
+            )
         # Twin wheels on one axle are wider than high, but round about it.
-        if width > ROUND * min(length, height) and max(length, height) > ROUND * min(length, height):
-            return (f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m across, expected "
-                    "a wheel that is thinnest along its axle")  # fmt: skip
+        if width > ROUND * min(length, height) and max(length, height) > ROUND * min(
+            length, height
+        ):
+            return (
+                f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m across, expected "
+                "a wheel that is thinnest along its axle"
+            )
     elif kind == "rotor":
-        reach, away = float((high - low).max()), float(np.linalg.norm(middle - pool.hinge))
+        reach = float((high - low).max())
+        away = float(np.linalg.norm(middle - pool.hinge))
         if away > OFF_HUB * reach:
-            return (f"hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
-                    "the hub")  # fmt: skip
+            return (
+                f"hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
+                "the hub"
+            )
     else:
-        hinge, centre = (place[0] - body[:, 0].mean() for place in (pool.hinge, pool.points.mean(axis=0)))
+        hinge, centre = (
+            place[0] - body[:, 0].mean() for place in (pool.hinge, pool.points.mean(axis=0))
+        )
         if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
-            return (f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected "
-                    "the hinge between body and wing")  # fmt: skip
+            return (
+                f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected "
+                "the hinge between body and wing"
+            )
     return ""
 
 
 def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) -> Iterator[str]:
-    """Yield what is unusual but possible about the parts of each kind. Wings are those that hang on the body."""
-    wheels, rotors = len(of_kind["wheel"]), len(of_kind["rotor"])
+    """Yield what is unusual but possible about the parts of each kind. Wings are those that hang on
+    the body.
+    """
+    wheels = len(of_kind["wheel"])
+    rotors = len(of_kind["rotor"])
     if category == "Vehicle" and wheels < FEWEST_WHEELS:
         yield f"{wheels} wheels, expected at least {FEWEST_WHEELS}"
     if category == "UAV" and count and rotors != count:
         yield f"{rotors} rotors, expected the {count} of its row"
     for kind in ("wheel", "wing"):
         offsets = np.array([pool.points[:, 0].mean() for pool in of_kind[kind]])
-        width = max((float(np.ptp(pool.points, axis=0).max()) for pool in of_kind[kind]), default=0.0)
+        width = max(
+            (float(np.ptp(pool.points, axis=0).max()) for pool in of_kind[kind]), default=0.0
+        )
         # The wheels of a bicycle stand in the middle.
         aside = np.abs(offsets) > OFF_MIDDLE * width
         if len(offsets) > 1 and aside.all() and len(set(np.sign(offsets))) < 2:
@@ -89,27 +121,36 @@ def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) ->
 
 
 def refuse_span(parts: dict[str, Pool], where: str) -> None:
-    """Refuse a bird whose wing span does not fit the length that its row states; a mesh is scaled as a whole.
+    """Refuse a bird whose wing span does not fit the length that its row states; a mesh is scaled
+    as a whole.
 
     Raises: InputError naming `where`, both sizes and what was expected.
     """
     low, high = _bounds(parts)
     span, length, _ = high - low
     if not SPANS[0] <= span / length <= SPANS[1]:
-        raise InputError(f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to tail, "
-                         f"expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or `up` (--up) "
-                         "another axis?")  # fmt: skip
+        raise InputError(
+            f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to tail, "
+            f"expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or `up` (--up) "
+            "another axis?"
+        )
 
 
 def refuse_implausible(
-    parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str, where: str,
+    parts: dict[str, Pool],
+    kinds: dict[str, str],
+    parents: dict[str, str],
+    category: str,
+    where: str,
     count: int | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Refuse parts whose shape contradicts their kind, and warn of unusual ones.
 
-    `parts` are pools in body axes by name, `kinds` their kinds, `parents` the parent of each part that has one,
-    `category` the published class that the target is like, `count` the rotors of its row.
-    Raises: InputError naming `where`, the part, the measures and what was expected. Warns: InputWarning.
+    `parts` are pools in body axes by name, `kinds` their kinds, `parents` the parent of each part
+    that has one, `category` the published class that the target is like, `count` the rotors of its
+    row.
+    Raises: InputError naming `where`, the part, the measures and what was expected. Warns:
+    InputWarning.
     """
     points = next(pool.points for name, pool in parts.items() if kinds[name] == "body")
     body = np.stack([points.min(axis=0), points.max(axis=0)])
@@ -131,17 +172,25 @@ def refuse_implausible(
         warn(f"{where}: {doubt}")
 
 
-def _refuse_size(record: dict, measure: str, size_m: float, wanted_m: float, row_m: float | None = None) -> None:
-    """Raise InputError if a size is more than the record's limit away from `wanted_m`; all in metres.
+def _refuse_size(
+    record: dict, measure: str, size_m: float, wanted_m: float, row_m: float | None = None
+) -> None:
+    """Raise InputError if a size is more than the record's limit away from `wanted_m`; all in
+    metres.
 
-    measure: what has the size, such as "the whole mesh". The error has the line to write: the unit with which the size
-    fits best, or the size of a row of its own, `row_m` or by default the size.
+    measure: what has the size, such as "the whole mesh". The error has the line to write: the unit
+    with which the size fits best, or the size of a row of its own, `row_m` or by default the size.
     """
-    limit, unit = record["scale_limit"], record["unit"]
+    limit = record["scale_limit"]
+    unit = record["unit"]
     if 1 / limit <= wanted_m / max(size_m, 1e-12) <= limit:
         return
     numbers = size_m / metres(unit)
-    off = {name: abs(np.log(numbers * unit_m / wanted_m)) for name, unit_m in UNITS_M.items()} if size_m else {}
+    off = (
+        {name: abs(np.log(numbers * unit_m / wanted_m)) for name, unit_m in UNITS_M.items()}
+        if size_m
+        else {}
+    )
     best = min(off, key=off.get, default="")
     if best and off[best] <= np.log(limit):
         way = f"write `unit: {best}` (--unit {best}), with which it measures {numbers * UNITS_M[best]:.4g} m"
@@ -161,36 +210,54 @@ def _bounds(parts: dict[str, Pool]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[np.ndarray, dict]:
-    """Return the scale factors (3,) along right, front and up, and the facts about sizes for the cloud's record.
+    """Return the scale factors (3,) along right, front and up, and the facts about sizes for the
+    cloud's record.
 
-    The mesh is compared with the published size even where the record asks for no scaling, to find a wrong unit.
-    Raises: InputError where mesh and published size differ by more than the record's limit, or where `size_is` is the
-    motor diagonal and there are fewer than two rotors.
+    The mesh is compared with the published size even where the record asks for no scaling, to find
+    a wrong unit.
+    Raises: InputError where mesh and published size differ by more than the record's limit, or
+    where `size_is` is the motor diagonal and there are fewer than two rotors.
     """
-    extent, size_is, where = np.subtract(*_bounds(parts)[::-1]), record["size_is"], record["subtype"]
-    row, whole = record["published"], float(extent.max())
+    extent = np.subtract(*_bounds(parts)[::-1])
+    size_is = record["size_is"]
+    where = record["subtype"]
+    row = record["published"]
+    whole = float(extent.max())
     if size_is == ALL_AXES:
-        size, wanted = extent, np.array([row["wid_m"], row["len_m"], row["hgt_m"]])
+        size = extent
+        wanted = np.array([row["wid_m"], row["len_m"], row["hgt_m"]])
     else:
-        measured = {"width": extent[0], "length": extent[1], "height": extent[2]}.get(size_is, whole)
+        measured = {"width": extent[0], "length": extent[1], "height": extent[2]}.get(
+            size_is, whole
+        )
         if size_is == "motor diagonal":
-            hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
+            hubs = np.array(
+                [pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"]
+            )
             if len(hubs) < 2:
-                raise InputError(f"{where}: size_is is {size_is!r} for {len(hubs)} rotors, expected at least two")
+                raise InputError(
+                    f"{where}: size_is is {size_is!r} for {len(hubs)} rotors, expected at least two"
+                )
             measured = portable.norm(hubs[:, None] - hubs[None]).max()
-            # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not show a wrong unit.
-            # Other sizes are the mesh's own: a gull's span may be more than `limit` times its length.
+            # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not
+            # show a wrong unit. Other sizes are the mesh's own: a gull's span may be more than
+            # `limit` times its length.
             _refuse_size(record, "the whole mesh", whole, row["size_m"], measured)
-        size, wanted = np.full(3, measured), np.full(3, row["size_m"])
+        size = np.full(3, measured)
+        wanted = np.full(3, row["size_m"])
     for axis in range(3):
         _refuse_size(record, f"the mesh ({size_is})", size[axis], wanted[axis])
     for name, pool in parts.items():
         largest = float(np.ptp(pool.points, axis=0).max())
         if kinds[name] != "body" and largest < whole / SMALLEST_PART:
-            raise InputError(f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, expected at "
-                             f"least 1/{SMALLEST_PART} of it; is the unit of its file right?")  # fmt: skip
+            raise InputError(
+                f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, expected at "
+                f"least 1/{SMALLEST_PART} of it; is the unit of its file right?"
+            )
     ratio = wanted / size
-    scale = {"published": ratio, "uniform": np.full(3, ratio[1]), "none": np.ones(3)}[record["scale"]]
+    scale = {"published": ratio, "uniform": np.full(3, ratio[1]), "none": np.ones(3)}[
+        record["scale"]
+    ]
     return scale, {"mesh_extent_m": extent.tolist(), "scale_factors": scale.tolist()}
 
 
@@ -201,11 +268,15 @@ def _turned_radius(pool: Pool) -> float:
     return float(portable.norm(away - along * pool.axis).max())
 
 
-def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str], category: str) -> tuple[dict[str, Pool], dict]:
-    """Return the pools scaled and centred, and the facts that the cloud's record gets; category: that it is like.
+def sized(
+    record: dict, parts: dict[str, Pool], kinds: dict[str, str], category: str
+) -> tuple[dict[str, Pool], dict]:
+    """Return the pools scaled and centred, and the facts that the cloud's record gets; category:
+    that it is like.
 
-    Wheels stay round: they are scaled about their hinge to the published diameter (or by the car's mean factor) and
-    set on the ground. The origin is the middle of the extents; in plan, a multirotor's is the middle of its hubs.
+    Wheels stay round: they are scaled about their hinge to the published diameter (or by the car's
+    mean factor) and set on the ground. The origin is the middle of the extents; in plan, a
+    multirotor's is the middle of its hubs.
     """
     scale, facts = factors(record, parts, kinds)
     ground = _bounds(parts)[0][2] * scale[2]
@@ -213,19 +284,27 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str], category:
     for name, pool in parts.items():
         normals = pool.normals / scale
         normals /= portable.norm(normals)[:, None]
-        result[name] = replace(pool, points=pool.points * scale, normals=normals, hinge=pool.hinge * scale)
+        result[name] = replace(
+            pool, points=pool.points * scale, normals=normals, hinge=pool.hinge * scale
+        )
         if kinds[name] == "wheel":
             raw = 2 * _turned_radius(pool)
             published = record["wheel_size"] == "published" and record["scale"] != "none"
-            diameter = record["published"]["wheel_diam_m"] if published else raw * float(np.sqrt(scale[1] * scale[2]))
+            diameter = (
+                record["published"]["wheel_diam_m"]
+                if published
+                else raw * float(np.sqrt(scale[1] * scale[2]))
+            )
             hinge = np.array([*(pool.hinge * scale)[:2], ground + diameter / 2])
             points = (pool.points - pool.hinge) * (diameter / raw) + hinge
             result[name] = replace(pool, points=points, hinge=hinge)
             facts["wheel_diameter_m"] = diameter
         diameter = 2 * _turned_radius(result[name]) if kinds[name] == "rotor" else np.inf
         if diameter < SMALLEST_ROTOR_M:
-            raise InputError(f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the final size, "
-                             f"expected at least {SMALLEST_ROTOR_M} m")  # fmt: skip
+            raise InputError(
+                f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the final size, "
+                f"expected at least {SMALLEST_ROTOR_M} m"
+            )
     low, high = _bounds(result)
     middle = (low + high) / 2
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
@@ -234,6 +313,11 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str], category:
     if category == "Vehicle":
         facts["origin_height_m"] = float(middle[2] - ground)
     if category == "Bird":
-        facts |= {"flap": bird.FLAP | record.get("flap", {}), "wing_span_m": float(high[0] - low[0])}
-    return {name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle)
-            for name, pool in result.items()}, facts  # fmt: skip
+        facts |= {
+            "flap": bird.FLAP | record.get("flap", {}),
+            "wing_span_m": float(high[0] - low[0]),
+        }
+    return {
+        name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle)
+        for name, pool in result.items()
+    }, facts

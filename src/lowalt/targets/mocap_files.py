@@ -1,6 +1,8 @@
-"""Reading CMU's skeleton (.asf) and motion (.amc) text files into arrays; every error names the file and the frame.
+"""Reading CMU's skeleton (.asf) and motion (.amc) text files into arrays; every error names the
+file and the frame.
 
-This module knows only the formats; `mocap` turns the bones by the angles. File axes: x left, y up, z front.
+This module knows only the formats; `mocap` turns the bones by the angles. File axes: x left, y up,
+z front.
 Source: Acclaim's ASF/AMC format as the CMU Graphics Lab Motion Capture Database writes it.
 """
 
@@ -24,8 +26,8 @@ _DOF = ("tx", "ty", "tz", "rx", "ry", "rz")
 class Skeleton:
     """The contents of a skeleton file.
 
-    bones: (31, 3) in file units and file axes; axes_rad: (31, 3), angles of each bone's own frame; dofs: the channels
-    of each node in the order of the file; unit_m: metres per file unit.
+    bones: (31, 3) in file units and file axes; axes_rad: (31, 3), angles of each bone's own frame;
+    dofs: the channels of each node in the order of the file; unit_m: metres per file unit.
     """
 
     bones: np.ndarray
@@ -67,8 +69,8 @@ def _blocks(lines: list[list[str]]) -> dict[str, dict[str, list[str]]]:
 def read_skeleton(path: str | Path) -> Skeleton:
     """Return the skeleton of an .asf file.
 
-    Raises: InputError naming the file and what is missing, unknown or no number; also where the bones are not the 31
-    nodes, or angles are not in degrees.
+    Raises: InputError naming the file and what is missing, unknown or no number; also where the
+    bones are not the 31 nodes, or angles are not in degrees.
     """
     path = existing(path, "skeleton file")
     sections = _sections(path)
@@ -83,30 +85,44 @@ def read_skeleton(path: str | Path) -> Skeleton:
         wrong = sorted(name for name in {*parents, *LIMBS} if parents.get(name) != LIMBS.get(name))
         raise InputError(f"{path}: hierarchy differs from CMU's 31 nodes at {wrong}")
     root = {words[0].lower(): words[1:] for words in sections[":root"]}
-    bones, axes = np.zeros((len(NODES), 3)), np.zeros((len(NODES), 3))
+    bones = np.zeros((len(NODES), 3))
+    axes = np.zeros((len(NODES), 3))
     dofs = {"root": tuple(word.lower() for word in root.get("order", []))}
     try:
         unit_m = INCH_M / float(units["length"][0])
         fixed = [float(word) for word in root["position"][:3] + root["orientation"][:3]]
         named = _blocks(sections[":bonedata"])
         for name in LIMBS:
-            block, index = named[name], NODES.index(name)
+            block = named[name]
+            index = NODES.index(name)
             direction = np.array([float(word) for word in block["direction"]])
             if float(block["length"][0]) < 0:
-                raise InputError(f"{path}: length of {name} is {block['length'][0]}, expected at least 0")
+                raise InputError(
+                    f"{path}: length of {name} is {block['length'][0]}, expected at least 0"
+                )
             bones[index] = direction / portable.norm(direction) * float(block["length"][0])
             if block["axis"][3].upper() != "XYZ":
-                raise InputError(f"{path}: axis order of {name} is {block['axis'][3]!r}, expected XYZ")
+                raise InputError(
+                    f"{path}: axis order of {name} is {block['axis'][3]!r}, expected XYZ"
+                )
             axes[index] = np.radians([float(word) for word in block["axis"][:3]])
             dofs[name] = tuple(word.lower() for word in block.get("dof", []))
     except (KeyError, IndexError, ValueError, ZeroDivisionError) as error:
-        raise InputError(f"{path}: missing or no number: {error}, expected an ASF skeleton") from None
+        raise InputError(
+            f"{path}: missing or no number: {error}, expected an ASF skeleton"
+        ) from None
     order = root.get("axis", ["xyz"])[0].upper()
     if order != "XYZ":
         raise InputError(f"{path}: axis order of root is {order!r}, expected XYZ")
-    wrong = {name: dof for name, dof in dofs.items() if not set(dof) <= set(_DOF[0 if name == "root" else 3 :])}
+    wrong = {
+        name: dof
+        for name, dof in dofs.items()
+        if not set(dof) <= set(_DOF[0 if name == "root" else 3 :])
+    }
     if wrong or len(dofs["root"]) != 6 or any(fixed):
-        raise InputError(f"{path}: root order, offset or dof not as in CMU's files ({wrong or fixed or dofs['root']})")
+        raise InputError(
+            f"{path}: root order, offset or dof not as in CMU's files ({wrong or fixed or dofs['root']})"
+        )
     if not (np.isfinite(bones).all() and np.isfinite(axes).all() and 0 < unit_m < math.inf):
         raise InputError(f"{path}: a length, direction or axis is not finite")
     return Skeleton(bones, axes, dofs, unit_m)
@@ -115,13 +131,15 @@ def read_skeleton(path: str | Path) -> Skeleton:
 def _frames(
     path: Path, skeleton: Skeleton, first: int, last: int | None
 ) -> tuple[dict[int, dict[str, list[float]]], bool]:
-    """Return the numbers of each node by frame, `first` to `last` by the file's own numbers, and whether the file says
-    before its first frame that its angles are in radians. A clip cut out of a longer one may begin at any frame.
+    """Return the numbers of each node by frame, `first` to `last` by the file's own numbers, and
+    whether the file says before its first frame that its angles are in radians. A clip cut out of a
+    longer one may begin at any frame.
 
     Raises: InputError naming file and frame, as `read_motion`.
     """
     frames: dict[int, dict[str, list[float]]] = {}
-    frame, radians = None, False
+    frame = None
+    radians = False
     for words in _lines(path):
         if words[0].startswith(":"):
             radians |= frame is None and words[0].upper() == ":RADIANS"
@@ -130,14 +148,20 @@ def _frames(
             if last is not None and number > last:
                 break
             if frame is not None and number != frame + 1:
-                raise InputError(f"{path}: frame {number} follows frame {frame}, expected {frame + 1}")
+                raise InputError(
+                    f"{path}: frame {number} follows frame {frame}, expected {frame + 1}"
+                )
             frame = number
         elif frame is None:
-            raise InputError(f"{path}: {' '.join(words)[:60]!r} stands before frame 1, expected an AMC motion")
+            raise InputError(
+                f"{path}: {' '.join(words)[:60]!r} stands before frame 1, expected an AMC motion"
+            )
         elif frame >= first:
             values = frames.setdefault(frame, {})
             if words[0] in values:
-                raise InputError(f"{path}: frame {frame} has {words[0]} twice, expected each node once")
+                raise InputError(
+                    f"{path}: frame {frame} has {words[0]} twice, expected each node once"
+                )
             values[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
     return frames, radians
 
@@ -151,20 +175,24 @@ def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
         values = []
     if not expected or len(values) != expected or not all(map(math.isfinite, values)):
         text = " ".join(words)[:80]
-        raise InputError(f"{where}: {text!r}, expected a node of the skeleton and {expected} finite numbers")
+        raise InputError(
+            f"{where}: {text!r}, expected a node of the skeleton and {expected} finite numbers"
+        )
     return values
 
 
 def read_motion(
     path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None
 ) -> tuple[dict[str, np.ndarray], int]:
-    """Return the channels (F, channels) of each node that has any, frames `first` to `last` by the file's own numbers,
-    both inclusive, and the number of the first: a file that begins later is read from its first frame.
+    """Return the channels (F, channels) of each node that has any, frames `first` to `last` by the
+    file's own numbers, both inclusive, and the number of the first: a file that begins later is
+    read from its first frame.
 
-    Values in file units and degrees; a file that says `:RADIANS` is converted. Frames outside first..last are not
-    checked, so that a record can leave out frames with known faults.
-    Raises: InputError naming file and frame: a frame that lacks a node or comes out of order, a value that is no
-    finite number, a node twice, an all-zero root, a frame equal to the one before it, fewer than two frames left.
+    Values in file units and degrees; a file that says `:RADIANS` is converted. Frames outside
+    first..last are not checked, so that a record can leave out frames with known faults.
+    Raises: InputError naming file and frame: a frame that lacks a node or comes out of order, a
+    value that is no finite number, a node twice, an all-zero root, a frame equal to the one before
+    it, fewer than two frames left.
     """
     path = existing(path, "motion file")
     frames, radians = _frames(path, skeleton, first, last)
@@ -172,13 +200,20 @@ def read_motion(
     count = (max(frames) if frames else 0) - first + 1
     if count < 2 or (last is not None and max(frames) < last):
         present = f"frames up to {max(frames)}" if frames else "no frame in that range"
-        raise InputError(f"{path}: {present}, expected frames {first} to {last or 'the end'}, at least two")
+        raise InputError(
+            f"{path}: {present}, expected frames {first} to {last or 'the end'}, at least two"
+        )
     needed = [name for name, dofs in skeleton.dofs.items() if dofs]
     for frame in range(first, first + count):
         lacking = [name for name in needed if name not in frames.get(frame, {})]
         if lacking:
-            raise InputError(f"{path}: frame {frame} lacks {lacking}, expected all nodes (end it by last_frame)")
-    motion = {name: np.array([frames[frame][name] for frame in range(first, first + count)]) for name in needed}
+            raise InputError(
+                f"{path}: frame {frame} lacks {lacking}, expected all nodes (end it by last_frame)"
+            )
+    motion = {
+        name: np.array([frames[frame][name] for frame in range(first, first + count)])
+        for name in needed
+    }
     if radians:
         for name, values in motion.items():
             turns = [dof[0] == "r" for dof in skeleton.dofs[name]]
@@ -191,5 +226,7 @@ def read_motion(
     still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
-        raise InputError(f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not frozen")
+        raise InputError(
+            f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not frozen"
+        )
     return motion, first

@@ -1,7 +1,9 @@
-"""Recordings as people have them, BVH and arrays of joint positions (AMASS, SMPL): to a motion of the 31 nodes.
+"""Recordings as people have them, BVH and arrays of joint positions (AMASS, SMPL): to a motion of
+the 31 nodes.
 
-Joints are known by their names; nodes between joints lie on the line between them, and those beyond the wrists and the
-head go on straight. Sources: Biovision's BVH as Meredith and Maddock describe it (2001); the joint order of SMPL.
+Joints are known by their names; nodes between joints lie on the line between them, and those beyond
+the wrists and the head go on straight. Sources: Biovision's BVH as Meredith and Maddock describe it
+(2001); the joint order of SMPL.
 """
 
 import re
@@ -18,17 +20,41 @@ from lowalt.targets.mocap_motion import Motion
 from lowalt.targets.skeleton import NODES, PARENTS, rotation, stature_m
 
 SMPL = (
-    "pelvis", "lefthip", "righthip", "spine1", "leftknee", "rightknee", "spine2", "leftankle", "rightankle", "spine3",
-    "lefttoe", "righttoe", "neck", "leftcollar", "rightcollar", "head", "leftshoulder", "rightshoulder", "leftelbow",
-    "rightelbow", "leftwrist", "rightwrist",
-)  # fmt: skip
+    "pelvis",
+    "lefthip",
+    "righthip",
+    "spine1",
+    "leftknee",
+    "rightknee",
+    "spine2",
+    "leftankle",
+    "rightankle",
+    "spine3",
+    "lefttoe",
+    "righttoe",
+    "neck",
+    "leftcollar",
+    "rightcollar",
+    "head",
+    "leftshoulder",
+    "rightshoulder",
+    "leftelbow",
+    "rightelbow",
+    "leftwrist",
+    "rightwrist",
+)
 NAMES = {
-    "root": "hips pelvis hip root", "hip": "hip upleg thigh femur upperleg leg",
+    "root": "hips pelvis hip root",
+    "hip": "hip upleg thigh femur upperleg leg",
     "knee": "knee shin leg tibia lowleg lowerleg calf",
-    "ankle": "ankle foot", "toe": "toe toebase ball forefoot foot", "shoulder": "shoulder arm uparm upperarm humerus",
-    "elbow": "elbow forearm lowarm lowerarm radius", "wrist": "wrist hand", "neck": "neck neck1 lowerneck spine3",
+    "ankle": "ankle foot",
+    "toe": "toe toebase ball forefoot foot",
+    "shoulder": "shoulder arm uparm upperarm humerus",
+    "elbow": "elbow forearm lowarm lowerarm radius",
+    "wrist": "wrist hand",
+    "neck": "neck neck1 lowerneck spine3",
     "head": "head",
-}  # fmt: skip
+}
 """Names of a joint by what it joins, the surest first, without the side and in small letters."""
 BEYOND = {"wrist": 0.1, "hand": 0.35, "fingers": 0.6, "thumb": 0.35}
 """Nodes beyond the wrist, in parts of the forearm."""
@@ -38,14 +64,18 @@ MOST_NUMBERS = 100_000_000
 def _plain(name: str) -> tuple[str, str]:
     """A joint's side ("l", "r" or "") and its name without it, in small letters."""
     word = re.sub(r"[^a-z0-9]", "", re.sub(r"^.*[:|]", "", name).lower())
-    side = re.match(f"left|right|[lr](?={'|'.join(dict.fromkeys(' '.join(NAMES.values()).split()))})", word)
+    side = re.match(
+        f"left|right|[lr](?={'|'.join(dict.fromkeys(' '.join(NAMES.values()).split()))})", word
+    )
     return (side[0][0], word[side.end() :]) if side else ("", word)
 
 
 def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
-    """Return the positions (F, 31, 3) of the nodes, in the joints' unit and axes, from positions (F, 3) by joint.
+    """Return the positions (F, 31, 3) of the nodes, in the joints' unit and axes, from positions
+    (F, 3) by joint.
 
-    A joint `NAME/end` is the end of a chain. Raises: InputError naming the joint that no name tells.
+    A joint `NAME/end` is the end of a chain. Raises: InputError naming the joint that no name
+    tells.
     """
     known = {_plain(name): name for name in reversed(list(joints)) if not name.endswith("/end")}
 
@@ -61,19 +91,30 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
 
     places = {"root": joints[joint("root")]}
     for side in "lr":
-        ankle, knee = joint("ankle", side), joint("knee", side)
+        ankle = joint("ankle", side)
+        knee = joint("knee", side)
         # A foot without a toe ends in the end of its chain.
         toe = f"{ankle}/end" if f"{ankle}/end" in joints else joint("toe", side, but=ankle)
-        elbow, wrist = joints[joint("elbow", side)], joints[joint("wrist", side)]
+        elbow = joints[joint("elbow", side)]
+        wrist = joints[joint("wrist", side)]
         toes = joints.get(f"{toe}/end", joints[toe] + 0.3 * (joints[toe] - joints[ankle]))
-        limbs = {"hipjoint": joints[joint("hip", side, but=knee)], "femur": joints[knee], "tibia": joints[ankle],
-                 "foot": joints[toe], "toes": toes, "clavicle": joints[joint("shoulder", side)], "humerus": elbow,
-                 "radius": wrist}  # fmt: skip
+        limbs = {
+            "hipjoint": joints[joint("hip", side, but=knee)],
+            "femur": joints[knee],
+            "tibia": joints[ankle],
+            "foot": joints[toe],
+            "toes": toes,
+            "clavicle": joints[joint("shoulder", side)],
+            "humerus": elbow,
+            "radius": wrist,
+        }
         limbs |= {name: wrist + share * (wrist - elbow) for name, share in BEYOND.items()}
         places |= {side + name: place for name, place in limbs.items()}
     head = joint("head")
     skull = joints[head]
-    neck = (places["lclavicle"] + places["rclavicle"]) / 2  # between the shoulders, where no joint is a neck
+    neck = (
+        places["lclavicle"] + places["rclavicle"]
+    ) / 2  # between the shoulders, where no joint is a neck
     if any(("", word) in known for word in NAMES["neck"].split()):
         neck = joints[joint("neck")]
     top = joints.get(f"{head}/end", skull + 0.8 * (skull - neck))
@@ -86,9 +127,9 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
 def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str) -> Motion:
     """Return the motion of nodes (F, 31, 3) whose unit and vertical axis are their own.
 
-    height_m: the stature of whom they show, which gives the unit; None where they are in metres. Bones have their mean
-    lengths; each turns from its mean direction to that of the frame on the shortest way. The vertical axis is the one
-    along which the head is farthest from the feet.
+    height_m: the stature of whom they show, which gives the unit; None where they are in metres.
+    Bones have their mean lengths; each turns from its mean direction to that of the frame on the
+    shortest way. The vertical axis is the one along which the head is farthest from the feet.
     Raises: InputError naming `where` for places that are not finite or a body without height.
     """
     if not np.isfinite(nodes).all() or len(nodes) < 2 or np.abs(nodes).max() > 1e6:
@@ -104,7 +145,9 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
     length = portable.norm(bones).mean(axis=0)
     mean = bones.mean(axis=0)
     size = portable.norm(mean)
-    rest_bones = np.where((size > 0)[:, None], mean / np.where(size > 0, size, 1)[:, None] * length[:, None], 0.0)
+    rest_bones = np.where(
+        (size > 0)[:, None], mean / np.where(size > 0, size, 1)[:, None] * length[:, None], 0.0
+    )
     unit = height_m / stature_m(rest_bones) if height_m else 1.0
     if not 0 < unit < np.inf:
         raise InputError(f"{where}: a body of no height, expected joints of a person")
@@ -112,10 +155,13 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
 
 
 def _shortest(rest_bones: np.ndarray, bones: np.ndarray) -> np.ndarray:
-    """Return the rotations (F, N, 3, 3) that turn bones (N, 3) to the directions of bones (F, N, 3)."""
+    """Return the rotations (F, N, 3, 3) that turn bones (N, 3) to the directions of bones (F, N,
+    3).
+    """
     a = rest_bones / np.maximum(portable.norm(rest_bones), 1e-12)[:, None]
     b = bones / np.maximum(portable.norm(bones), 1e-12)[..., None]
-    cross, cosine = np.cross(a, b), portable.dot(a, b)
+    cross = np.cross(a, b)
+    cosine = portable.dot(a, b)
     x, y, z = np.moveaxis(cross, -1, 0)
     zero = np.zeros_like(x)
     skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
@@ -124,7 +170,8 @@ def _shortest(rest_bones: np.ndarray, bones: np.ndarray) -> np.ndarray:
 
 
 def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
-    """Return the positions (F, 3) of each joint of a BVH file in its unit, `NAME/end` the ends of chains, and its rate.
+    """Return the positions (F, 3) of each joint of a BVH file in its unit, `NAME/end` the ends of
+    chains, and its rate.
 
     Raises: InputError naming the file and the joint or frame that is wrong.
     """
@@ -147,22 +194,38 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
             elif word == "}":
                 stack.pop()
         timing = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", data)
-        frames, step = int(timing[1]), float(timing[2])
+        frames = int(timing[1])
+        step = float(timing[2])
         values = np.array(re.sub(r"#.*", "", data[timing.end() :]).split(), float)
         width = sum(len(channels) for *_, channels in joints)
-        if not (frames and 1e-5 <= step <= 1 and len(values) == frames * width and np.isfinite(values).all()):
-            raise ValueError(f"{len(values)} finite numbers, expected {frames} frames of {width}, {step} s apart")
+        if not (
+            frames
+            and 1e-5 <= step <= 1
+            and len(values) == frames * width
+            and np.isfinite(values).all()
+        ):
+            raise ValueError(
+                f"{len(values)} finite numbers, expected {frames} frames of {width}, {step} s apart"
+            )
         places = _followed(joints, values.reshape(frames, width))
     return places, 1 / step
 
 
-def _followed(joints: list[tuple[str, str, np.ndarray, list[str]]], values: np.ndarray) -> dict[str, np.ndarray]:
+def _followed(
+    joints: list[tuple[str, str, np.ndarray, list[str]]], values: np.ndarray
+) -> dict[str, np.ndarray]:
     """Return the positions (F, 3) of joints, parents first, from their channels (F, C)."""
-    if len({name for name, *_ in joints}) < len(joints) or len(joints) * len(values) * 9 > MOST_NUMBERS:
+    if (
+        len({name for name, *_ in joints}) < len(joints)
+        or len(joints) * len(values) * 9 > MOST_NUMBERS
+    ):
         raise ValueError("a joint that stands twice, or too many frames")
-    places, turns, column = {}, {}, 0
+    places = {}
+    turns = {}
+    column = 0
     for name, parent, offset, channels in joints:
-        turn, shift = np.eye(3), np.tile(offset, (len(values), 1))
+        turn = np.eye(3)
+        shift = np.tile(offset, (len(values), 1))
         for channel in channels:
             axis = channel[0].lower()
             if channel.endswith("position"):
@@ -178,23 +241,33 @@ def _followed(joints: list[tuple[str, str, np.ndarray, list[str]]], values: np.n
 
 
 def read_joints(path: str | Path) -> tuple[dict[str, np.ndarray], float | None]:
-    """Return the positions (F, 3) m of joints of an .npz file by name, and its rate where it says one.
+    """Return the positions (F, 3) m of joints of an .npz file by name, and its rate where it says
+    one.
 
-    The file has an array `joints` (F, J, 3), J of at least 22 in SMPL's order or named by an array `names` (J,), and
-    maybe `mocap_framerate` or `fps`. AMASS itself keeps angles: its users compute joints by a body model, as SMPL's.
+    The file has an array `joints` (F, J, 3), J of at least 22 in SMPL's order or named by an array
+    `names` (J,), and maybe `mocap_framerate` or `fps`. AMASS itself keeps angles: its users compute
+    joints by a body model, as SMPL's.
     Raises: InputError naming the file and what is wrong with it.
     """
     checked_archive(path, "motion file")
     try:
         with np.load(path, allow_pickle=False) as data:
-            rates = [float(data[key]) for key in ("mocap_framerate", "mocap_frame_rate", "fps") if key in data.files]
+            rates = [
+                float(data[key])
+                for key in ("mocap_framerate", "mocap_frame_rate", "fps")
+                if key in data.files
+            ]
             if "joints" not in data.files:
-                raise ValueError(f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body model makes "
-                                 "them of poses")  # fmt: skip
+                raise ValueError(
+                    f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body model makes "
+                    "them of poses"
+                )
             places = np.asarray(data["joints"], float)
             names = [str(name) for name in data["names"]] if "names" in data.files else SMPL
     except (*UNREADABLE, zipfile.BadZipFile, TypeError, MemoryError) as error:
         raise InputError(f"{path}: not a readable file of joints ({error})") from None
     if places.ndim != 3 or places.shape[1] < len(names) or places.shape[2] != 3:
-        raise InputError(f"{path}: joints has shape {places.shape}, expected (frames, at least {len(names)}, 3)")
+        raise InputError(
+            f"{path}: joints has shape {places.shape}, expected (frames, at least {len(names)}, 3)"
+        )
     return {name: places[:, index] for index, name in enumerate(names)}, rates[0] if rates else None

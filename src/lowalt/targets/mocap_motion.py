@@ -1,5 +1,5 @@
-"""The motion of a recording: angles turn the bones of the skeleton, and the stretch whose end is most like its start is
-found and closed to a cycle without a jump.
+"""The motion of a recording: angles turn the bones of the skeleton, and the stretch whose end is
+most like its start is found and closed to a cycle without a jump.
 
 Axes of the result: x right, y front, z up, metres. The files themselves are read in `mocap_files`.
 """
@@ -20,18 +20,22 @@ FROM_FILE = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 """File axes (x left, y up, z front) to ours (x right, y front, z up): a proper rotation."""
 
 FADE_S = 0.15
-"""Length of the cross-fade that closes a cycle: about a quarter of a step, at most a sixth of the recording."""
+"""Length of the cross-fade that closes a cycle: about a quarter of a step, at most a sixth of the
+recording.
+"""
 
 SHORTEST_S = 0.5
-"""Shortest cycle that is looked for in a long recording: about two steps of the fastest sprinters."""
+"""Shortest cycle that is looked for in a long recording: about two steps of the fastest sprinters.
+"""
 
 SHORTEST_GAIT_S = 0.3
 """Shortest cycle that is accepted in a short recording: half of the shortest stride."""
 
 WALK_RATIO_S = (0.29, 0.62)
-"""Step length (m) times the time of a step (s), of a person of USUAL_M: adults have 0.38 at every speed of walking and
-runners 0.4 to 0.55; a rate that is wrong by two doubles or halves it. Source: Sekiya and Nagasaki, Gait and Posture 7
-(1998); our own limits around CMU's walks and runs, which have 0.34 to 0.52."""
+"""Step length (m) times the time of a step (s), of a person of USUAL_M: adults have 0.38 at every
+speed of walking and runners 0.4 to 0.55; a rate that is wrong by two doubles or halves it. Source:
+Sekiya and Nagasaki, Gait and Posture 7 (1998); our own limits around CMU's walks and runs, which
+have 0.34 to 0.52."""
 USUAL_M = 1.75
 
 BLOCK = 256
@@ -42,8 +46,8 @@ BLOCK = 256
 class Motion:
     """A recording in our axes.
 
-    root_m: (F, 3) places of the root; turned: (F, 31, 3, 3) global rotations of the bones; bones_m: (31, 3) bones
-    before they are turned; rate_hz: frames per second.
+    root_m: (F, 3) places of the root; turned: (F, 31, 3, 3) global rotations of the bones; bones_m:
+    (31, 3) bones before they are turned; rate_hz: frames per second.
     """
 
     root_m: np.ndarray
@@ -53,7 +57,9 @@ class Motion:
 
 
 def _euler(angles_rad: np.ndarray) -> np.ndarray:
-    """Return rotations (..., 3, 3) for angles (..., 3): about x first, then y, then z (ASF's order XYZ)."""
+    """Return rotations (..., 3, 3) for angles (..., 3): about x first, then y, then z (ASF's order
+    XYZ).
+    """
     x, y, z = np.moveaxis(np.asarray(angles_rad, float), -1, 0)
     return product(product(rotation("z", z), rotation("y", y)), rotation("x", x))
 
@@ -61,7 +67,8 @@ def _euler(angles_rad: np.ndarray) -> np.ndarray:
 def posed(skeleton: Skeleton, channels: dict[str, np.ndarray], rate_hz: float) -> Motion:
     """Return the motion that channels (F, channels; file units and degrees) give a skeleton.
 
-    A bone turns by its parent's rotation times C M C^-1; C is the bone's own frame, M the rotation of its channels.
+    A bone turns by its parent's rotation times C M C^-1; C is the bone's own frame, M the rotation
+    of its channels.
     Source: Acclaim's ASF/AMC.
     """
     frames = len(channels["root"])
@@ -87,16 +94,21 @@ def nodes_m(motion: Motion) -> np.ndarray:
 
 
 def front(motion: Motion, direction: np.ndarray) -> Motion:
-    """Return the motion turned about the vertical so that the horizontal `direction` (2,) becomes +y, and moved so
-    that the root's mean is the origin."""
+    """Return the motion turned about the vertical so that the horizontal `direction` (2,) becomes
+    +y, and moved so that the root's mean is the origin."""
     sine, cosine = direction / portable.norm(direction)
     spin = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
     root = applied(spin, motion.root_m)
-    return Motion(root - portable.mean(root, 0), product(spin, motion.turned), motion.bones_m, motion.rate_hz)
+    return Motion(
+        root - portable.mean(root, 0), product(spin, motion.turned), motion.bones_m, motion.rate_hz
+    )
 
 
-def refuse_glitches(positions: np.ndarray, rate_hz: float, limit_mps2: float, where: str, first: int) -> None:
-    """Raise InputError naming `where` and the frame if a node accelerates by more than `limit_mps2`.
+def refuse_glitches(
+    positions: np.ndarray, rate_hz: float, limit_mps2: float, where: str, first: int
+) -> None:
+    """Raise InputError naming `where` and the frame if a node accelerates by more than
+    `limit_mps2`.
 
     `positions` (F, 31, 3) metres, the first of them frame number `first`.
     """
@@ -111,7 +123,8 @@ def refuse_glitches(positions: np.ndarray, rate_hz: float, limit_mps2: float, wh
 
 
 def refuse_short(frames: int, rate_hz: float, where: str) -> None:
-    """Raise InputError naming `where` if the recording is shorter than two cycles of SHORTEST_GAIT_S.
+    """Raise InputError naming `where` if the recording is shorter than two cycles of
+    SHORTEST_GAIT_S.
 
     In a short recording `find_cycle` looks for cycles of half its length and longer.
     """
@@ -123,10 +136,14 @@ def refuse_short(frames: int, rate_hz: float, where: str) -> None:
         )
 
 
-def refuse_strange_rate(track: np.ndarray, rate_hz: float, speed_mps: float, stature: float, where: str) -> None:
-    """Raise InputError naming `where` if the steps of a closed cycle are too quick or too slow for their length.
+def refuse_strange_rate(
+    track: np.ndarray, rate_hz: float, speed_mps: float, stature: float, where: str
+) -> None:
+    """Raise InputError naming `where` if the steps of a closed cycle are too quick or too slow for
+    their length.
 
-    track: (F, 31, 3) m, front +y; stature: of the person, in m. Nothing is said of a cycle whose feet do not swing.
+    track: (F, 31, 3) m, front +y; stature: of the person, in m. Nothing is said of a cycle whose
+    feet do not swing.
     """
     apart = track[:, NODES.index("ltibia"), 1] - track[:, NODES.index("rtibia"), 1]
     swing = np.abs(np.fft.rfft(apart - apart.mean()))
@@ -144,12 +161,14 @@ def refuse_strange_rate(track: np.ndarray, rate_hz: float, speed_mps: float, sta
 
 
 def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
-    """Return (start, end, fade, mismatch) of the cycle start..end-1 that closes best, in frames and metres.
+    """Return (start, end, fade, mismatch) of the cycle start..end-1 that closes best, in frames and
+    metres.
 
-    The mismatch of two frames is a root mean square over the nodes: of the difference in place, and of the difference
-    in velocity times the fade's length. It leaves out the horizontal motion of the root. Among the cycles whose
-    mismatch is at most 1.5 times the least, the longest is taken, for variety. A cycle must move at least half as fast
-    as the fastest one, so that standing is no cycle. At least `fade` frames follow its end.
+    The mismatch of two frames is a root mean square over the nodes: of the difference in place, and
+    of the difference in velocity times the fade's length. It leaves out the horizontal motion of
+    the root. Among the cycles whose mismatch is at most 1.5 times the least, the longest is taken,
+    for variety. A cycle must move at least half as fast as the fastest one, so that standing is no
+    cycle. At least `fade` frames follow its end.
     """
     frames = len(motion.root_m)
     fade = max(1, min(round(FADE_S * motion.rate_hz), frames // 6))
@@ -158,11 +177,14 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     positions[..., :2] -= positions[:, :1, :2]
     velocity = np.gradient(positions, axis=0) * fade
     state = np.concatenate([positions, velocity], axis=1).reshape(frames, -1)
-    place, square = motion.root_m[:, :2], portable.dot(state, state)
-    # Only pairs (start, end) of a few starts at a time: all pairs of a long recording would take gigabytes.
+    place = motion.root_m[:, :2]
+    square = portable.dot(state, state)
+    # Only pairs (start, end) of a few starts at a time: all pairs of a long recording would take
+    # gigabytes.
     blocks = [np.arange(first, min(first + BLOCK, frames)) for first in range(0, frames, BLOCK)]
     fastest = max(_speeds(place, starts, shortest, fade).max() for starts in blocks)
-    least, candidates = np.inf, []
+    least = np.inf
+    candidates = []
     for starts in blocks:
         distance = square[starts, None] + square - 2 * product(state[starts], state.T)
         distance = np.sqrt(np.maximum(distance, 0) / len(NODES))
@@ -175,29 +197,33 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     longest = (end - start)[good].max()
     best = np.flatnonzero(good & (end - start == longest))
     best = best[np.argmin(distance[best])]
-    start, end = int(start[best]), int(end[best])
+    start = int(start[best])
+    end = int(end[best])
     return start, end, fade, float(portable.norm(state[start] - state[end]) / np.sqrt(len(NODES)))
 
 
 def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:
     """Return the horizontal speed (S, F) in metres a frame from each start to each end.
 
-    The value is -1 where the two are no cycle: fewer than `shortest` frames lie between them, or fewer than `fade`
-    frames follow the end.
+    The value is -1 where the two are no cycle: fewer than `shortest` frames lie between them, or
+    fewer than `fade` frames follow the end.
     """
     ends = np.arange(len(place))[None]
     length = ends - starts[:, None]
     way = portable.norm(place[None] - place[starts, None])
-    return np.where((length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0)
+    return np.where(
+        (length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0
+    )
 
 
 def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.ndarray]:
-    """Return the cycle start..end-1, closed in place and velocity, and the drift (2,) in m/s taken out of it.
+    """Return the cycle start..end-1, closed in place and velocity, and the drift (2,) in m/s taken
+    out of it.
 
-    The root's uniform horizontal drift over the cycle is taken out; its bob and sway stay. The first `fade` frames of
-    the cycle are blended with the frames that follow its end, by weights w that rise from 0 to 1 with slope zero at
-    both ends: w x first frames + (1 - w) x following frames. Blended rotations are made orthogonal again, so bones keep
-    their lengths.
+    The root's uniform horizontal drift over the cycle is taken out; its bob and sway stay. The
+    first `fade` frames of the cycle are blended with the frames that follow its end, by weights w
+    that rise from 0 to 1 with slope zero at both ends: w x first frames + (1 - w) x following
+    frames. Blended rotations are made orthogonal again, so bones keep their lengths.
     """
     count = end - start
     drift = (motion.root_m[end] - motion.root_m[start]) / count * [1, 1, 0]

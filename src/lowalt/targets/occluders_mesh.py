@@ -1,4 +1,5 @@
-"""The surfaces of a user's mesh, part by part, as its cloud has them: cut, turned, scaled and simplified.
+"""The surfaces of a user's mesh, part by part, as its cloud has them: cut, turned, scaled and
+simplified.
 
 The cloud's own steps cut the mesh; where they take a part's samples, here they take its triangles.
 """
@@ -19,11 +20,14 @@ TRIANGLES = 1500
 
 
 def _pool(mesh: Mesh, regions: list[dict]) -> Pool:
-    """Return a mesh as a pool of one sample per triangle, at its centre; its corners (F, 9) take the place of normals.
+    """Return a mesh as a pool of one sample per triangle, at its centre; its corners (F, 9) take
+    the place of normals.
 
-    Large triangles are divided first where `regions` cut through them, so that their middles say where they are.
+    Large triangles are divided first where `regions` cut through them, so that their middles say
+    where they are.
     """
-    corners, component = mesh.vertices[mesh.faces], mesh.component
+    corners = mesh.vertices[mesh.faces]
+    component = mesh.component
     grain = np.ptp(mesh.vertices, axis=0).max() / GRAIN
     for region in regions:
         while True:
@@ -44,17 +48,26 @@ def _wheel(diameter: float, width: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _triangles(record: dict, inputs: Path) -> dict[str, np.ndarray]:
-    """Triangles (F, 3, 3) of every part in body axes and the mesh's own size; a triangle goes where its middle is."""
-    frame, parts = body_axes(record["front"], record["up"]), record["parts"]
+    """Triangles (F, 3, 3) of every part in body axes and the mesh's own size; a triangle goes where
+    its middle is.
+    """
+    frame = body_axes(record["front"], record["up"])
+    parts = record["parts"]
     regions = [part["region"] for part in parts.values() if "region" in part] + record["drop"]
     cutting = [region for region in regions if not region.get("whole")]
-    cut, _ = cut_parts(record, inputs, frame, lambda mesh, is_body: _pool(mesh, cutting if is_body else []), _wheel)
-    return {name: (pool.points if "wheel" in parts[name] else pool.normals).reshape(-1, 3, 3) @ frame.T
-            for name, pool in cut.items()}  # fmt: skip
+    cut, _ = cut_parts(
+        record, inputs, frame, lambda mesh, is_body: _pool(mesh, cutting if is_body else []), _wheel
+    )
+    return {
+        name: (pool.points if "wheel" in parts[name] else pool.normals).reshape(-1, 3, 3) @ frame.T
+        for name, pool in cut.items()
+    }
 
 
 def simplified(triangles: np.ndarray, most: int) -> Surface:
-    """Return triangles (F, 3, 3) as a surface of at most about `most`, by quadric edge collapse (Garland 1997)."""
+    """Return triangles (F, 3, 3) as a surface of at most about `most`, by quadric edge collapse
+    (Garland 1997).
+    """
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = index.reshape(-1, 3)
     faces = faces[face_normals(vertices, faces)[1] > 0]
@@ -66,7 +79,8 @@ def simplified(triangles: np.ndarray, most: int) -> Surface:
         work.meshing_decimation_quadric_edge_collapse(
             targetfacenum=most, optimalplacement=False, preservenormal=True, planarquadric=True
         )
-        vertices, faces = work.current_mesh().vertex_matrix(), work.current_mesh().face_matrix()
+        vertices = work.current_mesh().vertex_matrix()
+        faces = work.current_mesh().face_matrix()
     return Surface(np.asarray(vertices, float), np.asarray(faces, np.int64))
 
 
@@ -80,15 +94,20 @@ def deviation_m(surface: Surface, points: np.ndarray) -> np.ndarray:
     return np.concatenate([closest_point_naive(shape, block)[1] for block in blocks])
 
 
-def mesh_surfaces(record: dict, inputs: Path, seed: int) -> tuple[list[Surface], np.ndarray, np.ndarray]:
-    """Return one surface a part in the cloud's axes, how far (L,) m each point lies off, and that none is closed.
+def mesh_surfaces(
+    record: dict, inputs: Path, seed: int
+) -> tuple[list[Surface], np.ndarray, np.ndarray]:
+    """Return one surface a part in the cloud's axes, how far (L,) m each point lies off, and that
+    none is closed.
 
     `record` is a merged record that `mesh_record.check_record` has passed.
     Raises: InputError naming the file or the part and the reason.
     """
     record = record | {"parts": ordered_parts(record["parts"])}
     cloud, raw, final = cloud_and_pools(record, inputs, seed)
-    triangles, surfaces, offsets = _triangles(record, inputs), [], []
+    triangles = _triangles(record, inputs)
+    surfaces = []
+    offsets = []
     for number, name in enumerate(cloud.names):
         # How a part's samples were scaled and moved, recovered from the samples themselves.
         before = np.column_stack([raw[name].points, np.ones(len(raw[name].points))])

@@ -1,9 +1,11 @@
 """The built-in dog: a trot on 27 nodes, diagonal legs together.
 
-Stride rate follows the animal's mass, feet stand still on the ground in stance and are lifted on an arc in swing.
-Sources: rate and speed of a trot that is about to become a gallop, 269 M^-0.14 strides a minute at 5.5 M^0.24 km/h (M
-in kg): Heglund, Taylor and McMahon 1974, Science 186, 1112-1113; pairs and the share of stance (0.42): Hildebrand 1968,
-J Mammalogy 49, 353-360. Lengths in heights at the withers, and the sway of back, head and tail: estimates.
+Stride rate follows the animal's mass, feet stand still on the ground in stance and are lifted on an
+arc in swing.
+Sources: rate and speed of a trot that is about to become a gallop, 269 M^-0.14 strides a minute at
+5.5 M^0.24 km/h (M in kg): Heglund, Taylor and McMahon 1974, Science 186, 1112-1113; pairs and the
+share of stance (0.42): Hildebrand 1968, J Mammalogy 49, 353-360. Lengths in heights at the withers,
+and the sway of back, head and tail: estimates.
 """
 
 import numpy as np
@@ -26,7 +28,8 @@ LIFT = 0.16
 
 
 def stride_hz(mass_kg: float, speed_mps: float) -> float:
-    """Return the stride rate of a trot: that at the change to a gallop, times the root of the share of its speed.
+    """Return the stride rate of a trot: that at the change to a gallop, times the root of the share
+    of its speed.
 
     Source: the module's; the root is an estimate between a fixed rate and a fixed stride.
     """
@@ -35,14 +38,19 @@ def stride_hz(mass_kg: float, speed_mps: float) -> float:
 
 
 def _foot(phase: np.ndarray, stride_m: float, lift_m: float) -> np.ndarray:
-    """A foot's path (F, 3) about the place below its joint: back at the ground's speed, then forward in the air."""
+    """A foot's path (F, 3) about the place below its joint: back at the ground's speed, then
+    forward in the air.
+    """
     at = phase % 1.0
     half = STANCE * stride_m / 2
     swing = np.clip((at - STANCE) / (1 - STANCE), 0, 1)
-    # Leaves and meets the ground at its speed: a cubic from -half to half with both end slopes those of stance.
+    # Leaves and meets the ground at its speed: a cubic from -half to half with both end slopes
+    # those of stance.
     slope = -2 * half / STANCE * (1 - STANCE)
     # Products, since the last bit of a library's cube depends on the processor.
-    cubic = -half + swing * (slope + swing * (6 * half - 3 * slope + swing * (2 * slope - 4 * half)))
+    cubic = -half + swing * (
+        slope + swing * (6 * half - 3 * slope + swing * (2 * slope - 4 * half))
+    )
     y = np.where(at < STANCE, half - 2 * half * at / STANCE, cubic)
     sine = portable.sine_cosine_turns(swing / 2)[0]
     return np.stack([np.zeros(len(at)), y, lift_m * sine * sine], 1)
@@ -51,7 +59,8 @@ def _foot(phase: np.ndarray, stride_m: float, lift_m: float) -> np.ndarray:
 def cycle_m(
     height_m: float, mass_kg: float, speed_mps: float, frames: int
 ) -> tuple[np.ndarray, tuple[str, ...], float, float]:
-    """Return one stride (frames, 27, 3) in metres, the nodes' names, its duration (s) and its length (m).
+    """Return one stride (frames, 27, 3) in metres, the nodes' names, its duration (s) and its
+    length (m).
 
     height_m: at the withers. The origin lies on the ground below the middle of the back.
     Raises: InputError where the legs do not reach the ground at this speed.
@@ -59,7 +68,8 @@ def cycle_m(
     duration = 1 / stride_hz(mass_kg, speed_mps)
     stride = speed_mps * duration
     phase = np.arange(frames) / frames
-    still, h = np.zeros((frames, 3)), height_m
+    still = np.zeros((frames, 3))
+    h = height_m
     sine, cosine = portable.sine_cosine_turns(2 * phase)
     bob = np.stack([np.zeros(frames), np.zeros(frames), 0.02 * h * cosine], 1)
     sway = portable.sine_cosine_turns(phase)[0]
@@ -68,12 +78,16 @@ def cycle_m(
              "belly": (0, -0.05, 0.62), "tail": (0, -0.7, 0.85)}  # fmt: skip
     nodes = {name: still + h * np.array(place) + bob for name, place in spine.items()}
     nodes["nose"] = nodes["nose"] + 0.03 * h * sine[:, None] * [0, 0, 1.0]
-    nodes["tail tip"] = nodes["tail"] + h * np.stack([0.06 * sway, np.full(frames, -0.25), 0.04 * sine + 0.02], 1)
+    nodes["tail tip"] = nodes["tail"] + h * np.stack(
+        [0.06 * sway, np.full(frames, -0.25), 0.04 * sine + 0.02], 1
+    )
     # Left fore with right hind, right fore with left hind.
     for name, x, y, upper, lower, bend, later in (
-        ("right fore", 0.13, 0.42, 0.36, 0.44, -1.0, 0.0), ("left fore", -0.13, 0.42, 0.36, 0.44, -1.0, 0.5),
-        ("right hind", 0.13, -0.5, 0.42, 0.44, 1.0, 0.5), ("left hind", -0.13, -0.5, 0.42, 0.44, 1.0, 0.0),
-    ):  # fmt: skip
+        ("right fore", 0.13, 0.42, 0.36, 0.44, -1.0, 0.0),
+        ("left fore", -0.13, 0.42, 0.36, 0.44, -1.0, 0.5),
+        ("right hind", 0.13, -0.5, 0.42, 0.44, 1.0, 0.5),
+        ("left hind", -0.13, -0.5, 0.42, 0.44, 1.0, 0.0),
+    ):
         top = still + h * np.array([x, y, 0.74 if "fore" in name else 0.8]) + bob
         foot = still + h * np.array([x, y, 0.02]) + _foot(phase + later, stride, LIFT * h)
         wrist = foot + h * np.array([0, -0.03, 0.08])
@@ -82,6 +96,10 @@ def cycle_m(
         except InputError as error:
             raise InputError(f"quadruped of {height_m} m at {speed_mps} m/s: {error}") from None
         places = (top, middle, wrist, foot)
-        words = ("shoulder", "elbow", "wrist", "paw") if "fore" in name else ("hip", "knee", "hock", "paw")
+        words = (
+            ("shoulder", "elbow", "wrist", "paw")
+            if "fore" in name
+            else ("hip", "knee", "hock", "paw")
+        )
         nodes |= {f"{name} {word}": place for word, place in zip(words, places, strict=True)}
     return np.stack(list(nodes.values()), 1), tuple(nodes), duration, stride

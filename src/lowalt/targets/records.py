@@ -1,9 +1,10 @@
 """Records of all subtypes, read from the table of published values and from record files.
 
-A record file is YAML, one record per name. Later files replace earlier ones, whole records at a time; files of the
-configuration's key `targets.own` come last. A record may have a key `row`, whose cells replace those of the subtype's
-row in the table of targets or make a new row: one file is then a whole new target. Keys of one source alone (a mesh's
-unit, the frames of a recording) are checked by that source's own `check_record`.
+A record file is YAML, one record per name. Later files replace earlier ones, whole records at a
+time; files of the configuration's key `targets.own` come last. A record may have a key `row`, whose
+cells replace those of the subtype's row in the table of targets or make a new row: one file is then
+a whole new target. Keys of one source alone (a mesh's unit, the frames of a recording) are checked
+by that source's own `check_record`.
 """
 
 import math
@@ -22,8 +23,11 @@ COMMON_KEYS = tuple(record_schema.schema()["sources"][record_schema.COMMON]["pro
 
 _WORDS = ("category", "name", "unseen_protocol")
 _WHOLE = ("idx", "n_rotors_or_wings", "points_in_published_cloud_approx")
-AIR_SPEEDS, GROUND_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max"), ("speed_lo", "speed_hi")
-"""Columns of speeds of targets in the air and on the ground; they may be 0: a craft hovers, a car stands."""
+AIR_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max")
+GROUND_SPEEDS = ("speed_lo", "speed_hi")
+"""Columns of speeds of targets in the air and on the ground; they may be 0: a craft hovers, a car
+stands.
+"""
 _NUMBERS = (
     "size_m",
     "freq_lo_hz",
@@ -39,10 +43,11 @@ COLUMNS = (*_WORDS, *_WHOLE, *_NUMBERS)
 
 
 def load_table(path: str | Path) -> dict[str, dict]:
-    """Return the published table by name, in its order: metres, hertz and m/s as numbers, empty cells as None.
+    """Return the published table by name, in its order: metres, hertz and m/s as numbers, empty
+    cells as None.
 
-    Raises: InputError naming the file, the subtype and the column that is missing, unknown or no positive
-    number; a speed may be 0.
+    Raises: InputError naming the file, the subtype and the column that is missing, unknown or no
+    positive number; a speed may be 0.
     """
     rows = read_csv(path, what="table of published targets")
     if not rows:
@@ -51,11 +56,14 @@ def load_table(path: str | Path) -> dict[str, dict]:
         raise InputError(f"{path}: columns {wrong} missing or unknown")
     table: dict[str, dict] = {}
     for row in rows:
-        name, where = row["name"], f"{path}: {row['name']}"
+        name = row["name"]
+        where = f"{path}: {row['name']}"
         if name in table:
             raise InputError(f"{where}: named twice, expected one row per subtype")
         if row["unseen_protocol"] not in ("seen", "unseen"):
-            raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
+            raise InputError(
+                f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen"
+            )
         table[name] = {column: _cell(where, column, text) for column, text in row.items()}
     with reading(path, "table of targets"):
         classes_of(table)
@@ -82,7 +90,8 @@ def _cell(where: str, column: str, text: str) -> str | int | float | None:
 def read_records(path: str | Path) -> dict[str, dict]:
     """Return the records of one file by subtype, as written.
 
-    Raises: InputError where the file is no mapping of names to records, or names a subtype or a key twice.
+    Raises: InputError where the file is no mapping of names to records, or names a subtype or a key
+    twice.
     """
     holds = "subtypes' names to their records"
     records = load_yaml(path, "record file", holds)
@@ -93,9 +102,11 @@ def read_records(path: str | Path) -> dict[str, dict]:
 
 
 def records_of(targets: dict, inputs: str | Path | None = None) -> dict[str, dict]:
-    """Return the merged records of the block `targets` of a configuration: those of its `own` files come last.
+    """Return the merged records of the block `targets` of a configuration: those of its `own` files
+    come last.
 
-    inputs: the folder of the user's files, in which a record's files must stand where `where_missing` is "builtin".
+    inputs: the folder of the user's files, in which a record's files must stand where
+    `where_missing` is "builtin".
     Raises: InputError as `load_records`.
     """
     own_files = targets.get("own", {}).values()
@@ -104,16 +115,22 @@ def records_of(targets: dict, inputs: str | Path | None = None) -> dict[str, dic
 
 
 def load_records(
-    table_path: str | Path, record_paths: list[str | Path], inputs: str | Path | None = None, fall_back: bool = False
+    table_path: str | Path,
+    record_paths: list[str | Path],
+    inputs: str | Path | None = None,
+    fall_back: bool = False,
 ) -> dict[str, dict]:
     """Return every subtype's merged and checked record, in the table's order; new rows come last.
 
-    fall_back: if a record names files that the folder `inputs` lacks, use the subtype's previous record.
+    fall_back: if a record names files that the folder `inputs` lacks, use the subtype's previous
+    record.
 
-    A merged record is the record as written, with `subtype`, `category`, `group` (seen or unseen), `published` (the
-    table's row), and the defaults of `points` (the published count) and `rcs_m2_per_point` (1 m2).
-    Raises: InputError naming file, subtype, key, value and what was expected: a subtype the table lacks or a file
-    names twice, an unknown key, a value out of range, a subtype that no file has a record of.
+    A merged record is the record as written, with `subtype`, `category`, `group` (seen or unseen),
+    `published` (the table's row), and the defaults of `points` (the published count) and
+    `rcs_m2_per_point` (1 m2).
+    Raises: InputError naming file, subtype, key, value and what was expected: a subtype the table
+    lacks or a file names twice, an unknown key, a value out of range, a subtype that no file has a
+    record of.
     """
     table = load_table(table_path)
     chosen: dict[str, list[tuple[str, dict]]] = {}
@@ -123,17 +140,27 @@ def load_records(
             if "row" in record:
                 table[name] = with_row(table.get(name), name, record["row"], where)
             if name not in table:
-                raise InputError(f"{path}: unknown subtype {name!r}, expected a key `row` or one of {list(table)}")
-            chosen.setdefault(name, []).append((where, {key: item for key, item in record.items() if key != "row"}))
+                raise InputError(
+                    f"{path}: unknown subtype {name!r}, expected a key `row` or one of {list(table)}"
+                )
+            chosen.setdefault(name, []).append(
+                (where, {key: item for key, item in record.items() if key != "row"})
+            )
     missing = [name for name in table if name not in chosen]
     if missing:
-        raise InputError(f"no record for {missing} in {[str(path) for path in record_paths]}, expected one each")
+        raise InputError(
+            f"no record for {missing} in {[str(path) for path in record_paths]}, expected one each"
+        )
     classes_of(table)
     return {name: _last(row, chosen[name], inputs, fall_back) for name, row in table.items()}
 
 
-def _last(row: dict, choices: list[tuple[str, dict]], inputs: str | Path | None, fall_back: bool) -> dict:
-    """The last of a subtype's records, or with `fall_back` the last whose files are all in the folder."""
+def _last(
+    row: dict, choices: list[tuple[str, dict]], inputs: str | Path | None, fall_back: bool
+) -> dict:
+    """The last of a subtype's records, or with `fall_back` the last whose files are all in the
+    folder.
+    """
     where, record = choices[-1]
     merged = merge(row, record, where)
     if fall_back and len(choices) > 1 and missing_inputs({row["name"]: merged}, inputs):
@@ -142,20 +169,29 @@ def _last(row: dict, choices: list[tuple[str, dict]], inputs: str | Path | None,
 
 
 def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
-    """Return a row of the table of targets, None for a new one, with the cells of a record's key `row` in it.
+    """Return a row of the table of targets, None for a new one, with the cells of a record's key
+    `row` in it.
 
-    Raises: InputError naming `where`, the column and the value that is missing, unknown or no positive number.
+    Raises: InputError naming `where`, the column and the value that is missing, unknown or no
+    positive number.
     """
     known = [column for column in COLUMNS if column not in ("name", "idx")]
     if not isinstance(cells, dict) or set(cells) - set(known):
         raise InputError(f"{where}: row is {cells!r}, expected cells of the columns {known}")
     changed = {
-        column: None if cell is None else _cell(f"{where}: row", column, str(cell)) for column, cell in cells.items()
+        column: None if cell is None else _cell(f"{where}: row", column, str(cell))
+        for column, cell in cells.items()
     }
-    blank = dict.fromkeys(COLUMNS) | {"name": name, "unseen_protocol": "seen", "points_in_published_cloud_approx": 150}
+    blank = dict.fromkeys(COLUMNS) | {
+        "name": name,
+        "unseen_protocol": "seen",
+        "points_in_published_cloud_approx": 150,
+    }
     result = (row or blank) | changed
     if not result["category"] or result["unseen_protocol"] not in ("seen", "unseen"):
-        raise InputError(f"{where}: row is {cells!r}, expected a category and unseen_protocol seen or unseen")
+        raise InputError(
+            f"{where}: row is {cells!r}, expected a category and unseen_protocol seen or unseen"
+        )
     return result
 
 
@@ -168,12 +204,19 @@ def merge(row: dict, record: dict, where: str) -> dict:
     if source not in SOURCES:
         raise InputError(f"{where}: source is {source!r}, expected one of {SOURCES}")
     merged = {"rcs_m2_per_point": 1.0, "points": row["points_in_published_cloud_approx"], **record}
-    merged |= {"subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row}
+    merged |= {
+        "subtype": row["name"],
+        "category": row["category"],
+        "group": row["unseen_protocol"],
+        "published": row,
+    }
     common = {key: merged[key] for key in COMMON_KEYS if key in merged}
     merged |= record_schema.check(record_schema.COMMON, common, where)
     _check_like(merged, where)
     if unknown := sorted(set(record.get("row_from", {})) - set(row)):
-        raise InputError(f"{where}: row_from names {unknown}, expected columns of the table of targets")
+        raise InputError(
+            f"{where}: row_from names {unknown}, expected columns of the table of targets"
+        )
     own = {key: value for key, value in record.items() if key not in COMMON_KEYS}
     merged |= record_schema.check(source, own, where)
     for name in record_files(merged):
@@ -182,24 +225,33 @@ def merge(row: dict, record: dict, where: str) -> dict:
 
 
 def _check_like(merged: dict, where: str) -> None:
-    """Refuse a record without a published class that it is like, or whose row lacks the speeds of that class."""
+    """Refuse a record without a published class that it is like, or whose row lacks the speeds of
+    that class.
+    """
     try:
         kind = like(merged)
     except InputError as error:
         raise InputError(f"{where}: {str(error).removeprefix(merged['subtype'] + ': ')}") from None
     speeds = AIR_SPEEDS if kind in AIRBORNE else GROUND_SPEEDS
     if empty := [column for column in speeds if merged["published"][column] is None]:
-        raise InputError(f"{where}: the table of targets has no {empty}, expected m/s for a target like a {kind}")
+        raise InputError(
+            f"{where}: the table of targets has no {empty}, expected m/s for a target like a {kind}"
+        )
 
 
 def estimates(record: dict) -> tuple[int, int]:
-    """Return how many figures of a merged record, and cells of a row of its own, are estimates, and how many there are.
+    """Return how many figures of a merged record, and cells of a row of its own, are estimates, and
+    how many there are.
 
-    A cell that the record's `row_from` does not name is an estimate; the cells of a published row do not count.
+    A cell that the record's `row_from` does not name is an estimate; the cells of a published row
+    do not count.
     """
-    row, named = record.get("published"), record.get("row_from", {})
+    row = record.get("published")
+    named = record.get("row_from", {})
     own_row = row is not None and row["idx"] is None
-    sources = [named.get(column, "estimate") for column in _NUMBERS if own_row and row[column] is not None]
+    sources = [
+        named.get(column, "estimate") for column in _NUMBERS if own_row and row[column] is not None
+    ]
     sources += [entry["source"] for entry in record.get("figures", {}).values()]
     return sources.count("estimate"), len(sources)
 
@@ -211,17 +263,21 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
     """
     names = record_files(record)
     if names and inputs is None:
-        raise InputError(f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of inputs")
+        raise InputError(
+            f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of inputs"
+        )
     return [str(Path(inputs) / name) for name in names]
 
 
 def missing_inputs(records: dict[str, dict], inputs: str | Path | None) -> list[str]:
-    """Return one line for each file that a record names and the folder `inputs` lacks: subtype, source, path and where
-    a user gets it."""
+    """Return one line for each file that a record names and the folder `inputs` lacks: subtype,
+    source, path and where a user gets it."""
     lines = []
     for name, record in records.items():
         for file in record_files(record):
             if inputs is None or not (Path(inputs) / file).is_file():
                 get = f"; get it from {record['where']}" if "where" in record else ""
-                lines.append(f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'}){get}")
+                lines.append(
+                    f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'}){get}"
+                )
     return lines

@@ -1,8 +1,10 @@
-"""The 31 nodes of a pedestrian: their names, the parent of each, and forward kinematics; limbs whose feet are known.
+"""The 31 nodes of a pedestrian: their names, the parent of each, and forward kinematics; limbs
+whose feet are known.
 
-Shared by recordings (`mocap`) and the built-in gait (`gait`), so that both give the same cloud. A node is the far
-end of the bone that carries its name, as in the CMU skeleton files. `cyclist` and `quadruped` have nodes of their own:
-limbs of two bones from a fixed joint to a moving point. Axes: x right, y front, z up, metres.
+Shared by recordings (`mocap`) and the built-in gait (`gait`), so that both give the same cloud. A
+node is the far end of the bone that carries its name, as in the CMU skeleton files. `cyclist` and
+`quadruped` have nodes of their own: limbs of two bones from a fixed joint to a moving point. Axes:
+x right, y front, z up, metres.
 """
 
 import numpy as np
@@ -12,15 +14,37 @@ from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
 
 LIMBS = {
-    "lhipjoint": "root", "lfemur": "lhipjoint", "ltibia": "lfemur", "lfoot": "ltibia", "ltoes": "lfoot",
-    "rhipjoint": "root", "rfemur": "rhipjoint", "rtibia": "rfemur", "rfoot": "rtibia", "rtoes": "rfoot",
-    "lowerback": "root", "upperback": "lowerback", "thorax": "upperback",
-    "lowerneck": "thorax", "upperneck": "lowerneck", "head": "upperneck",
-    "lclavicle": "thorax", "lhumerus": "lclavicle", "lradius": "lhumerus", "lwrist": "lradius",
-    "lhand": "lwrist", "lfingers": "lhand", "lthumb": "lwrist",
-    "rclavicle": "thorax", "rhumerus": "rclavicle", "rradius": "rhumerus", "rwrist": "rradius",
-    "rhand": "rwrist", "rfingers": "rhand", "rthumb": "rwrist",
-}  # fmt: skip
+    "lhipjoint": "root",
+    "lfemur": "lhipjoint",
+    "ltibia": "lfemur",
+    "lfoot": "ltibia",
+    "ltoes": "lfoot",
+    "rhipjoint": "root",
+    "rfemur": "rhipjoint",
+    "rtibia": "rfemur",
+    "rfoot": "rtibia",
+    "rtoes": "rfoot",
+    "lowerback": "root",
+    "upperback": "lowerback",
+    "thorax": "upperback",
+    "lowerneck": "thorax",
+    "upperneck": "lowerneck",
+    "head": "upperneck",
+    "lclavicle": "thorax",
+    "lhumerus": "lclavicle",
+    "lradius": "lhumerus",
+    "lwrist": "lradius",
+    "lhand": "lwrist",
+    "lfingers": "lhand",
+    "lthumb": "lwrist",
+    "rclavicle": "thorax",
+    "rhumerus": "rclavicle",
+    "rradius": "rhumerus",
+    "rwrist": "rradius",
+    "rhand": "rwrist",
+    "rfingers": "rhand",
+    "rthumb": "rwrist",
+}
 """Each bone and the bone it hangs on, parents first."""
 
 NODES = ("root", *LIMBS)
@@ -36,11 +60,14 @@ _LEG = ("femur", "tibia")
 _SPINE = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
 
 
-def forward_kinematics(root_m: np.ndarray, rotations: np.ndarray, offsets_m: np.ndarray) -> np.ndarray:
+def forward_kinematics(
+    root_m: np.ndarray, rotations: np.ndarray, offsets_m: np.ndarray
+) -> np.ndarray:
     """Return node positions (F, 31, 3) in metres.
 
-    `root_m` (F, 3) position of the root, `rotations` (F, 31, 3, 3) global rotation of every bone, `offsets_m`
-    (31, 3) each bone from its parent's node to its own, unrotated. Source: plain tree kinematics.
+    `root_m` (F, 3) position of the root, `rotations` (F, 31, 3, 3) global rotation of every bone,
+    `offsets_m` (31, 3) each bone from its parent's node to its own, unrotated. Source: plain tree
+    kinematics.
     """
     positions = np.empty((len(root_m), len(NODES), 3))
     positions[:, 0] = root_m
@@ -51,10 +78,11 @@ def forward_kinematics(root_m: np.ndarray, rotations: np.ndarray, offsets_m: np.
 
 
 def stature_m(offsets_m: np.ndarray) -> float:
-    """Return the vertical extent in metres of a skeleton that stands straight, from the toes to the node `head`.
+    """Return the vertical extent in metres of a skeleton that stands straight, from the toes to the
+    node `head`.
 
-    `offsets_m` (31, 3) bones in the rest pose. Legs and spine count with their whole length, hip joint and foot
-    with their vertical part in the rest pose; the mean of both legs.
+    `offsets_m` (31, 3) bones in the rest pose. Legs and spine count with their whole length, hip
+    joint and foot with their vertical part in the rest pose; the mean of both legs.
     """
 
     def bone(name: str) -> np.ndarray:
@@ -70,7 +98,9 @@ def stature_m(offsets_m: np.ndarray) -> float:
 
 
 def rotation(axis: str, angle_rad: np.ndarray) -> np.ndarray:
-    """Return right-handed rotations (..., 3, 3) about the axis "x", "y" or "z" by `angle_rad` (...)."""
+    """Return right-handed rotations (..., 3, 3) about the axis "x", "y" or "z" by `angle_rad`
+    (...).
+    """
     first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     angle_rad = np.asarray(angle_rad, float)
     result = np.zeros((*angle_rad.shape, 3, 3))
@@ -84,16 +114,24 @@ def rotation(axis: str, angle_rad: np.ndarray) -> np.ndarray:
 def node_cloud(track_m: np.ndarray, record: dict, names: tuple[str, ...] = NODES) -> Cloud:
     """Return the cloud of a cyclic recording: one part a node, the track's first frame as points.
 
-    `track_m` (F, L, 3) metres, body-centred; `names` of the L nodes; `record` the cloud's record, with `track_rate_hz`
-    and `rcs_m2_per_point`. Nodes have no surface, so normals are NaN.
+    `track_m` (F, L, 3) metres, body-centred; `names` of the L nodes; `record` the cloud's record,
+    with `track_rate_hz` and `rcs_m2_per_point`. Nodes have no surface, so normals are NaN.
     """
     count = len(names)
     nothing = np.full((count, 3), np.nan)
     return Cloud(
-        points=track_m[0].copy(), part=np.arange(count), kinds=("node",) * count, names=names,
-        parents=np.full(count, -1), hinges=nothing, axes=nothing.copy(), normals=nothing.copy(),
-        rcs_m2=np.full(count, float(record["rcs_m2_per_point"])), record=record, track=track_m,
-    )  # fmt: skip
+        points=track_m[0].copy(),
+        part=np.arange(count),
+        kinds=("node",) * count,
+        names=names,
+        parents=np.full(count, -1),
+        hinges=nothing,
+        axes=nothing.copy(),
+        normals=nothing.copy(),
+        rcs_m2=np.full(count, float(record["rcs_m2_per_point"])),
+        record=record,
+        track=track_m,
+    )
 
 
 def both_sides(start: str, *limb: str) -> list[tuple[str, ...]]:
@@ -101,10 +139,14 @@ def both_sides(start: str, *limb: str) -> list[tuple[str, ...]]:
     return [(start, *(f"{side} {name}" for name in limb)) for side in ("right", "left")]
 
 
-def joint(start: np.ndarray, end: np.ndarray, upper_m: float, lower_m: float, bend: float) -> np.ndarray:
-    """Return where two bones meet (F, 3) that reach from `start` (F, 3) to `end` (F, 3), in a plane along y and z.
+def joint(
+    start: np.ndarray, end: np.ndarray, upper_m: float, lower_m: float, bend: float
+) -> np.ndarray:
+    """Return where two bones meet (F, 3) that reach from `start` (F, 3) to `end` (F, 3), in a plane
+    along y and z.
 
-    upper_m, lower_m: lengths of the bones; bend: 1 where the joint points to the front, -1 to the back.
+    upper_m, lower_m: lengths of the bones; bend: 1 where the joint points to the front, -1 to the
+    back.
     Raises: InputError where the end is farther away than both bones reach, or too near.
     Source: law of cosines.
     """
@@ -126,7 +168,8 @@ def joint(start: np.ndarray, end: np.ndarray, upper_m: float, lower_m: float, be
 
 
 def circle(turns: np.ndarray, radius_m: float) -> np.ndarray:
-    """Return points (F, 3) of a circle about x that turns as a wheel does which rolls to the front: up, front, down.
+    """Return points (F, 3) of a circle about x that turns as a wheel does which rolls to the front:
+    up, front, down.
 
     turns (F,): angle in turns, 0 at the top.
     """

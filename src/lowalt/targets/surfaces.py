@@ -1,9 +1,10 @@
-"""Triangle surfaces: closed ones from parametric primitives, whether points lie inside, and points spread on them.
+"""Triangle surfaces: closed ones from parametric primitives, whether points lie inside, and points
+spread on them.
 
-This module is geometry only: it knows no target, part or record. Every primitive is one closed shell with outward
-normals (right-hand rule), in the caller's unit. Built-in models consist of several shells, which may overlap. trimesh's
-sampler draws the faces independently; here they are drawn systematically, which halves the unevenness before thinning
-and spares the import.
+This module is geometry only: it knows no target, part or record. Every primitive is one closed
+shell with outward normals (right-hand rule), in the caller's unit. Built-in models consist of
+several shells, which may overlap. trimesh's sampler draws the faces independently; here they are
+drawn systematically, which halves the unevenness before thinning and spares the import.
 """
 
 from collections.abc import Iterable
@@ -16,12 +17,16 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 
 GRAIN = 30
-"""Triangles across the border of a cut are divided until their edges are shorter than the part's extent / GRAIN."""
+"""Triangles across the border of a cut are divided until their edges are shorter than the part's
+extent / GRAIN.
+"""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A triangle surface: `vertices` (V, 3) and `faces` (F, 3), indices in right-hand order seen from outside."""
+    """A triangle surface: `vertices` (V, 3) and `faces` (F, 3), indices in right-hand order seen
+    from outside.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -31,7 +36,9 @@ class Surface:
         return replace(self, vertices=self.vertices + np.asarray(offset, float))
 
     def mapped(self, matrix: np.ndarray) -> Self:
-        """Return the surface under a linear map (3, 3); a mirroring map turns the faces, so normals stay outward."""
+        """Return the surface under a linear map (3, 3); a mirroring map turns the faces, so normals
+        stay outward.
+        """
         matrix = np.asarray(matrix, float)
         faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
         return replace(self, vertices=portable.applied(matrix, self.vertices), faces=faces)
@@ -54,10 +61,12 @@ def merged(surfaces: Iterable[Surface]) -> Surface:
 def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
     """Return for each point (L, 3) whether it lies inside the closed surface, shape (L,) bool.
 
-    Source: solid angle of a triangle, Van Oosterom & Strackee 1983; the winding number is their sum over 4 pi.
+    Source: solid angle of a triangle, Van Oosterom & Strackee 1983; the winding number is their sum
+    over 4 pi.
     """
     result = np.zeros(len(points), bool)
-    low, high = surface.vertices.min(0), surface.vertices.max(0)
+    low = surface.vertices.min(0)
+    high = surface.vertices.max(0)
     near = np.flatnonzero(((points > low) & (points < high)).all(1))
     corners = surface.vertices[surface.faces]
     # Blocks bound the memory of the points-by-triangles arrays.
@@ -66,27 +75,32 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
         la, lb, lc = (portable.norm(v) for v in (a, b, c))
         numerator = portable.dot(a, np.cross(b, c))
         ab, bc, ca = (portable.dot(v, w) for v, w in ((a, b), (b, c), (c, a)))
-        # The sum is 0 or 4 pi, so the last bits of the library's arc tangent cannot move it across 2 pi.
+        # The sum is 0 or 4 pi, so the last bits of the library's arc tangent cannot move it across
+        # 2 pi.
         angle = 2 * np.arctan2(numerator, la * lb * lc + ab * lc + bc * la + ca * lb)
         result[block] = angle.sum(1) > 2 * np.pi
     return result
 
 
 def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
-    """Return the closed skin over a row of sections (K, S, 3), each a loop of S points in the same sense.
+    """Return the closed skin over a row of sections (K, S, 3), each a loop of S points in the same
+    sense.
 
-    Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The normals point outward
-    for either sense of the loops.
+    Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The
+    normals point outward for either sense of the loops.
     """
     sections = np.asarray(sections, float)
     rows, sides, _ = sections.shape
     tips = portable.mean(sections[[0, -1]], 1) if tips is None else np.asarray(tips, float)
     grid = np.arange(rows * sides).reshape(rows, sides)
-    a, b = grid[:-1], np.roll(grid[:-1], -1, 1)
-    c, d = np.roll(grid[1:], -1, 1), grid[1:]
-    first, last = rows * sides, rows * sides + 1
-    # The two halves of a loop are split along mirrored diagonals. Otherwise the upper and the lower side of a twisted
-    # blade would cut through each other at its thin edge.
+    a = grid[:-1]
+    b = np.roll(grid[:-1], -1, 1)
+    c = np.roll(grid[1:], -1, 1)
+    d = grid[1:]
+    first = rows * sides
+    last = rows * sides + 1
+    # The two halves of a loop are split along mirrored diagonals. Otherwise the upper and the lower
+    # side of a twisted blade would cut through each other at its thin edge.
     half = np.arange(sides)[None, :, None] < sides // 2
     faces = [
         np.where(half, np.stack([a, b, c], -1), np.stack([a, b, d], -1)).reshape(-1, 3),
@@ -98,29 +112,40 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
     return surface if volume(surface) > 0 else Surface(surface.vertices, surface.faces[:, ::-1])
 
 
-def superellipse(half_a: float, half_b: float, exponent: float = 2.0, sides: int = 24) -> np.ndarray:
-    """Return the loop |a/A|^n + |b/B|^n = 1, shape (sides, 2): n = 2 an ellipse, larger n a rounded rectangle."""
+def superellipse(
+    half_a: float, half_b: float, exponent: float = 2.0, sides: int = 24
+) -> np.ndarray:
+    """Return the loop |a/A|^n + |b/B|^n = 1, shape (sides, 2): n = 2 an ellipse, larger n a rounded
+    rectangle.
+    """
     s, c = portable.sine_cosine_turns(np.arange(sides) / sides)
     along, across = (np.sign(part) * portable.power(abs(part), 2 / exponent) for part in (c, s))
     return np.stack([half_a * along, half_b * across], 1)
 
 
-def ellipsoid(radii: Iterable[float], centre: Iterable[float] = (0, 0, 0), sides: int = 16) -> Surface:
+def ellipsoid(
+    radii: Iterable[float], centre: Iterable[float] = (0, 0, 0), sides: int = 16
+) -> Surface:
     """Return an ellipsoid with the half axes `radii` (3,) about `centre` (3,)."""
     out, up = portable.sine_cosine_turns(np.arange(1, sides // 2) / (2 * (sides // 2)))
     ring = np.stack(portable.sine_cosine_turns(np.arange(sides) / sides)[::-1], 1)
-    rings = np.concatenate([out[:, None, None] * ring, np.broadcast_to(up[:, None, None], (len(up), sides, 1))], 2)
+    rings = np.concatenate(
+        [out[:, None, None] * ring, np.broadcast_to(up[:, None, None], (len(up), sides, 1))], 2
+    )
     unit = loft(rings, tips=[[0, 0, 1], [0, 0, -1]])
     return unit.mapped(np.diag(np.asarray(radii, float))).moved(centre)
 
 
 def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surface:
-    """Return a round tube along `path` (K, 3) with a radius at each of its points, closed by flat ends."""
+    """Return a round tube along `path` (K, 3) with a radius at each of its points, closed by flat
+    ends.
+    """
     path = np.asarray(path, float)
     radii = np.broadcast_to(np.asarray(radii, float), len(path))
     tangents = np.gradient(path, axis=0)
     tangents /= portable.norm(tangents)[:, None]
-    # All sections share the axis that the path follows least as their reference, so that the loops do not twist.
+    # All sections share the axis that the path follows least as their reference, so that the loops
+    # do not twist.
     reference = np.eye(3)[np.argmin(abs(tangents).max(0))]
     first = np.cross(tangents, reference)
     first /= portable.norm(first)[:, None]
@@ -130,13 +155,18 @@ def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surfac
     return loft(path[:, None] + radii[:, None, None] * rings)
 
 
-def cylinder(radius: float, bottom: Iterable[float], top: Iterable[float], sides: int = 16) -> Surface:
+def cylinder(
+    radius: float, bottom: Iterable[float], top: Iterable[float], sides: int = 16
+) -> Surface:
     """Return a cylinder between the centres of its two ends (3,)."""
     return tube(np.array([bottom, top], float), radius, sides)
 
 
-def hull(stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow: float = 0.0) -> Surface:
-    """Return a body along y from stations (y, half_width, z_low, z_high): superellipse sections, closed ends.
+def hull(
+    stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow: float = 0.0
+) -> Surface:
+    """Return a body along y from stations (y, half_width, z_low, z_high): superellipse sections,
+    closed ends.
 
     `bow` shifts both tips outward along y by that length, which rounds the ends.
     """
@@ -151,50 +181,67 @@ def hull(stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow:
     return loft(sections, tips)
 
 
-def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0) -> Surface:
-    """Return a box with the edge lengths `size` (x, y, z); the superellipse's exponent rounds its edges along y."""
+def box(
+    size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0
+) -> Surface:
+    """Return a box with the edge lengths `size` (x, y, z); the superellipse's exponent rounds its
+    edges along y.
+    """
     x, y, z = (float(value) / 2 for value in size)
     return hull([(-y, x, -z, z), (y, x, -z, z)], exponent).moved(centre)
 
 
 def ring(profile: np.ndarray, sides: int = 32) -> Surface:
-    """Return a closed profile (S, 2) of (radius, height) turned about the z axis: a tyre, a duct, a torus."""
+    """Return a closed profile (S, 2) of (radius, height) turned about the z axis: a tyre, a duct, a
+    torus.
+    """
     profile = np.asarray(profile, float)
     sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
     x = cosine[:, None] * profile[:, 0]
     y = sine[:, None] * profile[:, 0]
     vertices = np.stack([x, y, np.broadcast_to(profile[:, 1], x.shape)], -1)
     grid = np.arange(x.size).reshape(x.shape)
-    right, up = np.roll(grid, -1, 0), np.roll(grid, -1, 1)
+    right = np.roll(grid, -1, 0)
+    up = np.roll(grid, -1, 1)
     both = np.roll(right, -1, 1)
-    faces = np.concatenate([np.stack([grid, right, both], -1), np.stack([grid, both, up], -1)]).reshape(-1, 3)
+    faces = np.concatenate(
+        [np.stack([grid, right, both], -1), np.stack([grid, both, up], -1)]
+    ).reshape(-1, 3)
     surface = Surface(vertices.reshape(-1, 3), faces)
     return surface if volume(surface) > 0 else Surface(surface.vertices, faces[:, ::-1])
 
 
 def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
-    """Return a symmetric section (2 panels + 1, 2) of (along chord, across), leading edge at +chord/4, as a loop.
+    """Return a symmetric section (2 panels + 1, 2) of (along chord, across), leading edge at
+    +chord/4, as a loop.
 
-    `thickness` is the largest thickness over the chord. The blunt trailing edge has a fiftieth of that thickness.
+    `thickness` is the largest thickness over the chord. The blunt trailing edge has a fiftieth of
+    that thickness.
     Source: NACA four-digit thickness distribution, Abbott & von Doenhoff 1959.
     """
     x = (1 - portable.sine_cosine_turns(np.arange(panels + 1) / (2 * panels))[1]) / 2
-    y = 5 * thickness * (0.2969 * np.sqrt(x) + x * (-0.1260 + x * (-0.3516 + x * (0.2843 - 0.1015 * x))))
+    y = (
+        5
+        * thickness
+        * (0.2969 * np.sqrt(x) + x * (-0.1260 + x * (-0.3516 + x * (0.2843 - 0.1015 * x))))
+    )
     loop = np.concatenate([np.stack([x, y], 1), np.stack([x, -y], 1)[:0:-1]]) * chord
     return np.stack([chord / 4 - loop[:, 0], loop[:, 1]], 1)
 
 
 def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
-    """Return a wing or blade along +x from stations (x, y, z, chord, twist): airfoil sections, closed ends.
+    """Return a wing or blade along +x from stations (x, y, z, chord, twist): airfoil sections,
+    closed ends.
 
-    (x, y, z) is the quarter-chord point, the chord lies along y (leading edge at +y), a positive twist (rad) raises
-    the leading edge.
+    (x, y, z) is the quarter-chord point, the chord lies along y (leading edge at +y), a positive
+    twist (rad) raises the leading edge.
     """
     sections = []
     for x, y, z, chord, twist in stations:
         loop = airfoil(chord, thickness)
         s, c = portable.sine_cosine(twist)
-        along, across = loop[:, 0] * c - loop[:, 1] * s, loop[:, 0] * s + loop[:, 1] * c
+        along = loop[:, 0] * c - loop[:, 1] * s
+        across = loop[:, 0] * s + loop[:, 1] * c
         sections.append(np.stack([np.full(len(loop), float(x)), y + along, z + across], 1))
     return loft(np.array(sections))
 
@@ -205,15 +252,20 @@ def longest_edge(corners: np.ndarray) -> np.ndarray:
 
 
 def quartered(corners: np.ndarray) -> np.ndarray:
-    """Return triangles (F, 3, 3) each divided into four at the middles of its edges, (4 F, 3, 3), copies in turn."""
+    """Return triangles (F, 3, 3) each divided into four at the middles of its edges, (4 F, 3, 3),
+    copies in turn.
+    """
     a, b, c = np.moveaxis(corners, 1, 0)
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    ab = (a + b) / 2
+    bc = (b + c) / 2
+    ca = (c + a) / 2
     four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
     return np.concatenate([np.stack(three, axis=1) for three in four])
 
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return each triangle's unit normal (F, 3), by the right-hand rule, and its area (F,) in squared units.
+    """Return each triangle's unit normal (F, 3), by the right-hand rule, and its area (F,) in
+    squared units.
 
     `vertices` (V, 3), `faces` (F, 3) indices. A degenerate triangle has area 0 and a zero normal.
     """
@@ -227,11 +279,12 @@ def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
 def sample_faces(
     vertices: np.ndarray, faces: np.ndarray, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return `count` points (count, 3) spread over the triangles by area and the triangle (count,) each lies on.
+    """Return `count` points (count, 3) spread over the triangles by area and the triangle (count,)
+    each lies on.
 
-    `vertices` (V, 3), `faces` (F, 3) indices, `rng` the only source of randomness. One point falls into each of
-    `count` equal slices of the running area, so a face of area a gets count * a / total points to within two.
-    Degenerate triangles get none.
+    `vertices` (V, 3), `faces` (F, 3) indices, `rng` the only source of randomness. One point falls
+    into each of `count` equal slices of the running area, so a face of area a gets count * a /
+    total points to within two. Degenerate triangles get none.
     Raises: InputError where the surface has no area or the area is not finite.
     Source: Osada et al. 2002 (uniform point in a triangle), systematic sampling over the faces.
     """
@@ -239,29 +292,41 @@ def sample_faces(
     running = np.cumsum(areas)
     total = running[-1] if len(running) else 0.0
     if not (np.isfinite(total) and total > 0):
-        raise InputError(f"surface of {len(areas)} triangles has area {total}, expected a positive finite one")
+        raise InputError(
+            f"surface of {len(areas)} triangles has area {total}, expected a positive finite one"
+        )
     where = (np.arange(count) + rng.random(count)) / count * total
-    # side="right" passes over degenerate faces; the clip guards the last slice against rounding at its end.
+    # side="right" passes over degenerate faces; the clip guards the last slice against rounding at
+    # its end.
     face = np.searchsorted(running, where, side="right").clip(max=np.flatnonzero(areas)[-1])
     corners = np.asarray(vertices, float)[np.asarray(faces)[face]]
-    root, along = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
-    points = (1 - root) * corners[:, 0] + root * ((1 - along) * corners[:, 1] + along * corners[:, 2])
+    root = np.sqrt(rng.random(count))[:, None]
+    along = rng.random(count)[:, None]
+    points = (1 - root) * corners[:, 0] + root * (
+        (1 - along) * corners[:, 1] + along * corners[:, 2]
+    )
     return points, face
 
 
-def thin(points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()) -> np.ndarray:
-    """Return the indices (count,) of `count` points spread as evenly as can be, in the order they were chosen.
+def thin(
+    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()
+) -> np.ndarray:
+    """Return the indices (count,) of `count` points spread as evenly as can be, in the order they
+    were chosen.
 
-    Farthest-point sampling: each next point is the one farthest from all chosen so far (lowest index on a tie),
-    from a random first one. `points` (L, D); the indices in `keep` are chosen first, in their order. The count is
-    exact and the indices are unique, also where points coincide.
+    Farthest-point sampling: each next point is the one farthest from all chosen so far (lowest
+    index on a tie), from a random first one. `points` (L, D); the indices in `keep` are chosen
+    first, in their order. The count is exact and the indices are unique, also where points
+    coincide.
     Raises: InputError where `count` is not between max(1, len(keep)) and L.
     Source: Eldar et al. 1997, "The farthest point strategy for progressive image sampling".
     """
     points = np.asarray(points, float)
     keep = [int(index) for index in dict.fromkeys(np.asarray(keep, int).tolist())]
     if not max(1, len(keep)) <= count <= len(points):
-        raise InputError(f"thinning to {count} points, expected {max(1, len(keep))} to {len(points)}")
+        raise InputError(
+            f"thinning to {count} points, expected {max(1, len(keep))} to {len(points)}"
+        )
     columns = np.ascontiguousarray(points.T)
     nearest = np.full(len(points), np.inf)
     chosen = np.empty(count, np.int64)

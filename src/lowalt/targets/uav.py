@@ -1,9 +1,11 @@
-"""Built-in multirotor layouts: frame, motors, ducts, legs, payload and turning propellers as closed shells.
+"""Built-in multirotor layouts: frame, motors, ducts, legs, payload and turning propellers as closed
+shells.
 
-Axes: front +y, right +x, up +z, metres. The origin lies in the middle between all rotors, seen from above, at half the
-body's height. `records.schema.yaml` lists the figures of each layout: `hub_turn` is how far the first hub stands from
-the front, in parts of the angle between hubs; a rotor of two layers has equal blades `layer_gap` apart, the lower ones
-turned by `layer_turn` of a whole turn. A plain factor in the code only rounds or joins shells.
+Axes: front +y, right +x, up +z, metres. The origin lies in the middle between all rotors, seen from
+above, at half the body's height. `records.schema.yaml` lists the figures of each layout: `hub_turn`
+is how far the first hub stands from the front, in parts of the angle between hubs; a rotor of two
+layers has equal blades `layer_gap` apart, the lower ones turned by `layer_turn` of a whole turn. A
+plain factor in the code only rounds or joins shells.
 """
 
 import numpy as np
@@ -22,7 +24,8 @@ def fault(record: dict) -> str | None:
     figures = {name: value["si"] for name, value in record["figures"].items()}
     if record["model"] in aircraft.LAYOUTS:
         return aircraft.fault(record)
-    diagonal, size = motor_diagonal(record), record["published"]["size_m"]
+    diagonal = motor_diagonal(record)
+    size = record["published"]["size_m"]
     if diagonal <= 0 or (record["size_is"] != "body diagonal" and size < diagonal):
         return f"motor diagonal is {diagonal:.4g} m in a craft of {size} m"
     places = hubs(record, figures)
@@ -35,8 +38,13 @@ def fault(record: dict) -> str | None:
 
 def folding(record: dict, f: dict) -> list[Part]:
     """Return a folding camera quadrotor: fuselage, swung-out arms, front legs, nose gimbal."""
-    places, top = hubs(record, f), 0.5 * f["body_height"]
-    shells = [fuselage(f), *motors(places, top, f), *camera(f, 0.44 * f["body_length"], -0.42 * f["body_height"])]
+    places = hubs(record, f)
+    top = 0.5 * f["body_height"]
+    shells = [
+        fuselage(f),
+        *motors(places, top, f),
+        *camera(f, 0.44 * f["body_length"], -0.42 * f["body_height"]),
+    ]
     arm = f["arm_diameter"] / 2
     for x, y in places:
         front = y > 0
@@ -50,11 +58,15 @@ def folding(record: dict, f: dict) -> list[Part]:
 
 
 def ducted(record: dict, f: dict) -> list[Part]:
-    """Return a ducted quadrotor: four rings around the propellers, a narrow pod, a battery and a nose camera."""
+    """Return a ducted quadrotor: four rings around the propellers, a narrow pod, a battery and a
+    nose camera.
+    """
     places = hubs(record, f)
     outer = (record["published"]["size_m"] - motor_diagonal(record)) / 2
-    inner, half = f["propeller_diameter"] / 2 * 1.04, f["duct_height"] / 2
-    middle, wall = (inner + outer) / 2, (outer - inner) / 2
+    inner = f["propeller_diameter"] / 2 * 1.04
+    half = f["duct_height"] / 2
+    middle = (inner + outer) / 2
+    wall = (outer - inner) / 2
     sine, cosine = portable.sine_cosine_turns(np.arange(10) / 10)
     duct = ring(np.stack([middle + wall * cosine, half * sine], 1), 40)
     shells = [duct.moved((x, y, 0)) for x, y in places] + motors(places, 0.0, f)
@@ -64,41 +76,67 @@ def ducted(record: dict, f: dict) -> list[Part]:
             end = (x + middle * cosine, y + middle * sine, low)
             shells.append(tube([(x, y, low), end], f["arm_diameter"] / 2, 8))
     pod = fuselage(f, 0.8).moved((0, 0, f["body_height"] / 2))
-    battery = box((0.75 * f["body_width"], 0.45 * f["body_length"], 0.45 * f["body_height"]),
-                  (0, -0.22 * f["body_length"], f["body_height"]))  # fmt: skip
+    battery = box(
+        (0.75 * f["body_width"], 0.45 * f["body_length"], 0.45 * f["body_height"]),
+        (0, -0.22 * f["body_length"], f["body_height"]),
+    )
     shells += [pod, battery, *camera(f, 0.52 * f["body_length"], 0.45 * f["body_height"])]
     for x in (-1, 1):
         for y in (-1, 1):
             top = (0.4 * x * f["body_width"], 0.25 * y * f["body_length"], 0)
-            shells.append(tube([top, (top[0], top[1], -half - f["leg_height"])], f["arm_diameter"] / 2, 8))
+            shells.append(
+                tube([top, (top[0], top[1], -half - f["leg_height"])], f["arm_diameter"] / 2, 8)
+            )
     return [Part("body", "body", tuple(shells)), *rotors(places, 0.15 * half, f)]
 
 
 def raised(record: dict, f: dict) -> list[Part]:
-    """Return an H-frame craft in flight: side booms raised above the pod, cross tubes, a big gimbal below the nose."""
+    """Return an H-frame craft in flight: side booms raised above the pod, cross tubes, a big gimbal
+    below the nose.
+    """
     places = hubs(record, f)
-    boom, arm = f["frame_rise"], f["arm_diameter"] / 2
+    boom = f["frame_rise"]
+    arm = f["arm_diameter"] / 2
     reach_x, reach_y = abs(places).max(0)
     shells = [fuselage(f, 0.7), *motors(places, boom + arm + f["motor_height"], f)]
     for side in (-1, 1):
         x = side * reach_x
         shells.append(tube([(x, -1.08 * reach_y, boom), (x, 1.08 * reach_y, boom)], arm))
-        shells.append(tube([(0.2 * side * f["body_width"], 0, 0.1 * f["body_height"]), (x, 0, boom)], [1.3 * arm, arm]))
+        shells.append(
+            tube(
+                [(0.2 * side * f["body_width"], 0, 0.1 * f["body_height"]), (x, 0, boom)],
+                [1.3 * arm, arm],
+            )
+        )
         for y in (-reach_y, reach_y):
-            shells.append(tube([(x, y, boom), (1.04 * x, y, boom - f["leg_height"])], [0.7 * arm, 0.4 * arm], 8))
+            shells.append(
+                tube(
+                    [(x, y, boom), (1.04 * x, y, boom - f["leg_height"])], [0.7 * arm, 0.4 * arm], 8
+                )
+            )
     d = f["camera_diameter"]
     shells += camera(f, 0.38 * f["body_length"], -0.5 * f["body_height"] - 0.6 * d)
-    battery = box((0.55 * f["body_width"], 0.3 * f["body_length"], 0.4 * f["body_height"]),
-                  (0, -0.3 * f["body_length"], 0.5 * f["body_height"]))  # fmt: skip
-    return [Part("body", "body", (*shells, battery)), *rotors(places, boom + arm + 1.2 * f["motor_height"], f)]
+    battery = box(
+        (0.55 * f["body_width"], 0.3 * f["body_length"], 0.4 * f["body_height"]),
+        (0, -0.3 * f["body_length"], 0.5 * f["body_height"]),
+    )
+    return [
+        Part("body", "body", (*shells, battery)),
+        *rotors(places, boom + arm + 1.2 * f["motor_height"], f),
+    ]
 
 
 def radial(record: dict, f: dict) -> list[Part]:
-    """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids and a gimbal."""
-    places, arm = hubs(record, f), f["arm_diameter"] / 2
+    """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids
+    and a gimbal.
+    """
+    places = hubs(record, f)
+    arm = f["arm_diameter"] / 2
     shape = ((0.5, 0.25, 0.3), (0.42, 0.6, 0.42), (0.2, 0.95, 0.5), (-0.2, 0.95, 0.5), (-0.42, 0.6, 0.42),
              (-0.5, 0.25, 0.3))  # fmt: skip
-    length, width, height = f["body_length"], f["body_width"], f["body_height"]
+    length = f["body_length"]
+    width = f["body_width"]
+    height = f["body_height"]
     centre = hull([(y * length, w * width / 2, -h * height, h * height) for y, w, h in shape])
     top = arm + f["motor_height"]
     shells = [centre, *motors(places, top, f)]
@@ -107,59 +145,112 @@ def radial(record: dict, f: dict) -> list[Part]:
         shells.append(tube([(0.2 * x, 0.2 * y, 0), (x, y, 0)], arm))
         # Turn from the front to the arm's direction, by the arm's angle minus a quarter turn.
         far = np.sqrt(x * x + y * y)
-        sine, cosine = -x / far, y / far
+        sine = -x / far
+        cosine = y / far
         spin = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-        pack = box((0.4 * cell, cell, 0.5 * cell), (0, 0.36 * f["body_length"], 0.5 * f["body_height"]))
+        pack = box(
+            (0.4 * cell, cell, 0.5 * cell), (0, 0.36 * f["body_length"], 0.5 * f["body_height"])
+        )
         shells.append(pack.mapped(spin))
     bottom = -0.5 * f["body_height"] - f["leg_height"]
-    shells += skids(0.85 * f["body_width"], 1.2 * f["body_length"], -0.3 * f["body_height"], bottom, 0.6 * arm)
-    shells += camera(f, 0.1 * f["body_length"], -0.5 * f["body_height"] - 0.9 * f["camera_diameter"])
+    shells += skids(
+        0.85 * f["body_width"], 1.2 * f["body_length"], -0.3 * f["body_height"], bottom, 0.6 * arm
+    )
+    shells += camera(
+        f, 0.1 * f["body_length"], -0.5 * f["body_height"] - 0.9 * f["camera_diameter"]
+    )
     return [Part("body", "body", tuple(shells)), *rotors(places, top, f)]
 
 
 def cabin(record: dict, f: dict) -> list[Part]:
     """Return a passenger craft: a drop-shaped two-seat cabin on eight low arms and two skids."""
-    places, arm = hubs(record, f), f["arm_diameter"] / 2
-    length, half, height = f["body_length"], f["body_width"] / 2, f["body_height"]
-    shape = ((0.5, 0.2, -0.3, -0.1), (0.44, 0.55, -0.42, 0.1), (0.25, 0.95, -0.5, 0.38), (0, 1, -0.5, 0.5),
-             (-0.25, 0.85, -0.5, 0.44), (-0.42, 0.45, -0.44, 0.2), (-0.5, 0.15, -0.35, -0.05))  # fmt: skip
-    shells = [hull([(y * length, w * half, a * height, b * height) for y, w, a, b in shape], 2.3, bow=0.02 * length)]
+    places = hubs(record, f)
+    arm = f["arm_diameter"] / 2
+    length = f["body_length"]
+    half = f["body_width"] / 2
+    height = f["body_height"]
+    shape = (
+        (0.5, 0.2, -0.3, -0.1),
+        (0.44, 0.55, -0.42, 0.1),
+        (0.25, 0.95, -0.5, 0.38),
+        (0, 1, -0.5, 0.5),
+        (-0.25, 0.85, -0.5, 0.44),
+        (-0.42, 0.45, -0.44, 0.2),
+        (-0.5, 0.15, -0.35, -0.05),
+    )
+    shells = [
+        hull(
+            [(y * length, w * half, a * height, b * height) for y, w, a, b in shape],
+            2.3,
+            bow=0.02 * length,
+        )
+    ]
     level = -0.42 * height
     # The arms carry their motors half-way between the two layers of blades.
     top = level + f["layer_gap"] / 2
-    shells += [cylinder(f["motor_diameter"] / 2, (x, y, top - f["layer_gap"]), (x, y, top)) for x, y in places]
-    shells += [tube([(0.12 * x, 0.2 * y, level), (x, y, level)], [1.5 * arm, arm]) for x, y in places]
+    shells += [
+        cylinder(f["motor_diameter"] / 2, (x, y, top - f["layer_gap"]), (x, y, top))
+        for x, y in places
+    ]
+    shells += [
+        tube([(0.12 * x, 0.2 * y, level), (x, y, level)], [1.5 * arm, arm]) for x, y in places
+    ]
     bottom = -0.5 * height - f["leg_height"]
     shells += skids(0.9 * half, 0.75 * length, -0.45 * height, bottom, 0.7 * arm)
-    return [Part("body", "body", tuple(shells)), *rotors(places, top, f, bool(record.get("coaxial")))]
+    return [
+        Part("body", "body", tuple(shells)),
+        *rotors(places, top, f, bool(record.get("coaxial"))),
+    ]
 
 
 def tanker(record: dict, f: dict) -> list[Part]:
-    """Return a firefighting quadrotor: box frame, straight arms, a tank under it, wide skids and a nozzle lance."""
-    places, arm = hubs(record, f), f["arm_diameter"] / 2
-    length, width, height = f["body_length"], f["body_width"], f["body_height"]
+    """Return a firefighting quadrotor: box frame, straight arms, a tank under it, wide skids and a
+    nozzle lance.
+    """
+    places = hubs(record, f)
+    arm = f["arm_diameter"] / 2
+    length = f["body_length"]
+    width = f["body_width"]
+    height = f["body_height"]
     top = 0.5 * height + max(f["motor_height"], f["layer_gap"] / 2)
     frame = ((0.5, 0.3, 0.35), (0.35, 0.5, 0.5), (-0.35, 0.5, 0.5), (-0.5, 0.3, 0.35))
     shells = [hull([(y * length, w * width, -h * height, h * height) for y, w, h in frame], 5.0)]
     shells += motors(places, top, f)
-    shells += [tube([(0.12 * x, 0.12 * y, 0.2 * height), (x, y, 0.5 * height)], [1.1 * arm, arm]) for x, y in places]
-    d, span = f["tank_diameter"], f["tank_length"]
+    shells += [
+        tube([(0.12 * x, 0.12 * y, 0.2 * height), (x, y, 0.5 * height)], [1.1 * arm, arm])
+        for x, y in places
+    ]
+    d = f["tank_diameter"]
+    span = f["tank_length"]
     z = -0.5 * height - 0.5 * d
     tank = ((0.5, 0.3), (0.44, 0.8), (0.35, 1), (-0.35, 1), (-0.44, 0.8), (-0.5, 0.3))
     shells.append(hull([(y * span, w * d / 2, z - w * d / 2, z + w * d / 2) for y, w in tank], 2.0))
-    level, end = -0.2 * height, 0.5 * length + f["lance_length"]
+    level = -0.2 * height
+    end = 0.5 * length + f["lance_length"]
     shells.append(tube([(0, 0.3 * length, level), (0, end, level)], [0.6 * arm, 0.35 * arm], 8))
     bottom = -0.5 * height - f["leg_height"]
     shells += skids(0.75 * width, 1.3 * length, -0.3 * height, bottom, 0.5 * arm)
-    return [Part("body", "body", tuple(shells)), *rotors(places, top, f, bool(record.get("coaxial")))]
+    return [
+        Part("body", "body", tuple(shells)),
+        *rotors(places, top, f, bool(record.get("coaxial"))),
+    ]
 
 
 LAYOUTS = {
-    "folding": folding, "ducted": ducted, "raised": raised, "radial": radial, "cabin": cabin, "tanker": tanker,
+    "folding": folding,
+    "ducted": ducted,
+    "raised": raised,
+    "radial": radial,
+    "cabin": cabin,
+    "tanker": tanker,
     **aircraft.LAYOUTS,
-}  # fmt: skip
+}
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the craft that a merged record describes, and the entries for its cloud's record (none)."""
-    return LAYOUTS[record["model"]](record, {name: value["si"] for name, value in record["figures"].items()}), {}
+    """Return the parts of the craft that a merged record describes, and the entries for its cloud's
+    record (none).
+    """
+    return LAYOUTS[record["model"]](
+        record, {name: value["si"] for name, value in record["figures"].items()}
+    ), {}

@@ -1,4 +1,5 @@
-"""Pieces that multirotor layouts share: where rotors stand, propellers, motors, fuselage, gimbal and skids.
+"""Pieces that multirotor layouts share: where rotors stand, propellers, motors, fuselage, gimbal
+and skids.
 
 Axes: front +y, right +x, up +z, metres. `figure` is a record's figures in SI units by name.
 """
@@ -12,7 +13,8 @@ from lowalt.targets.surfaces import Surface, cylinder, ellipsoid, foil, hull, tu
 
 def motor_diagonal(record: dict) -> float:
     """Return the largest distance between motor axes (m) that gives the craft its published size."""
-    size, figure = record["published"]["size_m"], record["figures"]
+    size = record["published"]["size_m"]
+    figure = record["figures"]
     if record["size_is"] in ("body diagonal", "span over ducts"):
         return figure["motor_diagonal"]["si"]
     if record["size_is"] == "span over rotors":
@@ -23,8 +25,9 @@ def motor_diagonal(record: dict) -> float:
 def hubs(record: dict, figure: dict) -> np.ndarray:
     """Return the motor axes' places (R, 2) in plan (m), counted anticlockwise seen from above.
 
-    With a `spacing_ratio` (lateral over longitudinal) four axes stand at the corners of a rectangle. Otherwise they
-    stand evenly on a circle, the first by `hub_turn` of the angle between two of them from the front.
+    With a `spacing_ratio` (lateral over longitudinal) four axes stand at the corners of a
+    rectangle. Otherwise they stand evenly on a circle, the first by `hub_turn` of the angle between
+    two of them from the front.
     """
     ratio = figure.get("spacing_ratio")
     reach = motor_diagonal(record) / 2
@@ -34,26 +37,34 @@ def hubs(record: dict, figure: dict) -> np.ndarray:
         front = np.array([1, 1, -1, -1]) / slant
         right = np.array([1, -1, -1, 1]) * ratio / slant
     else:
-        front, right = portable.sine_cosine_turns(1 / 4 + (np.arange(count) - figure["hub_turn"]) / count)
+        front, right = portable.sine_cosine_turns(
+            1 / 4 + (np.arange(count) - figure["hub_turn"]) / count
+        )
     return reach * np.stack([right, front], 1)
 
 
 def blade(diameter: float, chord: float, sense: int) -> Surface:
-    """Return one propeller blade along +x, hub at the origin, for a rotor that turns anticlockwise (`sense` 1, leading
-    edge at +y) or clockwise (-1).
+    """Return one propeller blade along +x, hub at the origin, for a rotor that turns anticlockwise
+    (`sense` 1, leading edge at +y) or clockwise (-1).
 
-    The twist follows a constant pitch of two thirds of the diameter; the chord is largest at 0.35 of the radius.
+    The twist follows a constant pitch of two thirds of the diameter; the chord is largest at 0.35
+    of the radius.
     """
     radius = diameter / 2
     stations = np.array([0.08, 0.2, 0.35, 0.55, 0.75, 0.92, 1.0])
     chords = chord * np.array([0.55, 0.85, 1.0, 0.88, 0.68, 0.5, 0.25])
     twist = portable.arctan(4 / 3 / (2 * np.pi * np.maximum(stations, 0.2)))
-    shell = foil([(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10)
+    shell = foil(
+        [(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10
+    )
     return shell if sense > 0 else shell.mapped(np.diag([1.0, -1.0, 1.0]))
 
 
-def rotor(name: str, hub: np.ndarray, sense: int, figure: dict, layers: tuple[tuple[float, float], ...]) -> Part:
-    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade square to the arm.
+def rotor(
+    name: str, hub: np.ndarray, sense: int, figure: dict, layers: tuple[tuple[float, float], ...]
+) -> Part:
+    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade
+    square to the arm.
 
     layers: depth below the hub (m) and turn of each layer of blades.
     """
@@ -74,11 +85,16 @@ def rotor(name: str, hub: np.ndarray, sense: int, figure: dict, layers: tuple[tu
 def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False) -> list[Part]:
     """Return the rotors on the motor axes (R, 2) at `height`; neighbours turn in opposite senses.
 
-    With a figure `layer_gap` each rotor has two layers of blades. apart: whether the lower layer is a rotor of its own,
-    which turns against the upper one.
+    With a figure `layer_gap` each rotor has two layers of blades. apart: whether the lower layer is
+    a rotor of its own, which turns against the upper one.
     """
-    parts, single = [], ((0.0, 0.0),)
-    layers = single if apart or "layer_gap" not in figure else (*single, (figure["layer_gap"], figure["layer_turn"]))
+    parts = []
+    single = ((0.0, 0.0),)
+    layers = (
+        single
+        if apart or "layer_gap" not in figure
+        else (*single, (figure["layer_gap"], figure["layer_turn"]))
+    )
     for index, (x, y) in enumerate(places):
         sense = 1 if index % 2 == 0 else -1
         parts.append(rotor(f"rotor {index + 1}", np.array([x, y, height]), sense, figure, layers))
@@ -89,32 +105,52 @@ def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False)
 
 
 def motors(places: np.ndarray, top: float, figure: dict) -> list[Surface]:
-    """Return the motors as cylinders below the rotors (R, 2); their upper ends are at the height `top` (m)."""
-    low, radius = top - figure["motor_height"], figure["motor_diameter"] / 2
+    """Return the motors as cylinders below the rotors (R, 2); their upper ends are at the height
+    `top` (m).
+    """
+    low = top - figure["motor_height"]
+    radius = figure["motor_diameter"] / 2
     return [cylinder(radius, (x, y, low), (x, y, top)) for x, y in places]
 
 
 def fuselage(figure: dict, taper: float = 0.55) -> Surface:
     """Return a slender fuselage along y, blunt at the nose and tapering to the tail."""
-    length, width, height = figure["body_length"], figure["body_width"], figure["body_height"]
+    length = figure["body_length"]
+    width = figure["body_width"]
+    height = figure["body_height"]
     stations = [(0.5, 0.62, -0.25, 0.28), (0.42, 0.85, -0.42, 0.42), (0.1, 1, -0.5, 0.5), (-0.3, 0.95, -0.5, 0.46),
                 (-0.5, taper, -0.3, 0.3)]  # fmt: skip
-    return hull([(y * length, w * width / 2, a * height, b * height) for y, w, a, b in stations], exponent=3.2)
+    return hull(
+        [(y * length, w * width / 2, a * height, b * height) for y, w, a, b in stations],
+        exponent=3.2,
+    )
 
 
 def camera(figure: dict, y: float, z: float) -> list[Surface]:
     """Return a gimbal: a ball at (0, y, z) with its lens, below a short vertical bar."""
     d = figure["camera_diameter"]
     lens = cylinder(d * 0.28, (0, y + 0.3 * d, z), (0, y + 0.62 * d, z))
-    return [ellipsoid((d / 2, d / 2, d / 2), (0, y, z)), lens, cylinder(d * 0.12, (0, y, z), (0, y, z + 0.9 * d), 8)]
+    return [
+        ellipsoid((d / 2, d / 2, d / 2), (0, y, z)),
+        lens,
+        cylinder(d * 0.12, (0, y, z), (0, y, z + 0.9 * d), 8),
+    ]
 
 
-def skids(half_track: float, length: float, top: float, bottom: float, radius: float) -> list[Surface]:
+def skids(
+    half_track: float, length: float, top: float, bottom: float, radius: float
+) -> list[Surface]:
     """Return two landing skids: inclined struts from the body to runners along y."""
     shells = []
     for side in (-1, 1):
         foot = side * half_track
-        shells.append(tube([(foot, -length / 2, bottom + radius), (foot, length / 2, bottom + radius)], radius, 8))
+        shells.append(
+            tube(
+                [(foot, -length / 2, bottom + radius), (foot, length / 2, bottom + radius)],
+                radius,
+                8,
+            )
+        )
         for y in (-0.28 * length, 0.28 * length):
             shells.append(tube([(0.4 * foot, 0.7 * y, top), (foot, y, bottom + radius)], radius, 8))
     return shells

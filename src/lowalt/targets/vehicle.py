@@ -1,9 +1,11 @@
-"""Built-in car models: a lower body and a greenhouse by the car's profile, and four turning wheels; a bus is one box.
+"""Built-in car models: a lower body and a greenhouse by the car's profile, and four turning wheels;
+a bus is one box.
 
-Axes: front +y, right +x, up +z, metres. The origin lies in the middle of length, width and height, so that it is half
-the height above the ground. Of the figures, heights are relative to the height; stations along the car are distances
-from the front bumper, relative to its length; `roof_width` is relative to the width. `rolling_diameter` is that of the
-tyre, used where the record says `wheel_size: rolling`; by default the wheel has the published (rim) diameter.
+Axes: front +y, right +x, up +z, metres. The origin lies in the middle of length, width and height,
+so that it is half the height above the ground. Of the figures, heights are relative to the height;
+stations along the car are distances from the front bumper, relative to its length; `roof_width` is
+relative to the width. `rolling_diameter` is that of the tyre, used where the record says
+`wheel_size: rolling`; by default the wheel has the published (rim) diameter.
 """
 
 import numpy as np
@@ -24,13 +26,17 @@ def fault(record: dict) -> str | None:
     if axle >= table["len_m"]:
         return f"figures front_overhang + wheel_base are {axle:.4g} m, expected less than the {table['len_m']} m length"
     if f["track"] >= table["wid_m"]:
-        return f"figures.track is {f['track']:.4g} m, expected less than the {table['wid_m']} m width"
+        return (
+            f"figures.track is {f['track']:.4g} m, expected less than the {table['wid_m']} m width"
+        )
     return None if record["model"] == "bus" else _profile_fault(f, table)
 
 
 def _profile_fault(f: dict, table: dict) -> str | None:
     """The fault in the figures of a car's side view, or None where they describe a car."""
-    stations = [f[name] for name in ("windshield_base", "roof_front", "roof_rear", "rear_glass_base")]
+    stations = [
+        f[name] for name in ("windshield_base", "roof_front", "roof_rear", "rear_glass_base")
+    ]
     if not 0.18 < stations[0] < stations[1] < stations[2] < stations[3] < 1:
         return f"figures windshield_base to rear_glass_base are {stations}, expected rising from 0.18 to 1"
     heights = [f["ground_clearance"] / table["hgt_m"], f["hood_height"], f["belt_height"]]
@@ -41,8 +47,11 @@ def _profile_fault(f: dict, table: dict) -> str | None:
 
 def _lower(length: float, width: float, height: float, f: dict) -> Surface:
     """The body up to hood, belt and deck, as rounded sections along the car."""
-    floor, bottom = -height / 2 + f["ground_clearance"], -height / 2
-    hood, belt, deck = (bottom + f[name] * height for name in ("hood_height", "belt_height", "deck_height"))
+    floor = -height / 2 + f["ground_clearance"]
+    bottom = -height / 2
+    hood, belt, deck = (
+        bottom + f[name] * height for name in ("hood_height", "belt_height", "deck_height")
+    )
     nose = floor + 0.55 * (hood - floor)
     tail = floor + 0.35 * (deck - floor)
     half = width / 2
@@ -57,7 +66,11 @@ def _lower(length: float, width: float, height: float, f: dict) -> Surface:
         (0.97, 0.93, floor + 0.5 * lift, deck),
         (1.0, 0.82, floor + lift, max(tail, deck - 0.12 * height)),
     ]
-    return hull([(length * (0.5 - s), w * half, low, high) for s, w, low, high in rows], exponent=4.5, sides=32)
+    return hull(
+        [(length * (0.5 - s), w * half, low, high) for s, w, low, high in rows],
+        exponent=4.5,
+        sides=32,
+    )
 
 
 def _greenhouse(length: float, width: float, height: float, f: dict) -> Surface:
@@ -69,7 +82,8 @@ def _greenhouse(length: float, width: float, height: float, f: dict) -> Surface:
     rings = []
     for up, shrink in ((0.0, 1.0), (0.5, 1.0), (0.85, 1.0), (0.96, 0.97), (1.0, 0.88)):
         ends = base + up * (roof - base)
-        middle, half_length = ends.mean(), abs(np.ptp(ends)) / 2 * shrink
+        middle = ends.mean()
+        half_length = abs(np.ptp(ends)) / 2 * shrink
         half_width = width / 2 * (0.96 + up * (f["roof_width"] - 0.96)) * shrink
         loop = superellipse(half_width, half_length, 4.0, 32)
         z = belt + up * (height / 2 - belt)
@@ -79,42 +93,60 @@ def _greenhouse(length: float, width: float, height: float, f: dict) -> Surface:
 
 def _coach(length: float, width: float, height: float, f: dict) -> Surface:
     """The body of a bus: one box with rounded edges and a slightly slanted front."""
-    floor, top = -height / 2 + f["ground_clearance"], height / 2
-    rows = [(0.5, 0.9, floor + 0.1 * height, 0.86 * top), (0.492, 0.98, floor, 0.95 * top), (0.47, 1.0, floor, top),
-            (-0.49, 1.0, floor, top), (-0.5, 0.95, floor + 0.05 * height, 0.96 * top)]  # fmt: skip
-    return hull([(length * y, w * width / 2, low, high) for y, w, low, high in rows], exponent=7.0, sides=32)
+    floor = -height / 2 + f["ground_clearance"]
+    top = height / 2
+    rows = [
+        (0.5, 0.9, floor + 0.1 * height, 0.86 * top),
+        (0.492, 0.98, floor, 0.95 * top),
+        (0.47, 1.0, floor, top),
+        (-0.49, 1.0, floor, top),
+        (-0.5, 0.95, floor + 0.05 * height, 0.96 * top),
+    ]
+    return hull(
+        [(length * y, w * width / 2, low, high) for y, w, low, high in rows], exponent=7.0, sides=32
+    )
 
 
 def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
-    """Return a wheel about the x axis at the origin, as closed shells: tyre, hub and spokes; its lowest point is at
-    z = -diameter / 2."""
-    radius, half = diameter / 2, tyre_width / 2
+    """Return a wheel about the x axis at the origin, as closed shells: tyre, hub and spokes; its
+    lowest point is at z = -diameter / 2."""
+    radius = diameter / 2
+    half = tyre_width / 2
     inner = 0.62 * radius
     loop = superellipse((radius - inner) / 2, half, 3.5, 16) + np.array([(radius + inner) / 2, 0])
-    # `ring` turns about z. The map takes z to x, so that one section of the tyre points straight down.
+    # `ring` turns about z. The map takes z to x, so that one section of the tyre points straight
+    # down.
     to_x = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
-    shells = [ring(loop, 32).mapped(to_x), cylinder(0.16 * radius, (-0.5 * half, 0, 0), (0.6 * half, 0, 0))]
+    shells = [
+        ring(loop, 32).mapped(to_x),
+        cylinder(0.16 * radius, (-0.5 * half, 0, 0), (0.6 * half, 0, 0)),
+    ]
     for k in range(SPOKES):
         sine, cosine = portable.sine_cosine_turns(k / SPOKES)
         out = np.array([0, cosine, sine])
         across = np.array([0, -sine, cosine])
         side = np.array([1.0, 0, 0])
         section = superellipse(0.12 * radius, 0.2 * half, 4.0, 8)
-        rows = [out * r + 0.35 * half * side + section[:, :1] * across + section[:, 1:] * side
-                for r in (0.1 * radius, 1.04 * inner)]  # fmt: skip
+        rows = [
+            out * r + 0.35 * half * side + section[:, :1] * across + section[:, 1:] * side
+            for r in (0.1 * radius, 1.04 * inner)
+        ]
         shells.append(loft(np.array(rows)))
     return tuple(shells)
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the car that a merged record describes, and the entries for its cloud's record.
+    """Return the parts of the car that a merged record describes, and the entries for its cloud's
+    record.
 
-    The entries are `wheel_diameter_m`, which sets the wheels' rate, and `origin_height_m`, the height of the origin
-    above the ground on which the wheels stand.
+    The entries are `wheel_diameter_m`, which sets the wheels' rate, and `origin_height_m`, the
+    height of the origin above the ground on which the wheels stand.
     """
     f = {name: value["si"] for name, value in record["figures"].items()}
     table = record["published"]
-    length, width, height = table["len_m"], table["wid_m"], table["hgt_m"]
+    length = table["len_m"]
+    width = table["wid_m"]
+    height = table["hgt_m"]
     rolling = record.get("wheel_size", "published") == "rolling"
     diameter = f["rolling_diameter"] if rolling else table["wheel_diam_m"]
     front = length / 2 - f["front_overhang"]
@@ -123,20 +155,31 @@ def parts(record: dict) -> tuple[list[Part], dict]:
     across = min(f["track"] / 2, width / 2 - tyre / 2)
     shells = wheel(diameter, tyre)
     mirror = np.diag([-1.0, 1.0, 1.0])
-    wheels, wells = [], []
+    wheels = []
+    wells = []
     for name, y in (("front", front), ("rear", front - f["wheel_base"])):
         for side, word in ((-1, "left"), (1, "right")):
             centre = (side * across, y, -height / 2 + diameter / 2)
             turned = [shell if side > 0 else shell.mapped(mirror) for shell in shells]
             wheels.append(
-                Part(f"{name} {word} wheel", "wheel", tuple(shell.moved(centre) for shell in turned), centre,
-                     (-1.0, 0.0, 0.0))
-            )  # fmt: skip
-            inside, outside = side * (across - 0.6 * tyre), side * width
-            wells.append(cylinder(0.56 * diameter, (inside, *centre[1:]), (outside, *centre[1:]), 24))
+                Part(
+                    f"{name} {word} wheel",
+                    "wheel",
+                    tuple(shell.moved(centre) for shell in turned),
+                    centre,
+                    (-1.0, 0.0, 0.0),
+                )
+            )
+            inside = side * (across - 0.6 * tyre)
+            outside = side * width
+            wells.append(
+                cylinder(0.56 * diameter, (inside, *centre[1:]), (outside, *centre[1:]), 24)
+            )
     # No station sees a car from below, so the underside between the sills gets no points.
     floor = f["ground_clearance"] + 0.06 * height
     wells.append(box((0.86 * width, 1.1 * length, 2 * floor), (0, 0, -height / 2)))
     skins = (_lower, _greenhouse) if record["model"] == "car" else (_coach,)
-    body = Part("body", "body", tuple(skin(length, width, height, f) for skin in skins), cuts=tuple(wells))
+    body = Part(
+        "body", "body", tuple(skin(length, width, height, f) for skin in skins), cuts=tuple(wells)
+    )
     return [body, *wheels], {"wheel_diameter_m": diameter, "origin_height_m": height / 2}

@@ -1,4 +1,6 @@
-"""`python -m lowalt.tiles`: renders the noisy signals of a chunk as encoded tiles and, optionally, reduced images."""
+"""`python -m lowalt.tiles`: renders the noisy signals of a chunk as encoded tiles and, optionally,
+reduced images.
+"""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -15,16 +17,23 @@ from lowalt.tiles.signals import load_signals
 
 
 def encoded(
-    signals: np.ndarray, tiles: Renderer, seen: Callable[[int, np.ndarray], None],
+    signals: np.ndarray,
+    tiles: Renderer,
+    seen: Callable[[int, np.ndarray], None],
     late: Callable[[int], np.ndarray | None] = lambda model: None,
     cubes: Callable[[int, int, np.ndarray], list[Cube] | None] = lambda model, level, sample: None,
-) -> Iterator[bytes]:  # fmt: skip
-    """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number and its tile.
+) -> Iterator[bytes]:
+    """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number
+    and its tile.
 
-    late: how late a model's symbols are, cubes: those of a model at an SNR, both as in `Renderer.tile`.
+    late: how late a model's symbols are, cubes: those of a model at an SNR, both as in
+    `Renderer.tile`.
     """
-    palette, models = tiles.images.palette, reported(signals, len(signals), "models")
-    samples = ((place, level, one) for place, model in enumerate(models) for level, one in enumerate(model))
+    palette = tiles.images.palette
+    models = reported(signals, len(signals), "models")
+    samples = (
+        (place, level, one) for place, model in enumerate(models) for level, one in enumerate(model)
+    )
     for number, (place, level, sample) in enumerate(samples):
         tile = tiles.tile(sample, late=late(place), cubes=cubes(place, level, sample))
         seen(number, tile)
@@ -45,20 +54,33 @@ def main(arguments: list[str]) -> None:
     )
     line.add_argument("--motion", help="the chunk's motion table, for late symbols and range cells")
     line.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range cells")
-    line.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes, likewise")
+    line.add_argument(
+        "--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes, likewise"
+    )
     options = line.parse_args(arguments)
-    drawn, seen_in = options.settings.pop("drawn", None), options.settings.pop("cubes", None)
+    drawn = options.settings.pop("drawn", None)
+    seen_in = options.settings.pop("cubes", None)
     tiles = Renderer.from_settings(options.settings)
-    late = _late(options.settings["spectra"], drawn, tiles, options.motion) if drawn else lambda model: None
+    late = (
+        _late(options.settings["spectra"], drawn, tiles, options.motion)
+        if drawn
+        else lambda model: None
+    )
     more = {"cubes": _cubes(seen_in, tiles, options)} if seen_in else {}
     signals = load_signals(options.signals, tiles.network)
     targets = [reduced.target(text) for text in options.reduced]
-    with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)) as seen:
+    with reduced.writing(
+        targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)
+    ) as seen:
         tile_files.write(options.out, encoded(signals, tiles, seen, late, **more))
 
 
-def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[[int], np.ndarray | None]:
-    """Delays of the symbols of a chunk's models; drawn: {seed, effects}, from which the scene draws them."""
+def _late(
+    spectra: dict, drawn: dict, tiles: Renderer, motion: str
+) -> Callable[[int], np.ndarray | None]:
+    """Delays of the symbols of a chunk's models; drawn: {seed, effects}, from which the scene draws
+    them.
+    """
     from lowalt.motion import read_table
     from lowalt.scene.lateness import lateness
 
@@ -69,16 +91,22 @@ def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[
 def _cubes(
     settings: dict, tiles: Renderer, options: argparse.Namespace
 ) -> Callable[[int, int, np.ndarray], list[Cube] | None]:
-    """The cubes of a chunk's samples by model, SNR and signals; settings: {seed, tolerance, effects, snr_db}."""
+    """The cubes of a chunk's samples by model, SNR and signals; settings: {seed, tolerance,
+    effects, snr_db}.
+    """
     from lowalt.motion import read_table
     from lowalt.targets.cloud import read
     from lowalt.targets.occluders import read_all
     from lowalt.tiles.cubes import Cubes
 
-    rows, snrs, stations = read_table(options.motion), settings.pop("snr_db"), tiles.network.stations
+    rows = read_table(options.motion)
+    snrs = settings.pop("snr_db")
+    stations = tiles.network.stations
     clouds = {cloud.subtype: cloud for cloud in map(read, options.clouds)}
     scene = settings | {"network": options.settings["network"]}
-    maker = Cubes.from_settings(scene, clouds, read_all(options.occluders) if options.occluders else None)
+    maker = Cubes.from_settings(
+        scene, clouds, read_all(options.occluders) if options.occluders else None
+    )
     return lambda model, level, sample: [
         maker.of(rows[model], float(snrs[level]), station, heard)
         for station, heard in zip(stations, sample, strict=True)

@@ -1,4 +1,5 @@
-"""The cubes of samples: the range cells of every symbol with noise, before the receiver chooses one of them.
+"""The cubes of samples: the range cells of every symbol with noise, before the receiver chooses one
+of them.
 
 The scene's canceller, if any, has already been applied.
 """
@@ -22,19 +23,32 @@ from lowalt.targets.cloud import Cloud, cloud_of
 
 
 class Cubes:
-    """Makes the cubes of samples and caches the clean ones of the last `kept` motion models and stations."""
+    """Makes the cubes of samples and caches the clean ones of the last `kept` motion models and
+    stations.
+    """
 
     def __init__(
-        self, scene: Scene, clouds: Mapping[str, Cloud], occluders: Mapping[str, dict] | None = None,
-        every_cell: bool = False, empty: bool = False, kept: int = 3,
-    ) -> None:  # fmt: skip
-        """Take the scene, clouds by subtype and each subtype's surfaces, where the scene hides points behind them.
+        self,
+        scene: Scene,
+        clouds: Mapping[str, Cloud],
+        occluders: Mapping[str, dict] | None = None,
+        every_cell: bool = False,
+        empty: bool = False,
+        kept: int = 3,
+    ) -> None:
+        """Take the scene, clouds by subtype and each subtype's surfaces, where the scene hides
+        points behind them.
 
-        every_cell: whether noise at the samples' SNRs is an effect of the scene (`set_noise.in_all_cells`); empty:
-        whether the targets reflect nothing, so that noise and land alone are left.
+        every_cell: whether noise at the samples' SNRs is an effect of the scene
+        (`set_noise.in_all_cells`); empty: whether the targets reflect nothing, so that noise and
+        land alone are left.
         """
-        self.scene, self.clouds, self.occluders = scene, clouds, occluders or {}
-        self.every_cell, self.empty, self.kept = every_cell, empty, kept
+        self.scene = scene
+        self.clouds = clouds
+        self.occluders = occluders or {}
+        self.every_cell = every_cell
+        self.empty = empty
+        self.kept = kept
         self._clean: dict[tuple, tuple] = {}
 
     @classmethod
@@ -49,21 +63,28 @@ class Cubes:
 
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
-        seed, network, tolerance, effects = pick(settings, "seed", "network", "tolerance", "effects")
+        seed, network, tolerance, effects = pick(
+            settings, "seed", "network", "tolerance", "effects"
+        )
         scene = Scene(Network.from_settings(network), seed, tolerance, tuple(called(effects)))
         return cls(scene, clouds, occluders, in_all_cells(effects), empty)
 
-    def of(self, row: dict, snr_db: float, station: Station, signal: np.ndarray | None = None) -> Cube:
+    def of(
+        self, row: dict, snr_db: float, station: Station, signal: np.ndarray | None = None
+    ) -> Cube:
         """Return the cube of a row of the motion table at a station and an SNR (dB).
 
-        signal: the sample's noisy signal (N,) complex64 at this station, which is what the chosen cells then hold; the
-        noise of the other cells has the same power and a stream of its own for each subtype, model, station and SNR.
+        signal: the sample's noisy signal (N,) complex64 at this station, which is what the chosen
+        cells then hold; the noise of the other cells has the same power and a stream of its own for
+        each subtype, model, station and SNR.
         Raises: InputError naming the sample that cannot be computed.
         """
         clean, chosen, truths, power_w = self._seen(row, snr_db, station)
         cells = clean.astype(np.complex64)
         if not self.every_cell and not np.isposinf(snr_db):
-            rng = stream(self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
+            rng = stream(
+                self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db
+            )
             noise = add_noise(np.zeros(cells.shape), snr_db, rng, power_w)
             for filtered in every(self.scene.effects, "filtered").values():
                 noise = filtered(noise)
@@ -77,11 +98,17 @@ class Cubes:
     def sample(self, row: dict, snr_db: float, station: Station) -> SceneSample:
         """Return a row of the motion table as a station of the scene sees it, at an SNR (dB)."""
         scene = self.scene.at_snr(snr_db) if self.every_cell else self.scene
-        view = observe(scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"]))
+        view = observe(
+            scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"])
+        )
         return SceneSample(scene, view, self.clouds)
 
-    def _seen(self, row: dict, snr_db: float, station: Station) -> tuple[np.ndarray, np.ndarray, tuple, float]:
-        """Clean cells (N, M), chosen cells (N,), the truth of every target and the power (W) that SNRs refer to."""
+    def _seen(
+        self, row: dict, snr_db: float, station: Station
+    ) -> tuple[np.ndarray, np.ndarray, tuple, float]:
+        """Clean cells (N, M), chosen cells (N,), the truth of every target and the power (W) that
+        SNRs refer to.
+        """
         key = row["subtype"], row["model"], station.name, snr_db if self.every_cell else None
         if key not in self._clean:
             while len(self._clean) >= self.kept:
@@ -92,7 +119,8 @@ class Cubes:
     def _computed(self, row: dict, snr_db: float, station: Station) -> tuple:
         """Compute `_seen`."""
         sample = self.sample(row, snr_db, station)
-        received, sampling = sample.received(), sample.view.sampling
+        received = sample.received()
+        sampling = sample.view.sampling
         there = slice(None) if sampling is None else sampling.present
         seen = (sample.without_target() if self.empty else sample).filtered(sample.detection)
         cells = np.zeros((len(received.cell), seen.shape[1]), np.complex128)
@@ -102,7 +130,9 @@ class Cubes:
 
 
 def true_columns(sample: SceneSample, target: View) -> np.ndarray:
-    """Return what is true of the middle of a sample's target at each symbol, (N, 7), columns `spectra.cube.TRUTH`."""
+    """Return what is true of the middle of a sample's target at each symbol, (N, 7), columns
+    `spectra.cube.TRUTH`.
+    """
     place, speed_mps = sample.observed(target)
     known = np.full((len(speed_mps), 2), -1.0)
     there = slice(None) if target.sampling is None else target.sampling.present

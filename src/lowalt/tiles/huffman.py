@@ -1,8 +1,9 @@
-"""A DEFLATE encoder for filtered images: Huffman codes fitted to each image, matches only for runs of zeros.
+"""A DEFLATE encoder for filtered images: Huffman codes fitted to each image, matches only for runs
+of zeros.
 
-Filtered spectra have almost no repeated strings, so searching for them costs time and saves nothing; only the entropy
-coder remains. It uses only integer arithmetic, so equal images give equal bytes on every machine and with any library
-version. Any zlib reads the result.
+Filtered spectra have almost no repeated strings, so searching for them costs time and saves
+nothing; only the entropy coder remains. It uses only integer arithmetic, so equal images give equal
+bytes on every machine and with any library version. Any zlib reads the result.
 """
 
 import struct
@@ -16,7 +17,8 @@ from lowalt.tiles.huffman_code import LONGEST, canonical_codes, code_lengths
 END = 256
 SYMBOLS = 286
 WORD = 8
-# A shorter run of zeros is cheaper as literals, each of which costs about a bit where zeros are that common.
+# A shorter run of zeros is cheaper as literals, each of which costs about a bit where zeros are
+# that common.
 RUN_WORDS = 3
 U64 = np.uint64
 
@@ -29,7 +31,9 @@ def _lengths_of_matches() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         width = max(0, (code - 261) // 4)
         for rest in range(1 << width):
             if length < 258:
-                symbol[length], extra[length], bits[length] = code, rest, width
+                symbol[length] = code
+                extra[length] = rest
+                bits[length] = width
                 length += 1
     symbol[258] = 285
     return symbol, extra, bits
@@ -84,8 +88,11 @@ def _count(data, words):
 
 @PLAIN
 def _put(out, state, code, length):
-    """Append `length` bits, at most 60, without a branch; state: word being filled, bits in it, its number."""
-    word, bits = state[0], state[1]
+    """Append `length` bits, at most 60, without a branch; state: word being filled, bits in it, its
+    number.
+    """
+    word = state[0]
+    bits = state[1]
     out[state[2]] = word | code << bits
     ends = (bits + length) >> U64(6)
     # Shifted in two steps, since a shift by 64 is undefined.
@@ -97,11 +104,22 @@ def _put(out, state, code, length):
 
 @PLAIN
 def _put_words(data, table, first, last, out, state):
-    """Append the codes of the bytes of words first .. last - 1, four bytes at a time (at most 60 bits)."""
-    low, shift, six, one, full = U64(0x7FFF), U64(16), U64(6), U64(1), U64(63)
-    word, bits, number = state[0], state[1], state[2]
+    """Append the codes of the bytes of words first .. last - 1, four bytes at a time (at most 60
+    bits).
+    """
+    low = U64(0x7FFF)
+    shift = U64(16)
+    six = U64(6)
+    one = U64(1)
+    full = U64(63)
+    word = state[0]
+    bits = state[1]
+    number = state[2]
     for start in range(first * WORD, last * WORD, 4):
-        a, b, c, d = table[data[start]], table[data[start + 1]], table[data[start + 2]], table[data[start + 3]]
+        a = table[data[start]]
+        b = table[data[start + 1]]
+        c = table[data[start + 2]]
+        d = table[data[start + 3]]
         ab = (a & low) | (b & low) << (a >> shift)
         cd = (c & low) | (d & low) << (c >> shift)
         length = (a >> shift) + (b >> shift)
@@ -124,7 +142,9 @@ def _put_symbol(out, state, table, symbol):
 
 @PLAIN
 def _put_run(out, state, table, run):
-    """Append `run` words of zeros: one literal, then matches at distance 1 and what is left of them."""
+    """Append `run` words of zeros: one literal, then matches at distance 1 and what is left of
+    them.
+    """
     _put_symbol(out, state, table, np.int64(0))
     left = run * WORD - 1
     while left >= 3:
@@ -160,7 +180,8 @@ def _encode(data, words, counts, order, out):
         header[lengths[symbol]] += 1
     header_table = _table(header, np.int64(7))
     state = np.zeros(3, np.uint64)
-    # Final block, dynamic code, 286 literal and length codes, one distance code, 19 lengths of the header's code.
+    # Final block, dynamic code, 286 literal and length codes, one distance code, 19 lengths of the
+    # header's code.
     for value, width in ((1, 1), (2, 2), (SYMBOLS - 257, 5), (0, 5), (15, 4)):
         _put(out, state, U64(value), U64(width))
     for symbol in order:
@@ -168,7 +189,8 @@ def _encode(data, words, counts, order, out):
     for length in lengths:
         _put_symbol(out, state, header_table, length)
     # Typed numbers, because numba would compile the function again for a plain 0.
-    place, pending = np.int64(0), np.int64(0)
+    place = np.int64(0)
+    pending = np.int64(0)
     while place < words.size:
         if words[place] == 0:
             run = _zero_words(words, place)

@@ -1,6 +1,7 @@
 """Lengths and codes of a Huffman code for DEFLATE.
 
-Plain loops, because NumPy's sort, concatenate and sum would take longer to compile than the rest of the stage.
+Plain loops, because NumPy's sort, concatenate and sum would take longer to compile than the rest of
+the stage.
 """
 
 import numpy as np
@@ -8,12 +9,15 @@ import numpy as np
 from lowalt.machine.jit import PLAIN
 
 LONGEST = 15
-"""Bits of the longest code that DEFLATE allows for literals and lengths (RFC 1951, section 3.2.7)."""
+"""Bits of the longest code that DEFLATE allows for literals and lengths (RFC 1951, section 3.2.7).
+"""
 
 
 @PLAIN
 def _sort(weights, order):
-    """Fill `order` with the symbols that occur, by rising weight and then by number; return how many there are."""
+    """Fill `order` with the symbols that occur, by rising weight and then by number; return how
+    many there are.
+    """
     nodes = 0
     for symbol in range(weights.size):
         if weights[symbol] == 0:
@@ -29,13 +33,16 @@ def _sort(weights, order):
 
 @PLAIN
 def _depths(weights, order, nodes):
-    """Depth of each leaf in Huffman's tree over symbols `order`, and the largest: (2 nodes,), leaves first."""
+    """Depth of each leaf in Huffman's tree over symbols `order`, and the largest: (2 nodes,),
+    leaves first.
+    """
     weight = np.zeros(2 * nodes, np.int64)
     parent = np.zeros(2 * nodes, np.int64)
     depth = np.zeros(2 * nodes, np.int64)
     for node in range(nodes):
         weight[node] = weights[order[node]]
-    leaf, inner = 0, nodes
+    leaf = 0
+    inner = nodes
     for new in range(nodes, 2 * nodes - 1):
         for _ in range(2):
             # Two queues in rising order: leaves, and inner nodes as they are made.
@@ -56,7 +63,8 @@ def _depths(weights, order, nodes):
 
 @PLAIN
 def code_lengths(counts, longest):
-    """Lengths of a Huffman code for `counts`, at most `longest` bits, 0 for symbols that do not occur.
+    """Lengths of a Huffman code for `counts`, at most `longest` bits, 0 for symbols that do not
+    occur.
 
     Ties go to the lower symbol. Where the best code is too long, counts are halved until it fits.
     """

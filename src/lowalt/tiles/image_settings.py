@@ -1,4 +1,6 @@
-"""The settings of an image (the configuration's `images` block): size, amplitude scale and colour map."""
+"""The settings of an image (the configuration's `images` block): size, amplitude scale and colour
+map.
+"""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -19,20 +21,26 @@ def colour_map(name: str) -> np.ndarray:
     import matplotlib
 
     if name not in matplotlib.colormaps:
-        raise InputError(f"images.colour_map is {name!r}, expected a matplotlib name such as 'viridis' or 'gray'")
+        raise InputError(
+            f"images.colour_map is {name!r}, expected a matplotlib name such as 'viridis' or 'gray'"
+        )
     table = matplotlib.colormaps[name](np.linspace(0, 1, 256), bytes=True)[:, :3].copy()
     table.setflags(write=False)
     return table
 
 
 def paint(images: np.ndarray, palette: np.ndarray) -> np.ndarray:
-    """Return RGB images: (..., H, W) uint8 index values and a (256, 3) palette -> (..., H, W, 3) uint8."""
+    """Return RGB images: (..., H, W) uint8 index values and a (256, 3) palette -> (..., H, W, 3)
+    uint8.
+    """
     return np.take(palette, images, axis=0)
 
 
 @dataclass(frozen=True)
 class Images:
-    """`size` pixels per side of each image; values are scaled by `scale`, then coloured by `colour_map`."""
+    """`size` pixels per side of each image; values are scaled by `scale`, then coloured by
+    `colour_map`.
+    """
 
     size: int = 256
     scale: Scale = field(default_factory=Scale)
@@ -44,7 +52,9 @@ class Images:
 
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
-        size, name, floor_db, gamma, colours = pick(block, "size", "scale", "floor_db", "gamma", "colour_map")
+        size, name, floor_db, gamma, colours = pick(
+            block, "size", "scale", "floor_db", "gamma", "colour_map"
+        )
         if isinstance(size, bool) or not isinstance(size, int) or not 8 <= size <= 4096:
             raise InputError(f"images.size is {size!r}, expected an integer from 8 to 4096")
         colour_map(colours)

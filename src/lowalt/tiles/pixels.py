@@ -24,7 +24,8 @@ def _peak(values):
 def index_image(values, signed, lowest, shift, base, cut, out):
     """Fill out (S, S) uint8 with the index values of one image (S, S) float32.
 
-    signed: whether values have both signs; the others: a `lowalt.tiles.scale.Lookup`, cut as the bits of its floats.
+    signed: whether values have both signs; the others: a `lowalt.tiles.scale.Lookup`, cut as the
+    bits of its floats.
     """
     size = values.shape[1]
     largest = _peak(values)[0]

@@ -1,7 +1,8 @@
 """Palette PNG: 8-bit index images with their colour map, written small and fast, read back exactly.
 
-Spectra are resampled, so a pixel is nearly the plane through its neighbours: every row has the Paeth filter, and
-its differences an entropy code of our own (`lowalt.tiles.huffman`). Pixels, and bytes, are the same on every machine.
+Spectra are resampled, so a pixel is nearly the plane through its neighbours: every row has the
+Paeth filter, and its differences an entropy code of our own (`lowalt.tiles.huffman`). Pixels, and
+bytes, are the same on every machine.
 """
 
 import io
@@ -16,18 +17,23 @@ from lowalt.machine.jit import PLAIN
 from lowalt.tiles.huffman import zlib_compress
 
 MOST_EXPANSION = 1032
-"""Most bytes that one byte of a zlib stream gives. Source: RFC 1951, a match of 258 bytes takes at least two bits."""
+"""Most bytes that one byte of a zlib stream gives. Source: RFC 1951, a match of 258 bytes takes at
+least two bits.
+"""
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 def _chunk(name: bytes, body: bytes) -> bytes:
     """A chunk of a PNG: length, name, body, checksum."""
-    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", deflate.crc32(name + body))
+    return (
+        struct.pack(">I", len(body)) + name + body + struct.pack(">I", deflate.crc32(name + body))
+    )
 
 
 @PLAIN
 def apply_paeth(image, out):
-    """Filter image (H, W) uint8 into out (H, W + 1) uint8: filter type 4, then pixel minus Paeth predictor.
+    """Filter image (H, W) uint8 into out (H, W + 1) uint8: filter type 4, then pixel minus Paeth
+    predictor.
 
     Source: PNG specification (W3C, third edition), section 9.
     """
@@ -69,7 +75,9 @@ def encode(image: np.ndarray, palette: np.ndarray) -> bytes:
 
 
 def packed(shape: tuple[int, int], palette: np.ndarray, stream: bytes) -> bytes:
-    """Return the PNG file of an 8-bit palette image (H, W) from the zlib stream of its filtered rows."""
+    """Return the PNG file of an 8-bit palette image (H, W) from the zlib stream of its filtered
+    rows.
+    """
     header = struct.pack(">IIBBBBB", shape[1], shape[0], 8, 3, 0, 0, 0)
     colours = np.ascontiguousarray(palette).tobytes()
     parts = ((b"IHDR", header), (b"PLTE", colours), (b"IDAT", stream), (b"IEND", b""))
@@ -83,11 +91,15 @@ def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
     """
     if data[:8] != SIGNATURE:
         raise InputError("image: no PNG signature, expected a palette PNG")
-    view, place, chunks = memoryview(data), 8, []
+    view = memoryview(data)
+    place = 8
+    chunks = []
     while place + 12 <= len(data):
         size = int.from_bytes(view[place : place + 4], "big")
         end = place + 12 + size
-        if end > len(data) or deflate.crc32(view[place + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+        if end > len(data) or deflate.crc32(view[place + 4 : end - 4]) != int.from_bytes(
+            view[end - 4 : end], "big"
+        ):
             break
         chunks.append((bytes(view[place + 4 : place + 8]), view[place + 8 : end - 4]))
         if chunks[-1][0] == b"IEND":
@@ -97,7 +109,8 @@ def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
 
 
 def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Return index image (H, W) uint8 and palette (256, 3) uint8 of a palette PNG, whoever wrote it.
+    """Return index image (H, W) uint8 and palette (256, 3) uint8 of a palette PNG, whoever wrote
+    it.
 
     Raises: InputError where the bytes are no 8-bit palette PNG or are damaged.
     """
@@ -105,17 +118,23 @@ def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     header = chunks[0][1] if chunks[0][0] == b"IHDR" and len(chunks[0][1]) == 13 else bytes(13)
     width, height, depth, colour, *_ = struct.unpack(">IIBBBBB", header)
     if (depth, colour) != (8, 3):
-        raise InputError(f"image: PNG of bit depth {depth} and colour type {colour}, expected an 8-bit palette PNG")
+        raise InputError(
+            f"image: PNG of bit depth {depth} and colour type {colour}, expected an 8-bit palette PNG"
+        )
     palette = np.zeros((256, 3), np.uint8)
     for name, body in chunks:
         if name == b"PLTE":
             if len(body) % 3 or len(body) > palette.size:
-                raise InputError(f"image: a palette of {len(body)} bytes, expected up to 256 colours of three bytes")
+                raise InputError(
+                    f"image: a palette of {len(body)} bytes, expected up to 256 colours of three bytes"
+                )
             table = np.frombuffer(body, np.uint8).reshape(-1, 3)
             palette[: len(table)] = table
     packed = sum(len(body) for name, body in chunks if name == b"IDAT")
     if not width * height or height * (width + 1) > MOST_EXPANSION * (packed + 1):
-        raise InputError(f"image: {width} x {height} pixels in {packed} bytes, expected a size that fits them")
+        raise InputError(
+            f"image: {width} x {height} pixels in {packed} bytes, expected a size that fits them"
+        )
     try:
         # `Image.open` refuses large images, which are tiles here.
         with PngImageFile(io.BytesIO(data)) as picture:

@@ -1,7 +1,8 @@
-"""Reduced images of a chunk, made from its tiles while these are still pixels: no PNG has to be decoded for them.
+"""Reduced images of a chunk, made from its tiles while these are still pixels: no PNG has to be
+decoded for them.
 
-A file (.npy) holds (samples, views, size, size) uint8 in the order of the tiles file: `resize` of the views of every
-tile, the same bytes as from the decoded PNG, since PNG loses nothing.
+A file (.npy) holds (samples, views, size, size) uint8 in the order of the tiles file: `resize` of
+the views of every tile, the same bytes as from the decoded PNG, since PNG loses nothing.
 """
 
 import contextlib
@@ -34,10 +35,11 @@ def target(text: str) -> tuple[int, Path]:
 def writing(
     targets: list[tuple[int, Path]], samples: int, stations: int, spectra: int
 ) -> Iterator[Callable[[int, np.ndarray], None]]:
-    """Open reduced files and yield a function (number, tile) that fills the place of one sample in all of them.
+    """Open reduced files and yield a function (number, tile) that fills the place of one sample in
+    all of them.
 
-    targets: size (pixels per side) and path of each file; a tile is (stations S, spectra S) uint8. The files appear
-    under their names when the block ends without an error.
+    targets: size (pixels per side) and path of each file; a tile is (stations S, spectra S) uint8.
+    The files appear under their names when the block ends without an error.
     """
     with contextlib.ExitStack() as stack:
         arrays = []
@@ -60,12 +62,19 @@ def writing(
 def read(path: str | Path, size: int, samples: int) -> np.ndarray:
     """Return a reduced file as a read-only memory map, (samples, views, size, size) uint8.
 
-    Raises: InputError naming the file where it is missing, damaged, or of other samples or another size.
+    Raises: InputError naming the file where it is missing, damaged, or of other samples or another
+    size.
     """
     try:
         images = np.lib.format.open_memmap(existing(path, "reduced images"), "r")
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: not reduced images ({error})") from error
-    if images.dtype != np.uint8 or images.ndim != 4 or (images.shape[0], *images.shape[2:]) != (samples, size, size):
-        raise InputError(f"{path}: {images.dtype} {images.shape}, expected uint8 ({samples}, views, {size}, {size})")
+    if (
+        images.dtype != np.uint8
+        or images.ndim != 4
+        or (images.shape[0], *images.shape[2:]) != (samples, size, size)
+    ):
+        raise InputError(
+            f"{path}: {images.dtype} {images.shape}, expected uint8 ({samples}, views, {size}, {size})"
+        )
     return images

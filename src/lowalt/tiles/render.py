@@ -1,9 +1,10 @@
-"""From symbol-domain signals to index images in one pass: spectra, resampling, scaling, all in float32.
+"""From symbol-domain signals to index images in one pass: spectra, resampling, scaling, all in
+float32.
 
-The arithmetic is fixed (additions, products, divisions, square roots and comparisons in one order), so the pixels
-depend on the signal alone: not on the batch, the worker or the machine. A signal is first divided by a power of
-two, which changes no digit and keeps its squares inside float32; images are scaled by their own largest value,
-so nothing is lost.
+The arithmetic is fixed (additions, products, divisions, square roots and comparisons in one order),
+so the pixels depend on the signal alone: not on the batch, the worker or the machine. A signal is
+first divided by a power of two, which changes no digit and keeps its squares inside float32; images
+are scaled by their own largest value, so nothing is lost.
 """
 
 from collections.abc import Sequence
@@ -29,14 +30,17 @@ MOST_PIXELS = 2**29
 
 
 class Renderer:
-    """Everything that is the same for all samples: twiddles, weights, tables. Reusable, holds its work arrays.
+    """Everything that is the same for all samples: twiddles, weights, tables. Reusable, holds its
+    work arrays.
 
     Three stations' tones:
 
         >>> from lowalt.config.layers import overlaid
         >>> config = overlaid([])
-        >>> renderer = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
-        >>> tile = renderer.tile(np.exp(0.8j * np.arange(1200).reshape(3, 400)).astype(np.complex64))
+        >>> renderer = Renderer.from_settings({key: config[key] for key in ("network", "spectra",
+        "images")})
+        >>> tile = renderer.tile(np.exp(0.8j * np.arange(1200).reshape(3,
+        400)).astype(np.complex64))
         >>> tile.shape, split(tile, spectra=3).shape
         ((768, 768), (9, 256, 256))
     """
@@ -44,25 +48,34 @@ class Renderer:
     def __init__(self, network: Network, spectra: Spectra, images: Images) -> None:
         """Prepare for the stations and the number of symbols of `network`.
 
-        Raises: InputError naming the spectrum whose window is no shorter than the signal, or what is too large.
+        Raises: InputError naming the spectrum whose window is no shorter than the signal, or what
+        is too large.
         """
-        self.network, self.spectra, self.images = network, spectra, images
+        self.network = network
+        self.spectra = spectra
+        self.images = images
         spectra.check(network.symbols, len(network.stations), network.subcarriers)
         pixels = len(network.stations) * len(spectra) * images.size**2
         if pixels > MOST_PIXELS:
-            raise InputError(f"images.size is {images.size}: a tile of {pixels} pixels, expected at most {MOST_PIXELS}")
+            raise InputError(
+                f"images.size is {images.size}: a tile of {pixels} pixels, expected at most {MOST_PIXELS}"
+            )
         self._of_cells = {name for name in spectra if isinstance(spectrum(name), OfCells)}
         self._plans = {name: self._plan(name) for name in spectra}
         self._tables = {
             name: [
-                spectrum(name).tables(spectra[name], station.frequency_hz, network.symbol_interval_s)
+                spectrum(name).tables(
+                    spectra[name], station.frequency_hz, network.symbol_interval_s
+                )
                 for station in network.stations
             ]
             for name in spectra
             if name not in self._of_cells
         }
         steps = {name: lookup(images.scale, levels(name)) for name in spectra}
-        self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in steps.items()}
+        self._lookup = {
+            name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in steps.items()
+        }
         self._image = np.empty((images.size, images.size), np.float32)
 
     @classmethod
@@ -72,13 +85,22 @@ class Renderer:
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         network, spectra, images = pick(settings, "network", "spectra", "images")
-        return cls(Network.from_settings(network), Spectra.from_settings(spectra), Images.from_settings(images))
+        return cls(
+            Network.from_settings(network),
+            Spectra.from_settings(spectra),
+            Images.from_settings(images),
+        )
 
     def _plan(self, name: str) -> tuple:
-        """Taps of one spectrum's rows and columns, buffers for its values and between the axes, the axes' order."""
-        setting, kind = self.spectra[name], spectrum(name)
-        symbols, size = self.network.symbols, self.images.size
-        points, hop = kind.rows(setting), getattr(setting, "hop", 1)
+        """Taps of one spectrum's rows and columns, buffers for its values and between the axes, the
+        axes' order.
+        """
+        setting = self.spectra[name]
+        kind = spectrum(name)
+        symbols = self.network.symbols
+        size = self.images.size
+        points = kind.rows(setting)
+        hop = getattr(setting, "hop", 1)
         if name in self._of_cells:
             starts = kind.columns(setting, symbols)
             count = (starts - 1) // hop + 1
@@ -98,7 +120,9 @@ class Renderer:
         return source, weights, columns, shares, values, between, rows_first
 
     def plan(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Source rows and weights (S, taps), columns and shares (taps, S) of one spectrum's resampling."""
+        """Source rows and weights (S, taps), columns and shares (taps, S) of one spectrum's
+        resampling.
+        """
         return self._plans[name][:4]
 
     def rows_first(self, name: str) -> bool:
@@ -113,25 +137,36 @@ class Renderer:
         """Tables of one spectrum, a tuple of arrays a station."""
         return self._tables[name]
 
-    def values(self, signal: Source, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None) -> None:
-        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,), or of a cube
-        where the spectrum is made of range cells.
+    def values(
+        self,
+        signal: Source,
+        station: int,
+        name: str,
+        out: np.ndarray,
+        late: np.ndarray | None = None,
+    ) -> None:
+        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal
+        (symbols,), or of a cube where the spectrum is made of range cells.
 
-        late: (symbols,), how many symbol intervals after its nominal instant each symbol came, None for 0. Where
-        `spectra.times` is "known", symbols that are exactly zero were not received.
+        late: (symbols,), how many symbol intervals after its nominal instant each symbol came, None
+        for 0. Where `spectra.times` is "known", symbols that are exactly zero were not received.
         """
         source, weights, columns, shares, values, between, rows_first = self._plans[name]
-        setting, kind = self.spectra[name], spectrum(name)
+        setting = self.spectra[name]
+        kind = spectrum(name)
         if isinstance(signal, Cube):
             kind.fill_cells(signal, setting, values)
         elif self.spectra.times == "even" or even(signal, late):
-            re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
+            re = np.ascontiguousarray(signal.real)
+            im = np.ascontiguousarray(signal.imag)
             kind.fill(re, im, setting, self._tables[name][station], values)
         else:
             times = np.arange(len(signal)) + (0.0 if late is None else late)
             frequency_hz = self.network.stations[station].frequency_hz
             assert isinstance(kind, KnowsTimes)  # as `Spectra` has checked
-            kind.fill_known(signal, times, setting, frequency_hz, self.network.symbol_interval_s, values)
+            kind.fill_known(
+                signal, times, setting, frequency_hz, self.network.symbol_interval_s, values
+            )
         if rows_first:
             across_rows(values, source, weights, between)
             along_rows(between, columns, shares, out)
@@ -150,32 +185,52 @@ class Renderer:
         if not np.isfinite(signals).all():
             raise InputError("tile: signals have a NaN or infinite value")
 
-    def image(self, signal: Source, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None) -> None:
-        """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,); late: as in `values`."""
+    def image(
+        self,
+        signal: Source,
+        station: int,
+        name: str,
+        out: np.ndarray,
+        late: np.ndarray | None = None,
+    ) -> None:
+        """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,); late: as
+        in `values`.
+        """
         self.values(signal, station, name, self._image, late)
         index_image(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
 
-    def _source(self, name: str, signal: np.ndarray, cubes: Sequence[Cube] | None, station: int) -> Source:
+    def _source(
+        self, name: str, signal: np.ndarray, cubes: Sequence[Cube] | None, station: int
+    ) -> Source:
         """What the spectrum `name` is made of at a station: its normalised signal, or its cube."""
         if name not in self._of_cells:
             return signal
         if cubes is None:
-            raise InputError(f"spectrum {name}: made of range cells, and a signal alone does not hold them")
+            raise InputError(
+                f"spectrum {name}: made of range cells, and a signal alone does not hold them"
+            )
         return cubes[station]._replace(cells=normalised(cubes[station].cells))
 
     def tile(
-        self, signals: np.ndarray, out: np.ndarray | None = None, late: np.ndarray | None = None,
+        self,
+        signals: np.ndarray,
+        out: np.ndarray | None = None,
+        late: np.ndarray | None = None,
         cubes: Sequence[Cube] | None = None,
-    ) -> np.ndarray:  # fmt: skip
-        """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, spectra S) uint8.
+    ) -> np.ndarray:
+        """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, spectra S)
+        uint8.
 
-        late: (stations, symbols), as in `values`, None for symbols on time; cubes: a cube a station, where
-        spectra are made of range cells.
+        late: (stations, symbols), as in `values`, None for symbols on time; cubes: a cube a
+        station, where spectra are made of range cells.
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
         self.check(signals)
-        stations, size = len(self.network.stations), self.images.size
-        out = np.empty((stations * size, len(self.spectra) * size), np.uint8) if out is None else out
+        stations = len(self.network.stations)
+        size = self.images.size
+        out = (
+            np.empty((stations * size, len(self.spectra) * size), np.uint8) if out is None else out
+        )
         for station in range(stations):
             signal = normalised(signals[station])
             for view, name in enumerate(self.spectra):
@@ -185,10 +240,14 @@ class Renderer:
         return out
 
     def some(
-        self, signals: np.ndarray, numbers: Sequence[int], late: np.ndarray | None = None,
+        self,
+        signals: np.ndarray,
+        numbers: Sequence[int],
+        late: np.ndarray | None = None,
         cubes: Sequence[Cube] | None = None,
-    ) -> np.ndarray:  # fmt: skip
-        """Return images of one sample by number, spectra station + view: (stations, symbols) -> (n, S, S) uint8.
+    ) -> np.ndarray:
+        """Return images of one sample by number, spectra station + view: (stations, symbols) -> (n,
+        S, S) uint8.
 
         They are those of `tile`, and only these are computed.
         Raises: InputError where the shape does not fit the network or a value is not finite.
@@ -205,14 +264,17 @@ class Renderer:
 
 
 def normalised(signal: np.ndarray) -> np.ndarray:
-    """Return a signal of any shape as complex64, divided by the power of two that brings it just below 1."""
+    """Return a signal of any shape as complex64, divided by the power of two that brings it just
+    below 1.
+    """
     signal = np.asarray(signal)
     largest = max(np.abs(signal.real).max(), np.abs(signal.imag).max())
     if largest == 0:
         return signal.astype(np.complex64)
     exponent = int(np.frexp(largest)[1])
     result = np.empty(signal.shape, np.complex64)
-    result.real, result.imag = np.ldexp(signal.real, -exponent), np.ldexp(signal.imag, -exponent)
+    result.real = np.ldexp(signal.real, -exponent)
+    result.imag = np.ldexp(signal.imag, -exponent)
     return result
 
 
@@ -222,20 +284,25 @@ def levels(name: str) -> int:
 
 
 def split(tile: np.ndarray, spectra: int) -> np.ndarray:
-    """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S), station by station.
+    """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S), station by
+    station.
 
     Raises: InputError where the tile is not made of rows of so many squares.
     """
     rows, columns = tile.shape
     size = columns // spectra
     if not size or columns != spectra * size or not rows or rows % size:
-        raise InputError(f"tile: {rows} x {columns} pixels, expected rows of {spectra} square images")
+        raise InputError(
+            f"tile: {rows} x {columns} pixels, expected rows of {spectra} square images"
+        )
     grid = tile.reshape(tile.shape[0] // size, size, spectra, size)
     return np.ascontiguousarray(grid.swapaxes(1, 2)).reshape(-1, size, size)
 
 
 def join(images: np.ndarray, spectra: int) -> np.ndarray:
-    """Return the tile of images, (stations spectra, S, S) -> (stations S, spectra S): the inverse of `split`."""
+    """Return the tile of images, (stations spectra, S, S) -> (stations S, spectra S): the inverse
+    of `split`.
+    """
     size = images.shape[-1]
     grid = images.reshape(-1, spectra, size, size).swapaxes(1, 2)
     return np.ascontiguousarray(grid).reshape(-1, spectra * size)

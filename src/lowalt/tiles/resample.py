@@ -1,10 +1,11 @@
-"""The resampling kernel of the project: a triangle, with one formula for shrinking and for enlarging.
+"""The resampling kernel of the project: a triangle, with one formula for shrinking and for
+enlarging.
 
 Sample i of n is at i + 1/2, output j of m at (j + 1/2) n / m. The weight of sample i in output j is
     max(0, 1 - |i + 1/2 - (j + 1/2) n / m| / max(1, n / m)),
-divided by the sum over the samples there are. It interpolates linearly where it enlarges, averages over the
-whole output pixel where it shrinks, and is the identity for n = m; constants stay constants. It is what Pillow
-calls BILINEAR and what PyTorch computes with `antialias=True`.
+divided by the sum over the samples there are. It interpolates linearly where it enlarges, averages
+over the whole output pixel where it shrinks, and is the identity for n = m; constants stay
+constants. It is what Pillow calls BILINEAR and what PyTorch computes with `antialias=True`.
 """
 
 from functools import lru_cache
@@ -52,17 +53,21 @@ def taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def row_taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return `taps` as `across_rows` wants them: sources (out, taps) int64, weights (out, taps) float32.
+    """Return `taps` as `across_rows` wants them: sources (out, taps) int64, weights (out, taps)
+    float32.
 
     All callers share the arrays, which must not be changed.
     """
     first, weights = taps(size, out)
-    return np.ascontiguousarray(first[:, None] + np.arange(weights.shape[1])), weights.astype(np.float32)
+    return np.ascontiguousarray(first[:, None] + np.arange(weights.shape[1])), weights.astype(
+        np.float32
+    )
 
 
 @lru_cache(maxsize=64)
 def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Return `taps` as `along_rows` wants them: columns (taps, out) uintp, every hop-th, and shares float32.
+    """Return `taps` as `along_rows` wants them: columns (taps, out) uintp, every hop-th, and shares
+    float32.
 
     All callers share the arrays, which must not be changed.
     """
@@ -70,7 +75,9 @@ def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarr
     weights = np.pad(weights, ((0, 0), (0, weights.shape[1] % 2)))
     columns = np.minimum(first[:, None] + np.arange(weights.shape[1]), size - 1) * hop
     # Unsigned indices, so that the compiled loop does not test for negative ones.
-    return np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(weights.T.astype(np.float32))
+    return np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(
+        weights.T.astype(np.float32)
+    )
 
 
 @PLAIN
@@ -86,12 +93,16 @@ def along_rows(values, columns, shares, out):
             line[c] = shares[0, c] * row[columns[0, c]] + shares[1, c] * row[columns[1, c]]
         for k in range(2, shares.shape[0], 2):
             for c in range(line.size):
-                line[c] += shares[k, c] * row[columns[k, c]] + shares[k + 1, c] * row[columns[k + 1, c]]
+                line[c] += (
+                    shares[k, c] * row[columns[k, c]] + shares[k + 1, c] * row[columns[k + 1, c]]
+                )
 
 
 @PLAIN
 def across_rows(values, source, weights, out):
-    """The first axis: values (points, n) -> out (S, n); source, weights: (S, taps), summed in order."""
+    """The first axis: values (points, n) -> out (S, n); source, weights: (S, taps), summed in
+    order.
+    """
     for j in range(out.shape[0]):
         line = out[j]
         first = values[source[j, 0]]
@@ -125,12 +136,15 @@ def _resize(images, source, weights, columns, shares, out):
 def resize(images: np.ndarray, size: int) -> np.ndarray:
     """Return index images at another size: (..., S, S) uint8 -> (..., size, size) uint8.
 
-    Values are index values, before the colour map: both axes by `triangle`, in float32 and one fixed order, rounded
-    once at the end (half up). Raises: InputError where the images are not square uint8.
+    Values are index values, before the colour map: both axes by `triangle`, in float32 and one
+    fixed order, rounded once at the end (half up). Raises: InputError where the images are not
+    square uint8.
     """
     images = np.asarray(images)
     if images.dtype != np.uint8 or images.ndim < 2 or images.shape[-1] != images.shape[-2]:
-        raise InputError(f"resize: images {images.dtype} {images.shape}, expected uint8 (..., S, S)")
+        raise InputError(
+            f"resize: images {images.dtype} {images.shape}, expected uint8 (..., S, S)"
+        )
     if images.shape[-1] == size:
         return images.copy()
     stack = np.ascontiguousarray(images).reshape(-1, *images.shape[-2:])

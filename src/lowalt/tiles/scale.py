@@ -1,11 +1,13 @@
-"""Maps amplitudes to 256 index values: the scale as a list of thresholds, and lookup tables for them.
+"""Maps amplitudes to 256 index values: the scale as a list of thresholds, and lookup tables for
+them.
 
 With x = value / the image's own largest |value|, and y = f(x) in [0, 1],
-    linear   y = x          decibel   y = max(0, 1 + 20 log10(x) / floor_db)          power   y = x^gamma,
-a spectrum of magnitudes takes the index floor(255 y + 1/2), a signed one 128 +- floor(127 y + 1/2), exactly
-symmetric about 128. Every f increases, so an index is the number of thresholds that x reaches. Thresholds are computed
-once in float64 and comparisons are exact, so no pixel needs a logarithm.
-An image of zeros gets 0 (128 if signed).
+    linear   y = x          decibel   y = max(0, 1 + 20 log10(x) / floor_db)          power   y =
+    x^gamma,
+a spectrum of magnitudes takes the index floor(255 y + 1/2), a signed one 128 +- floor(127 y + 1/2),
+exactly symmetric about 128. Every f increases, so an index is the number of thresholds that x
+reaches. Thresholds are computed once in float64 and comparisons are exact, so no pixel needs a
+logarithm. An image of zeros gets 0 (128 if signed).
 """
 
 from dataclasses import dataclass
@@ -20,7 +22,9 @@ SCALES = ("linear", "decibel", "power")
 
 @dataclass(frozen=True)
 class Scale:
-    """An amplitude scale: `name` of SCALES, `floor_db` > 0 (decibel only), `gamma` > 0 (power only)."""
+    """An amplitude scale: `name` of SCALES, `floor_db` > 0 (decibel only), `gamma` > 0 (power
+    only).
+    """
 
     name: str = "decibel"
     floor_db: float = 40.0
@@ -29,13 +33,24 @@ class Scale:
     def __post_init__(self) -> None:
         if self.name not in SCALES:
             raise InputError(f"images.scale is {self.name!r}, expected one of {SCALES}")
-        for key, value, low, high in (("floor_db", self.floor_db, 1, 140), ("gamma", self.gamma, 0.2, 2)):
-            good = isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high
+        for key, value, low, high in (
+            ("floor_db", self.floor_db, 1, 140),
+            ("gamma", self.gamma, 0.2, 2),
+        ):
+            good = (
+                isinstance(value, (int, float))
+                and not isinstance(value, bool)
+                and low <= value <= high
+            )
             if not good:
-                raise InputError(f"images.{key} is {value!r}, expected a number from {low} to {high}")
+                raise InputError(
+                    f"images.{key} is {value!r}, expected a number from {low} to {high}"
+                )
 
     def thresholds(self, levels: int) -> np.ndarray:
-        """Return the x at which the index rises to 1 .. levels, shape (levels,), float64, ascending, in (0, 1)."""
+        """Return the x at which the index rises to 1 .. levels, shape (levels,), float64,
+        ascending, in (0, 1).
+        """
         y = (np.arange(1, levels + 1) - 0.5) / levels
         if self.name == "decibel":
             return portable.exp(self.floor_db * (y - 1) * (portable.LN_10 / 20))
@@ -46,8 +61,8 @@ class Scale:
 class Lookup:
     """Tables that map a float32 x in [0, 1] to its index with one comparison.
 
-    A key is the leading bits of x above `lowest`; `base[key]` counts the thresholds below the key's interval and
-    `cut[key]` is the one inside it (2 where there is none).
+    A key is the leading bits of x above `lowest`; `base[key]` counts the thresholds below the key's
+    interval and `cut[key]` is the one inside it (2 where there is none).
     """
 
     lowest: np.int32
@@ -65,7 +80,8 @@ def lookup(scale: Scale, levels: int) -> Lookup:
     bits = thresholds.view(np.int32)
     top = int(np.float32(1).view(np.int32))
     lowest = int(np.ldexp(np.float32(1), np.frexp(thresholds[0])[1] - 1).view(np.int32))
-    shift, keys = 0, bits
+    shift = 0
+    keys = bits
     for mantissa in range(6, 24):
         shift = 23 - mantissa
         keys = (bits - lowest) >> shift

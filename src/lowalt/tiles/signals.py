@@ -20,5 +20,7 @@ def load_signals(path: str | Path, network: Network) -> np.ndarray:
         raise InputError(f"{path}: not a NumPy array ({error})") from error
     shape = (len(network.stations), network.symbols)
     if signals.dtype != np.complex64 or signals.ndim != 4 or signals.shape[2:] != shape:
-        raise InputError(f"{path}: {signals.dtype} {signals.shape}, expected complex64 (models, snrs, {shape})")
+        raise InputError(
+            f"{path}: {signals.dtype} {signals.shape}, expected complex64 (models, snrs, {shape})"
+        )
     return signals

@@ -1,6 +1,8 @@
-"""The tiles file of a chunk: all its PNGs one after the other, (`data` uint8, `offsets` int64) in an .npz.
+"""The tiles file of a chunk: all its PNGs one after the other, (`data` uint8, `offsets` int64) in
+an .npz.
 
-The archive is not compressed, so it can be written as a stream and read image by image, with the memory of one sample.
+The archive is not compressed, so it can be written as a stream and read image by image, with the
+memory of one sample.
 """
 
 import os
@@ -18,7 +20,9 @@ from lowalt.files.errors import InputError
 
 
 def npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:
-    """Return the .npy header (format 1.0) of an array; the padding of NumPy's own changed between versions."""
+    """Return the .npy header (format 1.0) of an array; the padding of NumPy's own changed between
+    versions.
+    """
     text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {tuple(map(int, shape))}, }}"
     text = text.ljust(-(-(11 + len(text)) // 64) * 64 - 11) + "\n"
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode()
@@ -26,36 +30,46 @@ def npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:
 
 def _crc_behind(header: bytes, size: int) -> int:
     """CRC-32 of a header followed by `size` zero bytes."""
-    crc, zeros = deflate.crc32(header), bytes(min(size, 1 << 20))
+    crc = deflate.crc32(header)
+    zeros = bytes(min(size, 1 << 20))
     for _ in range(size >> 20):
         crc = deflate.crc32(zeros, crc)
     return deflate.crc32(zeros[: size & ((1 << 20) - 1)], crc)
 
 
 def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
-    """Write encoded images in their order; return their number and bytes. Equal images give equal files."""
-    offsets, blank = [0], npy_header("|u1", (0,))
-    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
+    """Write encoded images in their order; return their number and bytes. Equal images give equal
+    files.
+    """
+    offsets = [0]
+    blank = npy_header("|u1", (0,))
+    with (
+        replacing(path) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive,
+    ):
         info = zipfile.ZipInfo("data.npy")
         with archive.open(info, "w", force_zip64=True) as member:
             member.write(blank)
             for image in images:
                 member.write(image)
                 offsets.append(offsets[-1] + len(image))
-        # The array's length is known only now; its header has room for it. A CRC is linear, so the change of the CRC
-        # by a new header does not depend on the data.
+        # The array's length is known only now; its header has room for it. A CRC is linear, so the
+        # change of the CRC by a new header does not depend on the data.
         header = npy_header("|u1", (offsets[-1],))
         info.CRC ^= _crc_behind(blank, offsets[-1]) ^ _crc_behind(header, offsets[-1])
         assert archive.fp is not None  # open until the block ends
         archive.fp.seek(info.header_offset)
         archive.fp.write(info.FileHeader(zip64=True) + header)
         table = np.array(offsets, "<i8")
-        archive.writestr(zipfile.ZipInfo("offsets.npy"), npy_header("<i8", (len(table),)) + table.tobytes())
+        archive.writestr(
+            zipfile.ZipInfo("offsets.npy"), npy_header("<i8", (len(table),)) + table.tobytes()
+        )
     return len(offsets) - 1, offsets[-1]
 
 
 def stored_array(path: Path, name: str) -> tuple[np.dtype, int, int]:
-    """Return type, length and place in the file (bytes) of a one-dimensional array of an uncompressed .npz.
+    """Return type, length and place in the file (bytes) of a one-dimensional array of an
+    uncompressed .npz.
 
     Raises: InputError naming the file where it has no such array or is cut off.
     """
@@ -101,9 +115,13 @@ class Tiles:
         self.offsets = ends = np.array(map_array(self.path, "offsets.npy"))
         kind, size, self._start = stored_array(self.path, "data.npy")
         if ends.dtype.kind not in "iu" or kind != np.uint8:
-            raise InputError(f"{self.path}: data of {kind} parted by {ends.dtype}, expected bytes and whole numbers")
+            raise InputError(
+                f"{self.path}: data of {kind} parted by {ends.dtype}, expected bytes and whole numbers"
+            )
         if not len(ends) or ends[0] < 0 or (np.diff(ends) < 0).any() or ends[-1] != size:
-            raise InputError(f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is damaged")
+            raise InputError(
+                f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is damaged"
+            )
         # Read instead of mapping: gigabytes of mapped pages would count as memory of this process.
         self._file = self.path.open("rb")
 

@@ -1,4 +1,5 @@
-"""Progress of a run, one line per stage: finished and total jobs, rate, time left, running jobs. Counts and text only.
+"""Progress of a run, one line per stage: finished and total jobs, rate, time left, running jobs.
+Counts and text only.
 
 Times are seconds since the epoch, so that another process can read a board from a file.
 """
@@ -9,10 +10,14 @@ from dataclasses import asdict, dataclass, field
 from lowalt.machine.progress import Progress
 
 Reader = Callable[[str, float], Progress | None]
-"""Reads a job's progress from its log, given the job's start (s): an older log may be that of an earlier run."""
+"""Reads a job's progress from its log, given the job's start (s): an older log may be that of an
+earlier run.
+"""
 
 LEAST_PART = 0.1
-"""Progress of a job before the first estimate of the time left, because a job first imports and compiles code."""
+"""Progress of a job before the first estimate of the time left, because a job first imports and
+compiles code.
+"""
 
 
 @dataclass
@@ -27,7 +32,9 @@ class Job:
 
 @dataclass
 class Stage:
-    """Jobs of one rule: their number, how many are done, when the first started and the last ended (s)."""
+    """Jobs of one rule: their number, how many are done, when the first started and the last ended
+    (s).
+    """
 
     total: int
     done: int = 0
@@ -71,7 +78,8 @@ class Board:
             return None
         stage = self.stages[job.stage]
         stage.ended = now
-        stage.done, stage.failed = stage.done + good, stage.failed + (not good)
+        stage.done = stage.done + good
+        stage.failed = stage.failed + (not good)
         return job.stage if stage.done >= stage.total else None
 
     def running(self) -> list[str]:
@@ -81,7 +89,8 @@ class Board:
 
     def total(self, now: float) -> str:
         """Return the line of the whole run."""
-        done, planned = sum(stage.done for stage in self.stages.values()), sum(self.totals.values())
+        done = sum(stage.done for stage in self.stages.values())
+        planned = sum(self.totals.values())
         return f"{'all':<{self._width}} {done}/{planned} jobs, {span(now - self.started)} since the start"
 
     @property
@@ -98,8 +107,13 @@ class Board:
         if not now_running and stage.done >= stage.total:
             return f"{head}, done in {span(stage.ended - stage.started)}"
         progress_of = {key: read(job.log, job.started) for key, job in now_running.items()}
-        parts = sum(progress.done / progress.total for progress in progress_of.values() if progress and progress.total)
-        done, spent = stage.done + parts, now - stage.started
+        parts = sum(
+            progress.done / progress.total
+            for progress in progress_of.values()
+            if progress and progress.total
+        )
+        done = stage.done + parts
+        spent = now - stage.started
         if spent > 0 and (stage.done or parts >= LEAST_PART):
             head += f", {pace(stage.done / spent)}" if stage.done else ""
             head += f", {span((stage.total - done) * spent / done)} left"
@@ -116,12 +130,16 @@ def _running(job: Job, progress: Progress | None) -> str:
 def span(seconds: float) -> str:
     """Return a duration as minutes and seconds, or hours, minutes and seconds."""
     whole = max(0, round(seconds))
-    hours, minutes, remainder = whole // 3600, whole // 60 % 60, whole % 60
+    hours = whole // 3600
+    minutes = whole // 60 % 60
+    remainder = whole % 60
     return f"{hours}:{minutes:02}:{remainder:02}" if hours else f"{minutes}:{remainder:02}"
 
 
 def pace(per_second: float) -> str:
-    """Return a rate in jobs per second, minute or hour: the first of these units that gives at least one."""
+    """Return a rate in jobs per second, minute or hour: the first of these units that gives at
+    least one.
+    """
     for factor, unit in ((1, "s"), (60, "min"), (3600, "h")):
         if per_second * factor >= 1 or unit == "h":
             return f"{per_second * factor:.1f}/{unit}"

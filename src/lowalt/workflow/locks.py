@@ -1,8 +1,10 @@
-"""Locks that end with their run: next to each pair of Snakemake's lock files, a record that the run holds locked.
+"""Locks that end with their run: next to each pair of Snakemake's lock files, a record that the run
+holds locked.
 
-Snakemake locks a working directory with files, which remain when it is killed. The operating system releases a file
-lock when its holder ends for any reason. The next run can therefore remove the lock files of a dead run and end its
-orphaned jobs, and it refuses to start while another run is alive. `mends.py` replaces Snakemake's lock with this.
+Snakemake locks a working directory with files, which remain when it is killed. The operating system
+releases a file lock when its holder ends for any reason. The next run can therefore remove the lock
+files of a dead run and end its orphaned jobs, and it refuses to start while another run is alive.
+`mends.py` replaces Snakemake's lock with this.
 """
 
 import contextlib
@@ -38,7 +40,9 @@ class Owner:
 
     @classmethod
     def read(cls, path: Path) -> "Owner | None":
-        """Return the owner that a file records, or None where the file is damaged, as after a power loss."""
+        """Return the owner that a file records, or None where the file is damaged, as after a power
+        loss.
+        """
         try:
             block = json.loads(path.read_text())
             return cls(block["pid"], block["host"], block["token"])
@@ -51,8 +55,11 @@ class Owner:
         return self.host == socket.gethostname()
 
     def left_behind(self) -> list[int]:
-        """Ids of processes on this machine with the owner's token; of a dead owner, its orphaned jobs."""
-        mark, jobs = f"{TOKEN}={self.token}".encode(), []
+        """Ids of processes on this machine with the owner's token; of a dead owner, its orphaned
+        jobs.
+        """
+        mark = f"{TOKEN}={self.token}".encode()
+        jobs = []
         for folder in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
                 marked = mark in (folder / "environ").read_bytes().split(b"\0")
@@ -87,16 +94,20 @@ def held(path: Path) -> bool:
 
 
 def drop(locks: Path, number: int) -> None:
-    """Remove one lock, the owner's record last, so that a crash in between leaves no lock without an owner."""
+    """Remove one lock, the owner's record last, so that a crash in between leaves no lock without
+    an owner.
+    """
     for kind in KINDS:
         (locks / f"{number}.{kind}.lock").unlink(missing_ok=True)
     record(locks, number).unlink(missing_ok=True)
 
 
 def take_over(locks: Path, say: Callable[[str], None]) -> None:
-    """Remove the locks of dead owners on this host and end their orphaned jobs; call within `guarded`.
+    """Remove the locks of dead owners on this host and end their orphaned jobs; call within
+    `guarded`.
 
-    say: called with one sentence per removed lock. Locks of other hosts and locks without a record stay.
+    say: called with one sentence per removed lock. Locks of other hosts and locks without a record
+    stay.
     """
     for number in numbers(locks):
         owner = Owner.read(record(locks, number))
@@ -104,12 +115,16 @@ def take_over(locks: Path, say: Callable[[str], None]) -> None:
             continue
         ended = end(owner)
         drop(locks, number)
-        jobs = f", after ending its {len(ended)} processes that still ran ({ended})" if ended else ""
+        jobs = (
+            f", after ending its {len(ended)} processes that still ran ({ended})" if ended else ""
+        )
         say(f"took over the lock of the dead process {owner.pid} of {owner.host}{jobs}")
 
 
 def end(owner: Owner) -> list[int]:
-    """End the orphaned processes of a dead run, which would write the next run's files; return their ids."""
+    """End the orphaned processes of a dead run, which would write the next run's files; return
+    their ids.
+    """
     ended = owner.left_behind()
     for number in (signal.SIGTERM, signal.SIGKILL):
         for pid in owner.left_behind():
@@ -130,11 +145,17 @@ def holders(locks: Path, living: bool = False) -> list[str]:
         if owner and owner.here and held(path):
             lines.append(f"process {owner.pid} of {owner.host} is running; wait for it or end it")
         elif not living and owner is None:
-            lines.append(f"{locks / f'{number}.output.lock'}: no record of its owner in {path.name}")
+            lines.append(
+                f"{locks / f'{number}.output.lock'}: no record of its owner in {path.name}"
+            )
         elif not living and not owner.here:
-            lines.append(f"process {owner.pid} of host {owner.host}, which cannot be seen from here")
+            lines.append(
+                f"process {owner.pid} of host {owner.host}, which cannot be seen from here"
+            )
         elif not living:
-            lines.append(f"process {owner.pid} of {owner.host} has died; the next run takes its lock over")
+            lines.append(
+                f"process {owner.pid} of {owner.host} has died; the next run takes its lock over"
+            )
     return lines
 
 
@@ -147,8 +168,9 @@ def refusal(locks: Path) -> str:
 def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> tuple[int, FileLock]:
     """Write a lock, the owner's record first; call within `guarded`.
 
-    keys: the files read ("input") and written ("output") by the run. Returns the lock's number and the file lock on its
-    record, to be released at the end. Raises: OSError where a file cannot be written or the file system locks none.
+    keys: the files read ("input") and written ("output") by the run. Returns the lock's number and
+    the file lock on its record, to be released at the end. Raises: OSError where a file cannot be
+    written or the file system locks none.
     """
     number = next(number for number in count() if number not in numbers(locks))
     holding = FileLock(record(locks, number), timeout=0, fallback_to_soft=False)

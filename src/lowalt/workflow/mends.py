@@ -1,7 +1,9 @@
-"""Workarounds for faults of Snakemake, its Slurm executor and `logging`, each with fault, cause, cure and versions.
+"""Workarounds for faults of Snakemake, its Slurm executor and `logging`, each with fault, cause,
+cure and versions.
 
-`workflow/rules/common.smk` calls `install`, so that they apply to `make`, `lowalt run` and plain `snakemake`. For each
-a test shows that the installed version still has the fault. Those of numba stand in `machine/machine_code.py`.
+`workflow/rules/common.smk` calls `install`, so that they apply to `make`, `lowalt run` and plain
+`snakemake`. For each a test shows that the installed version still has the fault. Those of numba
+stand in `machine/machine_code.py`.
 """
 
 import contextlib
@@ -30,16 +32,19 @@ def install() -> None:
     quiet_logs_on_a_full_disk()
 
 
-# Fault: when a run is killed, its lock and its jobs remain. github.com/snakemake/snakemake/issues/2919
+# Fault: when a run is killed, its lock and its jobs remain.
+# github.com/snakemake/snakemake/issues/2919
 # Cause: a lock is a list of files without the process that holds it. Held in: Snakemake 9.27.
-# Cure: record the lock's owner; the next run takes over the lock of a dead run and ends its orphaned jobs.
+# Cure: record the lock's owner; the next run takes over the lock of a dead run and ends its
+# orphaned jobs.
 
 
 def end_locks() -> None:
     """Replace the locks of Snakemake's file backend with locks that record their owner."""
     from snakemake.persistence.file import FilePersistence
 
-    FilePersistence.lock, FilePersistence.lock_warn_only = _lock, _lock_warn_only
+    FilePersistence.lock = _lock
+    FilePersistence.lock_warn_only = _lock_warn_only
     FilePersistence.cleanup_locks = _cleanup_locks
 
 
@@ -47,19 +52,24 @@ def end_locks() -> None:
 def _lock(self: Any) -> Iterator[None]:
     """Hold the lock of a working directory for the length of a block.
 
-    self: Snakemake's persistence. Raises: SystemExit after one line that names the holders, or the folder in
-    which no lock can be written.
+    self: Snakemake's persistence. Raises: SystemExit after one line that names the holders, or the
+    folder in which no lock can be written.
     """
     from snakemake.logging import logger
 
-    folder, locks, owner = Path(self.path), Path(self._lockdir), Owner()
+    folder = Path(self.path)
+    locks = Path(self._lockdir)
+    owner = Owner()
     with refusing():
         try:
             with guarded(folder):
                 take_over(locks, logger.warning)
                 if self.locked:
                     raise InputError(refusal(locks))
-                keys = {"input": [*map(str, self.all_inputfiles())], "output": [*map(str, self.all_outputfiles())]}
+                keys = {
+                    "input": [*map(str, self.all_inputfiles())],
+                    "output": [*map(str, self.all_outputfiles())],
+                }
                 number, holding = take(locks, owner, keys)
         except OSError as error:
             raise InputError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
@@ -82,7 +92,9 @@ def _lock_warn_only(self: Any) -> Iterator[None]:
 
 
 def _cleanup_locks(self: Any) -> None:
-    """Remove all locks, as `--unlock` asks. Raises: SystemExit after one line that names a living holder."""
+    """Remove all locks, as `--unlock` asks. Raises: SystemExit after one line that names a living
+    holder.
+    """
     with refusing(), guarded(Path(self.path)):
         alive = holders(Path(self._lockdir), living=True)
         if alive:
@@ -90,8 +102,10 @@ def _cleanup_locks(self: Any) -> None:
         self.unlock()
 
 
-# Fault: a second Ctrl-C interrupts the clean-up of jobs and files, with tracebacks. No issue upstream.
-# Cause: KeyboardInterrupt is handled once, and raised again inside its handler. Held in: Snakemake 9.27.
+# Fault: a second Ctrl-C interrupts the clean-up of jobs and files, with tracebacks. No issue
+# upstream.
+# Cause: KeyboardInterrupt is handled once, and raised again inside its handler. Held in: Snakemake
+# 9.27.
 # Cure: answer every Ctrl-C after the first with one line.
 
 ANSWER = b"already ending; the same command goes on where this run stops\n"
@@ -113,10 +127,12 @@ def _first(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-# Fault: after n jobs Snakemake schedules n times a second. github.com/snakemake/snakemake/issues/2354
-# Cause: each scheduling round starts a timer that starts another round `--max-jobs-per-timespan` later (1 s), and each
-# finished job starts a round. Held in: Snakemake 9.27.
-# Cure: one timer at a time. A longer timespan would not help, because a finished run waits for its timers.
+# Fault: after n jobs Snakemake schedules n times a second.
+# github.com/snakemake/snakemake/issues/2354
+# Cause: each scheduling round starts a timer that starts another round `--max-jobs-per-timespan`
+# later (1 s), and each finished job starts a round. Held in: Snakemake 9.27.
+# Cure: one timer at a time. A longer timespan would not help, because a finished run waits for its
+# timers.
 
 
 def keep_one_timer() -> None:
@@ -136,13 +152,16 @@ def _one_timer(self: Any, delay: float) -> None:
         self._next_round.start()
 
 
-# Fault: the end of a job of 46 s is noticed 34 s later. github.com/snakemake/snakemake-executor-plugin-slurm/issues/319
-# Cause: after each poll that finds no finished job, the Slurm executor waits 10 s longer, up to 180 s. Held in:
-# snakemake-executor-plugin-slurm 2.8.
-# Cure: each wait is 20 % longer than the last, at most 30 s; the end of a job of length T is noticed within T / 5.
+# Fault: the end of a job of 46 s is noticed 34 s later.
+# github.com/snakemake/snakemake-executor-plugin-slurm/issues/319
+# Cause: after each poll that finds no finished job, the Slurm executor waits 10 s longer, up to 180
+# s. Held in: snakemake-executor-plugin-slurm 2.8.
+# Cure: each wait is 20 % longer than the last, at most 30 s; the end of a job of length T is
+# noticed within T / 5.
 
 PLUGIN = "snakemake_executor_plugin_slurm"
-GROWTH, MOST_S = 1.2, 30.0
+GROWTH = 1.2
+MOST_S = 30.0
 
 
 def ask_slurm_sooner() -> None:
@@ -156,14 +175,20 @@ def ask_slurm_sooner() -> None:
 
 
 def _slower(executor: Any, asked_s: float | None) -> None:
-    """Set the seconds until the next poll; the plugin asks for a longer wait than the last if no job has finished."""
+    """Set the seconds until the next poll; the plugin asks for a longer wait than the last if no
+    job has finished.
+    """
     last_s = executor._next_seconds_between_status_checks
     grown = last_s is not None and asked_s is not None and asked_s > last_s
-    executor._next_seconds_between_status_checks = min(GROWTH * last_s, max(MOST_S, last_s)) if grown else asked_s
+    executor._next_seconds_between_status_checks = (
+        min(GROWTH * last_s, max(MOST_S, last_s)) if grown else asked_s
+    )
 
 
-# Fault: on a full disk every line of a log prints two tracebacks, although the run itself reports the disk. No issue.
-# Cause: `logging.Handler.handleError` prints the exception and the stack of the call. Held in: Python 3.11 to 3.13.
+# Fault: on a full disk every line of a log prints two tracebacks, although the run itself reports
+# the disk. No issue.
+# Cause: `logging.Handler.handleError` prints the exception and the stack of the call. Held in:
+# Python 3.11 to 3.13.
 # Cure: a log file says nothing of a full disk; other faults keep their tracebacks.
 
 

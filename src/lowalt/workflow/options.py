@@ -1,7 +1,8 @@
-"""Command-line options of a stage that depend on the job: a list of words, empty if the job lacks the input.
+"""Command-line options of a stage that depend on the job: a list of words, empty if the job lacks
+the input.
 
-Each function takes the wildcards and the inputs of a job and can stand in a rule's `params:`. Snakemake's format `:q`
-quotes every word of a list for the shell.
+Each function takes the wildcards and the inputs of a job and can stand in a rule's `params:`.
+Snakemake's format `:q` quotes every word of a list for the shell.
 """
 
 from collections.abc import Callable
@@ -29,19 +30,26 @@ def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
     return words
 
 
-occluders, powers = of_inputs("occluders"), of_inputs("powers")
+occluders = of_inputs("occluders")
+powers = of_inputs("powers")
 scene = of_inputs("motion", "clouds", "occluders")
 """Further inputs of the tiles stage, needed for late symbols or range cells."""
 content = of_inputs("signals", "tiles", "echoes", "powers", "clouds", "occluders")
 """The files from which a shard of some kind is packed."""
 reduced_chunk = of_inputs("reduced", "motion")
-"""The reduced images of a chunk and its motion table, if the tiles stage makes them at the required size."""
+"""The reduced images of a chunk and its motion table, if the tiles stage makes them at the required
+size.
+"""
 samples = of_inputs("dataset", "views", "index")
-"""The configuration to make samples from, the shrunk images, or the index of the shards: a job has one of them."""
+"""The configuration to make samples from, the shrunk images, or the index of the shards: a job has
+one of them.
+"""
 
 
 def reduced(wildcards: Any, output: Any) -> list[str]:
-    """The reduced images of a chunk that the tiles stage writes, by their size, which is the name of their folder."""
+    """The reduced images of a chunk that the tiles stage writes, by their size, which is the name
+    of their folder.
+    """
     return _option("reduced", [f"{Path(path).parent.name}={path}" for path in output.reduced])
 
 
@@ -52,13 +60,21 @@ def noise_modules(config: dict) -> list[str]:
 
 
 def shard_modules(config: dict) -> list[str]:
-    """The modules of effects that the shards stage loads: all where it makes cubes, the town's for what records say."""
+    """The modules of effects that the shards stage loads: all where it makes cubes, the town's for
+    what records say.
+    """
     town = [dotted("town")] if "town" in config["effects"] else []
     return [*map(dotted, config["effects"])] if config["shards"]["kind"] == "cube" else town
 
 
 def tile_modules(config: dict) -> list[str]:
-    """The modules that the tiles stage loads where spectra know the instants of late symbols or show range cells."""
+    """The modules that the tiles stage loads where spectra know the instants of late symbols or
+    show range cells.
+    """
     named = late_effects(config)
     late = ["lowalt.scene.lateness", "lowalt.motion", *map(dotted, named)] if named else []
-    return [*late, "lowalt.tiles.cubes", *map(dotted, config["effects"])] if of_cells(config["spectra"]) else late
+    return (
+        [*late, "lowalt.tiles.cubes", *map(dotted, config["effects"])]
+        if of_cells(config["spectra"])
+        else late
+    )

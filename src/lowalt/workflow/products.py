@@ -1,7 +1,8 @@
-"""Input files of the remaining rules, derived from the plan of the run (data stages: `data_products`).
+"""Input files of the remaining rules, derived from the plan of the run (data stages:
+`data_products`).
 
-Each method takes the wildcards of a job and can be used in a rule's `input:`. No file is read here. A method checks
-the existence of a file only if no rule of the run can make it.
+Each method takes the wildcards of a job and can be used in a rule's `input:`. No file is read here.
+A method checks the existence of a file only if no rule of the run can make it.
 """
 
 import json
@@ -22,9 +23,15 @@ REFERENCE = "results/reference"
 PAGE = (".html", ".css", ".js")
 """Suffixes of the templates of the report."""
 TABLES = (
-    "accuracy.csv", "confusion.csv", "confusion_by_snr.csv", "subtypes.csv", "comparisons.csv", "orderings.csv",
-    "alarms.csv", "calibration.csv",
-)  # fmt: skip
+    "accuracy.csv",
+    "confusion.csv",
+    "confusion_by_snr.csv",
+    "subtypes.csv",
+    "comparisons.csv",
+    "orderings.csv",
+    "alarms.csv",
+    "calibration.csv",
+)
 """Tables of recognition; their rows name a protocol and a scheme."""
 PAGE_TABLES = ("accuracy", "confusion_by_snr", "subtypes", "comparisons", "orderings", "seeds")
 """Tables that the report shows."""
@@ -34,9 +41,10 @@ class Products(DataProducts):
     """Paths of the products of one run: those of its data set, of its trainings and of its report."""
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Inputs of training and evaluation as configured: images reduced to the scheme's size, the index of the
-        shards, or clouds for samples simulated on access."""
-        base, scheme = f"results/{self._run.data}", self._run.schemes_by_slug[wildcards.scheme]
+        """Inputs of training and evaluation as configured: images reduced to the scheme's size, the
+        index of the shards, or clouds for samples simulated on access."""
+        base = f"results/{self._run.data}"
+        scheme = self._run.schemes_by_slug[wildcards.scheme]
         if self._config["recognition"].get("input") == "dataset":
             return self._made()
         if not self._config["recognition"]["cache"]:
@@ -45,7 +53,9 @@ class Products(DataProducts):
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
 
     def _made(self) -> dict[str, str | list[str]]:
-        """Inputs for samples simulated on access: configuration, clouds, and surfaces for the effect `occlusion`."""
+        """Inputs for samples simulated on access: configuration, clouds, and surfaces for the
+        effect `occlusion`.
+        """
         base = f"results/{self._run.data}"
         clouds = [f"{base}/clouds/{subtype}.npz" for subtype in self._run.subtypes]
         surfaces = [path.replace("/clouds/", "/occluders/") for path in clouds]
@@ -53,19 +63,31 @@ class Products(DataProducts):
         return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Inputs of one training: `samples`, and the user's file if it defines the scheme's backbone."""
+        """Inputs of one training: `samples`, and the user's file if it defines the scheme's
+        backbone.
+        """
         name = self._run.own_backbone(self._run.schemes_by_slug[wildcards.scheme])
         return self.samples(wildcards) | ({"backbone": name.rpartition(":")[0]} if name else {})
 
     def data(self, wildcards: Any) -> list[str]:
         """Files of the run's data set: shards, their tables, index and data card."""
-        shards = [f"{shard}.{ending}" for shard in self._run.plan.shards for ending in ("tar", "npz")]
-        return [f"results/{self._run.name}/shards/{name}" for name in ("index.json", "README.md", *shards)]
+        shards = [
+            f"{shard}.{ending}" for shard in self._run.plan.shards for ending in ("tar", "npz")
+        ]
+        return [
+            f"results/{self._run.name}/shards/{name}"
+            for name in ("index.json", "README.md", *shards)
+        ]
 
     def own_views(self, wildcards: Any) -> list[str]:
         """Images of this run's own samples, shrunk to the sizes of the schemes that are trained."""
-        sizes, shards = self._run.image_sizes, self._run.plan.shards
-        return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
+        sizes = self._run.image_sizes
+        shards = self._run.plan.shards
+        return [
+            f"results/{self._run.name}/views/{size}/{shard}.npz"
+            for size in sizes
+            for shard in shards
+        ]
 
     def studied(self, wildcards: Any) -> list[str]:
         """Predictions of the presets that a study trains on this run's data, one per training seed.
@@ -87,7 +109,10 @@ class Products(DataProducts):
         """
         others = self._config["recognition"]["transfer"]
         for other in others:
-            names = ["config.yaml", *(f"models/{training}/model.safetensors" for training in self._run.trainings)]
+            names = [
+                "config.yaml",
+                *(f"models/{training}/model.safetensors" for training in self._run.trainings),
+            ]
             missing = [name for name in names if not Path(f"results/{other}/{name}").is_file()]
             if missing:
                 raise InputError(
@@ -98,7 +123,9 @@ class Products(DataProducts):
 
     def report(self, wildcards: Any) -> dict[str, str | list[str]]:
         """The files of the report by the names of its manifest (`lowalt.report.inputs`)."""
-        base, data, block = f"results/{wildcards.run}", f"results/{self._run.data}", self._config["report"]
+        base = f"results/{wildcards.run}"
+        data = f"results/{self._run.data}"
+        block = self._config["report"]
         files: dict[str, str | list[str]] = {
             **{name: f"{base}/{name}.csv" for name in PAGE_TABLES},
             "published": block["published"],
@@ -119,7 +146,9 @@ class Products(DataProducts):
         if baselines.is_file():
             files["benchmark"] = str(baselines)
         if self._run.trainings:
-            files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
+            files["predictions"] = [
+                f"{base}/predictions/{training}.csv" for training in self._run.trainings
+            ]
         asked = {"accuracy_cost": block["accuracy"], "echo_cost": block["cost"]}
         return files | {name: path for name, path in asked.items() if path}
 
@@ -128,8 +157,11 @@ class Products(DataProducts):
         return json.dumps(self.report(wildcards), indent=1)
 
     def prepared(self, wildcards: Any) -> list[str]:
-        """Files made without torch before the first training; empty if the data set is another run's."""
-        run, base = self._run, f"results/{self._run.name}"
+        """Files made without torch before the first training; empty if the data set is another
+        run's.
+        """
+        run = self._run
+        base = f"results/{self._run.name}"
         if run.data != run.name:
             return []
         names = ["SHA256SUMS", "distances.csv", "clouds.png", "shards/README.md"]
@@ -142,11 +174,14 @@ class Products(DataProducts):
 
     def page_templates(self, wildcards: Any) -> list[str]:
         """Templates, style and scripts of the report."""
-        return [near(path) for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE]
+        return [
+            near(path) for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE
+        ]
 
     def data_benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of the jobs of the data set, in pipeline order."""
-        run, plan = self._run, self._run.plan
+        run = self._run
+        plan = self._run.plan
         kind = self._config["shards"]["kind"]
         cached = self._config["recognition"]["cache"]
         sizes = run.image_sizes if cached else []
@@ -165,10 +200,15 @@ class Products(DataProducts):
 
     def benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of all jobs, in pipeline order."""
-        trainings, folder = self._run.trainings, f"results/{wildcards.run}/benchmarks"
+        trainings = self._run.trainings
+        folder = f"results/{wildcards.run}/benchmarks"
         return [
             *self.data_benchmarks(wildcards),
-            *(f"{folder}/{kind}/{training}.jsonl" for kind in ("train", "evaluate") for training in trainings),
+            *(
+                f"{folder}/{kind}/{training}.jsonl"
+                for kind in ("train", "evaluate")
+                for training in trainings
+            ),
             f"results/{self._run.data}/benchmarks/distances.jsonl",
             f"{folder}/tables.jsonl",
         ]

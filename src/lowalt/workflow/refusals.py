@@ -1,6 +1,8 @@
-"""Checks that refuse a configuration whose values contradict each other, another run, or the existing files.
+"""Checks that refuse a configuration whose values contradict each other, another run, or the
+existing files.
 
-Each function raises InputError naming the key, its value and what was expected. `Run.of` calls them before any job.
+Each function raises InputError naming the key, its value and what was expected. `Run.of` calls them
+before any job.
 """
 
 import contextlib
@@ -23,12 +25,19 @@ from lowalt.spectra.catalogue import named, of_cells
 from lowalt.targets.records import missing_inputs, records_of
 
 TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
-"""Blocks of the configuration that may differ between a run and the run whose data set it trains on."""
+"""Blocks of the configuration that may differ between a run and the run whose data set it trains
+on.
+"""
 
 
 def refuse_braces(config: dict, inputs: str | None) -> None:
     """Refuse paths with braces, which Snakemake would interpret as wildcards or format fields."""
-    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("motion", "track"))
+    keys = (
+        ("recognition", "table"),
+        ("report", "published"),
+        ("report", "accuracy"),
+        ("motion", "track"),
+    )
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
     paths |= {"effects": " ".join(own_effects(config["effects"]))}
     paths |= {"effects.town.buildings": buildings_of(config["effects"])}
@@ -39,7 +48,9 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
 
 
 def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> None:
-    """Refuse incompatible effects, companions that are not subtypes of the run, and added SNRs with `cell_noise`."""
+    """Refuse incompatible effects, companions that are not subtypes of the run, and added SNRs with
+    `cell_noise`.
+    """
     links = any(station.transmitter is not None for station in network.stations)
     if config["effects"] or links or network.guard_subcarriers < 0:
         from lowalt.scene.checks import check
@@ -48,8 +59,13 @@ def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> N
     companions = (config["effects"].get("companions") or {}).get("subtypes", [])
     if unknown := sorted(set(companions) - set(subtypes)):
         raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
-    if in_all_cells(config["effects"]) and any("snr_db" in step for step in config.get("added", [])):
-        raise InputError("added: snr_db together with effects.cell_noise, whose echoes contain the noise of all SNRs")
+    if in_all_cells(config["effects"]) and any(
+        "snr_db" in step for step in config.get("added", [])
+    ):
+        raise InputError(
+            "added: snr_db together with effects.cell_noise, whose echoes contain the noise of all "
+            "SNRs"
+        )
 
 
 def refuse_contradictions(config: dict, published: dict, classes: tuple[str, ...]) -> None:
@@ -58,7 +74,9 @@ def refuse_contradictions(config: dict, published: dict, classes: tuple[str, ...
     published: rows of the table of targets by subtype; classes: those of the table.
     """
     if config["run"] in config["recognition"]["transfer"]:
-        raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
+        raise InputError(
+            f"recognition.transfer: {config['run']!r} is this run, expected other runs"
+        )
     refuse_heights(config["motion"]["height_m"], published, classes)
     refuse_sizes(config, classes)
     for refuse_values in (refuse_cells, refuse_missing, refuse_region, refuse_speeds, refuse_input):
@@ -71,7 +89,9 @@ def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str
         raise InputError(f"{key}: {unknown}, expected {expected}")
     for name, (low, high) in ranges.items():
         if low > high:
-            raise InputError(f"{key}: {name} from {low} to {high} m, expected the smaller value first")
+            raise InputError(
+                f"{key}: {name} from {low} to {high} m, expected the smaller value first"
+            )
 
 
 def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> None:
@@ -85,21 +105,30 @@ def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> 
 
 
 def refuse_input(config: dict) -> None:
-    """Refuse an image cache for samples simulated on access, and recipe shards in scenes without clean echoes."""
+    """Refuse an image cache for samples simulated on access, and recipe shards in scenes without
+    clean echoes.
+    """
     if config["shards"]["kind"] == "recipe":
         refuse(config["effects"])
     block = config["recognition"]
     own = own_effects(config["effects"])
     if block.get("input") == "dataset" and own:
-        raise InputError(f"recognition.input: 'dataset' together with the effects {own}, expected shards")
+        raise InputError(
+            f"recognition.input: 'dataset' together with the effects {own}, expected shards"
+        )
     if block.get("input") == "dataset" and block["cache"]:
-        raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
+        raise InputError(
+            "recognition.input: 'dataset' together with recognition.cache true, expected cache: "
+            "false"
+        )
 
 
 def refuse_cells(config: dict) -> None:
-    """Refuse three combinations: spectra of range cells with shards of signals, cubes with interpolated gaps, and
-    `shards.cells` for shards other than cubes."""
-    kind, shown, cells = config["shards"]["kind"], of_cells(config["spectra"]), config["shards"].get("cells")
+    """Refuse three combinations: spectra of range cells with shards of signals, cubes with
+    interpolated gaps, and `shards.cells` for shards other than cubes."""
+    kind = config["shards"]["kind"]
+    shown = of_cells(config["spectra"])
+    cells = config["shards"].get("cells")
     if cells and kind != "cube":
         raise InputError(f"shards.cells: {cells!r} and shards.kind {kind!r}, expected kind 'cube'")
     if shown and kind not in ("image", "cube"):
@@ -115,43 +144,65 @@ def refuse_cells(config: dict) -> None:
 
 
 def refuse_no_files(targets: dict, inputs: str | None) -> None:
-    """Refuse a folder with none of the named files if built-in models would silently replace them all."""
+    """Refuse a folder with none of the named files if built-in models would silently replace them
+    all.
+    """
     if targets.get("where_missing") != "builtin":
         return
     records = records_of({**targets, "where_missing": "refuse"})
-    real = {name: record for name, record in records.items() if record["source"] in ("mesh", "mocap")}
+    real = {
+        name: record for name, record in records.items() if record["source"] in ("mesh", "mocap")
+    }
     lacking = [name for name, record in real.items() if missing_inputs({name: record}, inputs)]
     if real and len(lacking) == len(real):
-        raise InputError(f"inputs: {inputs}, expected a folder with the files of at least one of {lacking}")
+        raise InputError(
+            f"inputs: {inputs}, expected a folder with the files of at least one of {lacking}"
+        )
 
 
 def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:
     """Refuse flight heights for names that are neither subtypes nor classes, and reversed ranges."""
     known = {*published, *classes, *CATEGORIES}
-    _refuse_ranges("motion.height_m", heights, known, f"subtypes, classes {list(classes)} or {list(AIRBORNE)}")
+    _refuse_ranges(
+        "motion.height_m", heights, known, f"subtypes, classes {list(classes)} or {list(AIRBORNE)}"
+    )
 
 
 def refuse_data(config: dict) -> None:
-    """Refuse another run's data set if it or its images are missing, or if its settings differ from these."""
+    """Refuse another run's data set if it or its images are missing, or if its settings differ from
+    these.
+    """
     name = config.get("data", config["run"])
     if name == config["run"]:
         return
     made = Path("results") / name / "config.yaml"
     if not made.is_file():
         raise InputError(f"data: no {made}, expected a finished run; make run {name!r} first")
-    here, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
-    differ = [key for key in sorted({*here, *other} - set(TRAINING_BLOCKS)) if here.get(key) != other.get(key)]
+    here = plain(as_named(config))
+    other = plain(as_named(load_yaml(made)))
+    differ = [
+        key
+        for key in sorted({*here, *other} - set(TRAINING_BLOCKS))
+        if here.get(key) != other.get(key)
+    ]
     if differ:
-        raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")
+        raise InputError(
+            f"data: run {name!r} was made with other settings of {differ}, expected equal ones"
+        )
     needed = ("SHA256SUMS", "views") if config["recognition"]["cache"] else ("SHA256SUMS",)
     if lacking := [part for part in needed if not (made.parent / part).exists()]:
-        raise InputError(f"data: {made.parent} has no {' and no '.join(lacking)}, expected a run made to its end; "
-                         f"make run {name!r} without --target first")  # fmt: skip
+        raise InputError(
+            f"data: {made.parent} has no {' and no '.join(lacking)}, expected a run made to its end; "
+            f"make run {name!r} without --target first"
+        )
 
 
 def refuse_missing(config: dict) -> None:
-    """Refuse a missing file or folder that the configuration names; some are needed only by the last jobs."""
-    report, network = config["report"], config["recognition"]["network"]
+    """Refuse a missing file or folder that the configuration names; some are needed only by the
+    last jobs.
+    """
+    report = config["report"]
+    network = config["recognition"]["network"]
     backbone, colon, _ = network["backbone"].rpartition(":")
     files = {
         "inputs": [config["inputs"]],
@@ -159,13 +210,17 @@ def refuse_missing(config: dict) -> None:
         "effects.town.buildings": [buildings_of(config["effects"])],
         "recognition.table": [config["recognition"]["table"]],
         "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
-        "recognition.network.weights": [] if network["weights"] in ("none", "hub") else [network["weights"]],
+        "recognition.network.weights": []
+        if network["weights"] in ("none", "hub")
+        else [network["weights"]],
         **{f"report.{key}": [report[key]] for key in ("published", "accuracy")},
     }
     for key, paths in files.items():
         missing = [path for path in paths if path is not None and not Path(path).exists()]
         if missing:
-            raise InputError(f"{key}: {missing[0]!r} is not there, expected the path of a file or folder that is")
+            raise InputError(
+                f"{key}: {missing[0]!r} is not there, expected the path of a file or folder that is"
+            )
 
 
 def refuse_region(config: dict) -> None:
@@ -174,7 +229,11 @@ def refuse_region(config: dict) -> None:
     corners = masts_m(config["network"]) if polygon is None else polygon
     sides = [(x - corners[0][0], y - corners[0][1]) for x, y in corners[1:]]
     if all(a * d == b * c for a, b in sides for c, d in sides):
-        stations = f", the area between the stations, and there is none between {corners}" if polygon is None else ""
+        stations = (
+            f", the area between the stations, and there is none between {corners}"
+            if polygon is None
+            else ""
+        )
         raise InputError(
             f"motion.region.polygon_m: {polygon}{stations}; expected corners (m) such as [[0, 0], [500, 0], [250, 433]]"
         )
@@ -182,12 +241,14 @@ def refuse_region(config: dict) -> None:
 
 def refuse_speeds(config: dict) -> None:
     """Refuse VT speeds beyond the unambiguous speed c / (4 f T_r), where the spectrum repeats."""
-    network, vt = config["network"], config["spectra"].get("vt")
+    network = config["network"]
+    vt = config["spectra"].get("vt")
     fold = SPEED_OF_LIGHT / (4 * network["carrier_hz"] * network["symbol_interval_s"])
     # Unevenly spaced symbols resolve higher speeds if their instants are known.
     if vt is None or config["spectra"].get("times") == "known":
         return
-    low, high = vt["speed_min_mps"], vt["speed_max_mps"]
+    low = vt["speed_min_mps"]
+    high = vt["speed_max_mps"]
     if high - low > 2 * fold + vt["speed_step_mps"]:
         raise InputError(
             f"spectra.vt: speed_min_mps {low:g} to speed_max_mps {high:g}, expected at most {-fold:.3g} to {fold:.3g}: "
@@ -197,8 +258,11 @@ def refuse_speeds(config: dict) -> None:
 
 
 def _suited(config: dict, name: str) -> Scheme:
-    """Return a scheme of the table. Raises: InputError where this configuration lacks its stations or spectra."""
-    table, stations = config["recognition"]["table"], station_names(config["network"])
+    """Return a scheme of the table. Raises: InputError where this configuration lacks its stations
+    or spectra.
+    """
+    table = config["recognition"]["table"]
+    stations = station_names(config["network"])
     scheme = scheme_named(table, name, stations)
     columns_in(scheme.columns, named(config["spectra"]), len(stations), table)
     return scheme
@@ -216,18 +280,21 @@ def _able(config: dict) -> list[str]:
 def schemes_of(config: dict) -> dict[str, Scheme]:
     """Return the schemes that a run trains or times, by the name that the configuration gives them.
 
-    Raises: InputError for a scheme that does not suit the stations and spectra, listing those that do; for one named
-    twice; and if no scheme trains in a protocol of the run.
+    Raises: InputError for a scheme that does not suit the stations and spectra, listing those that
+    do; for one named twice; and if no scheme trains in a protocol of the run.
     """
     block = config["recognition"]
-    known, schemes = set(map(slug, names(block["table"]))), {}
+    known = set(map(slug, names(block["table"])))
+    schemes = {}
     for key in ("schemes", "timed"):
         for name in block[key]:
             try:
                 schemes[name] = _suited(config, name)
             except InputError as error:
                 able = _able(config) or "none: name a table of your own in recognition.table"
-                advice = f"; for this network and its spectra {block['table']} has {able}" * (slug(name) in known)
+                advice = f"; for this network and its spectra {block['table']} has {able}" * (
+                    slug(name) in known
+                )
                 raise InputError(f"recognition.{key}: {name!r}: {error}{advice}") from None
     trained = [schemes[name] for name in block["schemes"]]
     if len({scheme.name for scheme in trained}) < len(trained):

@@ -1,4 +1,5 @@
-"""One run: the facts derived from its checked configuration. Other modules hold its files and its stages' settings.
+"""One run: the facts derived from its checked configuration. Other modules hold its files and its
+stages' settings.
 
 Every fault of a configuration is found here, before any job starts.
 """
@@ -23,9 +24,11 @@ from lowalt.workflow import refusals
 
 @dataclass(frozen=True)
 class Run:
-    """Network, records, classes, plan and schemes of one run; `inputs` is the folder of the user's files, or None.
+    """Network, records, classes, plan and schemes of one run; `inputs` is the folder of the user's
+    files, or None.
 
-    The classes are those of the whole table of targets, so that labels do not depend on the selection of targets.
+    The classes are those of the whole table of targets, so that labels do not depend on the
+    selection of targets.
     """
 
     config: dict
@@ -40,15 +43,18 @@ class Run:
     def of(cls, config: dict, schema: str | Path, inputs: str | None) -> "Run":
         """Return the run of a merged configuration.
 
-        Raises: InputError naming the key, its value and the expected one, or the missing files of the user.
+        Raises: InputError naming the key, its value and the expected one, or the missing files of
+        the user.
         """
         check(config, schema)
         refusals.refuse_braces(config, inputs)
         records = records_of(config["targets"], inputs)
         published = {name: record["published"] for name, record in records.items()}
-        classes, plan = classes_of(published), Plan.of(config, published)
+        classes = classes_of(published)
+        plan = Plan.of(config, published)
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
-        network, spectra = Network.from_settings(config["network"]), Spectra.from_settings(config["spectra"])
+        network = Network.from_settings(config["network"])
+        spectra = Spectra.from_settings(config["spectra"])
         spectra.check(network.symbols, len(network.stations), network.subcarriers)
         Images.from_settings(config["images"])
         refusals.refuse_contradictions(config, published, classes)
@@ -62,8 +68,12 @@ class Run:
 
     @property
     def sources(self) -> str:
-        """One line: the number of subtypes with built-in models, and the subtypes made from the user's files."""
-        named = [name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")]
+        """One line: the number of subtypes with built-in models, and the subtypes made from the
+        user's files.
+        """
+        named = [
+            name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")
+        ]
         if not named:
             return f"targets: {len(self.records)} built-in"
         return f"targets: {len(self.records) - len(named)} built-in; from files: {', '.join(named)}"
@@ -82,7 +92,9 @@ class Run:
 
     @property
     def data(self) -> str:
-        """Name of the run whose data set is used for training: this run, unless the configuration names another."""
+        """Name of the run whose data set is used for training: this run, unless the configuration
+        names another.
+        """
         return self.config.get("data", self.name)
 
     @cached_property
@@ -134,7 +146,9 @@ class Run:
 
     @cached_property
     def priced(self) -> list[str]:
-        """The trainings in the comparison of accuracy and cost: unseen protocol, all training seeds."""
+        """The trainings in the comparison of accuracy and cost: unseen protocol, all training
+        seeds.
+        """
         seeds = self.config["recognition"]["seeds"]
         return [f"unseen/{scheme.slug}/{seed}" for scheme in self.trained for seed in seeds]
 
@@ -143,7 +157,9 @@ class Run:
         return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]
 
     def images_of_job(self, wildcards: Any) -> int:
-        """Number of images per sample in the scheme of a job; the training time is proportional to it."""
+        """Number of images per sample in the scheme of a job; the training time is proportional to
+        it.
+        """
         return len(self.schemes_by_slug[wildcards.scheme].columns)
 
     @cached_property

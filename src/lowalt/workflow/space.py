@@ -1,6 +1,7 @@
 """Checks whether the disk is writable and whether a run's files fit on it.
 
-The Snakefile calls `writable` when it is read and `before` when a run starts; the display names a disk that is full.
+The Snakefile calls `writable` when it is read and `before` when a run starts; the display names a
+disk that is full.
 """
 
 import os
@@ -23,11 +24,14 @@ SIGNAL_BYTES = 8
 
 
 def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> float:
-    """Return the bytes that a job leaves; 0 for rules that leave little, or temporary files such as tiles."""
+    """Return the bytes that a job leaves; 0 for rules that leave little, or temporary files such as
+    tiles.
+    """
     if "part" not in wildcards:
         return 0.0
     chunk = plan.chunk(f"{wildcards['group']}-{wildcards['part']}")
-    models, stations = chunk.count * len(chunk.members), len(config["network"]["stations"])
+    models = chunk.count * len(chunk.members)
+    stations = len(config["network"]["stations"])
     values = models * stations * config["network"]["symbols"]
     if rule in ("echo", "echo_in_scene"):
         return SIGNAL_BYTES * values / (stations if "station" in wildcards else 1)
@@ -43,28 +47,37 @@ def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -
 
 
 def cubes_size(config: dict, plan: Plan) -> dict:
-    """Return the size of a data set of cubes: number of `samples`, bytes per sample (`sample_bytes`) and in all
-    (`bytes`), and the type of its stored `cells`.
+    """Return the size of a data set of cubes: number of `samples`, bytes per sample
+    (`sample_bytes`) and in all (`bytes`), and the type of its stored `cells`.
 
     Empty for shards of other kinds.
     """
     if config["shards"]["kind"] != "cube":
         return {}
-    size, count = sample_bytes(config), plan.samples
-    return {"cells": cell_type(config), "samples": count, "sample_bytes": size, "bytes": count * size}
+    size = sample_bytes(config)
+    count = plan.samples
+    return {
+        "cells": cell_type(config),
+        "samples": count,
+        "sample_bytes": size,
+        "bytes": count * size,
+    }
 
 
 def cubes_sentence(size: dict) -> str:
     """Return `cubes_size` as one line."""
-    sample_mb, total_gb = size["sample_bytes"] / 1e6, size["bytes"] / 1e9
+    sample_mb = size["sample_bytes"] / 1e6
+    total_gb = size["bytes"] / 1e9
     samples = f"{size['samples']} samples, {size['cells']}"
     return f"cube shards: {sample_mb:.2f} MB per sample, {total_gb:.3f} GB in all ({samples})"
 
 
 def check(needed: float, folder: Path) -> None:
-    """Refuse a run whose files do not fit on the disk of a folder, unless the variable LOWALT_SPACE is "off".
+    """Refuse a run whose files do not fit on the disk of a folder, unless the variable LOWALT_SPACE
+    is "off".
 
-    needed: bytes. Raises: SpaceError with both sizes; InputError where the variable has another value.
+    needed: bytes. Raises: SpaceError with both sizes; InputError where the variable has another
+    value.
     """
     choice = os.environ.get(VARIABLE)
     if choice not in (None, "off"):
@@ -78,7 +91,8 @@ def check(needed: float, folder: Path) -> None:
 
 
 def before(workflow: Any, plan: Plan, config: dict) -> None:
-    """Print the size of cubes, and compare the bytes that a run will write with the free space, before its first job.
+    """Print the size of cubes, and compare the bytes that a run will write with the free space,
+    before its first job.
 
     Existing outputs are not counted. workflow: Snakemake's workflow object. Raises: as `check`.
     """
@@ -86,25 +100,36 @@ def before(workflow: Any, plan: Plan, config: dict) -> None:
         print(cubes_sentence(size), file=sys.stderr)
     needed = 0.0
     for job in workflow.dag.needrun_jobs():
-        there = sum(path.stat().st_size for path in map(Path, map(str, job.output)) if path.is_file())
+        there = sum(
+            path.stat().st_size for path in map(Path, map(str, job.output)) if path.is_file()
+        )
         needed += max(0.0, written(job.rule.name, dict(job.wildcards_dict), plan, config) - there)
     check(needed, Path.cwd() / "results")
 
 
 def writable(folder: Path, run: str) -> None:
-    """Test writing: put an unnamed file of TRIAL_BYTES into the working directory, `results`, the run's folder and its
-    subfolders. In a full or read-only one Snakemake would end with a traceback.
+    """Test writing: put an unnamed file of TRIAL_BYTES into the working directory, `results`, the
+    run's folder and its subfolders. In a full or read-only one Snakemake would end with a
+    traceback.
 
-    Raises: InputError with the reason and the free space if that fails, or if `results` is a dangling link.
+    Raises: InputError with the reason and the free space if that fails, or if `results` is a
+    dangling link.
     """
     results = folder / "results"
     if results.is_symlink() and not results.exists():
-        raise InputError(f"{results}: a link to {results.readlink()}, which is not there (is its disk mounted?)")
+        raise InputError(
+            f"{results}: a link to {results.readlink()}, which is not there (is its disk mounted?)"
+        )
     made = results / run
-    for place in (folder, *(place for place in (results, made, *sorted(made.glob("*/"))) if place.exists())):
+    for place in (
+        folder,
+        *(place for place in (results, made, *sorted(made.glob("*/"))) if place.exists()),
+    ):
         try:
             with tempfile.TemporaryFile(dir=place) as file:
                 file.write(bytes(TRIAL_BYTES))
         except OSError as error:
             facts = f"{error.strerror}, {free_bytes(place) / 1e6:.1f} MB free"
-            raise InputError(f"{place.resolve()}: cannot write into this folder ({facts})") from None
+            raise InputError(
+                f"{place.resolve()}: cannot write into this folder ({facts})"
+            ) from None

@@ -1,7 +1,7 @@
 """The state of a run in a file, which `lowalt status` shows in another terminal.
 
-Each run writes .snakemake/status/{process id}.json in its working directory. The file of a finished run stays until
-the next run starts there. The command shows all running runs, or else the last one.
+Each run writes .snakemake/status/{process id}.json in its working directory. The file of a finished
+run stays until the next run starts there. The command shows all running runs, or else the last one.
 """
 
 import json
@@ -17,19 +17,27 @@ from lowalt.workflow.board import Board, span
 
 FOLDER = Path(".snakemake/status")
 PLANNED_JOBS = "LOWALT_PLANNED_JOBS"
-"""Environment variable: file to which a dry run appends each job that would run, one JSON object per line."""
+"""Environment variable: file to which a dry run appends each job that would run, one JSON object
+per line.
+"""
 
 FRESH_S = 60.0
-"""Age (s) below which a state counts as current. A run writes every second, but clocks of other machines may differ."""
+"""Age (s) below which a state counts as current. A run writes every second, but clocks of other
+machines may differ.
+"""
 
 
 def write(board: Board, state: str, folder: Path = FOLDER) -> None:
     """Write the state of this process's run: "running", "ended", "failed" or "interrupted"."""
     pid = os.getpid()
     kept = {
-        "pid": pid, "process": started(pid), "host": socket.gethostname(), "state": state, "written": time.time(),
+        "pid": pid,
+        "process": started(pid),
+        "host": socket.gethostname(),
+        "state": state,
+        "written": time.time(),
         "board": board.kept(),
-    }  # fmt: skip
+    }
     path = folder / f"{pid}.json"
     if not path.exists():
         _sweep(folder)
@@ -44,14 +52,18 @@ def elsewhere(kept: dict) -> str:
 
 
 def alive(kept: dict) -> bool:
-    """Return whether the process of a run is alive; on another machine, whether it wrote within the last FRESH_S."""
+    """Return whether the process of a run is alive; on another machine, whether it wrote within the
+    last FRESH_S.
+    """
     if elsewhere(kept):
         return kept["state"] == "running" and time.time() - kept["written"] < FRESH_S
     return kept["process"] is not None and started(kept["pid"]) == kept["process"]
 
 
 def read(folder: Path = FOLDER) -> list[dict]:
-    """Return the stored states of all runs of a working directory, oldest first; damaged files are skipped."""
+    """Return the stored states of all runs of a working directory, oldest first; damaged files are
+    skipped.
+    """
     states = []
     for path in folder.glob("*.json"):
         try:
@@ -70,8 +82,13 @@ def _sweep(folder: Path) -> None:
 
 def describe(kept: dict, now: float) -> str:
     """Return the lines of one run."""
-    board, living = Board.read(kept["board"]), alive(kept)
-    state = kept["state"] if living or kept["state"] != "running" else "stopped unexpectedly, perhaps killed"
+    board = Board.read(kept["board"])
+    living = alive(kept)
+    state = (
+        kept["state"]
+        if living or kept["state"] != "running"
+        else "stopped unexpectedly, perhaps killed"
+    )
     host = elsewhere(kept)
     process = f"process {kept['pid']} of {host}" if host else f"process {kept['pid']}"
     head = f"{process}: {state}, {span(now - kept['written'])} ago"

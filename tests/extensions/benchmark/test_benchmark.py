@@ -1,4 +1,6 @@
-"""The benchmark's definition and tracks: frozen, disjoint, and from the data that the checksums describe."""
+"""The benchmark's definition and tracks: frozen, disjoint, and from the data that the checksums
+describe.
+"""
 
 import hashlib
 from pathlib import Path
@@ -18,7 +20,18 @@ from lowalt.recognition import recogniser, runs, schemes
 from lowalt.workflow.run import Run
 
 ROOT = Path(__file__).parents[3]
-MADE_OF = ("seed", "network", "targets", "motion", "echo", "effects", "noise", "spectra", "images", "split")
+MADE_OF = (
+    "seed",
+    "network",
+    "targets",
+    "motion",
+    "echo",
+    "effects",
+    "noise",
+    "spectra",
+    "images",
+    "split",
+)
 """Blocks of a configuration that decide a byte of its samples."""
 
 
@@ -34,13 +47,21 @@ def test_the_definition_takes_nothing_that_decides_bytes_from_the_default():
     for name in MADE_OF:
         given, own = (dict(leaves({name: block[name]})) for block in (merged, written))
         assert set(given) == set(own)
-        assert {key: str(value) for key, value in given.items()} == {key: str(value) for key, value in own.items()}
+        assert {key: str(value) for key, value in given.items()} == {
+            key: str(value) for key, value in own.items()
+        }
 
 
 @pytest.mark.parametrize("part", PARTS)
 def test_samples_made_again_are_those_that_are_kept(part):
-    """Every subtype, in the town a few: a change of targets, motion, echo, noise, spectra or effects is seen here."""
-    kept = [(name, digest) for name, digest in frozen_bytes.kept(frozen_bytes.SAMPLES).items() if name.startswith(part)]
+    """Every subtype, in the town a few: a change of targets, motion, echo, noise, spectra or
+    effects is seen here.
+    """
+    kept = [
+        (name, digest)
+        for name, digest in frozen_bytes.kept(frozen_bytes.SAMPLES).items()
+        if name.startswith(part)
+    ]
     assert len(kept) == frozen_bytes.FEW.get(part, 40)
     assert [(f"{part}/{key}", digest) for key, digest in frozen_bytes.samples(part)] == kept
 
@@ -52,7 +73,11 @@ def test_keys_and_folds_are_those_of_the_workflow():
     assert classes == tuple(run.classes)
     pairs = {f"{group}-{fold}" for group, fold in zip(facts.group, facts.fold, strict=True)}
     assert pairs == {name.rpartition("-")[0] for name in run.plan.shards}
-    assert np.bincount(np.unique(facts.fold, return_inverse=True)[1]).tolist() == [6000, 48000, 6000]
+    assert np.bincount(np.unique(facts.fold, return_inverse=True)[1]).tolist() == [
+        6000,
+        48000,
+        6000,
+    ]
 
 
 @pytest.mark.parametrize("track", TRACKS.values(), ids=list(TRACKS))
@@ -61,21 +86,36 @@ def test_no_motion_model_is_in_two_parts_of_a_track(track):
     for use in ("train", "validation", "test"):
         part = track.part if use == "test" else MAIN
         facts = track.truth(part).facts.take(track.numbers(use))
-        models[use] = {f"{part}/{name}/{model}" for name, model in zip(facts.subtype, facts.model, strict=True)}
+        models[use] = {
+            f"{part}/{name}/{model}" for name, model in zip(facts.subtype, facts.model, strict=True)
+        }
         assert models[use]
         # All SNRs of a motion model are in one part.
         snrs = len(set(track.truth(part).facts.snr_db.tolist()))
         assert len(facts) == snrs * len(models[use])
-    assert not models["train"] & models["validation"] and not (models["train"] | models["validation"]) & models["test"]
+    assert (
+        not models["train"] & models["validation"]
+        and not (models["train"] | models["validation"]) & models["test"]
+    )
 
 
 def test_the_unseen_subtypes_train_as_often_as_a_track_says():
-    for name, shots in (("unseen", 0), ("one-station", 0), ("few-shot-1", 1), ("few-shot-5", 5), ("few-shot-20", 20)):
+    for name, shots in (
+        ("unseen", 0),
+        ("one-station", 0),
+        ("few-shot-1", 1),
+        ("few-shot-5", 5),
+        ("few-shot-20", 20),
+    ):
         facts = truth(MAIN).facts.take(TRACKS[name].numbers("train"))
         unseen = facts.take(facts.group == "unseen")
-        models = {(subtype, model) for subtype, model in zip(unseen.subtype, unseen.model, strict=True)}
+        models = {
+            (subtype, model) for subtype, model in zip(unseen.subtype, unseen.model, strict=True)
+        }
         assert len(models) == 20 * shots
-        assert set(truth(MAIN).facts.take(TRACKS[name].numbers("test")).group.tolist()) == {"unseen"}
+        assert set(truth(MAIN).facts.take(TRACKS[name].numbers("test")).group.tolist()) == {
+            "unseen"
+        }
 
 
 def test_the_held_out_class_neither_trains_nor_validates():
@@ -95,9 +135,19 @@ def test_forty_labels_are_the_subtypes():
 def test_a_trained_network_may_have_the_classes_of_a_track(track, tmp_path):
     classes = TRACKS[track].truth().classes
     scheme = schemes.Scheme("A:VRP", (0,), (0,))
-    block = {"backbone": "test_resnet", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
-             "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
-    weights = recogniser.Recogniser(scheme, block, 24, np.zeros((1, 256, 3), np.uint8), len(classes)).state_dict()
+    block = {
+        "backbone": "test_resnet",
+        "weights": "none",
+        "intra_depth": 1,
+        "inter_depth": 1,
+        "heads": 4,
+        "feed_forward": 1,
+        "dropout": 0.0,
+        "hidden": 0,
+    }
+    weights = recogniser.Recogniser(
+        scheme, block, 24, np.zeros((1, 256, 3), np.uint8), len(classes)
+    ).state_dict()
     about = {"scheme": vars(scheme), "protocol": "seen", "network": block, "size": 24, "seed": 0}
     model_files.save(
         tmp_path / "model.safetensors",

@@ -1,4 +1,6 @@
-"""The benchmark as a stranger uses it, on a small copy of its definition: data, examples, scores, confirmation."""
+"""The benchmark as a stranger uses it, on a small copy of its definition: data, examples, scores,
+confirmation.
+"""
 
 import importlib.util
 import json
@@ -44,7 +46,8 @@ def small(made, monkeypatch):
 
 
 def test_samples_of_a_track_are_those_of_its_keys(small):
-    train, test = benchmark.load("unseen", "train"), benchmark.load("unseen", "test")
+    train = benchmark.load("unseen", "train")
+    test = benchmark.load("unseen", "test")
     assert train.images.shape == (64, 9, 24, 24) and test.signals.shape == (16, 3, 400)
     data = small_benchmark.Dataset(definition.config_of("main"))
     for samples, number in ((train, 5), (test, 7)):
@@ -56,7 +59,9 @@ def test_samples_of_a_track_are_those_of_its_keys(small):
         assert np.array_equal(samples.images[number], small_benchmark.resized(data, found))
         assert samples.classes[samples.labels[number]] == data.record(found)["category"]
     alone = benchmark.load("one-station", "test")
-    assert np.array_equal(alone.images, test.images[:, :3]) and np.array_equal(alone.signals, test.signals[:, :1])
+    assert np.array_equal(alone.images, test.images[:, :3]) and np.array_equal(
+        alone.signals, test.signals[:, :1]
+    )
     assert set(benchmark.load("low-snr", "test").facts.snr_db.tolist()) == {3, 18}
 
 
@@ -85,14 +90,18 @@ def test_the_example_of_a_network_is_a_backbone_and_its_overlay_names_it():
     import torch
 
     assert own.small(24)(torch.zeros(2, 3, 24, 24)).shape == (2, 64)
-    config = small_benchmark.overlaid([*definition.overlays("main"), str(ROOT / "examples/benchmark_network.yaml")])
+    config = small_benchmark.overlaid(
+        [*definition.overlays("main"), str(ROOT / "examples/benchmark_network.yaml")]
+    )
     assert config["data"] == definition.RUN
     assert config["recognition"]["network"]["backbone"] == "examples/benchmark_network.py:small"
 
 
 def test_score_prints_intervals_and_every_baseline(small, capsys):
     test = benchmark.load("unseen", "test")
-    with pytest.raises(InputError, match=rf"row {test.key[0]}: p_uav is -2.5, expected a number from 0 to 1"):
+    with pytest.raises(
+        InputError, match=rf"row {test.key[0]}: p_uav is -2.5, expected a number from 0 to 1"
+    ):
         benchmark.write("mine.csv", test, np.full((len(test), 4), -2.5))
     assert not Path("mine.csv").exists(), "logits are refused before a file is written"
     benchmark.write("mine.csv", test, np.eye(4)[test.labels])
@@ -148,7 +157,9 @@ def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeyp
     assert first.samples == 4 * 4 * 2 and first.percent.value > 60
     assert first.seed == definition.root_seed(ZOO.read_bytes() + b"lowalt-40 v1")
     # Another seed gives other motion of the same subtypes.
-    rows = [confirm.dataset(track, seed).record(0)["motion"] for seed in (first.seed, first.seed + 1)]
+    rows = [
+        confirm.dataset(track, seed).record(0)["motion"] for seed in (first.seed, first.seed + 1)
+    ]
     assert rows[0] != rows[1]
     assert set(confirm.dataset(track, 1).plan.groups["unseen"]) == {
         "DJI Mini 4 Pro",
@@ -165,13 +176,29 @@ def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeyp
 @pytest.mark.slow
 def test_a_confirmed_row_of_the_table_is_what_the_command_finds_again(capsys):
     (row,) = [row for row in baseline_table.read() if row["confirmed_percent"]]
-    assert main(["benchmark", "confirm", f"{definition.RUN}-{row['track']}", "--track", row["track"], "--json"]) == 0
+    assert (
+        main(
+            [
+                "benchmark",
+                "confirm",
+                f"{definition.RUN}-{row['track']}",
+                "--track",
+                row["track"],
+                "--json",
+            ]
+        )
+        == 0
+    )
     found = json.loads(capsys.readouterr().out)["percent"]
     # One answer of thousands may depend on the processor's arithmetic.
-    assert found == pytest.approx([float(row[f"confirmed_{name}"]) for name in ("percent", "low", "high")], abs=0.1)
+    assert found == pytest.approx(
+        [float(row[f"confirmed_{name}"]) for name in ("percent", "low", "high")], abs=0.1
+    )
 
 
-def test_frozen_features_are_those_of_each_sample_s_images_station_by_station(small, tmp_path, monkeypatch):
+def test_frozen_features_are_those_of_each_sample_s_images_station_by_station(
+    small, tmp_path, monkeypatch
+):
     monkeypatch.syspath_prepend(ROOT / "studies")
     monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
     from frozen import SCALE, embedded, embedded_of
@@ -181,9 +208,13 @@ def test_frozen_features_are_those_of_each_sample_s_images_station_by_station(sm
 
     test = benchmark.load("unseen", "test")
     found = embedded_of(test, tmp_path).reshape(len(test), 3, -1)
-    model = backbone(BACKBONE, str(write_weights(tmp_path / f"{BACKBONE}.pth")), SCALE * test.size).eval()
+    model = backbone(
+        BACKBONE, str(write_weights(tmp_path / f"{BACKBONE}.pth")), SCALE * test.size
+    ).eval()
     chosen = [5, 0, len(test) - 1]
-    np.testing.assert_allclose(found[chosen], embedded(test.images[chosen], model, "viridis"), rtol=0.02, atol=0.01)
+    np.testing.assert_allclose(
+        found[chosen], embedded(test.images[chosen], model, "viridis"), rtol=0.02, atol=0.01
+    )
     assert abs(found[5] - found[0]).max() > 0.5
     assert (embedded_of(benchmark.load("one-station", "test"), tmp_path) == found[:, 0]).all()
 
@@ -195,15 +226,27 @@ def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatc
 
     monkeypatch.setattr(study, "OUT", tmp_path / "out")
     monkeypatch.setattr(study, "REFERENCE", str(tmp_path))
-    for method in ("majority class", "nearest centroid on moments", "logistic regression on features"):
+    for method in (
+        "majority class",
+        "nearest centroid on moments",
+        "logistic regression on features",
+    ):
         for track in ("unseen", "open-set", "one-station"):
             study.one((method, track, 0), "results")
-    # A call that found the network trained measured no training, so the time that the training kept counts.
-    (study.place("logistic regression on features", "unseen", 0) / "run.json").write_text('{"train_processor_s": 1000}')
+    # A call that found the network trained measured no training, so the time that the training kept
+    # counts.
+    (study.place("logistic regression on features", "unseen", 0) / "run.json").write_text(
+        '{"train_processor_s": 1000}'
+    )
     rows = study.tables(tmp_path)
-    assert {row["track"] for row in rows} == {"unseen", "open-set", "one-station"} and len(rows) == 9
+    assert {row["track"] for row in rows} == {"unseen", "open-set", "one-station"} and len(
+        rows
+    ) == 9
     by = {(row["track"], row["method"]): row for row in rows}
-    assert by["unseen", "majority class"]["percent"] == 25 and by["open-set", "majority class"]["percent"] == 50
+    assert (
+        by["unseen", "majority class"]["percent"] == 25
+        and by["open-set", "majority class"]["percent"] == 50
+    )
     assert by["unseen", "logistic regression on features"]["percent"] > 60
     assert by["unseen", "logistic regression on features"]["train_core_s"] == 1000
     assert by["unseen", "majority class"]["seeds"] == "none"

@@ -16,7 +16,8 @@ from lowalt.recognition.predictions import probability_columns
 sys.path.append(str(Path(__file__).parents[3] / "studies/benchmark"))
 import kept_results
 
-UNSEEN, OPEN = TRACKS["unseen"], TRACKS["open-set"]
+UNSEEN = TRACKS["unseen"]
+OPEN = TRACKS["open-set"]
 
 
 def answers(track, seed, skill=2.0):
@@ -32,7 +33,10 @@ def submission(path, track, shares, extra=""):
     """Write a submission line by line."""
     facts, classes = track.samples()
     lines = [",".join(("key", *probability_columns(classes)))]
-    lines += [",".join((key, *map(repr, row))) for key, row in zip(facts.key.tolist(), shares.tolist(), strict=True)]
+    lines += [
+        ",".join((key, *map(repr, row)))
+        for key, row in zip(facts.key.tolist(), shares.tolist(), strict=True)
+    ]
     path.write_text("\n".join(lines) + "\n" + extra)
     return path
 
@@ -52,9 +56,15 @@ def last(shares):
 
 
 FAULTS = {
-    "missing": (lambda rows: rows[:-2], "2 of the 6000 test samples of the track unseen are missing, the first is"),
+    "missing": (
+        lambda rows: rows[:-2],
+        "2 of the 6000 test samples of the track unseen are missing, the first is",
+    ),
     "twice": (lambda rows: [*rows, rows[7]], "line 6002: key .* stands twice"),
-    "unknown": (lambda rows: [*rows, "owl-000999-snr003,1,0,0,0"], "owl-000999-snr003' is no sample of the track"),
+    "unknown": (
+        lambda rows: [*rows, "owl-000999-snr003,1,0,0,0"],
+        "owl-000999-snr003' is no sample of the track",
+    ),
     "nan": (last("0.5,nan,0.5,0"), "line 6001: p_bird is 'nan'"),
     "words": (last("0.5,half,0.5,0"), "p_bird is 'half', expected a number"),
     "negative": (last("1.5,-0.5,0,0"), "p_uav is '1.5'"),
@@ -87,20 +97,28 @@ def test_headline_and_f1_are_those_of_the_definitions():
     guesses = shares.argmax(1)
     assert found["percent"].value == pytest.approx(100 * np.mean(guesses == facts.label))
     assert found["percent"].low < found["percent"].value < found["percent"].high
-    by_snr = [f1_score(facts.label[some], guesses[some], average="macro")
-              for snr in set(facts.snr_db.tolist()) for some in [facts.snr_db == snr]]  # fmt: skip
+    by_snr = [
+        f1_score(facts.label[some], guesses[some], average="macro")
+        for snr in set(facts.snr_db.tolist())
+        for some in [facts.snr_db == snr]
+    ]
     assert found["macro_f1_percent"].value == pytest.approx(100 * np.mean(by_snr))
     owls = facts.subtype == "Owl"
-    assert found["by_subtype_percent"]["Owl"] == pytest.approx(100 * np.mean(guesses[owls] == facts.label[owls]))
+    assert found["by_subtype_percent"]["Owl"] == pytest.approx(
+        100 * np.mean(guesses[owls] == facts.label[owls])
+    )
     assert list(found["by_snr_percent"]) == ["3", "8", "13", "18", "23", "inf"]
 
 
 def test_the_interval_of_a_headline_number_ends_at_0_and_100():
     facts, classes = UNSEEN.samples()
-    # All subtypes but two are right in every sample, so an interval that is symmetric passes 100 percent.
+    # All subtypes but two are right in every sample, so an interval that is symmetric passes 100
+    # percent.
     wrong = np.isin(facts.subtype, ["EH 216 S", "Sparrow"])
     for right, end in ((~wrong, "high"), (wrong, "low")):
-        shares = np.eye(len(classes))[np.where(right, facts.label, (facts.label + 1) % len(classes))]
+        shares = np.eye(len(classes))[
+            np.where(right, facts.label, (facts.label + 1) % len(classes))
+        ]
         parts = [scoring.tested(UNSEEN, facts, shares)]
         found = scoring.headline(UNSEEN, scoring.values_of(UNSEEN, parts, classes))
         assert getattr(found, end) == {"high": 100.0, "low": 0.0}[end]
@@ -113,10 +131,16 @@ def test_auroc_is_the_area_under_the_curve_and_its_interval_covers_it():
     found = scoring.scores(OPEN, [shares], {})
     area = 100 * roc_auc_score(held_out, shares[:, classes.index(UNKNOWN)])
     assert found["percent"].value == pytest.approx(area)
-    # Samples are independent here, so Hanley and McNeil's standard error of AUROC holds (Radiology 143, 1982).
-    share, known, other = area / 100, (~held_out).sum(), held_out.sum()
-    first, second = share / (2 - share), 2 * share**2 / (1 + share)
-    spread = share * (1 - share) + (other - 1) * (first - share**2) + (known - 1) * (second - share**2)
+    # Samples are independent here, so Hanley and McNeil's standard error of AUROC holds (Radiology
+    # 143, 1982).
+    share = area / 100
+    known = (~held_out).sum()
+    other = held_out.sum()
+    first = share / (2 - share)
+    second = 2 * share**2 / (1 + share)
+    spread = (
+        share * (1 - share) + (other - 1) * (first - share**2) + (known - 1) * (second - share**2)
+    )
     variance = spread / known / other
     width = found["percent"].high - found["percent"].low
     assert width == pytest.approx(2 * 1.96 * 100 * variance**0.5, rel=0.25)
@@ -131,7 +155,9 @@ def test_equal_scores_count_half():
 def test_what_is_kept_of_a_baseline_gives_its_difference_back(track, tmp_path, monkeypatch):
     facts, classes = track.samples()
     parts = [scoring.tested(track, facts, answers(track, seed)) for seed in (3, 4)]
-    kept_results.write_values(track, {"some method": kept_results.packed(track, parts, classes)}, tmp_path)
+    kept_results.write_values(
+        track, {"some method": kept_results.packed(track, parts, classes)}, tmp_path
+    )
     monkeypatch.setattr(baselines, "path_of", lambda track: tmp_path / f"{track.name}.npz")
     kept = baselines.kept(track)
     found = scoring.scores(track, [part.probabilities for part in parts], kept)
@@ -146,6 +172,9 @@ def test_a_group_ends_where_a_difference_is_certain():
     subtypes = np.repeat([f"type {number}" for number in range(20)], 50)
     draw = np.random.default_rng(0).random((4, 1000))
     levels = {"best": 0.92, "near": 0.915, "worse": 0.7, "also worse": 0.69}
-    values = {name: (draw[number] < level)[None].astype(float) for number, (name, level) in enumerate(levels.items())}
+    values = {
+        name: (draw[number] < level)[None].astype(float)
+        for number, (name, level) in enumerate(levels.items())
+    }
     found = kept_results.groups(UNSEEN, np.ones(1000), subtypes, values)
     assert found == {"best": 1, "near": 1, "worse": 2, "also worse": 2}

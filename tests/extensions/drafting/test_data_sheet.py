@@ -1,4 +1,6 @@
-"""Targets drafted from a data sheet: what it states stands in the record, the rest grows with the size."""
+"""Targets drafted from a data sheet: what it states stands in the record, the rest grows with the
+size.
+"""
 
 import warnings
 
@@ -12,9 +14,31 @@ from lowalt.files.errors import InputError
 from lowalt.targets.cloud import read
 from lowalt.targets.records import estimates
 
-DRONE = ["--rotors", "6", "--diagonal", "1.13", "--propeller", "0.53", "--blades", "2", "--rate", "50:120"]
+DRONE = [
+    "--rotors",
+    "6",
+    "--diagonal",
+    "1.13",
+    "--propeller",
+    "0.53",
+    "--blades",
+    "2",
+    "--rate",
+    "50:120",
+]
 BIRD = ["--length", "0.46", "--span", "0.99", "--rate", "3:5"]
-CAR = ["--length", "4.6", "--width", "1.85", "--height", "1.44", "--wheel", "0.67", "--wheel-base", "2.85"]
+CAR = [
+    "--length",
+    "4.6",
+    "--width",
+    "1.85",
+    "--height",
+    "1.44",
+    "--wheel",
+    "0.67",
+    "--wheel-base",
+    "2.85",
+]
 SPEED = ["--speed", "18"]
 
 
@@ -45,7 +69,11 @@ def test_a_drone_has_the_sheet_s_rotors_propellers_and_diagonal(drafts, tmp_path
         reach = np.linalg.norm(cloud.points[cloud.part == part][:, :2] - hub, axis=1).max()
         assert reach == pytest.approx(0.53 / 2, rel=0.02)
     published = cloud.record["published"]
-    assert (published["freq_lo_hz"], published["freq_hi_hz"], published["vx_abs_max"]) == (50, 120, 18)
+    assert (published["freq_lo_hz"], published["freq_hi_hz"], published["vx_abs_max"]) == (
+        50,
+        120,
+        18,
+    )
     # Nine stated: two figures, and of the row all but the climb.
     guessed, figures = estimates(cloud.record)
     assert figures - guessed == 7
@@ -54,7 +82,9 @@ def test_a_drone_has_the_sheet_s_rotors_propellers_and_diagonal(drafts, tmp_path
 def test_a_bird_and_a_vehicle_have_the_sheet_s_sizes(drafts, tmp_path):
     extents = {}
     for kind in ("bird", "vehicle"):
-        assert main(["target", "make", str(drafts[kind]), "--out", str(tmp_path / f"{kind}.npz")]) == 0
+        assert (
+            main(["target", "make", str(drafts[kind]), "--out", str(tmp_path / f"{kind}.npz")]) == 0
+        )
         extents[kind] = np.ptp(read(tmp_path / f"{kind}.npz").points, axis=0)
     assert extents["bird"][:2] == pytest.approx([0.99, 0.46], rel=0.03)
     assert extents["vehicle"] == pytest.approx([1.85, 4.6, 1.44], rel=0.06)
@@ -65,33 +95,59 @@ def test_a_bird_and_a_vehicle_have_the_sheet_s_sizes(drafts, tmp_path):
 
 def test_what_the_sheet_does_not_say_grows_with_the_size(drafts, tmp_path):
     twice = [{"1.13": "2.26", "0.53": "1.06"}.get(word, word) for word in DRONE]
-    frame = ["--frame", "radial", "--climb", "3", "--subtype", "Twice", "--out", str(tmp_path / "twice.yaml")]
+    frame = [
+        "--frame",
+        "radial",
+        "--climb",
+        "3",
+        "--subtype",
+        "Twice",
+        "--out",
+        str(tmp_path / "twice.yaml"),
+    ]
     assert main(["target", "drone", *twice, *SPEED, *frame]) == 0
     small = yaml.safe_load(drafts["drone"].read_text())["my-drone"]
     large = yaml.safe_load((tmp_path / "twice.yaml").read_text())["Twice"]
     for name, (value, unit, _) in small["figures"].items():
-        assert large["figures"][name][0] == pytest.approx(value * (2 if unit == "m" else 1), rel=0.01)
+        assert large["figures"][name][0] == pytest.approx(
+            value * (2 if unit == "m" else 1), rel=0.01
+        )
     assert large["row"]["vz_abs_max"] == 3 and "vz_abs_max" in large["row_from"]
     assert "vz_abs_max" not in small["row_from"]
 
 
 def test_python_drafts_the_same_record_and_refuses_what_a_sheet_lacks(drafts, tmp_path):
-    stated = {"rotors": 6, "diagonal": 1.13, "propeller": 0.53, "blades": 2, "rate": (50.0, 120.0), "speed": 18.0}
+    stated = {
+        "rotors": 6,
+        "diagonal": 1.13,
+        "propeller": 0.53,
+        "blades": 2,
+        "rate": (50.0, 120.0),
+        "speed": 18.0,
+    }
     text, lender = lowalt.draft_target("drone", subtype="my-drone", **stated)
     assert text == drafts["drone"].read_text() and lender in text
-    assert lowalt.draft_target("drone", tmp_path / "again.yaml", subtype="my-drone", **stated)[0] == text
+    assert (
+        lowalt.draft_target("drone", tmp_path / "again.yaml", subtype="my-drone", **stated)[0]
+        == text
+    )
     assert (tmp_path / "again.yaml").read_text() == text
     lacking = {word: value for word, value in stated.items() if word != "blades"}
     for kind, wrong, words in (
-        ("drone", lacking, "it states"), ("drone", {**stated, "wheel": 1.0}, "it states"),
-        ("drone", {**stated, "rate": (1, 2, 3)}, "rate is .*, expected 2 numbers"), ("boat", stated, "no kind"),
-    ):  # fmt: skip
+        ("drone", lacking, "it states"),
+        ("drone", {**stated, "wheel": 1.0}, "it states"),
+        ("drone", {**stated, "rate": (1, 2, 3)}, "rate is .*, expected 2 numbers"),
+        ("boat", stated, "no kind"),
+    ):
         with pytest.raises(InputError, match=words):
             lowalt.draft_target(kind, **wrong)
 
 
 def test_its_echo_is_made_by_its_name(drafts):
-    own = {"network": {"symbols": 64, "subcarriers": 16}, "targets": {"own": {"mine": str(drafts["drone"])}}}
+    own = {
+        "network": {"symbols": 64, "subcarriers": 16},
+        "targets": {"own": {"mine": str(drafts["drone"])}},
+    }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         echo = lowalt.receive(own, "my-drone", at="signal")
@@ -103,9 +159,13 @@ def test_wrong_sheets_are_refused_in_words_of_the_command(tmp_path, capsys):
     assert "--frame is 'hexa', expected one of ['folding', 'ducted', 'raised', 'radial'" in refusal(
         [*given, "--frame", "hexa"], capsys
     )
-    assert "expected n_rotors_or_wings 4 in its row, not 6" in refusal([*given, "--frame", "folding"], capsys)
+    assert "expected n_rotors_or_wings 4 in its row, not 6" in refusal(
+        [*given, "--frame", "folding"], capsys
+    )
     wide = [word.replace("0.53", "0.63") for word in given]
-    assert "figures.propeller_diameter is 0.63 m, expected less than the 0.565 m" in refusal(wide, capsys)
+    assert "figures.propeller_diameter is 0.63 m, expected less than the 0.565 m" in refusal(
+        wide, capsys
+    )
     assert "--frame is 'radial', expected one of ['car', 'bus']" in refusal(
         ["vehicle", *CAR, *SPEED, "--frame", "radial"], capsys
     )

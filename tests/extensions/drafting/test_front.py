@@ -1,4 +1,6 @@
-"""Where the front of a target is: each kind of evidence, evidence that contradicts itself or the user, and its law."""
+"""Where the front of a target is: each kind of evidence, evidence that contradicts itself or the
+user, and its law.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,14 @@ FOUR = {"a": (1, 1), "b": (1, -1), "c": (-1, 1), "d": (-1, -1)}
 def shape(category="UAV", named=None, turning=(), steered=(), points=BOX) -> Shape:
     """What is seen of a target with these parts, up along z."""
     named = {name: np.array([*place, 0.0])[:3] for name, place in (named or {}).items()}
-    return Shape(category, UP, points, named, [Turning(*part) for part in turning], [np.array(at) for at in steered])
+    return Shape(
+        category,
+        UP,
+        points,
+        named,
+        [Turning(*part) for part in turning],
+        [np.array(at) for at in steered],
+    )
 
 
 @pytest.mark.parametrize(
@@ -49,8 +58,16 @@ def test_axles_tell_the_axis_steered_wheels_the_sign_and_the_usual_front_where_n
     assert (along_y.axis, along_y.sure) == ("y", False)
     assert "GUESSED, please confirm: y or -y; the wheel axles" in along_y.comment
     usual = front_of(shape("Vehicle", turning=wheels([0, 1, 0])), None, "x", "y")
-    assert (usual.axis, usual.sure) == ("x", True) and "x is the front of such files" in usual.comment
-    steered = front_of(shape("Vehicle", turning=wheels([1, 0, 0]), steered=[(1, -1, 0), (-1, -1, 0)]), None, "x", "x")
+    assert (usual.axis, usual.sure) == (
+        "x",
+        True,
+    ) and "x is the front of such files" in usual.comment
+    steered = front_of(
+        shape("Vehicle", turning=wheels([1, 0, 0]), steered=[(1, -1, 0), (-1, -1, 0)]),
+        None,
+        "x",
+        "x",
+    )
     assert (steered.axis, steered.sure) == ("-y", True) and "the steered wheels" in steered.comment
 
 
@@ -73,7 +90,9 @@ def test_a_mirror_plane_and_long_sides_are_guesses_and_without_any_evidence_the_
     assert (bus.axis, bus.sure, bus.words) == ("y", False, "the long axis")
     wing = front_of(shape(points=BOX * [1, 3, 2]), None, None, "z")
     assert (wing.axis, wing.sure, wing.words) == ("x", False, "the span")
-    assert front_of(shape(points=BOX * [3, 1, 2]), None, "x", "y").axis == "x"  # the convention outweighs a span
+    assert (
+        front_of(shape(points=BOX * [3, 1, 2]), None, "x", "y").axis == "x"
+    )  # the convention outweighs a span
     none = front_of(shape(), None, "x", "y")
     assert (none.axis, none.sure) == ("x", False) and "no part tells" in none.comment
     assert front_of(shape(), "-y", "x", "x").comment == ""
@@ -86,9 +105,17 @@ def test_evidence_that_contradicts_itself_or_the_user_is_refused_with_the_option
     with pytest.raises(InputError, match=words):
         front_of(car, None, "x", "x")
     assert front_of(car, "y", "x", "x").axis == "y"
-    with pytest.raises(InputError, match="--front is x, but the wheel axles say that the front is y or -y: give"):
+    with pytest.raises(
+        InputError, match="--front is x, but the wheel axles say that the front is y or -y: give"
+    ):
         front_of(car, "x", "x", "x")
-    both = {"front_a": (1, 0), "rear_a": (-1, 0), "tail_b": (0.9, 0), "nose_c": (0.5, 0), "left": (0, -1)}
+    both = {
+        "front_a": (1, 0),
+        "rear_a": (-1, 0),
+        "tail_b": (0.9, 0),
+        "nose_c": (0.5, 0),
+        "left": (0, -1),
+    }
     assert front_of(shape(named=both | {"right": (0, 1)}), "-x", None, "x").axis == "-x"
 
 
@@ -99,13 +126,32 @@ def test_a_description_turned_by_a_quarter_gives_the_same_cloud(tmp_path):
         path.write_text(car_urdf(turned))
         out = tmp_path / f"{turned}.yaml"
         words = ["--inputs", str(tmp_path), "--out"]
-        assert main(["target", "new", str(path), "--subtype", "car", "--category", "Vehicle", *words, str(out)]) == 0
+        assert (
+            main(
+                [
+                    "target",
+                    "new",
+                    str(path),
+                    "--subtype",
+                    "car",
+                    "--category",
+                    "Vehicle",
+                    *words,
+                    str(out),
+                ]
+            )
+            == 0
+        )
         record = yaml.safe_load(out.read_text())["car"]
         # A wheel at the front is steered; a steering wheel turns without end and is no wheel.
         assert record["front"] == ("y" if turned else "x") and len(record["parts"]) == 5
         made = out.with_suffix(".npz")
         assert main(["target", "make", str(out), *words, str(made)]) == 0
         clouds.append(read(made))
-    np.testing.assert_allclose(np.sort(clouds[0].hinges[1:], axis=0), np.sort(clouds[1].hinges[1:], axis=0), atol=1e-4)
+    np.testing.assert_allclose(
+        np.sort(clouds[0].hinges[1:], axis=0), np.sort(clouds[1].hinges[1:], axis=0), atol=1e-4
+    )
     np.testing.assert_allclose(np.abs(clouds[1].axes[1:, 0]), 1, atol=1e-9)
-    np.testing.assert_allclose(np.ptp(clouds[0].points, axis=0), np.ptp(clouds[1].points, axis=0), rtol=1e-3)
+    np.testing.assert_allclose(
+        np.ptp(clouds[0].points, axis=0), np.ptp(clouds[1].points, axis=0), rtol=1e-3
+    )

@@ -1,4 +1,6 @@
-"""Robots' own descriptions: each joint of a rotor or wheel becomes a part that turns about the right line."""
+"""Robots' own descriptions: each joint of a rotor or wheel becomes a part that turns about the
+right line.
+"""
 
 from pathlib import Path
 
@@ -22,7 +24,9 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def joints(path: Path, inputs: Path, kind: str = "rotor") -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
+def joints(
+    path: Path, inputs: Path, kind: str = "rotor"
+) -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
     """Joints and triangles of a description's parts."""
     return parts_of(read_robot(path, inputs), kind)
 
@@ -30,8 +34,15 @@ def joints(path: Path, inputs: Path, kind: str = "rotor") -> tuple[dict[str, Joi
 def made(path: Path, inputs: Path, *words: str) -> tuple[dict, Cloud]:
     """The record that `target new` drafts of a description, and the cloud of it."""
     out = inputs / "own.yaml"
-    assert main(["target", "new", str(path), "--inputs", str(inputs), "--out", str(out), *words]) == 0
-    assert main(["target", "make", str(out), "--inputs", str(inputs), "--out", str(inputs / "own.npz")]) == 0
+    assert (
+        main(["target", "new", str(path), "--inputs", str(inputs), "--out", str(out), *words]) == 0
+    )
+    assert (
+        main(
+            ["target", "make", str(out), "--inputs", str(inputs), "--out", str(inputs / "own.npz")]
+        )
+        == 0
+    )
     return yaml.safe_load(out.read_text()), read(inputs / "own.npz")
 
 
@@ -40,7 +51,11 @@ def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
     (inputs / "craft/craft.urdf").write_text(urdf())
     records, cloud = made(inputs / "craft/craft.urdf", inputs)
     (record,) = records.values()
-    assert list(records) == ["craft"] and record["row"]["size_m"] == pytest.approx(0.5) and record["front"] == "x"
+    assert (
+        list(records) == ["craft"]
+        and record["row"]["size_m"] == pytest.approx(0.5)
+        and record["front"] == "x"
+    )
     assert cloud.kinds == ("body", *("rotor",) * 4) and cloud.names[1:] == tuple(HUBS)
     # x is the front and y the left, so right is -y.
     np.testing.assert_allclose(cloud.hinges[1:, :2], [(-y, x) for x, y in HUBS.values()], atol=1e-6)
@@ -51,7 +66,9 @@ def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
         blade = cloud.points[cloud.part == part] - cloud.hinges[part]
         assert np.linalg.norm(blade[:, :2], axis=1).max() == pytest.approx(0.12, rel=0.01)
         along = blade[np.argmax(np.linalg.norm(blade, axis=1))]
-        turned = np.degrees(np.arctan2(-along[0], along[1]) - (part - 1)) % 180  # its joint's own turn, in radians
+        turned = (
+            np.degrees(np.arctan2(-along[0], along[1]) - (part - 1)) % 180
+        )  # its joint's own turn, in radians
         assert min(turned, 180 - turned) < 6
 
 
@@ -87,16 +104,21 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     (tmp_path / "top/top.sdf").write_text(top)
     found, triangles = joints(tmp_path / "top/top.sdf", tmp_path)
     assert set(found) == {"pusher", "lift", "eye pusher"}
-    # The link's own turn by a quarter about y takes its z, and the joint's shift along it, to the front.
+    # The link's own turn by a quarter about y takes its z, and the joint's shift along it, to the
+    # front.
     np.testing.assert_allclose(found["pusher"].hinge, [-0.28, 0, 1], atol=1e-9)
     np.testing.assert_allclose(found["pusher"].axis, [1, 0, 0], atol=1e-9)
     np.testing.assert_allclose(found["eye pusher"].hinge, [-0.28, 0, 5], atol=1e-9)
     np.testing.assert_allclose(found["lift"].hinge, [0.1, 0, 1.2], atol=1e-9)
     np.testing.assert_allclose(found["lift"].axis, [0, 0, -1], atol=1e-9)
     np.testing.assert_allclose(triangles["pusher"].mean(axis=(0, 1))[:2], [-0.3, 0], atol=1e-9)
-    np.testing.assert_allclose(np.ptp(triangles["pusher"].reshape(-1, 3), axis=0), [0.01, 0.2, 0.2], atol=1e-3)
+    np.testing.assert_allclose(
+        np.ptp(triangles["pusher"].reshape(-1, 3), axis=0), [0.01, 0.2, 0.2], atol=1e-3
+    )
     assert triangles["body"].reshape(-1, 3)[:, 1].max() == pytest.approx(0.3)  # the aileron is held
-    at_its_hinge = top.replace('"pusher">0 0 0 0 0 0', '"hull">0.1 0 0.2 0 0 0').replace("0 0 5 0", "0 0 1.2 0")
+    at_its_hinge = top.replace('"pusher">0 0 0 0 0 0', '"hull">0.1 0 0.2 0 0 0').replace(
+        "0 0 5 0", "0 0 1.2 0"
+    )
     (tmp_path / "top/top.sdf").write_text(at_its_hinge)
     words = [str(tmp_path / "top/top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
     assert main(["target", "new", *words]) == 0
@@ -115,32 +137,50 @@ def test_an_mjcf_s_classes_angles_and_hinges_are_followed(tmp_path):
     np.testing.assert_allclose(found["rotor_a"].hinge, [0.4, 0, 0.5], atol=1e-9)
     np.testing.assert_allclose(found["rotor_a"].axis, [1, 0, 0], atol=1e-9)
     np.testing.assert_allclose(found["rotor_b"].axis, [0, 0, -1], atol=1e-9)
-    np.testing.assert_allclose(np.ptp(triangles["rotor_a"].reshape(-1, 3), axis=0), [0.004, 0.02, 0.24], atol=1e-9)
+    np.testing.assert_allclose(
+        np.ptp(triangles["rotor_a"].reshape(-1, 3), axis=0), [0.004, 0.02, 0.24], atol=1e-9
+    )
     body = triangles["body"].reshape(-1, 3)
-    assert np.ptp(body, axis=0)[0] == pytest.approx(0.3) and body[:, 1].max() == pytest.approx(0.21, abs=1e-6)
+    assert np.ptp(body, axis=0)[0] == pytest.approx(0.3) and body[:, 1].max() == pytest.approx(
+        0.21, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(
     ("version", "flag", "in_model"),
-    [("1.4", 0, True), ("1.6", 0, False), ("1.6", 1, True), ("1.7", 1, False), ("1.9", 0, False), ("1.10", 0, False),
-     ("1.11", 0, False)],
-)  # fmt: skip
+    [
+        ("1.4", 0, True),
+        ("1.6", 0, False),
+        ("1.6", 1, True),
+        ("1.7", 1, False),
+        ("1.9", 0, False),
+        ("1.10", 0, False),
+        ("1.11", 0, False),
+    ],
+)
 def test_an_sdf_s_axis_is_in_the_frame_that_its_version_says(version, flag, in_model, tmp_path):
     text = SDF.replace('version="1.9"', f'version="{version}"')
-    text = text.replace("<xyz>0 0 1</xyz>", f"<xyz>0 0 1</xyz><use_parent_model_frame>{flag}</use_parent_model_frame>")
+    text = text.replace(
+        "<xyz>0 0 1</xyz>",
+        f"<xyz>0 0 1</xyz><use_parent_model_frame>{flag}</use_parent_model_frame>",
+    )
     (tmp_path / "a.sdf").write_text(text)
     found, _ = joints(tmp_path / "a.sdf", tmp_path)
-    np.testing.assert_allclose(found["pusher"].axis, [0, 0, 1] if in_model else [1, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(
+        found["pusher"].axis, [0, 0, 1] if in_model else [1, 0, 0], atol=1e-9
+    )
 
 
 def test_a_namespace_an_optional_variable_and_macros_of_sensors_change_nothing(tmp_path):
     inputs = folder(tmp_path)
-    plain, other = inputs / "craft/craft.urdf", inputs / "craft/other.urdf"
+    plain = inputs / "craft/craft.urdf"
+    other = inputs / "craft/other.urdf"
     plain.write_text(urdf())
     more = '<gazebo reference="base"><a b="${c}"/></gazebo><link name="imu"/><joint name="imu" type="fixed"><origin '
     more += 'xyz="$(optenv IMU_XYZ 0.19 0 0.149)"/><parent link="base"/><child link="imu"/></joint>'
     other.write_text(urdf(more).replace("<robot ", '<robot xmlns="http://drake.mit.edu" '))
-    expected, found = joints(plain, inputs)[0], joints(other, inputs)[0]
+    expected = joints(plain, inputs)[0]
+    found = joints(other, inputs)[0]
     assert list(found) == list(expected) == list(HUBS)
     for name in HUBS:
         np.testing.assert_array_equal(found[name].hinge, expected[name].hinge)
@@ -158,14 +198,20 @@ def test_a_package_of_another_folder_s_name_is_found_where_one_file_fits(tmp_pat
         found, triangles = joints(path, inputs)
     assert list(found) == list(HUBS) and len(triangles["rotor_0"]) == 12
     (inputs / "second/meshes").mkdir(parents=True)
-    (inputs / "second/meshes/prop.stl").write_bytes((inputs / "clone-of-craft/meshes/prop.stl").read_bytes())
-    with pytest.raises(InputError, match=r"2 files below the folder of inputs fit \(.*\), expected one"):
+    (inputs / "second/meshes/prop.stl").write_bytes(
+        (inputs / "clone-of-craft/meshes/prop.stl").read_bytes()
+    )
+    with pytest.raises(
+        InputError, match=r"2 files below the folder of inputs fit \(.*\), expected one"
+    ):
         joints(path, inputs)
 
 
 def test_geoms_of_an_mjcf_that_are_named_rotors_are_rotors(tmp_path):
-    geoms = "".join(f'<geom name="rotor{n}" type="ellipsoid" size=".13 .13 .01" pos="{x} {y} .08"/>'
-                    for n, (x, y) in enumerate(HUBS.values()))  # fmt: skip
+    geoms = "".join(
+        f'<geom name="rotor{n}" type="ellipsoid" size=".13 .13 .01" pos="{x} {y} .08"/>'
+        for n, (x, y) in enumerate(HUBS.values())
+    )
     body = f'<body name="q"><freejoint/><geom type="box" size=".16 .04 .02"/>{geoms}</body>'
     (tmp_path / "x2.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     _, cloud = made(tmp_path / "x2.xml", tmp_path)
@@ -174,21 +220,42 @@ def test_geoms_of_an_mjcf_that_are_named_rotors_are_rotors(tmp_path):
     np.testing.assert_allclose(hubs, np.tile([0.15, 0.2], (4, 1)), atol=0.01)
 
 
-def test_a_plane_with_one_wheel_and_a_motor_is_asked_for_its_category_and_a_surface_must_have_triangles(tmp_path):
-    turning = "".join(f'<link name="{name}"><visual><geometry><box size="{size}"/></geometry></visual></link><joint '
-                      f'name="{name}_joint" type="continuous"><origin xyz="{at}"/><parent link="base"/><child '
-                      f'link="{name}"/><axis xyz="{axis}"/></joint>'
-                      for name, size, at, axis in (("main_wheel", "0.1 0.03 0.1", "0 0 -0.1", "0 1 0"),
-                                                   ("motor", "0.01 0.2 0.02", "0.4 0 0", "1 0 0")))  # fmt: skip
-    base = '<link name="base"><visual><geometry><box size="0.6 1.2 0.08"/></geometry></visual></link>'
+def test_a_plane_with_one_wheel_and_a_motor_is_asked_for_its_category_and_a_surface_must_have_triangles(
+    tmp_path,
+):
+    turning = "".join(
+        f'<link name="{name}"><visual><geometry><box size="{size}"/></geometry></visual></link><joint '
+        f'name="{name}_joint" type="continuous"><origin xyz="{at}"/><parent link="base"/><child '
+        f'link="{name}"/><axis xyz="{axis}"/></joint>'
+        for name, size, at, axis in (
+            ("main_wheel", "0.1 0.03 0.1", "0 0 -0.1", "0 1 0"),
+            ("motor", "0.01 0.2 0.02", "0.4 0 0", "1 0 0"),
+        )
+    )
+    base = (
+        '<link name="base"><visual><geometry><box size="0.6 1.2 0.08"/></geometry></visual></link>'
+    )
     path = tmp_path / "plane.urdf"
     path.write_text(f'<robot name="p">{base}{turning}</robot>')
-    words = ["target", "new", str(path), "--inputs", str(tmp_path), "--out", str(tmp_path / "a.yaml")]
+    words = [
+        "target",
+        "new",
+        str(path),
+        "--inputs",
+        str(tmp_path),
+        "--out",
+        str(tmp_path / "a.yaml"),
+    ]
     assert main(words) == 2
     assert main([*words, "--category", "UAV"]) == 0
-    assert list(yaml.safe_load((tmp_path / "a.yaml").read_text())["plane"]["parts"]) == ["body", "motor"]
+    assert list(yaml.safe_load((tmp_path / "a.yaml").read_text())["plane"]["parts"]) == [
+        "body",
+        "motor",
+    ]
     (tmp_path / "empty.obj").write_text("v 0 0 0\n")
-    path.write_text(path.read_text().replace('<box size="0.6 1.2 0.08"/>', '<mesh filename="empty.obj"/>'))
+    path.write_text(
+        path.read_text().replace('<box size="0.6 1.2 0.08"/>', '<mesh filename="empty.obj"/>')
+    )
     with pytest.raises(InputError, match=r"'empty\.obj' has no triangle, expected a surface"):
         read_robot(path, tmp_path)
 
@@ -210,7 +277,10 @@ def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, caps
     path = tmp_path / "two.urdf"
     path.write_text((tmp_path / "rover.urdf").read_text().replace("continuous", "fixed", 2))
     before = sorted(tmp_path.rglob("*"))
-    assert main(["target", "new", str(path), "--inputs", str(tmp_path), "--subtype", "AITO M9 2024"]) == 2
+    assert (
+        main(["target", "new", str(path), "--inputs", str(tmp_path), "--subtype", "AITO M9 2024"])
+        == 2
+    )
     assert "2 wheels turn, expected 4 for AITO M9 2024: leave --subtype" in capsys.readouterr().err
     assert sorted(tmp_path.rglob("*")) == before
 
@@ -218,17 +288,29 @@ def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, caps
 @pytest.mark.parametrize(
     ("name", "seen"), [("drum_", "neither rotors nor wheels"), ("wheel_", "both rotors and wheels")]
 )
-def test_a_description_whose_names_tell_no_category_is_refused_until_it_is_given(name, seen, tmp_path, capsys):
+def test_a_description_whose_names_tell_no_category_is_refused_until_it_is_given(
+    name, seen, tmp_path, capsys
+):
     path = folder(tmp_path) / "craft/craft.urdf"
     path.write_text(urdf().replace("rotor_", name, -1 if name == "drum_" else 6))
-    command = ["target", "new", str(path), "--inputs", str(tmp_path), "--out", str(tmp_path / "a.yaml")]
+    command = [
+        "target",
+        "new",
+        str(path),
+        "--inputs",
+        str(tmp_path),
+        "--out",
+        str(tmp_path / "a.yaml"),
+    ]
     assert main(command) == 2
     error = capsys.readouterr().err
     assert seen in error and "--category Vehicle" in error and error.count("\n") == 1
     assert main([*command, "--category", "UAV"]) == 0
 
 
-def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_path, capsys, monkeypatch):
+def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(
+    tmp_path, capsys, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     inputs = folder(tmp_path)
     path = inputs / "craft/craft.urdf"
@@ -238,7 +320,11 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
     path.write_text(urdf().replace("continuous", "fixed").replace("rotor_", "disc_"))
     assert main([*command, "a.yaml"]) == 2
     error = capsys.readouterr().err
-    assert "its category cannot be seen" in error and "--category UAV" in error and "with --rotors N" in error
+    assert (
+        "its category cannot be seen" in error
+        and "--category UAV" in error
+        and "with --rotors N" in error
+    )
     assert main([*command, "a.yaml", "--category=UAV"]) == 0
     for name in ("named", "a"):
         parts = yaml.safe_load((inputs / f"{name}.yaml").read_text())["craft"]["parts"]
@@ -248,7 +334,10 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (urdf(blade="package://craft/meshes/gone.stl"), "'package://craft/meshes/gone.stl' is not there"),
+        (
+            urdf(blade="package://craft/meshes/gone.stl"),
+            "'package://craft/meshes/gone.stl' is not there",
+        ),
         (urdf(blade="../../outside.stl"), "lies outside the folder of inputs"),
         (urdf(blade="/etc/passwd"), "lies outside the folder of inputs"),
         (urdf(blade="meshes/link.stl"), "lies outside the folder of inputs"),
@@ -256,15 +345,28 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
         (urdf(blade="https://example.org/a.stl"), "is no file of the folder of inputs"),
         (urdf(base='<box size="a b c"/>'), "not a readable description"),
         (urdf(base="<box/>"), "expected 3 finite numbers"),
-        ('<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]>' + urdf(), "it declares a document type"),
-        (urdf('<xacro:a xmlns:xacro="http://x/xacro"/>'), "it holds macros, expected what they expand to: xacro FILE"),
+        (
+            '<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]>' + urdf(),
+            "it declares a document type",
+        ),
+        (
+            urdf('<xacro:a xmlns:xacro="http://x/xacro"/>'),
+            "it holds macros, expected what they expand to: xacro FILE",
+        ),
         ("<html/>", "<html>, expected one of"),
         ('<robot name="a"><link name="b"/></robot>', "no surface of finite places"),
-        ('<sdf><model name="a"><include><uri>self.urdf</uri></include></model></sdf>', "in a circle|at most 200"),
-        ('<sdf><model name="a"><link name="l"><pose relative_to="l">0 0 0 0 0 0</pose><visual name="v"><geometry>'
-         "<sphere><radius>1</radius></sphere></geometry></visual></link></model></sdf>", "hangs on itself"),
+        (
+            '<sdf><model name="a"><include><uri>self.urdf</uri></include></model></sdf>',
+            "in a circle|at most 200",
+        ),
+        (
+            '<sdf><model name="a"><link name="l"><pose relative_to="l">0 0 0 0 0 0</pose><visual '
+            'name="v"><geometry>'
+            "<sphere><radius>1</radius></sphere></geometry></visual></link></model></sdf>",
+            "hangs on itself",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_description_that_is_wrong_or_reaches_outside_is_refused_by_name(text, words, tmp_path):
     (tmp_path / "outside.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
     inputs = folder(tmp_path / "inputs")
@@ -273,5 +375,7 @@ def test_a_description_that_is_wrong_or_reaches_outside_is_refused_by_name(text,
     with pytest.raises(InputError, match=rf"self\.urdf: .*({words})"):
         read_robot(inputs / "craft/self.urdf", inputs)
     (inputs / "b.urdf.xacro").write_text("")
-    with pytest.raises(InputError, match=r"is a template, expected what it .* xacro b.urdf.xacro > robot.urdf"):
+    with pytest.raises(
+        InputError, match=r"is a template, expected what it .* xacro b.urdf.xacro > robot.urdf"
+    ):
         read_robot(inputs / "b.urdf.xacro", inputs)

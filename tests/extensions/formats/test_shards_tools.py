@@ -23,8 +23,18 @@ from lowalt.shards.croissant import FIELDS, RESPONSIBLE
 def published(request, tmp_path_factory):
     folder = build(tmp_path_factory.mktemp(request.param) / "shards", request.param, inputs=False)
     (folder.parent / "config.yaml").write_text(yaml.safe_dump(CONFIG))
-    card(["--index", str(folder / "index.json"), "--config", str(folder.parent / "config.yaml"),
-          "--date", "2026-01-31", "--url", "https://example.org/trial"])  # fmt: skip
+    card(
+        [
+            "--index",
+            str(folder / "index.json"),
+            "--config",
+            str(folder.parent / "config.yaml"),
+            "--date",
+            "2026-01-31",
+            "--url",
+            "https://example.org/trial",
+        ]
+    )
     return folder
 
 
@@ -40,7 +50,10 @@ def loaded(folder, tmp_path, monkeypatch, *names):
 def test_the_hubs_library_reads_every_protocol_by_the_card(published, tmp_path, monkeypatch):
     shards = ShardSet(published / "index.json")
     numbers = {key.decode(): number for number, key in enumerate(shards.keys.tolist())}
-    counts = {"seen": {"train": 12, "validation": 6, "test": 6}, "unseen": {"train": 8, "validation": 4, "test": 8}}
+    counts = {
+        "seen": {"train": 12, "validation": 6, "test": 6},
+        "unseen": {"train": 8, "validation": 4, "test": 8},
+    }
     for protocol, expected in counts.items():
         found = loaded(published, tmp_path, monkeypatch, str(published), protocol)
         assert {split: len(rows) for split, rows in found.items()} == expected
@@ -61,11 +74,16 @@ def text(value):
 
 
 def test_croissant_is_valid_and_its_first_record_unpacks_no_shard(published, mlcroissant):
-    """Every cell of its records is that of the table of samples; all required and recommended properties are there."""
+    """Every cell of its records is that of the table of samples; all required and recommended
+    properties are there.
+    """
     data = mlcroissant.Dataset(str(published / "croissant.json"))
     assert not data.metadata.issues.errors
     assert not data.metadata.issues.warnings
-    assert data.metadata.conforms_to == ["http://mlcommons.org/croissant/1.1", "http://mlcommons.org/croissant/RAI/1.0"]
+    assert data.metadata.conforms_to == [
+        "http://mlcommons.org/croissant/1.1",
+        "http://mlcommons.org/croissant/RAI/1.0",
+    ]
     assert f"{data.metadata.date_published:%Y-%m-%d}" == "2026-01-31"
     assert [record_set.uuid for record_set in data.metadata.record_sets] == ["samples"]
     with (published / "samples.csv").open(newline="") as file:
@@ -91,7 +109,8 @@ def test_the_responsible_ai_properties_are_words_of_the_vocabulary(published, ml
 def test_a_description_without_a_date_has_the_day_of_the_index(published):
     folder = published.parent
     day = datetime(2025, 3, 4, tzinfo=UTC).timestamp()
-    before, times = (published / "croissant.json").read_bytes(), (published / "index.json").stat()
+    before = (published / "croissant.json").read_bytes()
+    times = (published / "index.json").stat()
     os.utime(published / "index.json", (day, day))
     card(["--index", str(published / "index.json"), "--config", str(folder / "config.yaml")])
     assert json.loads((published / "croissant.json").read_text())["datePublished"] == "2025-03-04"

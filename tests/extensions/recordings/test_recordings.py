@@ -1,4 +1,6 @@
-"""Recordings in: every format gives the same samples, bad files are refused by name, rates and tones come out right."""
+"""Recordings in: every format gives the same samples, bad files are refused by name, rates and
+tones come out right.
+"""
 
 import struct
 from dataclasses import fields
@@ -22,7 +24,9 @@ BASE = {"carrier_hz": 24.0e9, "source": "made here", "licence": "MIT"}
 
 
 def tone(hertz: float, seconds: float = 0.5, rate: float = RATE) -> np.ndarray:
-    """A complex tone (samples,) of unit amplitude, with a little of another one so that nothing is constant."""
+    """A complex tone (samples,) of unit amplitude, with a little of another one so that nothing is
+    constant.
+    """
     time = np.arange(round(seconds * rate)) / rate
     return np.exp(2j * np.pi * hertz * time) + 0.1 * np.exp(2j * np.pi * 3.7 * hertz * time)
 
@@ -49,7 +53,8 @@ def test_a_sigmf_recording_brings_its_own_rate(tmp_path):
     values = tone(200.0).astype(np.complex64)
     values.tofile(tmp_path / "e.sigmf-data")
     about = sigmf.SigMFFile(
-        data_file=str(tmp_path / "e.sigmf-data"), global_info={"core:datatype": "cf32_le", "core:sample_rate": RATE}
+        data_file=str(tmp_path / "e.sigmf-data"),
+        global_info={"core:datatype": "cf32_le", "core:sample_rate": RATE},
     )
     about.add_capture(0)
     about.tofile(str(tmp_path / "e.sigmf-meta"))
@@ -64,7 +69,9 @@ def test_columns_are_chosen_by_name_or_number_and_times_are_checked(tmp_path):
     table = np.stack([times, values], axis=1)
     np.savetxt(tmp_path / "f.csv", table, delimiter=",", header="t,V", comments="", fmt="%.18g")
     named = read(entry(tmp_path, "f.csv", "real", columns=["V"], times="t"))
-    np.testing.assert_array_equal(named.values, read(entry(tmp_path, "f.csv", "real", columns=[1], times="t")).values)
+    np.testing.assert_array_equal(
+        named.values, read(entry(tmp_path, "f.csv", "real", columns=[1], times="t")).values
+    )
     assert named.rate_hz == pytest.approx(RATE, rel=1e-9)
     with pytest.raises(InputError, match=r"no column 'W', expected one of \['t', 'V'\]"):
         read(entry(tmp_path, "f.csv", "real", columns=["W"], rate_hz=RATE))
@@ -87,7 +94,11 @@ def test_bad_samples_are_refused_by_name(tmp_path):
     refused(np.full(100, 0.25), r"x.npy: silent, all 100 samples of channel are 0.25", "real")
     refused(values.real * (1 + 1j), r"I and Q hold the same signal")
     # Positive Doppler approaches; the conjugate is what exchanged columns give.
-    refused(values.conj(), r"channels swapped, the record says the target moves towards", moves="towards")
+    refused(
+        values.conj(),
+        r"channels swapped, the record says the target moves towards",
+        moves="towards",
+    )
     refused(values, r"channels swapped, the record says the target moves away", moves="away")
 
 
@@ -144,7 +155,8 @@ def test_the_schema_of_records_has_the_words_of_the_code():
 
 def test_a_record_file_says_where_its_samples_are(tmp_path):
     (tmp_path / "r.yaml").write_text(
-        "file: a.wav\ncarrier_hz: 24.0e+9\nchannel: real\nsource: me\nlicence: MIT\nlabel: Vehicle\n"
+        "file: a.wav\ncarrier_hz: 24.0e+9\nchannel: real\nsource: me\nlicence: MIT\nlabel: "
+        "Vehicle\n"
     )
     found = read_record(tmp_path / "r.yaml")
     assert (found.file, found.name, found.label) == (tmp_path / "a.wav", "a", "Vehicle")
@@ -154,25 +166,32 @@ def test_a_record_file_says_where_its_samples_are(tmp_path):
 def test_a_record_needs_three_keys_and_takes_numbers_in_any_writing(tmp_path):
     path = tmp_path / "r.yaml"
     for text in ("3.3e9", "3300000000", "3.3e+9", ".33e10", "+33E8"):
-        path.write_text(f"file: a.csv\ncarrier_hz: {text}\nchannel: real\nrate_hz: 8e3\ncolumns: [2.0]\n")
+        path.write_text(
+            f"file: a.csv\ncarrier_hz: {text}\nchannel: real\nrate_hz: 8e3\ncolumns: [2.0]\n"
+        )
         found = read_record(path)
         assert (found.carrier_hz, found.rate_hz) == (3.3e9, 8e3) and repr(found.columns) == "(2,)"
     for text in (".inf", ".nan", "1e400", "3.3 GHz", "'0x10'"):
         path.write_text(f"file: a.csv\ncarrier_hz: {text}\nchannel: real\n")
-        with pytest.raises(InputError, match=r"r\.yaml: carrier_hz: value .*, expected type number"):
+        with pytest.raises(
+            InputError, match=r"r\.yaml: carrier_hz: value .*, expected type number"
+        ):
             read_record(path)
 
 
 def test_the_record_of_a_radar_takes_numbers_in_any_writing_and_is_refused_by_key(tmp_path):
-    path, known = tmp_path / "mine.yaml", Path("config/measured/radars/uav_3ghz.yaml").read_text()
+    path = tmp_path / "mine.yaml"
+    known = Path("config/measured/radars/uav_3ghz.yaml").read_text()
     path.write_text(known.replace("3.3e+9", "3.3e9"))
     assert radars(tmp_path) == {"mine": radars()["uav_3ghz"]}
-    for line, change, words in (("carrier_hz: 3.3e+9", "carrier_hz: .inf", "carrier_hz: value "),
-                                ("sampling: bare", "sampling: [1]", "twin.sampling: value "),
-                                ("rate_hz: 5000.1", "", r"missing key\(s\) \['file'\], expected it, or twin"),
-                                ("simulated_hz: 5000.1", "simulated_hz: 100", "expected at least one sample per value"),
-                                ("tip: [2.0", "tips: [2.0", r"twin.scenes.UAV.0: unknown key\(s\) \['tips'\]"),
-                                ("leak_db: [10.0", "leak_db: [1000", "twin.receiver.leak_db")):  # fmt: skip
+    for line, change, words in (
+        ("carrier_hz: 3.3e+9", "carrier_hz: .inf", "carrier_hz: value "),
+        ("sampling: bare", "sampling: [1]", "twin.sampling: value "),
+        ("rate_hz: 5000.1", "", r"missing key\(s\) \['file'\], expected it, or twin"),
+        ("simulated_hz: 5000.1", "simulated_hz: 100", "expected at least one sample per value"),
+        ("tip: [2.0", "tips: [2.0", r"twin.scenes.UAV.0: unknown key\(s\) \['tips'\]"),
+        ("leak_db: [10.0", "leak_db: [1000", "twin.receiver.leak_db"),
+    ):
         assert known.count(line) >= 1
         path.write_text(known.replace(line, change, 1))
         with pytest.raises(InputError, match=rf"mine\.yaml: .*{words}") as refused:
@@ -203,7 +222,9 @@ def test_a_fast_tone_folds_bare_and_vanishes_anti_aliased():
 
 
 PASSED = {"anti_aliased": (-0.4, 0.4), "one_sided": (0.0, ONE_SIDED_EDGE), "bare": (-1.0, 1.0)}
-"""Band over the symbol rate in which a tone keeps its amplitude; the rest is filtered away, or folds (bare)."""
+"""Band over the symbol rate in which a tone keeps its amplitude; the rest is filtered away, or
+folds (bare).
+"""
 STOPPED = {"anti_aliased": 0.5, "one_sided": 1.0, "bare": np.inf}
 
 
@@ -211,13 +232,30 @@ STOPPED = {"anti_aliased": 0.5, "one_sided": 1.0, "bare": np.inf}
 @pytest.mark.parametrize("sampling", ["anti_aliased", "one_sided", "bare"])
 @pytest.mark.parametrize("rate", [2000.0, 2205.0, 8000.0])
 def test_tones_across_the_band_keep_their_amplitude_or_vanish(sampling, channel, rate):
-    """A symbol rate of 1000: the gain of tones from 2 Hz on, at least 99.9 % where kept, at most 0.1 % where not."""
+    """A symbol rate of 1000: the gain of tones from 2 Hz on, at least 99.9 % where kept, at most
+    0.1 % where not.
+    """
     if sampling == "one_sided" and channel == "complex":
         with pytest.raises(InputError, match="one_sided' for a complex channel"):
             symbol_rate(np.ones(100, complex), rate, 1e-3, sampling)
         return
     low, high = PASSED[sampling]
-    for hertz in (2.0, 5.0, 20.0, 60.0, 150.0, 399.0, 520.0, 700.0, 900.0, 940.0, 1010.0, 1300.0, 1900.0, 3900.0):
+    for hertz in (
+        2.0,
+        5.0,
+        20.0,
+        60.0,
+        150.0,
+        399.0,
+        520.0,
+        700.0,
+        900.0,
+        940.0,
+        1010.0,
+        1300.0,
+        1900.0,
+        3900.0,
+    ):
         for sign in (1, -1) if channel == "complex" else (1,):
             if hertz >= (0.5 if channel == "real" or sampling != "bare" else 0.4) * rate:
                 continue
@@ -225,7 +263,10 @@ def test_tones_across_the_band_keep_their_amplitude_or_vanish(sampling, channel,
             found = symbol_rate(tone if channel == "complex" else tone.real, rate, 1e-3, sampling)
             count = np.arange(len(found))[200:-200]
             taper = np.hanning(len(count))
-            left = abs(np.sum(taper * found[count] * np.exp(-2e-3j * np.pi * sign * hertz * count))) / taper.sum()
+            left = (
+                abs(np.sum(taper * found[count] * np.exp(-2e-3j * np.pi * sign * hertz * count)))
+                / taper.sum()
+            )
             if low <= sign * hertz / 1000 <= high or (sampling == "bare" and hertz < rate / 2):
                 assert left == pytest.approx(1, abs=1e-3), (hertz, sign)
             elif hertz / 1000 >= STOPPED[sampling]:
@@ -233,7 +274,9 @@ def test_tones_across_the_band_keep_their_amplitude_or_vanish(sampling, channel,
 
 
 def test_one_sided_sampling_shows_the_upper_half_of_its_band_as_negative_frequencies():
-    found = symbol_rate(np.cos(2 * np.pi * 800.0 * np.arange(8000) / 8000.0), 8000.0, 1e-3, "one_sided")[80:-80]
+    found = symbol_rate(
+        np.cos(2 * np.pi * 800.0 * np.arange(8000) / 8000.0), 8000.0, 1e-3, "one_sided"
+    )[80:-80]
     spectrum = abs(np.fft.fft(found * np.hanning(len(found))))
     assert np.fft.fftfreq(len(found), 1e-3)[spectrum.argmax()] == pytest.approx(-200.0, abs=2)
 
@@ -256,7 +299,8 @@ def test_intervals_do_not_overlap_and_lose_only_what_stands_still():
 
 
 def test_what_is_slower_than_the_slowest_target_is_gone_and_all_else_keeps_its_level():
-    time, taper = np.arange(1200) / 3000, np.hanning(1200)
+    time = np.arange(1200) / 3000
+    taper = np.hanning(1200)
     for hertz, wanted in (
         (5.0, -50),
         (20.0, -50),
@@ -271,7 +315,11 @@ def test_what_is_slower_than_the_slowest_target_is_gone_and_all_else_keeps_its_l
             tone = np.exp(2j * np.pi * hertz * time + 1j * phase)
             left = coherent_intervals(tone, 1200, slow=64 / 3000)[0] * taper
             level = 20 * np.log10(np.linalg.norm(left) / np.linalg.norm(taper))
-            assert level < wanted if wanted else level == pytest.approx(0, abs=0.05), (hertz, phase, level)
+            assert level < wanted if wanted else level == pytest.approx(0, abs=0.05), (
+                hertz,
+                phase,
+                level,
+            )
     still = coherent_intervals(np.full(1200, 3 + 4j), 1200, slow=64 / 3000)
     assert not still.any()
 

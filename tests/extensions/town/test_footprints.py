@@ -1,4 +1,6 @@
-"""Buildings as people tag and draw them: each is read as its tags say, or counted, or refused by its place."""
+"""Buildings as people tag and draw them: each is read as its tags say, or counted, or refused by
+its place.
+"""
 
 import json
 
@@ -88,12 +90,15 @@ def test_what_is_read_otherwise_than_stated_is_said(tmp_path):
     path = write(tmp_path / "town.geojson", list(map(feature, tags, squares)))
     found = found_in(path)
     assert found.facts["notes"] == {
-        "heights that cannot be read, such as 'tall': building:levels or --height stands for them": 1,
+        "heights that cannot be read, such as 'tall': building:levels or --height stands for "
+        "them": 1,
         "least heights that cannot be read, such as '-3': the ground stands for them": 1,
         "surfaces of materials that no table has, such as 'cheese': concrete stands for them": 1,
     }
     assert set(found.facts["materials"]) == {"concrete", "brick"}
-    assert sum(line.startswith("read otherwise: 1 ") for line in town_plan.described(path, found)) == 3
+    assert (
+        sum(line.startswith("read otherwise: 1 ") for line in town_plan.described(path, found)) == 3
+    )
 
 
 def test_parts_of_a_building_stand_in_the_place_of_its_outline(tmp_path):
@@ -112,8 +117,15 @@ def test_parts_of_a_building_stand_in_the_place_of_its_outline(tmp_path):
 
 def test_polygons_of_one_building_that_adjoin_are_one_outline(tmp_path):
     parts = [ring(0, 0, 10, 20), ring(10, 0, 10, 20), ring(0, 20, 20, 10)]
-    adjoining = found_in(write(tmp_path / "parts.geojson", [feature({"building": "yes", "height": 9}, *parts)]))
-    whole = found_in(write(tmp_path / "one.geojson", [feature({"building": "yes", "height": 9}, ring(0, 0, 20, 30))]))
+    adjoining = found_in(
+        write(tmp_path / "parts.geojson", [feature({"building": "yes", "height": 9}, *parts)])
+    )
+    whole = found_in(
+        write(
+            tmp_path / "one.geojson",
+            [feature({"building": "yes", "height": 9}, ring(0, 0, 20, 30))],
+        )
+    )
     for key in ("buildings", "walls", "roofs", "dropped", "notes"):
         assert adjoining.facts[key] == whole.facts[key]
     np.testing.assert_allclose(adjoining.facts["low_m"], whole.facts["low_m"], atol=2e-3)
@@ -133,13 +145,16 @@ def test_a_file_of_which_much_is_left_out_is_refused_unless_the_user_allows_it(t
     }
     path = write(tmp_path / "worse.geojson", [*good, bow, bow])
     with pytest.raises(
-        InputError, match=r"2 of 11 buildings are left out \(2 footprints that cross themselves\).*--left-out"
+        InputError,
+        match=r"2 of 11 buildings are left out \(2 footprints that cross themselves\).*--left-out",
     ):
         found_in(path)
     assert found_in(path, left_out=0.2).facts["buildings"] == 9
 
 
-def test_polygons_of_a_file_without_tags_are_buildings_where_their_height_is_given(tmp_path, monkeypatch, capsys):
+def test_polygons_of_a_file_without_tags_are_buildings_where_their_height_is_given(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     plain = [feature({"name": "a"}, ring(30 * k, 0, 10, 10)) for k in range(5)]
     path = write(tmp_path / "plain.geojson", plain)
@@ -150,18 +165,24 @@ def test_polygons_of_a_file_without_tags_are_buildings_where_their_height_is_giv
     assert main(["scene", "inspect", str(path)]) == 2
     assert "or --height" in capsys.readouterr().err
     # Beside buildings, a polygon without a tag is a park or a pond.
-    mixed = write(tmp_path / "mixed.geojson", [*plain, feature({"building": "yes"}, ring(0, 40, 9, 9))])
+    mixed = write(
+        tmp_path / "mixed.geojson", [*plain, feature({"building": "yes"}, ring(0, 40, 9, 9))]
+    )
     facts = found_in(mixed, height_m=8.0).facts
-    assert facts["buildings"] == 1 and facts["dropped"] == {"features that are no buildings": 5} and not facts["notes"]
+    assert (
+        facts["buildings"] == 1
+        and facts["dropped"] == {"features that are no buildings": 5}
+        and not facts["notes"]
+    )
 
 
 def test_a_building_without_a_height_is_named_by_its_place_in_the_file(tmp_path):
-    low, unknown = (
-        feature({"building": "yes", "height": 9}, ring(0, 0, 9, 9)),
-        feature({"building": "yes"}, ring(30, 0, 9, 9)),
-    )
+    low = feature({"building": "yes", "height": 9}, ring(0, 0, 9, 9))
+    unknown = feature({"building": "yes"}, ring(30, 0, 9, 9))
     path = write(tmp_path / "town.geojson", [low, unknown | {"id": "way/17"}])
-    with pytest.raises(InputError, match=r"1 of 2 buildings .* the first is features\[1\] \(way/17\); expected"):
+    with pytest.raises(
+        InputError, match=r"1 of 2 buildings .* the first is features\[1\] \(way/17\); expected"
+    ):
         found_in(path)
 
 
@@ -169,7 +190,9 @@ def test_a_material_that_no_table_has_is_named_in_a_mesh_and_in_a_mitsuba_scene(
     path = mitsuba(tmp_path / "scene.xml", BOXES)
     assert not read(town.DEFAULTS | {"buildings": str(path)}).facts["notes"]
     text = path.read_text()
-    path.write_text(text.replace("mat-itu_brick", "itu_regolith").replace('value="brick"', 'value="regolith"'))
+    path.write_text(
+        text.replace("mat-itu_brick", "itu_regolith").replace('value="brick"', 'value="regolith"')
+    )
     count = "surfaces of materials that no table has, such as 'regolith': concrete stands for them"
     assert read(town.DEFAULTS | {"buildings": str(path)}).facts["notes"] == {count: len(BOXES)}
     inner = '<bsdf type="itu-radio-material"><string name="type" value="glass"/></bsdf>'
@@ -181,7 +204,9 @@ def test_a_material_that_no_table_has_is_named_in_a_mesh_and_in_a_mitsuba_scene(
     mesh.write_text("\n".join([*vertices, "usemtl Material.003", *faces, ""]))
     (note,) = read(town.DEFAULTS | {"buildings": str(mesh)}).facts["notes"]
     assert "'Material.003'" in note
-    assert not read(town.DEFAULTS | {"buildings": str(ply(tmp_path / "town.ply", BOXES))}).facts["notes"]
+    assert not read(town.DEFAULTS | {"buildings": str(ply(tmp_path / "town.ply", BOXES))}).facts[
+        "notes"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -189,22 +214,36 @@ def test_a_material_that_no_table_has_is_named_in_a_mesh_and_in_a_mitsuba_scene(
     [
         (7, r"features\[0\] is no object"),
         ({"properties": [1], "geometry": None}, r"features\[0\]: `properties` is no object"),
-        ({"properties": {"building": "yes"}, "geometry": "Polygon"}, r"features\[0\]: `geometry` is no object"),
         (
-            {"properties": {"building": "yes"}, "geometry": {"type": "Polygon", "coordinates": "abc"}},
+            {"properties": {"building": "yes"}, "geometry": "Polygon"},
+            r"features\[0\]: `geometry` is no object",
+        ),
+        (
+            {
+                "properties": {"building": "yes"},
+                "geometry": {"type": "Polygon", "coordinates": "abc"},
+            },
             r"features\[0\]: its geometry cannot be read",
         ),
         (
-            {"properties": {"building": "yes"}, "geometry": {"type": "Polygon", "coordinates": [[[1, 1], [2, 2]]]}},
+            {
+                "properties": {"building": "yes"},
+                "geometry": {"type": "Polygon", "coordinates": [[[1, 1], [2, 2]]]},
+            },
             r"features\[0\]: its geometry cannot be read",
         ),
         (
-            {"properties": {"building": "yes"}, "geometry": {"type": "Polygon", "coordinates": None}},
+            {
+                "properties": {"building": "yes"},
+                "geometry": {"type": "Polygon", "coordinates": None},
+            },
             "has no building",
         ),
     ],
 )
-def test_a_damaged_file_is_refused_in_one_sentence_also_where_its_middle_is_asked(tmp_path, broken, message):
+def test_a_damaged_file_is_refused_in_one_sentence_also_where_its_middle_is_asked(
+    tmp_path, broken, message
+):
     path = write(tmp_path / "town.geojson", [broken])
     with pytest.raises(InputError, match=rf"town.geojson: {message}"):
         middle_of(path, None)

@@ -1,4 +1,6 @@
-"""A town: facets, blockage, reflections and diffraction against brute force, closed forms and the simpler effects."""
+"""A town: facets, blockage, reflections and diffraction against brute force, closed forms and the
+simpler effects.
+"""
 
 import itertools
 import json
@@ -48,32 +50,42 @@ def crosses(start, end, triangle):
 
 
 def test_direct_rays_are_blocked_as_by_every_triangle():
-    rng, city = np.random.default_rng(1), built(BOXES)
+    rng = np.random.default_rng(1)
+    city = built(BOXES)
     places = rng.uniform([-80, -80, 0.5], [80, 80, 40], (50, 8, 3))
     lit = image_paths.seen(city, MAST, image_paths.rays_to(places, 0.0), np.empty(0, np.int64))
     triangles = np.concatenate([block(*box) for box in BOXES])
-    expected = [not any(crosses(MAST, end, triangle) for triangle in triangles) for end in places.reshape(-1, 3)]
+    expected = [
+        not any(crosses(MAST, end, triangle) for triangle in triangles)
+        for end in places.reshape(-1, 3)
+    ]
     np.testing.assert_array_equal(lit.reshape(-1), expected)
     assert 0.2 < lit.mean() < 0.9
 
 
 def edge_field(nu, edge=0):
-    """The field behind a screen of whose edges (top, left, right) all but one are too far off for any wave to pass."""
-    rows, result = np.full((3, len(nu)), 1e15), np.empty(len(nu), np.complex128)
+    """The field behind a screen of whose edges (top, left, right) all but one are too far off for
+    any wave to pass.
+    """
+    rows = np.full((3, len(nu)), 1e15)
+    result = np.empty(len(nu), np.complex128)
     rows[edge] = nu
     knife_edge.fields(rows, result)
     return result
 
 
 def edge_nu(start, edge, ends):
-    """The parameter nu of an edge that a wave passes from start to ends (..., 3) m, by how much longer its way is."""
+    """The parameter nu of an edge that a wave passes from start to ends (..., 3) m, by how much
+    longer its way is.
+    """
     direct_m = np.linalg.norm(ends - start, axis=-1)
     detour_m = np.linalg.norm(edge - start) + np.linalg.norm(ends - edge, axis=-1) - direct_m
     return 2.0 * np.sqrt(detour_m / WAVELENGTH_M)
 
 
 def kirchhoff_sum(start, end, half_width_m, top_m):
-    """The field behind a screen x = 0, |y| < half_width_m, z < top_m, over that in free space: a sum over its plane.
+    """The field behind a screen x = 0, |y| < half_width_m, z < top_m, over that in free space: a
+    sum over its plane.
 
     The screen fades out far below its top, where a sharp end would diffract.
     """
@@ -84,8 +96,11 @@ def kirchhoff_sum(start, end, half_width_m, top_m):
     total = 0.0
     for part, weight in zip(np.array_split(below_m, 60), np.array_split(fade, 60), strict=True):
         places = np.stack(np.broadcast_arrays(0.0, y[:, None], top_m - part), axis=-1)
-        out_m, on_m = np.linalg.norm(places - start, axis=-1), np.linalg.norm(places - end, axis=-1)
-        total += (np.exp(-2j * np.pi * (out_m + on_m) / WAVELENGTH_M) / (out_m * on_m) * weight).sum() * step**2
+        out_m = np.linalg.norm(places - start, axis=-1)
+        on_m = np.linalg.norm(places - end, axis=-1)
+        total += (
+            np.exp(-2j * np.pi * (out_m + on_m) / WAVELENGTH_M) / (out_m * on_m) * weight
+        ).sum() * step**2
     direct_m = np.linalg.norm(end - start)
     free = np.exp(-2j * np.pi * direct_m / WAVELENGTH_M) / direct_m
     slant = abs(end[0] - start[0]) / direct_m
@@ -93,10 +108,16 @@ def kirchhoff_sum(start, end, half_width_m, top_m):
 
 
 def reference_paths(scene, mast, place, order):
-    """Every path of 1 to `order` facets to one place: images of the mast, each leg against every triangle."""
+    """Every path of 1 to `order` facets to one place: images of the mast, each leg against every
+    triangle.
+    """
     facets = scene.facets
     corners = [facets.triangles[a:b] for a, b in itertools.pairwise(facets.first)]
-    triangles = [(k, np.array([t[:3], t[:3] + t[3:6], t[:3] + t[6:]])) for k, rows in enumerate(corners) for t in rows]
+    triangles = [
+        (k, np.array([t[:3], t[:3] + t[3:6], t[:3] + t[6:]]))
+        for k, rows in enumerate(corners)
+        for t in rows
+    ]
 
     def mirror(k, point):
         return point - 2 * (facets.normal[k] @ point - facets.offset[k]) * facets.normal[k]
@@ -109,20 +130,27 @@ def reference_paths(scene, mast, place, order):
             images = [mast]
             for k in route:
                 images.append(mirror(k, images[-1]))
-            points, end, fits = [place], place, True
+            points = [place]
+            end = place
+            fits = True
             for k, image in zip(route[::-1], images[:0:-1], strict=True):
-                here, there = facets.normal[k] @ end - facets.offset[k], facets.normal[k] @ image - facets.offset[k]
+                here = facets.normal[k] @ end - facets.offset[k]
+                there = facets.normal[k] @ image - facets.offset[k]
                 if here * there >= 0:
                     fits = False
                     break
                 end = end + here / (here - there) * (image - end)
                 points.append(end)
                 rows = corners[k]
-                on = [np.linalg.lstsq(np.column_stack([t[3:6], t[6:]]), end - t[:3], rcond=None)[0] for t in rows]
+                on = [
+                    np.linalg.lstsq(np.column_stack([t[3:6], t[6:]]), end - t[:3], rcond=None)[0]
+                    for t in rows
+                ]
                 fits &= not rows.size or any(u >= 0 and v >= 0 and u + v <= 1 for u, v in on)
             if not fits:
                 continue
-            points, at = [*points, mast][::-1], (None, *route, None)
+            points = [*points, mast][::-1]
+            at = (None, *route, None)
             if not any(
                 crosses(start, stop, triangle)
                 for leg, (start, stop) in enumerate(itertools.pairwise(points))
@@ -134,11 +162,15 @@ def reference_paths(scene, mast, place, order):
 
 
 def test_reflected_paths_are_those_of_every_pair_of_facets():
-    rng, city = np.random.default_rng(2), built(BOXES[:3])
-    epsilon, counts = image_paths.epsilons(city, HZ, "test"), []
+    rng = np.random.default_rng(2)
+    city = built(BOXES[:3])
+    epsilon = image_paths.epsilons(city, HZ, "test")
+    counts = []
     for place in rng.uniform([-50, -50, 1.0], [60, 50, 30], (40, 3)):
         places = place[None, None]
-        routes = image_paths.reflected(city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
+        routes = image_paths.reflected(
+            city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2
+        )
         assert {route.facets for route in routes} == reference_paths(city, MAST, place, 2), place
         counts.append(len(routes))
         for route in routes:
@@ -156,31 +188,49 @@ def test_a_wall_that_closes_no_building_reflects_on_both_sides():
     for corners, sides in ((closed[2:4], 2), (closed[2:4, ::-1], 2), (closed[:8], 2), (closed, 1)):
         city = made(corners, np.zeros(len(corners), int), ("concrete",), "medium_dry_ground")
         assert (city.facets.outward[:-1] == 0.0).all() == (sides == 2)
-    sheet = made(block(0.0, 40.0, 2.0, 80.0, 30.0)[2:4], np.zeros(2, int), ("concrete",), "medium_dry_ground")
+    sheet = made(
+        block(0.0, 40.0, 2.0, 80.0, 30.0)[2:4], np.zeros(2, int), ("concrete",), "medium_dry_ground"
+    )
     epsilon = image_paths.epsilons(sheet, HZ, "test")
     for side in (-1.0, 1.0):
-        mast, place = np.array([side * 30.0, 30.0, 20.0]), np.array([[[side * 40.0, 50.0, 10.0]]])
-        routes = image_paths.reflected(sheet, epsilon, mast, place, image_paths.rays_to(place, 0.0), 1)
+        mast = np.array([side * 30.0, 30.0, 20.0])
+        place = np.array([[[side * 40.0, 50.0, 10.0]]])
+        routes = image_paths.reflected(
+            sheet, epsilon, mast, place, image_paths.rays_to(place, 0.0), 1
+        )
         assert {route.facets for route in routes} == reference_paths(sheet, mast, place[0, 0], 1)
         assert (0,) in {route.facets for route in routes}
 
 
 def test_paths_of_many_points_are_those_of_each():
-    rng, city = np.random.default_rng(3), built(BOXES)
+    rng = np.random.default_rng(3)
+    city = built(BOXES)
     epsilon = image_paths.epsilons(city, HZ, "test")
-    places = np.array([5.0, -40.0, 12.0]) + rng.uniform(-1, 1, (1, 20, 3)) + np.linspace(0, 25, 90)[:, None, None]
-    together = image_paths.reflected(city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2)
+    places = (
+        np.array([5.0, -40.0, 12.0])
+        + rng.uniform(-1, 1, (1, 20, 3))
+        + np.linspace(0, 25, 90)[:, None, None]
+    )
+    together = image_paths.reflected(
+        city, epsilon, MAST, places, image_paths.rays_to(places, 0.0), 2
+    )
     found = {route.facets: route.coefficient for route in together}
     for n, point in itertools.product(range(0, 90, 9), range(0, 20, 5)):
         one = places[n : n + 1, point : point + 1]
         alone = image_paths.reflected(city, epsilon, MAST, one, image_paths.rays_to(one, 0.0), 2)
-        assert {route.facets for route in alone} == {key for key, value in found.items() if value[n, point] != 0}
+        assert {route.facets for route in alone} == {
+            key for key, value in found.items() if value[n, point] != 0
+        }
         for route in alone:
-            np.testing.assert_allclose(found[route.facets][n, point], route.coefficient[0, 0], rtol=1e-12)
+            np.testing.assert_allclose(
+                found[route.facets][n, point], route.coefficient[0, 0], rtol=1e-12
+            )
 
 
 def test_one_wall_and_the_ground_are_the_simpler_effects(tmp_path):
-    """The ground's law is that of `ground_reflection`; the wall's is that of `walls` where rays are level."""
+    """The ground's law is that of `ground_reflection`; the wall's is that of `walls` where rays are
+    level.
+    """
     rng = np.random.default_rng(4)
     places = np.array([60.0, 25.0, 10.0]) + rng.uniform(-1, 1, (24, 9, 3))
     places[:, :4, 2] = A.position_m[2]
@@ -192,8 +242,11 @@ def test_one_wall_and_the_ground_are_the_simpler_effects(tmp_path):
     wall, ground = sorted(found, key=lambda each: each.station_m[2], reverse=True)
     hz = radar(NETWORK, A).centre_hz
     permittivity, conductivity = properties("concrete", hz, "test")
-    facade = {"facades": [[20.0, -59.0, 90.0, 400.0, 800.0]], "permittivity": permittivity,
-              "conductivity_s_m": conductivity}  # fmt: skip
+    facade = {
+        "facades": [[20.0, -59.0, 90.0, 400.0, 800.0]],
+        "permittivity": permittivity,
+        "conductivity_s_m": conductivity,
+    }
     by_wall = walls.paths(walls.DEFAULTS | facade, view)[0]
     by_ground = ground_reflection.paths(ground_reflection.DEFAULTS, view)[0]
     for each, expected in ((wall, by_wall), (ground, by_ground)):
@@ -225,14 +278,19 @@ def test_the_field_behind_an_edge_is_fresnels_integral(edge):
 
 
 def test_a_wide_block_is_one_knife_edge_and_a_pole_nearly_none():
-    wide, ends = built([(0.0, 0.0, 2.0, 4000.0, 40.0)]), np.array([[[60.0, 3.0, 20.0]]])
+    wide = built([(0.0, 0.0, 2.0, 4000.0, 40.0)])
+    ends = np.array([[[60.0, 3.0, 20.0]]])
     mast = np.array([-60.0, 3.0, 30.0])
-    lit, field = image_paths.direct(wide, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    lit, field = image_paths.direct(
+        wide, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True
+    )
     assert not lit.any()
     expected = max(edge_nu(mast, np.array([x, 3.0, 40.0]), ends[0, 0]) for x in (-1.0, 1.0))
     np.testing.assert_allclose(field[0], edge_field([expected]), atol=1e-3)
     pole = built([(0.0, 3.0, 0.02, 0.02, 400.0)])
-    lit, field = image_paths.direct(pole, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    lit, field = image_paths.direct(
+        pole, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True
+    )
     assert not lit.any()
     assert 0.9 < abs(field[0, 0]) < 1.05
 
@@ -248,18 +306,22 @@ def test_a_wide_block_is_one_knife_edge_and_a_pole_nearly_none():
     ],
 )
 def test_the_field_behind_a_finite_screen_is_kirchhoffs_sum(end, half_width_m, top_m):
-    mast, end = np.array([-60.0, 0.0, 30.0]), np.array(end)
+    mast = np.array([-60.0, 0.0, 30.0])
+    end = np.array(end)
     expected = kirchhoff_sum(mast, end, half_width_m, top_m)
     screen = built([(0.0, 0.0, 1e-2, 2 * half_width_m, top_m)])
     ends = end[None, None]
-    field = image_paths.direct(screen, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)[1][0, 0]
+    field = image_paths.direct(
+        screen, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True
+    )[1][0, 0]
     assert abs(20.0 * np.log10(abs(field / expected))) < 0.2
     assert abs(np.angle(field / expected)) < 0.05
 
 
 def test_the_field_among_buildings_never_jumps():
     """Where other buildings block most as a target moves on, finer steps change the field by less."""
-    city, mast = built(BOXES), np.array([-60.0, 3.0, 30.0])
+    city = built(BOXES)
+    mast = np.array([-60.0, 3.0, 30.0])
     largest = []
     for step_m in (0.02, 0.005):
         y = np.arange(-49.0, -41.0, step_m)
@@ -276,8 +338,12 @@ def test_the_field_among_buildings_never_jumps():
 
 def test_the_field_is_smooth_across_the_border_of_the_shadow():
     wide = built([(0.0, 0.0, 2.0, 4000.0, 26.0)])
-    ends = np.stack([np.full(400, 60.0), np.full(400, 3.0), np.linspace(10, 30, 400)], axis=1)[:, None]
-    lit, field = image_paths.direct(wide, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    ends = np.stack([np.full(400, 60.0), np.full(400, 3.0), np.linspace(10, 30, 400)], axis=1)[
+        :, None
+    ]
+    lit, field = image_paths.direct(
+        wide, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True
+    )
     assert lit.any()
     assert not lit.all()
     assert abs(np.diff(field[:, 0])).max() < 0.1
@@ -286,10 +352,13 @@ def test_the_field_is_smooth_across_the_border_of_the_shadow():
 
 
 def test_an_upright_edge_diffracts_on_both_sides_of_its_shadow_and_by_a_wall_that_goes_on_past_the_target():
-    wall, mast = built([(0.0, 1000.0, 0.02, 2000.0, 9000.0)]), np.array([-200.0, 5.0, 30.0])
+    wall = built([(0.0, 1000.0, 0.02, 2000.0, 9000.0)])
+    mast = np.array([-200.0, 5.0, 30.0])
     y = np.linspace(-2.0, 30.0, 600)
     ends = np.stack([np.full(600, 30.0), y, np.full(600, 30.0)], axis=1)[:, None]
-    lit, field = image_paths.direct(wall, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True)
+    lit, field = image_paths.direct(
+        wall, mast, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, True
+    )
     edge = np.array([0.0, 0.0, 30.0])
     nu = edge_nu(mast, edge, ends[:, 0]) * np.sign(5.0 + 200.0 / 230.0 * (y - 5.0))
     assert 0 < (lit[:, 0] & (nu > -0.78)).sum() < lit.sum()
@@ -299,9 +368,11 @@ def test_an_upright_edge_diffracts_on_both_sides_of_its_shadow_and_by_a_wall_tha
 
 
 def test_the_ply_the_geojson_and_the_mitsuba_version_of_a_town_have_equal_facades(tmp_path):
-    files = {"ply": (ply(tmp_path / "town.ply", BOXES), None),
-             "geojson": (geojson(tmp_path / "town.geojson", BOXES), ORIGIN),
-             "xml": (mitsuba(tmp_path / "scene.xml", BOXES), None)}  # fmt: skip
+    files = {
+        "ply": (ply(tmp_path / "town.ply", BOXES), None),
+        "geojson": (geojson(tmp_path / "town.geojson", BOXES), ORIGIN),
+        "xml": (mitsuba(tmp_path / "scene.xml", BOXES), None),
+    }
     planes = {}
     for kind, (path, origin) in files.items():
         found = read(town.DEFAULTS | {"buildings": str(path), "origin": origin}).town.facets
@@ -328,7 +399,9 @@ def test_without_diffraction_a_blocked_ray_has_no_field():
     city = built([(0.0, 0.0, 2.0, 4000.0, 40.0)])
     for end, free in ((60.0, False), (-50.0, True)):
         ends = np.array([[[end, 3.0, 20.0]]])
-        lit, field = image_paths.direct(city, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, False)
+        lit, field = image_paths.direct(
+            city, MAST, ends, image_paths.rays_to(ends, 0.0), WAVELENGTH_M, False
+        )
         assert lit[0, 0] == free
         assert field[0, 0] == float(free)
 
@@ -349,7 +422,10 @@ def test_a_record_names_the_paths(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"height_m": None, "heights": False}, "4 of 4 buildings have neither height nor building:levels"),
+        (
+            {"height_m": None, "heights": False},
+            "4 of 4 buildings have neither height nor building:levels",
+        ),
         ({"origin": None}, "origin is not set"),
         ({"origin": [11.7, 48.137]}, r"km from station .*expected at most 2 km"),
         ({"material": "cheese"}, "effects.town.material: 'cheese'"),
@@ -363,16 +439,26 @@ def test_a_town_that_does_not_fit_is_refused(tmp_path, change, message):
         town.refuse_place(settings, NETWORK)
 
 
-def test_a_geojson_in_metres_is_refused_by_the_command_in_one_sentence(tmp_path, monkeypatch, capsys):
+def test_a_geojson_in_metres_is_refused_by_the_command_in_one_sentence(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     path = geojson(tmp_path / "utm.geojson", BOXES)
     collection = json.loads(path.read_text())
-    square = [[691_000.0, 5_335_000.0], [691_020.0, 5_335_000.0], [691_020.0, 5_335_020.0], [691_000.0, 5_335_000.0]]
+    square = [
+        [691_000.0, 5_335_000.0],
+        [691_020.0, 5_335_000.0],
+        [691_020.0, 5_335_020.0],
+        [691_000.0, 5_335_000.0],
+    ]
     collection["features"][0]["geometry"] = {"type": "Polygon", "coordinates": [square]}
     path.write_text(json.dumps(collection))
     assert main(["scene", "inspect", str(path)]) == 2
     said = capsys.readouterr().err
-    assert "utm.geojson: the place [691000, 5.335e+06] is no longitude and latitude" in said and "EPSG:4326" in said
+    assert (
+        "utm.geojson: the place [691000, 5.335e+06] is no longitude and latitude" in said
+        and "EPSG:4326" in said
+    )
 
 
 def test_wrong_units_and_sunk_towns_are_refused(tmp_path):
@@ -385,7 +471,9 @@ def test_wrong_units_and_sunk_towns_are_refused(tmp_path):
 def test_a_station_under_a_roof_is_refused(tmp_path):
     x, y, z = NETWORK.stations[0].position_m
     path = ply(tmp_path / "town.ply", [*BOXES, (x, y, 20.0, 20.0, z + 5.0)])
-    with pytest.raises(InputError, match=f"station {NETWORK.stations[0].name} .* stands under a roof"):
+    with pytest.raises(
+        InputError, match=f"station {NETWORK.stations[0].name} .* stands under a roof"
+    ):
         town.refuse_place(town.DEFAULTS | {"buildings": str(path)}, NETWORK)
 
 
@@ -394,7 +482,9 @@ def test_a_mesh_outside_the_folder_of_a_scene_is_not_opened(tmp_path):
     (tmp_path / "inside").mkdir()
     for name in ("../secret.ply", str(tmp_path / "secret.ply"), "\0.ply"):
         path = mitsuba(tmp_path / "inside/scene.xml", BOXES, name=name.replace("\0", "&#1;"))
-        with pytest.raises(InputError, match=r"expected a file in the folder of the scene|not a readable XML"):
+        with pytest.raises(
+            InputError, match=r"expected a file in the folder of the scene|not a readable XML"
+        ):
             read(town.DEFAULTS | {"buildings": str(path)})
 
 
@@ -412,30 +502,43 @@ def test_what_counts_the_same_waves_twice_is_refused(tmp_path):
     settings = town.DEFAULTS | {"buildings": str(ply(tmp_path / "town.ply", BOXES))}
     for name in ("ground_reflection", "walls", "line_of_sight"):
         with pytest.raises(InputError, match=f"{name}.*together with town"):
-            town.check(settings, CheckedScene(NETWORK, {name: {}, "town": settings}, {}, (math.inf,), False))
-    town.check(settings, CheckedScene(NETWORK, {"clutter": {}, "town": settings}, {}, (math.inf,), False))
+            town.check(
+                settings,
+                CheckedScene(NETWORK, {name: {}, "town": settings}, {}, (math.inf,), False),
+            )
+    town.check(
+        settings, CheckedScene(NETWORK, {"clutter": {}, "town": settings}, {}, (math.inf,), False)
+    )
     with pytest.raises(InputError, match="buildings: not set"):
         town.check(town.DEFAULTS, CheckedScene(NETWORK, {}, {}, (math.inf,), False))
 
 
 def test_a_strangers_folder_may_not_name_a_file_of_buildings():
-    with pytest.raises(InputError, match=r"index.json: its effect 'town' reads the file '/etc/passwd'"):
+    with pytest.raises(
+        InputError, match=r"index.json: its effect 'town' reads the file '/etc/passwd'"
+    ):
         refuse_effects({"town": {"buildings": "/etc/passwd"}}, "index.json")
 
 
 def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):
-    """Far buildings change nothing, a wall hides, and the ground of a town is that of `ground_reflection`."""
+    """Far buildings change nothing, a wall hides, and the ground of a town is that of
+    `ground_reflection`.
+    """
     cloud, row = target(np.random.default_rng(5))
     alone = ply(tmp_path / "far.ply", [(900.0, 900.0, 9.0, 9.0, 9.0)])
     behind = ply(tmp_path / "wall.ply", [(30.0, 12.0, 2.0, 300.0, 60.0)])
     quiet = {"order": 0, "ground": "very_dry_ground"}
     free = received_signal(scene({}), A, cloud, row).signal
-    clear = received_signal(scene({"town": {"buildings": str(alone), **quiet}}), A, cloud, row).signal
+    clear = received_signal(
+        scene({"town": {"buildings": str(alone), **quiet}}), A, cloud, row
+    ).signal
     np.testing.assert_allclose(clear, free, rtol=1e-9, atol=1e-9 * abs(free).max())
     dark = received_signal(scene({"town": {"buildings": str(behind), **quiet}}), A, cloud, row)
     assert abs(dark.signal).max() < 0.01 * abs(free).max()
     # Set SNRs refer to free space.
     assert math.isclose(dark.power, received_signal(scene({}), A, cloud, row).power, rel_tol=1e-6)
     ground = received_signal(scene({"ground_reflection": {}}), A, cloud, row).signal
-    both = received_signal(scene({"town": {"buildings": str(alone), "order": 1}}), A, cloud, row).signal
+    both = received_signal(
+        scene({"town": {"buildings": str(alone), "order": 1}}), A, cloud, row
+    ).signal
     np.testing.assert_allclose(both, ground, rtol=1e-6, atol=1e-6 * abs(ground).max())

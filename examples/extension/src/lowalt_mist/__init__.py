@@ -4,7 +4,9 @@ from lowalt.config.core_commands import Command
 from lowalt.config.extensions import AddedEffect, Extension
 
 MIST = Extension(
-    commands={"mist": Command("lowalt_mist.command", "how much of a wave mist leaves", "lowalt mist 500")},
+    commands={
+        "mist": Command("lowalt_mist.command", "how much of a wave mist leaves", "lowalt mist 500")
+    },
     effects={"mist": AddedEffect("lowalt_mist.effect", "channel")},
     spectra={"power": "lowalt_mist.power"},
 )

@@ -9,7 +9,9 @@ from lowalt_mist.effect import DEFAULTS, share
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     """Add `mist` to a parser's commands."""
     line = add_command(commands, name, run)
-    line.add_argument("way", type=positive(1e6, "metres, such as 500"), help="length of the way (m)")
+    line.add_argument(
+        "way", type=positive(1e6, "metres, such as 500"), help="length of the way (m)"
+    )
 
 
 def run(options: argparse.Namespace) -> Answer:

@@ -1,1 +1,3 @@
-"""The fast kernel: short polynomials replace functions, the strongest cell is proved, errors are bounded beforehand."""
+"""The fast kernel: short polynomials replace functions, the strongest cell is proved, errors are
+bounded beforehand.
+"""

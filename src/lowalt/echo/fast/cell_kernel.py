@@ -1,7 +1,9 @@
-"""The range-cell kernel as polynomials of a point's range, so that a few moments of the points give all near cells.
+"""The range-cell kernel as polynomials of a point's range, so that a few moments of the points give
+all near cells.
 
-With v the range scaled to [-1, 1] and the moments M_k = sum z v^k, cell j is sum_k c_jk M_k. The polynomials depend on
-the target's position between two cells and on its depth; they are tabulated at fixed positions for each depth.
+With v the range scaled to [-1, 1] and the moments M_k = sum z v^k, cell j is sum_k c_jk M_k. The
+polynomials depend on the target's position between two cells and on its depth; they are tabulated
+at fixed positions for each depth.
 """
 
 import math
@@ -10,7 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo.fast.polynomials import CELL_REACH, TOP, CosineSum, cell_rule, degree_for, economised, folding, tail
+from lowalt.echo.fast.polynomials import (
+    CELL_REACH,
+    TOP,
+    CosineSum,
+    cell_rule,
+    degree_for,
+    economised,
+    folding,
+    tail,
+)
 
 PLACES = 32
 """Number of positions between two whole cells at which the kernel is tabulated."""
@@ -19,10 +30,12 @@ SIDE = 4
 
 
 class CellPolynomials(NamedTuple):
-    """Kernels (PLACES + 1, 2 SIDE + 1, degree + 1) and sines of pi times the range (PLACES + 1, degree + 1).
+    """Kernels (PLACES + 1, 2 SIDE + 1, degree + 1) and sines of pi times the range (PLACES + 1,
+    degree + 1).
 
-    half: the range in cells at |v| = 1; error: bound of every polynomial's error on [-1, 1]; sizes: largest |c_0| and
-    |c_1| and largest sum of the other |c_k| of any kernel: they weight the moments' roundings.
+    half: the range in cells at |v| = 1; error: bound of every polynomial's error on [-1, 1]; sizes:
+    largest |c_0| and |c_1| and largest sum of the other |c_k| of any kernel: they weight the
+    moments' roundings.
     """
 
     kernels: np.ndarray
@@ -34,24 +47,33 @@ class CellPolynomials(NamedTuple):
 
 @lru_cache(maxsize=256)
 def cell_polynomials(count: int, deep: float, error: float) -> CellPolynomials | None:
-    """Return polynomials to `error` for targets within `deep` cells of their reference; None if they are too long.
+    """Return polynomials to `error` for targets within `deep` cells of their reference; None if
+    they are too long.
 
     count: subcarriers M.
     """
     half = deep + 0.5 / PLACES
-    # Moments are computed four at a time, so round the degree up to one less than a multiple of four at no cost.
+    # Moments are computed four at a time, so round the degree up to one less than a multiple of
+    # four at no cost.
     degree = degree_for(math.pi * half, error) | 3
     if degree > TOP or SIDE + 0.5 + half > CELL_REACH or count < 2 * SIDE + 3:
         return None
-    rule, room, fold = cell_rule(count), np.empty((3, 32)), folding()
+    rule = cell_rule(count)
+    room = np.empty((3, 32))
+    fold = folding()
     # sin(pi x) is cos(pi (x - 1/2)).
     sine = CosineSum(np.ones(1), np.array([np.pi]))
-    kernels, sines = np.empty((PLACES + 1, 2 * SIDE + 1, degree + 1)), np.empty((PLACES + 1, degree + 1))
+    kernels = np.empty((PLACES + 1, 2 * SIDE + 1, degree + 1))
+    sines = np.empty((PLACES + 1, degree + 1))
     for number, row in enumerate(kernels):
         place = number / PLACES - 0.5
         for j in range(2 * SIDE + 1):
             economised(rule, place - (j - SIDE), half, degree, fold, room, row[j])
         economised(sine, place - 0.5, half, degree, fold, room, sines[number])
     size = np.abs(kernels)
-    sizes = (float(size[..., 0].max()), float(size[..., 1].max()), float(size[..., 2:].sum(axis=-1).max()))
+    sizes = (
+        float(size[..., 0].max()),
+        float(size[..., 1].max()),
+        float(size[..., 2:].sum(axis=-1).max()),
+    )
     return CellPolynomials(kernels, sines, half, float(tail(np.pi * half, degree)), sizes)

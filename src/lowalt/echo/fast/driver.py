@@ -1,7 +1,9 @@
-"""Driver of the fast kernel: loops over segments of symbols and strips of points, and proves the strongest cells.
+"""Driver of the fast kernel: loops over segments of symbols and strips of points, and proves the
+strongest cells.
 
-All smooth factors are evaluated as the plan's polynomials, in the loops of `vector_loops`. The code is compiled
-without reference counting, which took a quarter of the time, so nothing here may allocate: see `workspace`.
+All smooth factors are evaluated as the plan's polynomials, in the loops of `vector_loops`. The code
+is compiled without reference counting, which took a quarter of the time, so nothing here may
+allocate: see `workspace`.
 """
 
 import math
@@ -22,7 +24,9 @@ from lowalt.machine.jit import INLINED, LEAN
 
 @INLINED
 def add_moments(strip, size, block, moments):
-    """Add the strip's moments to moments (2, orders), orders a multiple of four, `block` points at a time."""
+    """Add the strip's moments to moments (2, orders), orders a multiple of four, `block` points at
+    a time.
+    """
     for at in range(0, size, block):
         many = min(block, size - at)
         for order in range(0, moments.shape[1], 4):
@@ -39,36 +43,54 @@ def add_moments(strip, size, block, moments):
 
 @INLINED
 def add_amplitudes(strip, share, point, plan, size):
-    """Fill the strip's amplitudes by polynomials of the plan's degree; returns sums of |z| and of |z| v^2."""
-    c, s = plan.cosine, plan.sine
+    """Fill the strip's amplitudes by polynomials of the plan's degree; returns sums of |z| and of
+    |z| v^2.
+    """
+    c = plan.cosine
+    s = plan.sine
     if len(c) == 6:
         return vector_loops.amplitudes(
-            strip, share, point, (c[0], c[1], c[2], c[3], c[4], c[5]), (s[0], s[1], s[2], s[3], s[4], s[5]), size
+            strip,
+            share,
+            point,
+            (c[0], c[1], c[2], c[3], c[4], c[5]),
+            (s[0], s[1], s[2], s[3], s[4], s[5]),
+            size,
         )
     if len(c) == 8:
         return vector_loops.amplitudes(
-            strip, share, point, (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
-            (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]), size,
-        )  # fmt: skip
+            strip,
+            share,
+            point,
+            (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
+            (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]),
+            size,
+        )
     return vector_loops.amplitudes(
-        strip, share, point, (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10]),
-        (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10]), size,
-    )  # fmt: skip
+        strip,
+        share,
+        point,
+        (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10]),
+        (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10]),
+        size,
+    )
 
 
 @INLINED
 def sum_points(sample, n, r, constants, degrees, plan, block, work):
-    """Fill work.moments with symbol n's moments divided by lay.total / r^2; return so divided sums of |z| and |z| v^2.
+    """Fill work.moments with symbol n's moments divided by lay.total / r^2; return so divided sums
+    of |z| and |z| v^2.
 
-    r: the reference's range (m); constants: of `segment.constants`; degrees: of the gains' polynomials; block: most
-    points added in the strip's type.
+    r: the reference's range (m); constants: of `segment.constants`; degrees: of the gains'
+    polynomials; block: most points added in the strip's type.
     """
     strip, offsets, (geometry, placing) = work.strip, work.offsets, constants
     padded = len(work.share)
     length = strip_size(padded)
     for order in range(work.moments.shape[1]):
         work.moments[0, order], work.moments[1, order] = 0.0, 0.0
-    total, second = 0.0, 0.0
+    total = 0.0
+    second = 0.0
     for point in range(0, padded, length):
         size = min(length, padded - point)
         fill_offsets(sample, n, r, point, size, placing, offsets)
@@ -84,9 +106,11 @@ def sum_points(sample, n, r, constants, degrees, plan, block, work):
 
 @INLINED
 def precision(plan, padded, orders):
-    """Return (unit rounding of the strip's type, most points added in it, relative rounding of a moment).
+    """Return (unit rounding of the strip's type, most points added in it, relative rounding of a
+    moment).
 
-    A moment of order k takes 3 k + 1 roundings of a power and its argument, one of the product, and those of the sums.
+    A moment of order k takes 3 k + 1 roundings of a power and its argument, one of the product, and
+    those of the sums.
     """
     unit = 2.0**-24 if plan.single else 2.0**-53
     block = SINGLE_BLOCK if plan.single else STRIP
@@ -97,18 +121,25 @@ def precision(plan, padded, orders):
 def run(sample, symbols, approximation, final, work, found):
     """Compute the symbols into `found`.
 
-    sample: `layout.EchoSample`; symbols, approximation, work, found: the bundles of `workspace`; final: accept a
-    strongest cell without proof, because there is no more precise plan.
+    sample: `layout.EchoSample`; symbols, approximation, work, found: the bundles of `workspace`;
+    final: accept a strongest cell without proof, because there is no more precise plan.
     """
-    plan, table, radar = approximation.plan, approximation.cells, sample.radar
-    orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
+    plan = approximation.plan
+    table = approximation.cells
+    radar = sample.radar
+    orders = table.kernels.shape[2]
+    half = table.half
+    sizes = table.sizes
     padded = len(work.share)
     unit, block, rounding = precision(plan, padded, orders)
     length = strip_size(padded)
-    refs, extents, moments = symbols.refs, symbols.extents, work.moments
+    refs = symbols.refs
+    extents = symbols.extents
+    moments = work.moments
     for index in range(len(symbols.segments)):
         segment = symbols.segments[index]
-        start, end = int(segment[START]), int(segment[END])
+        start = int(segment[START])
+        end = int(segment[END])
         degree_h, degree_v, gains = fit_gains(
             segment, sample.aims, approximation.gains, plan.fit, unit, approximation.fold, work
         )
@@ -117,11 +148,15 @@ def run(sample, symbols, approximation, final, work, found):
                 found.state[symbols.index[i]] = UNCERTAIN
             continue
         for i in range(start, end):
-            n, r = symbols.index[i], refs[i, RANGE]
+            n = symbols.index[i]
+            r = refs[i, RANGE]
             place = max(0, min(int(np.rint((refs[i, REST] + 0.5) * PLACES)), PLACES))
             placed = constants(sample, refs[i], segment, place / PLACES - 0.5, half)
-            total, second = sum_points(sample, n, r, placed, (degree_h, degree_v), plan, block, work)
-            # Undo the division by the sum of amplitudes, which keeps float32 from overflow and underflow.
+            total, second = sum_points(
+                sample, n, r, placed, (degree_h, degree_v), plan, block, work
+            )
+            # Undo the division by the sum of amplitudes, which keeps float32 from overflow and
+            # underflow.
             scale = sample.lay.total / (r * r)
             for order in range(orders):
                 moments[0, order] *= scale
@@ -129,28 +164,46 @@ def run(sample, symbols, approximation, final, work, found):
             total *= scale * (1.0 + unit * (length + 20))
             second *= scale * (1.0 + unit * (length + 24))
             peaks = scale / (1.0 - extents[i, SPREAD]) ** 2
-            # `total` sums approximate amplitudes; add their error to bound the sum of the true ones.
+            # `total` sums approximate amplitudes; add their error to bound the sum of the true
+            # ones.
             total += total * plan.share + peaks * (plan.peak + gains)
-            summed = rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
+            summed = rounding * (
+                sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second
+            )
             bound = total * (plan.share + table.error) + summed + peaks * (plan.peak + gains)
             bound += plan.phase * min(total * extents[i, SIZE], peaks * extents[i, MEAN])
             found.totals[n], found.bounds[n] = total, bound
             state, row, tie, lead = certify(
-                table, place, extents[i, SIZE] * radar.cells, (total, second),
-                table.error + 4.0 * rounding * (sizes[0] + sizes[1] + sizes[2]), bound, radar.subcarriers, work,
-            )  # fmt: skip
+                table,
+                place,
+                extents[i, SIZE] * radar.cells,
+                (total, second),
+                table.error + 4.0 * rounding * (sizes[0] + sizes[1] + sizes[2]),
+                bound,
+                radar.subcarriers,
+                work,
+            )
             if lead <= 0.0 and not final:
                 state = UNCERTAIN
             found.state[n] = state
             if state == CERTAIN:
-                keep(found, n, int(refs[i, CELL]) + row - SIDE, work.sums[row], radar.subcarriers, tie, lead)
+                keep(
+                    found,
+                    n,
+                    int(refs[i, CELL]) + row - SIDE,
+                    work.sums[row],
+                    radar.subcarriers,
+                    tie,
+                    lead,
+                )
 
 
 @INLINED
 def keep(found, n, cell, value, subcarriers, tie, lead):
     """Write symbol n's strongest cell into `found`.
 
-    cell: its number before reduction modulo M; value: its real and imaginary part before the cell's phase factor;
+    cell: its number before reduction modulo M; value: its real and imaginary part before the cell's
+    phase factor;
     tie, lead: as returned by `strongest_cell.certify`.
     """
     found.values[n] = complex(value[0], value[1]) * cell_phase(cell, subcarriers)

@@ -1,4 +1,6 @@
-"""Selects precision and polynomials for a sample: the cheapest ones whose proved error bound is small enough."""
+"""Selects precision and polynomials for a sample: the cheapest ones whose proved error bound is
+small enough.
+"""
 
 import math
 from typing import NamedTuple
@@ -9,16 +11,19 @@ from lowalt.echo.fast.polynomials import CosineSum, array_rule, smooth
 from lowalt.echo.radar import Radar
 
 SPREAD_LIMIT = 0.22
-"""Largest ratio of target radius to range for the fast kernel; closer targets use the pointwise kernel."""
+"""Largest ratio of target radius to range for the fast kernel; closer targets use the pointwise
+kernel.
+"""
 FINEST = 1e-15
 """Required accuracy of every polynomial in exact mode."""
 
 
 class EchoPlan(NamedTuple):
-    """How to compute a sample. `fit`: error of gains and cell kernels; `share`, `peak`: bound of the other errors,
-    relative to the sum of amplitudes and to the sum of peak amplitudes; `phase`: rounding of the phase relative to the
-    sum of amplitudes times distances from the reference, per metre; `single`: float32 after the phase; `cosine`,
-    `sine`: coefficients of `polynomials.smooth` in the type of the sums."""
+    """How to compute a sample. `fit`: error of gains and cell kernels; `share`, `peak`: bound of
+    the other errors, relative to the sum of amplitudes and to the sum of peak amplitudes; `phase`:
+    rounding of the phase relative to the sum of amplitudes times distances from the reference, per
+    metre; `single`: float32 after the phase; `cosine`, `sine`: coefficients of `polynomials.smooth`
+    in the type of the sums."""
 
     fit: float
     share: float
@@ -39,9 +44,13 @@ class ArrayGains(NamedTuple):
 COSINE_DEGREES = (5, 7, 10)
 """Degrees in t^2 of cosine and sine that `vector_loops` has loops for."""
 SINGLE_BLOCK = 128
-"""Largest number of float32 values summed before continuing in double; longer sums exceed a tolerance of 1e-4."""
+"""Largest number of float32 values summed before continuing in double; longer sums exceed a
+tolerance of 1e-4.
+"""
 SINGLE_ERROR = 400 * 2.0**-24
-"""Error bound of float32 after the phase reduction; float32 is not used if a smaller error is required."""
+"""Error bound of float32 after the phase reduction; float32 is not used if a smaller error is
+required.
+"""
 
 
 def array_gains(radar: Radar) -> ArrayGains:
@@ -53,41 +62,51 @@ def array_gains(radar: Radar) -> ArrayGains:
 
 
 def round_up(value: float, steps: int = 2) -> float:
-    """Return `value` rounded up to one of `steps` values an octave, so that few polynomials serve all samples."""
+    """Return `value` rounded up to one of `steps` values an octave, so that few polynomials serve
+    all samples.
+    """
     return 2.0 ** (math.ceil(steps * math.log2(max(value, 1e-9))) / steps)
 
 
 def echo_plan(radar: Radar, points: int, error: float) -> EchoPlan:
     """Return the cheapest plan whose bound is about `error` relative to the sum of amplitudes.
 
-    `error` is rounded down to a power of two, so that few cell kernels serve all samples; below FINEST it means the
-    exact mode.
+    `error` is rounded down to a power of two, so that few cell kernels serve all samples; below
+    FINEST it means the exact mode.
     """
     error = 2.0 ** math.floor(math.log2(max(error, FINEST)))
     elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
     array_phase = np.pi * radar.kappa / 2 * (elements - 4)
-    unit, single = 2.0**-53, error > SINGLE_ERROR
+    unit = 2.0**-53
+    single = error > SINGLE_ERROR
     coarse, kind = (2.0**-24, np.float32) if single else (unit, np.float64)
     for degree in COSINE_DEGREES:
         cosine, cosine_error = smooth("cosine", degree)
         sine, sine_error = smooth("sine", degree)
         if cosine_error + 0.5 * sine_error <= error / 3:
             break
-    # Order k of cosine and sine has 2 k + 2 roundings: at half a turn at most 85 in both together. The turn itself and
-    # the products of the amplitude have another 16.
+    # Order k of cosine and sine has 2 k + 2 roundings: at half a turn at most 85 in both together.
+    # The turn itself and the products of the amplitude have another 16.
     rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + -(-points // 512) * unit
     share = cosine_error + 0.5 * sine_error + rounding
     return EchoPlan(
-        max(error / 6, FINEST), share, 8 * array_phase * unit, 64 * np.pi * radar.turns * unit, single,
-        cosine.astype(kind), sine.astype(kind),
-    )  # fmt: skip
+        max(error / 6, FINEST),
+        share,
+        8 * array_phase * unit,
+        64 * np.pi * radar.turns * unit,
+        single,
+        cosine.astype(kind),
+        sine.astype(kind),
+    )
 
 
 def pointwise_bound(radar: Radar, size_m: float, points: int) -> tuple[float, float]:
-    """Return the pointwise kernel's error bound relative to its sums of amplitudes and of risks (`terms.terms`).
+    """Return the pointwise kernel's error bound relative to its sums of amplitudes and of risks
+    (`terms.terms`).
 
-    Phase: a range difference has a few roundings of the offset, independent of the range; the other errors come from
-    sums. Risk: effect of the rounding of a direction cosine on the gains and the array phase.
+    Phase: a range difference has a few roundings of the offset, independent of the range; the other
+    errors come from sums. Risk: effect of the rounding of a direction cosine on the gains and the
+    array phase.
     """
     elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
     wave = 2 * np.pi * radar.turns * 2 * size_m

@@ -1,7 +1,8 @@
 """Polynomials of low degree that replace functions, each with a proved error bound.
 
-Array gains and the range-cell kernel are finite sums of cosines. Over a short interval, with B the largest rate times
-half the interval, their Chebyshev coefficients are Bessel functions with |2 J_p(B)| <= 2 (B/2)^p / p!.
+Array gains and the range-cell kernel are finite sums of cosines. Over a short interval, with B the
+largest rate times half the interval, their Chebyshev coefficients are Bessel functions with |2
+J_p(B)| <= 2 (B/2)^p / p!.
 """
 
 import math
@@ -28,7 +29,9 @@ class CosineSum(NamedTuple):
 
 @LEAN
 def tail(band, degree):
-    """Return a bound of the error of `economised` for cosines with weights of sum 1 and phases up to `band` (rad)."""
+    """Return a bound of the error of `economised` for cosines with weights of sum 1 and phases up
+    to `band` (rad).
+    """
     half = 0.5 * band
     term = 4.0
     for p in range(1, degree + 2):
@@ -54,11 +57,13 @@ def degree_for(band, error):
 
 @lru_cache(maxsize=1)
 def folding() -> np.ndarray:
-    """Return weights (TOP + 1, EXTRA, TOP + 1): row d, j holds x^(d + 1 + j) on [-1, 1], its Chebyshev series cut after
-    T_d, as powers of x."""
+    """Return weights (TOP + 1, EXTRA, TOP + 1): row d, j holds x^(d + 1 + j) on [-1, 1], its
+    Chebyshev series cut after T_d, as powers of x."""
     top = TOP + EXTRA + 1
-    # Powers to Chebyshev polynomials by x T_n = (T_{n+1} + T_{|n-1|}) / 2, and back by T_{n+1} = 2 x T_n - T_{n-1}.
-    shares, powers = np.zeros((top + 1, top + 1)), np.zeros((TOP + 1, TOP + 1))
+    # Powers to Chebyshev polynomials by x T_n = (T_{n+1} + T_{|n-1|}) / 2, and back by T_{n+1} = 2
+    # x T_n - T_{n-1}.
+    shares = np.zeros((top + 1, top + 1))
+    powers = np.zeros((TOP + 1, TOP + 1))
     shares[0, 0] = shares[1, 1] = powers[0, 0] = powers[1, 1] = 1.0
     for p in range(1, top):
         shares[p + 1, 1:] = shares[p, :-1] / 2
@@ -69,7 +74,9 @@ def folding() -> np.ndarray:
         powers[n + 1] -= powers[n - 1]
     result = np.zeros((TOP + 1, EXTRA, TOP + 1))
     for degree in range(TOP + 1):
-        result[degree] = shares[degree + 1 : degree + 1 + EXTRA, : degree + 1] @ powers[: degree + 1]
+        result[degree] = (
+            shares[degree + 1 : degree + 1 + EXTRA, : degree + 1] @ powers[: degree + 1]
+        )
     return result
 
 
@@ -81,10 +88,14 @@ def economised(cosines, centre, half, degree, fold, room, out):
     """
     weights, rates = cosines
     count = len(weights)
-    term, even, odd = room[0], room[1], room[2]
+    term = room[0]
+    even = room[1]
+    odd = room[2]
     for i in range(count):
         angle = rates[i] * centre
-        term[i], even[i], odd[i] = weights[i], math.cos(angle), -math.sin(angle)
+        term[i] = weights[i]
+        even[i] = math.cos(angle)
+        odd[i] = -math.sin(angle)
     out[:] = 0.0
     for p in range(degree + EXTRA + 1):
         value = 0.0
@@ -109,7 +120,8 @@ def economised(cosines, centre, half, degree, fold, room, out):
 def _half(weights: np.ndarray, rates: np.ndarray) -> CosineSum:
     """Return the same sum of cosines with the rates r and -r joined."""
     order = np.argsort(-rates, kind="stable")
-    weights, rates = weights[order], rates[order]
+    weights = weights[order]
+    rates = rates[order]
     keep = (len(rates) + 1) // 2
     weights = 2 * weights[:keep]
     if len(rates) % 2:
@@ -120,10 +132,12 @@ def _half(weights: np.ndarray, rates: np.ndarray) -> CosineSum:
 
 @lru_cache(maxsize=64)
 def cell_rule(count: int) -> CosineSum:
-    """Return a short cosine sum (rates in rad per cell) equal to the cell kernel of `count` subcarriers.
+    """Return a short cosine sum (rates in rad per cell) equal to the cell kernel of `count`
+    subcarriers.
 
-    This is the Gauss rule of the uniform discrete measure on the subcarriers (recurrence of the discrete Chebyshev
-    polynomials). 32 nodes are exact to degree 63, with an error below 1e-17 at a distance of seven cells.
+    This is the Gauss rule of the uniform discrete measure on the subcarriers (recurrence of the
+    discrete Chebyshev polynomials). 32 nodes are exact to degree 63, with an error below 1e-17 at a
+    distance of seven cells.
     """
     nodes = min(count, 32)
     k = np.arange(1, nodes)
@@ -139,7 +153,9 @@ CELL_REACH = 7.0
 
 @lru_cache(maxsize=64)
 def array_rule(transmit: int, receive: int, kappa: float) -> CosineSum:
-    """Return U_{T-1} U_{R-1} / (T R) as a cosine sum: weights of sum 1, rates in rad per unit of direction cosine."""
+    """Return U_{T-1} U_{R-1} / (T R) as a cosine sum: weights of sum 1, rates in rad per unit of
+    direction cosine.
+    """
     weights = np.convolve(np.ones(transmit), np.ones(receive)) / (transmit * receive)
     top = transmit + receive - 2
     return _half(weights, np.pi * kappa / 2 * (top - 2.0 * np.arange(top + 1)))
@@ -147,10 +163,11 @@ def array_rule(transmit: int, receive: int, kappa: float) -> CosineSum:
 
 @lru_cache(maxsize=1)
 def _nodes() -> tuple[np.ndarray, np.ndarray]:
-    """Return the 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to Chebyshev coefficients.
+    """Return the 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to
+    Chebyshev coefficients.
 
-    Computed in extended precision if the machine has it, because the rounding of a double-precision transform would
-    look like coefficients.
+    Computed in extended precision if the machine has it, because the rounding of a double-precision
+    transform would look like coefficients.
     """
     count = 96
     angle = 4 * np.arctan(np.longdouble(1)) * (np.arange(count) + np.longdouble(0.5)) / count
@@ -161,10 +178,14 @@ def _nodes() -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=2)
 def _expansion(kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the Chebyshev coefficients (96,) of a function of `smooth`, and the error of stopping at each degree."""
+    """Return the Chebyshev coefficients (96,) of a function of `smooth`, and the error of stopping
+    at each degree.
+    """
     s, matrix = _nodes()
     turn = 8 * np.arctan(np.longdouble(1)) * np.sqrt((1 + s) / 8)
-    value = np.cos(turn) if kind == "cosine" else 8 * np.arctan(np.longdouble(1)) * np.sin(turn) / turn
+    value = (
+        np.cos(turn) if kind == "cosine" else 8 * np.arctan(np.longdouble(1)) * np.sin(turn) / turn
+    )
     coefficients = matrix @ value
     noise = max(64 * float(np.finfo(np.longdouble).eps), 1e-17) * float(abs(coefficients).max())
     size = np.where(abs(coefficients) < noise, 0, abs(coefficients)).astype(np.float64)
@@ -175,8 +196,8 @@ def _expansion(kind: str) -> tuple[np.ndarray, np.ndarray]:
 def smooth(kind: str, degree: int) -> tuple[np.ndarray, float]:
     """Return a polynomial of `degree` in x = t^2 for |t| <= 1/2: coefficients and error bound.
 
-    kind: "cosine" for cos(2 pi t), "sine" for sin(2 pi t) / t. The bound is the sum of the Chebyshev coefficients left
-    out, computed with 96 nodes, plus rounding.
+    kind: "cosine" for cos(2 pi t), "sine" for sin(2 pi t) / t. The bound is the sum of the
+    Chebyshev coefficients left out, computed with 96 nodes, plus rounding.
     """
     coefficients, tails = _expansion(kind)
     inner = np.polynomial.Polynomial(np.array([-1, 8], np.longdouble))

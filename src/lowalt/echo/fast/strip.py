@@ -1,4 +1,5 @@
-"""A strip: the points of one symbol that the fast kernel processes together. Its arrays, constants and length.
+"""A strip: the points of one symbol that the fast kernel processes together. Its arrays, constants
+and length.
 
 The arrays of a strip fit into the first-level cache.
 """
@@ -14,13 +15,15 @@ STRIP = 256
 MULTIPLE = 16
 """Strips hold whole multiples of this many points; the padding has no amplitude."""
 STRIP_ROOM = STRIP + MULTIPLE + 8
-"""Length of a work array: a strip plus room for a part's last group, which may write beyond it. It is not a power of
-two, because with arrays a multiple of 4096 bytes apart loads wait for unrelated stores (4K aliasing)."""
+"""Length of a work array: a strip plus room for a part's last group, which may write beyond it. It
+is not a power of two, because with arrays a multiple of 4096 bytes apart loads wait for unrelated
+stores (4K aliasing)."""
 
 
 class Placing(NamedTuple):
-    """Constants that place the points: twice the unit vector to the reference (array's axes), and how horizontal and
-    vertical coordinates become direction cosines on [-1, 1] before the division by r."""
+    """Constants that place the points: twice the unit vector to the reference (array's axes), and
+    how horizontal and vertical coordinates become direction cosines on [-1, 1] before the division
+    by r."""
 
     twice_x: float
     twice_y: float
@@ -32,9 +35,9 @@ class Placing(NamedTuple):
 
 
 class Geometry(NamedTuple):
-    """One symbol's constants: shifts of the scaled direction cosines psi and omega; scale and shift that take the
-    relative range difference to [-1, 1]; turns of phase per relative range difference, per psi and per omega; the
-    reference's turn."""
+    """One symbol's constants: shifts of the scaled direction cosines psi and omega; scale and shift
+    that take the relative range difference to [-1, 1]; turns of phase per relative range
+    difference, per psi and per omega; the reference's turn."""
 
     psi_shift: float
     omega_shift: float
@@ -47,7 +50,9 @@ class Geometry(NamedTuple):
 
 
 class Offsets(NamedTuple):
-    """A strip's points in float64 (STRIP_ROOM,): eps = r^2 / r_ref^2 - 1, scaled horizontal and vertical coordinate."""
+    """A strip's points in float64 (STRIP_ROOM,): eps = r^2 / r_ref^2 - 1, scaled horizontal and
+    vertical coordinate.
+    """
 
     eps: np.ndarray
     y: np.ndarray
@@ -55,8 +60,9 @@ class Offsets(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """A strip's points in the type of the sums (STRIP_ROOM,): direction cosines and ranges on [-1, 1], turns on
-    [-1/2, 1/2], (r_ref / r)^2, array gains, and real and imaginary part of the amplitudes."""
+    """A strip's points in the type of the sums (STRIP_ROOM,): direction cosines and ranges on [-1,
+    1], turns on [-1/2, 1/2], (r_ref / r)^2, array gains, and real and imaginary part of the
+    amplitudes."""
 
     psi: np.ndarray
     omega: np.ndarray
@@ -71,7 +77,7 @@ class Strip(NamedTuple):
 
 @LEAN
 def strip_size(points: int) -> int:
-    """Return the points of a strip when a target has `points` (padded): equal shares of at most STRIP, whole multiples
-    of MULTIPLE."""
+    """Return the points of a strip when a target has `points` (padded): equal shares of at most
+    STRIP, whole multiples of MULTIPLE."""
     shares = -(-points // STRIP)
     return -(-points // (shares * MULTIPLE)) * MULTIPLE

@@ -13,12 +13,15 @@ NEAR_TIE = 1e-12
 
 @INNER
 def strongest_of(sums, first, last):
-    """Return the largest |sum| of the rows first..last of sums (cells, 2), the second largest, and the largest's row.
+    """Return the largest |sum| of the rows first..last of sums (cells, 2), the second largest, and
+    the largest's row.
 
-    Columns of sums: real and imaginary part. Of equal sums the first row wins. The second largest is -1 where only one
-    row is given.
+    Columns of sums: real and imaginary part. Of equal sums the first row wins. The second largest
+    is -1 where only one row is given.
     """
-    best, second, which = -1.0, -1.0, first
+    best = -1.0
+    second = -1.0
+    which = first
     for j in range(first, last + 1):
         strength = sums[j, 0] * sums[j, 0] + sums[j, 1] * sums[j, 1]
         if strength > best:

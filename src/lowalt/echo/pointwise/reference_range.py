@@ -1,7 +1,8 @@
 """Range of one reference point for each symbol, in double-double arithmetic.
 
-The range of any other point is this one plus a difference that a double represents accurately, so phase errors do not
-grow with range. Compiled without fast-math flags, which would optimise the corrections away.
+The range of any other point is this one plus a difference that a double represents accurately, so
+phase errors do not grow with range. Compiled without fast-math flags, which would optimise the
+corrections away.
 """
 
 import math
@@ -13,8 +14,8 @@ from lowalt.machine.jit import INNER, LEAN
 from lowalt.numerics import double_double
 
 X, Y, Z, RANGE, TURN, CELL, REST = range(7)
-"""Columns of the table of reference ranges: vector from the station (m), range (m), fraction of a turn of its phase,
-nearest whole range cell, and the rest of the range in cells."""
+"""Columns of the table of reference ranges: vector from the station (m), range (m), fraction of a
+turn of its phase, nearest whole range cell, and the rest of the range in cells."""
 
 two_sum = LEAN(double_double.two_sum)
 two_product = LEAN(double_double.two_product)
@@ -30,9 +31,12 @@ def _fraction(r, r_lo, k, k_lo):
 
 @LEAN
 def _fill(place, radar, out):
-    """Fill `out` (N, 7) with the reference ranges of places (N, 3) m; `reference` names the columns."""
+    """Fill `out` (N, 7) with the reference ranges of places (N, 3) m; `reference` names the
+    columns.
+    """
     for n in range(len(place)):
-        h2, h2_lo = 0.0, 0.0
+        h2 = 0.0
+        h2_lo = 0.0
         for i in range(3):
             d, d_lo = two_sum(place[n, i], -radar.station[i])
             out[n, i] = d

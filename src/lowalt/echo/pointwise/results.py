@@ -20,15 +20,21 @@ from lowalt.machine.jit import PLAIN
 def far_bound(z, u, low, high, count):
     """Return an upper bound of |sum| in any cell outside low..high (from the reference's).
 
-    With c = z sin(pi u) a far cell is sum c g(j - u), g(x) = 1 / (M sin(pi x / M)). It is expanded to second order
-    about the middle of the points; the remainder is bounded by the largest |g''|, which falls with distance.
+    With c = z sin(pi u) a far cell is sum c g(j - u), g(x) = 1 / (M sin(pi x / M)). It is expanded
+    to second order about the middle of the points; the remainder is bounded by the largest |g''|,
+    which falls with distance.
     """
-    least, most = u.min(), u.max()
-    middle, half = 0.5 * (least + most), 0.5 * (most - least)
+    least = u.min()
+    most = u.max()
+    middle = 0.5 * (least + most)
+    half = 0.5 * (most - least)
     distance = min(high + 1 - middle, middle - (low - 1), 0.5 * count)
     if distance - half <= 0.0:
         return np.inf
-    c0, c1, a2, total = 0.0j, 0.0j, 0.0, 0.0
+    c0 = 0.0j
+    c1 = 0.0j
+    a2 = 0.0
+    total = 0.0
     for l in range(len(z)):  # noqa: E741
         y = u[l] - middle
         c = z[l] * math.sin(math.pi * (u[l] - np.rint(u[l])))
@@ -38,7 +44,8 @@ def far_bound(z, u, low, high, count):
         a2 += abs(c) * y * y
         total += abs(z[l])
     step = math.pi / count
-    s, k = math.sin(step * distance), math.cos(step * distance)
+    s = math.sin(step * distance)
+    k = math.cos(step * distance)
     near = math.sin(step * (distance - half))
     bound = abs(c0) / s + abs(c1) * step * abs(k) / (s * s) + 0.5 * a2 * 2.0 * step * step / near**3
     return bound / count * (1.0 + 1e-9) + 1e-14 * total
@@ -48,15 +55,19 @@ def far_bound(z, u, low, high, count):
 def strongest(z, u, base, count, sums):
     """Return (value, cell, near-tie, lead) of one symbol's strongest cell.
 
-    lead: its |sum| minus any other, ignoring rounding; base: the reference's cell; sums (M, 2): work array.
+    lead: its |sum| minus any other, ignoring rounding; base: the reference's cell; sums (M, 2):
+    work array.
     """
-    low, high = math.floor(u.min()), math.ceil(u.max())
+    low = math.floor(u.min())
+    high = math.ceil(u.max())
     far = 0.0
     for grow in range(3):
         if grow == 1:
-            low, high = low - 8, high + 8
+            low = low - 8
+            high = high + 8
         if grow == 2 or high - low + 1 >= count:
-            low, high = -base % count, -base % count + count - 1
+            low = -base % count
+            high = -base % count + count - 1
         for j in range(low, high + 1):
             there = cell_sum(z, u, j, count)
             sums[j - low, 0], sums[j - low, 1] = there.real, there.imag
@@ -73,16 +84,20 @@ def strongest(z, u, base, count, sums):
 def room(scene):
     """Return empty `PointTerms` for the points of a scene."""
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
-    return PointTerms(np.empty((count, 3)), np.empty(count, np.complex128), np.empty(count), np.empty(count))
+    return PointTerms(
+        np.empty((count, 3)), np.empty(count, np.complex128), np.empty(count), np.empty(count)
+    )
 
 
 @PLAIN
 def signal(scene, radar, refs, symbols, aims, found, risks):
-    """Fill `found` (`refine.Found`) and risks (N,) at `symbols`, indices of refs; gaps without roundings.
+    """Fill `found` (`refine.Found`) and risks (N,) at `symbols`, indices of refs; gaps without
+    roundings.
 
     Returns 0, or n L + l + 1 where point l stands in the station at symbol n.
     """
-    points, sums = room(scene), np.empty((radar.subcarriers, 2))
+    points = room(scene)
+    sums = np.empty((radar.subcarriers, 2))
     for n in symbols:
         fault = terms(scene, radar, refs[n], n, aims, points)
         if fault:
@@ -90,21 +105,25 @@ def signal(scene, radar, refs, symbols, aims, found, risks):
         base = int(refs[n, CELL])
         answer = strongest(points.z, points.u, base, radar.subcarriers, sums)
         found.values[n], found.cells[n], found.ties[n], found.gaps[n] = answer
-        found.totals[n], risks[n] = np.abs(points.z).sum(), points.risk.sum()
+        found.totals[n] = np.abs(points.z).sum()
+        risks[n] = points.risk.sum()
     return 0
 
 
 @PLAIN
 def matrix(scene, radar, refs, aims, out):
     """Fill out (N, M) with all range cells, each by the closed form; returns as `signal`."""
-    points, total = room(scene), radar.subcarriers
+    points = room(scene)
+    total = radar.subcarriers
     for n in range(len(refs)):
         fault = terms(scene, radar, refs[n], n, aims, points)
         if fault:
             return n * len(points.e) + fault
         base = int(refs[n, CELL])
         for j in range(total):
-            out[n, (base + j) % total] = cell_sum(points.z, points.u, j, total) * cell_phase(base + j, total)
+            out[n, (base + j) % total] = cell_sum(points.z, points.u, j, total) * cell_phase(
+                base + j, total
+            )
     return 0
 
 
@@ -117,7 +136,8 @@ def bounded(
     pointwise_bound: tuple[float, float],
     found: Found,
 ) -> int:
-    """Fill `found` at `symbols` as `signal`, with error bounds and with gaps that allow for them; returns as `signal`.
+    """Fill `found` at `symbols` as `signal`, with error bounds and with gaps that allow for them;
+    returns as `signal`.
 
     pointwise_bound: `refine.Method.pointwise_bound`.
     """

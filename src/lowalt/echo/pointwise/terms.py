@@ -1,4 +1,5 @@
-"""The pointwise kernel: every point's complex amplitude and range at one symbol, whatever the geometry or arrays.
+"""The pointwise kernel: every point's complex amplitude and range at one symbol, whatever the
+geometry or arrays.
 
 Used for symbols that the fast kernel cannot decide.
 """
@@ -13,8 +14,9 @@ from lowalt.machine.jit import LEAN, PLAIN
 
 
 class PointTerms(NamedTuple):
-    """Values of all points at one symbol: places `e` (L, 3) m from the reference's point; complex amplitudes `z`
-    without the cell's own phase, ranges `u` in cells from the reference's cell, and risks (`terms`), each (L,)."""
+    """Values of all points at one symbol: places `e` (L, 3) m from the reference's point; complex
+    amplitudes `z` without the cell's own phase, ranges `u` in cells from the reference's cell, and
+    risks (`terms`), each (L,)."""
 
     e: np.ndarray
     z: np.ndarray
@@ -24,7 +26,9 @@ class PointTerms(NamedTuple):
 
 @PLAIN
 def sin_pi(x):
-    """Return sin(pi x), exactly zero for integer x: the argument is reduced before the product with pi."""
+    """Return sin(pi x), exactly zero for integer x: the argument is reduced before the product with
+    pi.
+    """
     k = np.rint(x)
     s = math.sin(math.pi * (x - k))
     return -s if int(k) & 1 else s
@@ -46,7 +50,9 @@ def dirichlet(x, count):
 
 @LEAN
 def aim_cosines(aim, station, sine, cosine):
-    """Return the direction cosines (horizontal, vertical) of the beams (Eq. 4 put into Psi and Omega)."""
+    """Return the direction cosines (horizontal, vertical) of the beams (Eq. 4 put into Psi and
+    Omega).
+    """
     x, y, z = aim[0] - station[0], aim[1] - station[1], aim[2] - station[2]
     r = math.sqrt(x * x + y * y + z * z)
     return (cosine * y - sine * x) / r, z / r
@@ -73,10 +79,10 @@ def offsets(scene, n, place, e):
 def terms(scene, radar, ref, n, aims, out):
     """Fill `out` (`PointTerms`) with the share of each point at symbol n.
 
-    ref: the symbol's row of `reference_range.reference`; aims: direction cosines of the beams. The risk is the peak
-    amplitude times (r_ref + |e|) / r, which grows with the rounding of the point's direction.
-    Returns 0, or 1 + l where point l stands in the station. Source: paper Eqs. 7 and 24, steering sums as Chebyshev
-    polynomials.
+    ref: the symbol's row of `reference_range.reference`; aims: direction cosines of the beams. The
+    risk is the peak amplitude times (r_ref + |e|) / r, which grows with the rounding of the point's
+    direction. Returns 0, or 1 + l where point l stands in the station. Source: paper Eqs. 7 and 24,
+    steering sums as Chebyshev polynomials.
     """
     place = scene.translation[n, 0 if scene.rotation.shape[0] == 0 else scene.part[0]]
     e, z, u, risk = out
@@ -86,7 +92,9 @@ def terms(scene, radar, ref, n, aims, out):
     cells = radar.cells
     peak = float(radar.transmit_h * radar.transmit_v) * float(radar.receive_h * radar.receive_v)
     for l in range(len(e)):  # noqa: E741
-        x, y, w = ref[0] + e[l, 0], ref[1] + e[l, 1], ref[2] + e[l, 2]
+        x = ref[0] + e[l, 0]
+        y = ref[1] + e[l, 1]
+        w = ref[2] + e[l, 2]
         r2 = x * x + y * y + w * w
         if r2 == 0.0:
             return 1 + l
@@ -98,7 +106,8 @@ def terms(scene, radar, ref, n, aims, out):
         more = excess / (r + ref[RANGE])
         psi = (radar.cosine * y - radar.sine * x) / r - aims[0]
         omega = w / r - aims[1]
-        h, v = 0.5 * radar.kappa * psi, 0.5 * radar.kappa * omega
+        h = 0.5 * radar.kappa * psi
+        v = 0.5 * radar.kappa * omega
         gain = dirichlet(h, radar.transmit_h) * dirichlet(h, radar.receive_h)
         gain *= dirichlet(v, radar.transmit_v) * dirichlet(v, radar.receive_v)
         turn = phase_h * psi + phase_v * omega - ref[TURN] - radar.turns * more
@@ -114,7 +123,9 @@ def terms(scene, radar, ref, n, aims, out):
 
 @PLAIN
 def cell_phase(m, count):
-    """Return the phase factor exp(j pi (M-1) m / M) of range cell m; its argument is reduced in whole numbers."""
+    """Return the phase factor exp(j pi (M-1) m / M) of range cell m; its argument is reduced in
+    whole numbers.
+    """
     turn = ((count - 1) * (m % (2 * count)) % (2 * count)) / (2.0 * count)
     return complex(math.cos(2.0 * math.pi * turn), math.sin(2.0 * math.pi * turn))
 
@@ -127,7 +138,9 @@ def cell_weight(x, count):
 
 @PLAIN
 def cell_sum(z, u, j, count):
-    """Return the sum of the points in the cell j cells after the reference's, without the cell's phase."""
+    """Return the sum of the points in the cell j cells after the reference's, without the cell's
+    phase.
+    """
     total = 0.0j
     for l in range(len(z)):  # noqa: E741
         total += z[l] * cell_weight(j - u[l], count)

@@ -1,8 +1,10 @@
-"""Correct rounding to complex64 (Ziv's strategy): recompute values whose error bound does not decide the rounding.
+"""Correct rounding to complex64 (Ziv's strategy): recompute values whose error bound does not
+decide the rounding.
 
-The second computation uses double-double arithmetic. The complex64 signal is then the correctly rounded true value and
-depends neither on the processor nor on the kernel that computed it. Source: Ziv 1991, "Fast
-evaluation of elementary mathematical functions with correctly rounded last bit", ACM TOMS 17.
+The second computation uses double-double arithmetic. The complex64 signal is then the correctly
+rounded true value and depends neither on the processor nor on the kernel that computed it. Source:
+Ziv 1991, "Fast evaluation of elementary mathematical functions with correctly rounded last bit",
+ACM TOMS 17.
 """
 
 from fractions import Fraction
@@ -29,12 +31,14 @@ def same_single(x, error):
 
 @LEAN
 def doubtful(values, bounds, totals, gaps, out):
-    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds do not decide.
+    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds do not
+    decide.
 
-    Returns their number, and how many of them lack a proved strongest cell. A symbol whose amplitudes are all zero is
-    exactly zero.
+    Returns their number, and how many of them lack a proved strongest cell. A symbol whose
+    amplitudes are all zero is exactly zero.
     """
-    count, unproved = 0, 0
+    count = 0
+    unproved = 0
     for n in range(len(values)):
         decided = same_single(values[n].real, bounds[n]) and same_single(values[n].imag, bounds[n])
         if totals[n] > 0.0 and not (decided and gaps[n] > 0.0):
@@ -48,8 +52,9 @@ def doubtful(values, bounds, totals, gaps, out):
 def to_odd(high, low, bits):
     """Return a double that rounds to the same float32 as the double-double (high, low).
 
-    Rounding to odd: a sum that is not a double becomes the neighbouring double whose last bit is one. The two
-    formats differ by more than one bit, so the second rounding is then correct. bits (1,) int64: work array.
+    Rounding to odd: a sum that is not a double becomes the neighbouring double whose last bit is
+    one. The two formats differ by more than one bit, so the second rounding is then correct. bits
+    (1,) int64: work array.
     """
     if low == 0.0 or high == 0.0:
         return high
@@ -63,8 +68,8 @@ def to_odd(high, low, bits):
 def compute_again(sample, symbols, found, work, bits):
     """Replace the values of `symbols` (K,) in their strongest cells by sums in double-double.
 
-    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols whose nearest complex64 is
-    still undecided.
+    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols whose
+    nearest complex64 is still undecided.
     """
     still = 0
     for n in symbols:
@@ -77,7 +82,9 @@ def compute_again(sample, symbols, found, work, bits):
 
 @INLINED
 def same_double(x, error, bits):
-    """Return whether all numbers within `error` of a double-double have the same nearest float32; bits: work array."""
+    """Return whether all numbers within `error` of a double-double have the same nearest float32;
+    bits: work array.
+    """
     # Rounding to double first could move both ends onto the tie between them.
     least, below = two_sum(x[0], x[1] - error)
     most, above = two_sum(x[0], x[1] + error)
@@ -87,33 +94,48 @@ def same_double(x, error, bits):
 def correct(
     sample: EchoSample, refs: np.ndarray, found: Found, pointwise_bound: tuple[float, float]
 ) -> tuple[int, int]:
-    """Make every value of `found` round to the complex64 nearest to the true value, in the truly strongest cell.
+    """Make every value of `found` round to the complex64 nearest to the true value, in the truly
+    strongest cell.
 
-    Returns the number of recomputed symbols and how many of them remain undecided. Cells whose strengths differ by less
-    than the error count as equal, and the lowest index wins.
+    Returns the number of recomputed symbols and how many of them remain undecided. Cells whose
+    strengths differ by less than the error count as equal, and the lowest index wins.
     """
     open_ones = np.empty(len(refs), np.int64)
     count, unproved = doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)
     if not count:
         return 0, 0
     open_ones = open_ones[:count]
-    work, bits = np.empty((ROWS, len(sample.lay.root) + 4)), np.empty(1, np.int64)
+    work = np.empty((ROWS, len(sample.lay.root) + 4))
+    bits = np.empty(1, np.int64)
     for n in open_ones[found.gaps[open_ones] <= 0.0] if unproved else ():
         cells = _contenders(sample, refs, int(n), pointwise_bound)
         if len(cells) > 1:
             pairs = [cell_value(sample, n, cell, work) for cell in cells]
-            strengths = [sum((Fraction(high) + Fraction(low)) ** 2 for high, low in pair) for pair in pairs]
-            least = max(strengths) - 4 * Fraction(ERROR * found.totals[n]) * Fraction(abs(found.values[n]))
-            cells = [cell for cell, strength in zip(cells, strengths, strict=True) if strength >= least]
+            strengths = [
+                sum((Fraction(high) + Fraction(low)) ** 2 for high, low in pair) for pair in pairs
+            ]
+            least = max(strengths) - 4 * Fraction(ERROR * found.totals[n]) * Fraction(
+                abs(found.values[n])
+            )
+            cells = [
+                cell for cell, strength in zip(cells, strengths, strict=True) if strength >= least
+            ]
         found.cells[n] = min(cells)
     return len(open_ones), compute_again(sample, open_ones, found, work, bits)
 
 
-def _contenders(sample: EchoSample, refs: np.ndarray, n: int, pointwise_bound: tuple[float, float]) -> list[int]:
+def _contenders(
+    sample: EchoSample, refs: np.ndarray, n: int, pointwise_bound: tuple[float, float]
+) -> list[int]:
     """Return the cells of symbol n that may be the strongest by the error bounds of float64."""
-    scene, radar, aims, part = sample.scene, sample.radar, sample.aims, slice(n, n + 1)
+    scene = sample.scene
+    radar = sample.radar
+    aims = sample.aims
+    part = slice(n, n + 1)
     here = scene._replace(translation=scene.translation[part], rotation=scene.rotation[part])
-    one, risks, cells = Found.empty(1), np.zeros(1), np.empty((1, radar.subcarriers), np.complex128)
+    one = Found.empty(1)
+    risks = np.zeros(1)
+    cells = np.empty((1, radar.subcarriers), np.complex128)
     pointwise.signal(here, radar, refs[part], np.arange(1), aims, one, risks)
     pointwise.matrix(here, radar, refs[part], aims, cells)
     strengths = abs(cells[0])

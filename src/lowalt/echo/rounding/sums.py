@@ -1,7 +1,8 @@
-"""One range cell of one symbol in double-double: the paper's sum over all points, with an error of 2^-64 of its terms.
+"""One range cell of one symbol in double-double: the paper's sum over all points, with an error of
+2^-64 of its terms.
 
-The loops are compiled without fast-math flags. Vector instructions of any width give equal results, because only the
-last loop sums over points, in a fixed order.
+The loops are compiled without fast-math flags. Vector instructions of any width give equal results,
+because only the last loop sums over points, in a fixed order.
 """
 
 import numpy as np
@@ -14,15 +15,20 @@ from lowalt.numerics.exact.sines import dirichlet, sine_cosine
 constants_of = INLINED(constants)
 
 X, Y, Z, SIDE, UP, TURN, CELL, AMPLITUDE = range(0, 16, 2)
-"""Rows of the work array (16, points), the low half in the row that follows: vector from the station (m), half turns of
-array phase per element, horizontally and vertically, turns of phase, distance from the cell over M, and amplitude."""
+"""Rows of the work array (16, points), the low half in the row that follows: vector from the
+station (m), half turns of array phase per element, horizontally and vertically, turns of phase,
+distance from the cell over M, and amplitude."""
 ROWS = 16
 
 
 @INNER
 def place(sample, n, work):
-    """Fill rows X, Y, Z with the vectors from the station to all points at symbol n; padding stands at one metre."""
-    scene, station, groups = sample.scene, sample.radar.station, sample.lay.groups
+    """Fill rows X, Y, Z with the vectors from the station to all points at symbol n; padding stands
+    at one metre.
+    """
+    scene = sample.scene
+    station = sample.radar.station
+    groups = sample.lay.groups
     x, y, z = sample.lay.coordinates
     for i in range(work.shape[1]):
         for row in range(6):
@@ -35,12 +41,17 @@ def place(sample, n, work):
         return
     for group in range(len(groups.parts)):
         p = groups.parts[group]
-        low, high = np.uint64(groups.starts[group]), np.uint64(groups.starts[group + 1])
+        low = np.uint64(groups.starts[group])
+        high = np.uint64(groups.starts[group + 1])
         for axis in range(3):
-            a, b, c = scene.rotation[n, p, axis, 0], scene.rotation[n, p, axis, 1], scene.rotation[n, p, axis, 2]
+            a = scene.rotation[n, p, axis, 0]
+            b = scene.rotation[n, p, axis, 1]
+            c = scene.rotation[n, p, axis, 2]
             origin = two_sum(scene.translation[n, p, axis], -station[axis])
-            row, below = np.uint64(2 * axis), np.uint64(2 * axis + 1)
-            # Write full vectors of four. The next group overwrites the surplus, and the padding has zero amplitude.
+            row = np.uint64(2 * axis)
+            below = np.uint64(2 * axis + 1)
+            # Write full vectors of four. The next group overwrites the surplus, and the padding has
+            # zero amplitude.
             for i in range(low, low + (high - low + np.uint64(3)) // np.uint64(4) * np.uint64(4)):
                 at = add(add(product(a, x[i]), product(b, y[i])), product(c, z[i]))
                 work[row, i], work[below, i] = add(at, origin)
@@ -48,7 +59,9 @@ def place(sample, n, work):
 
 @INLINED
 def cosines(x, y, z, constants):
-    """Return (range, its inverse, horizontal and vertical direction cosine) of a vector from the station (m)."""
+    """Return (range, its inverse, horizontal and vertical direction cosine) of a vector from the
+    station (m).
+    """
     r = root(add(add(multiply(x, x), multiply(y, y)), multiply(z, z)))
     inverse = divide((1.0, 0.0), r)
     across = subtract(multiply(constants.cosine, y), multiply(constants.sine, x))
@@ -57,11 +70,18 @@ def cosines(x, y, z, constants):
 
 @INNER
 def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
-    """Fill rows SIDE to AMPLITUDE from X, Y, Z; aims: the beams' direction cosines; cell, count: whole doubles."""
+    """Fill rows SIDE to AMPLITUDE from X, Y, Z; aims: the beams' direction cosines; cell, count:
+    whole doubles.
+    """
     for i in range(np.uint64(len(root_rcs))):
-        x, y, z = (work[X, i], work[X + 1, i]), (work[Y, i], work[Y + 1, i]), (work[Z, i], work[Z + 1, i])
+        x, y, z = (
+            (work[X, i], work[X + 1, i]),
+            (work[Y, i], work[Y + 1, i]),
+            (work[Z, i], work[Z + 1, i]),
+        )
         r, inverse, psi, omega = cosines(x, y, z, constants)
-        psi, omega = subtract(psi, aims[0]), subtract(omega, aims[1])
+        psi = subtract(psi, aims[0])
+        omega = subtract(omega, aims[1])
         work[SIDE, i], work[SIDE + 1, i] = multiply(constants.half_kappa, psi)
         work[UP, i], work[UP + 1, i] = multiply(constants.half_kappa, omega)
         turn = add(multiply(constants.phase_h, psi), multiply(constants.phase_v, omega))
@@ -71,18 +91,22 @@ def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
         high = root_rcs[i]
         p, e = product(high, high)
         low = ((rcs_m2[i] - p) - e) / (2.0 * high if high > 0.0 else 1.0)
-        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply((high, low), multiply(inverse, inverse))
+        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply(
+            (high, low), multiply(inverse, inverse)
+        )
 
 
 @INLINED
 def patterns(radar):
-    """Return the five Dirichlet kernels that a point's amplitude is multiplied by: (row, elements, squared) of each.
+    """Return the five Dirichlet kernels that a point's amplitude is multiplied by: (row, elements,
+    squared) of each.
 
-    They are the patterns of both arrays, horizontal and vertical, and of the subcarriers; row: that of the half turns
-    in the work array; squared: where both arrays are alike, one kernel is squared and the other one has one element,
-    which makes it 1.
+    They are the patterns of both arrays, horizontal and vertical, and of the subcarriers; row: that
+    of the half turns in the work array; squared: where both arrays are alike, one kernel is squared
+    and the other one has one element, which makes it 1.
     """
-    like_h, like_v = radar.transmit_h == radar.receive_h, radar.transmit_v == radar.receive_v
+    like_h = radar.transmit_h == radar.receive_h
+    like_v = radar.transmit_v == radar.receive_v
     return (
         (SIDE, float(radar.transmit_h), like_h),
         (SIDE, 1.0 if like_h else float(radar.receive_h), False),
@@ -100,7 +124,9 @@ def times_dirichlet(work, row, count, twice, points):
         u = dirichlet((work[row, i], work[below, i]), count)
         if twice:
             u = multiply(u, u)
-        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply((work[AMPLITUDE, i], work[AMPLITUDE + 1, i]), u)
+        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply(
+            (work[AMPLITUDE, i], work[AMPLITUDE + 1, i]), u
+        )
 
 
 @INNER
@@ -115,7 +141,9 @@ def wave(work, points):
 
 @INLINED
 def phase_of(cell, count):
-    """Return sine and cosine of a cell's own phase, exp(j pi (M - 1) m / M), reduced in whole numbers."""
+    """Return sine and cosine of a cell's own phase, exp(j pi (M - 1) m / M), reduced in whole
+    numbers.
+    """
     return sine_cosine(divide((float((count - 1) * cell % (2 * count)), 0.0), (2.0 * count, 0.0)))
 
 
@@ -123,13 +151,17 @@ def phase_of(cell, count):
 def cell_value(sample, n, cell, work):
     """Return the real and imaginary part, double-doubles, of range cell `cell` at symbol n.
 
-    sample: `layout.EchoSample`, of whose radar whole numbers, the station's position and the double-doubles are used;
-    work (ROWS, padded L + 4): work array. No point may stand in the station.
+    sample: `layout.EchoSample`, of whose radar whole numbers, the station's position and the
+    double-doubles are used; work (ROWS, padded L + 4): work array. No point may stand in the
+    station.
     """
-    scene, lay, radar = sample.scene, sample.lay, sample.radar
+    scene = sample.scene
+    lay = sample.lay
+    radar = sample.radar
     x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])
     z = two_sum(scene.aim[2], -radar.station[2])
-    exact, points = constants_of(radar.exact), len(lay.root)
+    exact = constants_of(radar.exact)
+    points = len(lay.root)
     _, _, psi0, omega0 = cosines(x, y, z, exact)
     place(sample, n, work)
     geometry(work, lay.root, lay.rcs, exact, (psi0, omega0), float(cell), float(radar.subcarriers))
@@ -137,10 +169,13 @@ def cell_value(sample, n, cell, work):
         if elements > 1.0:
             times_dirichlet(work, row, elements, squared, points)
     wave(work, points)
-    real, imag = (0.0, 0.0), (0.0, 0.0)
+    real = (0.0, 0.0)
+    imag = (0.0, 0.0)
     for i in range(points):
-        real, imag = add(real, (work[TURN, i], work[TURN + 1, i])), add(imag, (work[CELL, i], work[CELL + 1, i]))
+        real = add(real, (work[TURN, i], work[TURN + 1, i]))
+        imag = add(imag, (work[CELL, i], work[CELL + 1, i]))
     factor = divide(exact.scale, (float(radar.subcarriers), 0.0))
-    real, imag = multiply(real, factor), multiply(imag, factor)
+    real = multiply(real, factor)
+    imag = multiply(imag, factor)
     s, c = phase_of(cell, radar.subcarriers)
     return subtract(multiply(real, c), multiply(imag, s)), add(multiply(real, s), multiply(imag, c))

@@ -1,6 +1,8 @@
-"""The benchmark lowalt-40: its frozen definition, its tracks, scores of submissions, and the table of baselines.
+"""The benchmark lowalt-40: its frozen definition, its tracks, scores of submissions, and the table
+of baselines.
 
-`load(track, part)` gives the samples of a track's part, `write(path, samples, probabilities)` a submission.
+`load(track, part)` gives the samples of a track's part, `write(path, samples, probabilities)` a
+submission.
 """
 
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS

@@ -1,4 +1,6 @@
-"""`python -m lowalt.extensions.benchmark RESULTS` writes the checksums of finished runs, for a new version."""
+"""`python -m lowalt.extensions.benchmark RESULTS` writes the checksums of finished runs, for a new
+version.
+"""
 
 import argparse
 
@@ -9,10 +11,14 @@ from lowalt.extensions.benchmark.definition import REFERENCE
 
 def main(arguments: list[str]) -> None:
     """Write the checksums of all parts and of the samples that a test makes again."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.extensions.benchmark", description=main.__doc__)
+    line = argparse.ArgumentParser(
+        prog="python -m lowalt.extensions.benchmark", description=main.__doc__
+    )
     line.add_argument("results", help="folder of the finished runs, such as results")
     line.add_argument("--samples", action="store_true", help="only the samples, which need no run")
-    line.add_argument("--out", default=REFERENCE, help=f"folder to write into (default: {REFERENCE})")
+    line.add_argument(
+        "--out", default=REFERENCE, help=f"folder to write into (default: {REFERENCE})"
+    )
     options = line.parse_args(arguments)
     warn_in_one_line()
     frozen_bytes.write_samples(options.out)

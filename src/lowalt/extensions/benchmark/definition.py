@@ -1,7 +1,7 @@
 """The frozen definition of the benchmark: its version, its parts, and the samples of each part.
 
-A part is one configuration: the main part, and smaller ones that tracks only test on. Keys, labels and folds follow
-from it by rule, so that a submission is scored without any data.
+A part is one configuration: the main part, and smaller ones that tracks only test on. Keys, labels
+and folds follow from it by rule, so that a submission is scored without any data.
 """
 
 import hashlib
@@ -21,13 +21,15 @@ from lowalt.targets.records import records_of
 VERSION = "lowalt-40 v1"
 RUN = VERSION.replace(" ", "-")
 REFERENCE = f"results/reference/{RUN}"
-"""Folder of what is kept of this version: checksums, the table, and what the baselines got right."""
+"""Folder of what is kept of this version: checksums, the table, and what the baselines got right.
+"""
 MAIN = "main"
 PARTS = (MAIN, "low-snr", "town", "fr2")
 
 
 def root_seed(text: str | bytes) -> int:
-    """Return the root seed that a text stands for: the first eight hexadecimal digits of its SHA-256.
+    """Return the root seed that a text stands for: the first eight hexadecimal digits of its
+    SHA-256.
 
     >>> root_seed("lowalt-40 v1")
     467398228
@@ -36,7 +38,9 @@ def root_seed(text: str | bytes) -> int:
 
 
 def named_seed(part: str) -> int:
-    """Return the root seed of a part: that of the version's name, followed by the part's unless it is the main one."""
+    """Return the root seed of a part: that of the version's name, followed by the part's unless it
+    is the main one.
+    """
     return root_seed(VERSION if part == MAIN else f"{VERSION} {part}")
 
 
@@ -66,8 +70,11 @@ class Truth(NamedTuple):
 def truth(part: str) -> Truth:
     """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
     config = config_of(part)
-    published = {name: record["published"] for name, record in records_of(config["targets"]).items()}
-    plan, classes = Plan.of(config, published), classes_of(published)
+    published = {
+        name: record["published"] for name, record in records_of(config["targets"]).items()
+    }
+    plan = Plan.of(config, published)
+    classes = classes_of(published)
     rows = [
         (sample_key(name, model, snr), name, model, snr, group, of_model, number)
         for group, names in plan.groups.items()
@@ -76,7 +83,7 @@ def truth(part: str) -> Truth:
         for model in range(plan.models)
         for of_model in [fold(plan.split, plan.seed, name, model)]
         for snr in plan.snrs
-    ]  # fmt: skip
+    ]
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     nowhere = np.full((len(rows), len(config["network"]["stations"])), np.nan)
     return Truth(Facts(*columns, range_m=nowhere, aspect_rad=nowhere), classes)

@@ -1,8 +1,8 @@
 """Checksums of the benchmark's bytes: of whole parts, and of a few samples that a test makes again.
 
-Kept are `checksums.txt`, with a line "SHA-256  PART/FILE" for each file of signals and the files they come from, and
-`samples.txt`, with one sample of each subtype, "SHA-256  PART/KEY". Records are hashed without the version
-of the rules, which they name.
+Kept are `checksums.txt`, with a line "SHA-256  PART/FILE" for each file of signals and the files
+they come from, and `samples.txt`, with one sample of each subtype, "SHA-256  PART/KEY". Records are
+hashed without the version of the rules, which they name.
 """
 
 import hashlib
@@ -17,8 +17,10 @@ from lowalt.files.shipped import shipped
 from lowalt.shards.dataset import Dataset
 
 FILES = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy")
-"""Files of a part's run, in the order in which each makes the next. Images follow from the signals."""
-WHOLE, SAMPLES = "checksums.txt", "samples.txt"
+"""Files of a part's run, in the order in which each makes the next. Images follow from the signals.
+"""
+WHOLE = "checksums.txt"
+SAMPLES = "samples.txt"
 FEW = {"low-snr": 8, "town": 8, "fr2": 8}
 """Number of subtypes of which a sample is kept, where it is not one of each: two of each class."""
 
@@ -48,34 +50,44 @@ def _write(path: Path, sums: dict[str, str]) -> None:
 
 
 def compared(part: str, folder: str | Path) -> list[str]:
-    """Return how a part's files compare with the kept checksums: a line for each that is missing, differs or is not
-    kept, those of the earliest stage first. Raises: as `of_part`.
+    """Return how a part's files compare with the kept checksums: a line for each that is missing,
+    differs or is not kept, those of the earliest stage first. Raises: as `of_part`.
     """
     found = of_part(part, folder)
     wanted = {name: digest for name, digest in kept().items() if name.startswith(f"{part}/")}
     words = {name: "is missing" for name in wanted if name not in found}
-    words |= {name: "differs" for name, digest in found.items() if wanted.get(name, digest) != digest}
+    words |= {
+        name: "differs" for name, digest in found.items() if wanted.get(name, digest) != digest
+    }
     words |= {name: "is not among the kept files" for name in found if name not in wanted}
     return [f"{name} {words[name]}" for name in {**wanted, **found} if name in words]
 
 
 def write(folder: str | Path, out: str | Path) -> None:
     """Write the checksums of all parts into the folder `out`; folder: where the runs' folders are."""
-    _write(Path(out) / WHOLE, {name: digest for part in PARTS for name, digest in of_part(part, folder).items()})
+    _write(
+        Path(out) / WHOLE,
+        {name: digest for part in PARTS for name, digest in of_part(part, folder).items()},
+    )
 
 
 def write_samples(out: str | Path) -> None:
     """Make the samples of all parts and write their checksums into the folder `out`."""
-    _write(Path(out) / SAMPLES, {f"{part}/{key}": digest for part in PARTS for key, digest in samples(part)})
+    _write(
+        Path(out) / SAMPLES,
+        {f"{part}/{key}": digest for part in PARTS for key, digest in samples(part)},
+    )
 
 
 def samples(part: str) -> Iterator[tuple[str, str]]:
-    """Make one sample of each subtype of a part (or of some, FEW) and yield its key and its SHA-256.
+    """Make one sample of each subtype of a part (or of some, FEW) and yield its key and its
+    SHA-256.
 
     The checksum covers the record without the version of its rules, the signals and the tile.
     """
     data = Dataset(config_of(part))
-    names, snrs = [name for members in data.plan.groups.values() for name in members], data.plan.snrs
+    names = [name for members in data.plan.groups.values() for name in members]
+    snrs = data.plan.snrs
     step = -(-len(names) // FEW.get(part, len(names)))
     for number, name in list(enumerate(names))[::step]:
         place = data.place_of(name, number % data.plan.models, snrs[number % len(snrs)])

@@ -1,4 +1,6 @@
-"""The samples of a track's part as arrays: images and complex signals, read from the runs that made the data."""
+"""The samples of a track's part as arrays: images and complex signals, read from the runs that made
+the data.
+"""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -20,7 +22,9 @@ VIEWS = (0, 1, 2)
 
 
 def _of_unit_power(signals: np.ndarray) -> np.ndarray:
-    """Signals (..., symbols) complex64 divided by the root of their mean power; signals of zeros stay zeros."""
+    """Signals (..., symbols) complex64 divided by the root of their mean power; signals of zeros
+    stay zeros.
+    """
     power = np.mean(np.abs(signals).astype(float) ** 2, axis=-1, keepdims=True)
     return (signals / np.sqrt(np.where(power > 0, power, 1))).astype(np.complex64)
 
@@ -28,19 +32,22 @@ def _of_unit_power(signals: np.ndarray) -> np.ndarray:
 class TrackSamples(Samples):
     """The samples of one part of a track, also a source for trainings of `lowalt.recognition`.
 
-    `key`, `labels` (n,) and `classes`; `images` (n, stations * 3, 24, 24) uint8 index values, station by station,
-    each VRP, TRP, VT; `signals` (n, stations, 400) complex64, of mean power one at each station.
+    `key`, `labels` (n,) and `classes`; `images` (n, stations * 3, 24, 24) uint8 index values,
+    station by station, each VRP, TRP, VT; `signals` (n, stations, 400) complex64, of mean power one
+    at each station.
     """
 
     def __init__(self, track: Track, part: str, folder: str | Path) -> None:
-        """track: which samples; part: "train", "validation" or "test"; folder: where the runs' folders are.
+        """track: which samples; part: "train", "validation" or "test"; folder: where the runs'
+        folders are.
 
         Raises: InputError for another part, or where the data have not been made.
         """
         self.track = track
         source = track.part if part == "test" else MAIN
         (self.facts, self.classes), self.config = track.samples(part), config_of(source)
-        self.run, self.size = Path(folder) / run_name(source), self.config["recognition"]["size"]
+        self.run = Path(folder) / run_name(source)
+        self.size = self.config["recognition"]["size"]
         if not self.run.is_dir():
             raise InputError(
                 f"{self.run}: no data, expected those that `lowalt benchmark make --track {track.name}` makes "
@@ -62,34 +69,47 @@ class TrackSamples(Samples):
 
     @cached_property
     def images(self) -> np.ndarray:
-        """Index images (n, stations * 3, size, size) uint8. Raises: InputError where a sample has none."""
+        """Index images (n, stations * 3, size, size) uint8. Raises: InputError where a sample has
+        none.
+        """
         pairs = set(zip(self.facts.group.tolist(), self.facts.fold.tolist(), strict=True))
         columns = Scheme("all spectra", self.track.stations, VIEWS).columns
-        stored = [path for path in (self.run / f"views/{self.size}").glob("*.npz")
-                  if tuple(path.stem.split("-")[:2]) in pairs]  # fmt: skip
+        stored = [
+            path
+            for path in (self.run / f"views/{self.size}").glob("*.npz")
+            if tuple(path.stem.split("-")[:2]) in pairs
+        ]
         found = ViewSamples(stored, columns, pairs)
         places = {key: number for number, key in enumerate(found.facts.key.tolist())}
         if missing := [key for key in self.key.tolist() if key not in places]:
-            raise InputError(f"{self.run}/views: no image of {missing[0]}, expected one of every sample")
+            raise InputError(
+                f"{self.run}/views: no image of {missing[0]}, expected one of every sample"
+            )
         return found.images[[places[key] for key in self.key.tolist()]]
 
     @cached_property
     def signals(self) -> np.ndarray:
-        """Noisy signals (n, stations, symbols) complex64 of mean power one. Raises: InputError where a sample has none.
+        """Noisy signals (n, stations, symbols) complex64 of mean power one. Raises: InputError
+        where a sample has none.
 
-        The level is taken out because it counts the points of the target's cloud; see docs/benchmark-rules.md.
+        The level is taken out because it counts the points of the target's cloud; see
+        docs/benchmark-rules.md.
         """
         network = Network.from_settings(self.config["network"])
         return self.of_chunks(lambda path: _of_unit_power(load_signals(path, network)))
 
     def of_chunks(self, values: Callable[[Path], np.ndarray]) -> np.ndarray:
-        """Return what `values` computes, for the samples and the track's stations alone, (n, stations, ...).
+        """Return what `values` computes, for the samples and the track's stations alone, (n,
+        stations, ...).
 
-        values: a function from a chunk's noisy signals (.npy) to an array (models, SNRs, stations, ...).
+        values: a function from a chunk's noisy signals (.npy) to an array (models, SNRs, stations,
+        ...).
         Raises: InputError where a sample has no signal.
         """
         wanted: dict[tuple, list[int]] = {}
-        for number, pair in enumerate(zip(self.facts.subtype.tolist(), self.facts.model.tolist(), strict=True)):
+        for number, pair in enumerate(
+            zip(self.facts.subtype.tolist(), self.facts.model.tolist(), strict=True)
+        ):
             wanted.setdefault(pair, []).append(number)
         levels = {float(snr): place for place, snr in enumerate(self.config["noise"]["snr_db"])}
         level = [levels[snr] for snr in self.facts.snr_db.tolist()]
@@ -97,12 +117,16 @@ class TrackSamples(Samples):
         for path in sorted((self.run / "noisy").glob("*.npy")):
             chunk = values(path)
             if result is None:
-                result = np.empty((len(self), len(self.track.stations), *chunk.shape[3:]), chunk.dtype)
+                result = np.empty(
+                    (len(self), len(self.track.stations), *chunk.shape[3:]), chunk.dtype
+                )
             for row, entry in enumerate(read_table(self.run / f"motion/{path.stem}.csv")):
                 for number in wanted.pop((entry["subtype"], entry["model"]), []):
                     result[number] = chunk[row, level[number]][list(self.track.stations)]
         if wanted or result is None:
-            raise InputError(f"{self.run}/noisy: no signal of {next(iter(wanted))}, expected one of every sample")
+            raise InputError(
+                f"{self.run}/noisy: no signal of {next(iter(wanted))}, expected one of every sample"
+            )
         return result
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
@@ -115,7 +139,8 @@ class TrackSamples(Samples):
 
 
 def load(track: str, part: str = "train", folder: str | Path = "results") -> TrackSamples:
-    """Return the samples of a track's part, "train", "validation" or "test"; folder: where the runs' folders are.
+    """Return the samples of a track's part, "train", "validation" or "test"; folder: where the
+    runs' folders are.
 
     Raises: InputError for an unknown track or part, or where the data have not been made.
     """

@@ -18,12 +18,21 @@ def _band(text: str) -> tuple[float, float]:
 
 
 SIZES = {
-    "drone": {"rotors": "number of rotors", "diagonal": "largest distance between two motor axes (m)",
-              "propeller": "propeller's diameter (m)", "blades": "blades of a rotor"},
+    "drone": {
+        "rotors": "number of rotors",
+        "diagonal": "largest distance between two motor axes (m)",
+        "propeller": "propeller's diameter (m)",
+        "blades": "blades of a rotor",
+    },
     "bird": {"length": "length from bill tip to tail tip (m)", "span": "wing span (m)"},
-    "vehicle": {"length": "length (m)", "width": "width (m)", "height": "height (m)",
-                "wheel": "rolling diameter of a wheel (m)", "wheel-base": "distance between the axles (m)"},
-}  # fmt: skip
+    "vehicle": {
+        "length": "length (m)",
+        "width": "width (m)",
+        "height": "height (m)",
+        "wheel": "rolling diameter of a wheel (m)",
+        "wheel-base": "distance between the axles (m)",
+    },
+}
 EXAMPLES = {
     "drone": "lowalt target drone --rotors 6 --diagonal 1.13 --propeller 0.53 --blades 2 --rate 50:120 --speed 18 "
     "--out m600.yaml",
@@ -39,21 +48,36 @@ def add_sheets(actions: argparse._SubParsersAction) -> None:
     """Add `drone`, `bird` and `vehicle` to the commands of `lowalt target`."""
     metres = positive(1e5, "a positive number")
     for kind, sizes in SIZES.items():
-        line = add_command(actions, kind, _draft, f"draft a {kind}'s record from its data sheet", EXAMPLES[kind])
+        line = add_command(
+            actions, kind, _draft, f"draft a {kind}'s record from its data sheet", EXAMPLES[kind]
+        )
         line.set_defaults(kind=kind)
         for word, meaning in sizes.items():
             line.add_argument(
-                f"--{word}", type=int if word in ("rotors", "blades") else metres, required=True, help=meaning
+                f"--{word}",
+                type=int if word in ("rotors", "blades") else metres,
+                required=True,
+                help=meaning,
             )
         if kind != "vehicle":
             line.add_argument(
-                "--rate", type=_band, required=True, metavar="LOW:HIGH", help="revolutions or wing beats a second (Hz)"
+                "--rate",
+                type=_band,
+                required=True,
+                metavar="LOW:HIGH",
+                help="revolutions or wing beats a second (Hz)",
             )
             line.add_argument("--climb", type=metres, help="highest vertical speed (m/s)")
-        line.add_argument("--speed", type=metres, required=True, help="highest speed over ground (m/s)")
-        line.add_argument("--frame", default=FRAMES[kind], help="built-in model (default: %(default)s)")
+        line.add_argument(
+            "--speed", type=metres, required=True, help="highest speed over ground (m/s)"
+        )
+        line.add_argument(
+            "--frame", default=FRAMES[kind], help="built-in model (default: %(default)s)"
+        )
         line.add_argument("--subtype", default="", help="its name (default: that of the file)")
-        line.add_argument("--about", default="data sheet", help="which data sheet it is, for the record")
+        line.add_argument(
+            "--about", default="data sheet", help="which data sheet it is, for the record"
+        )
         line.add_argument("--out", type=Path, help="record file to write (default: print it)")
 
 
@@ -64,7 +88,12 @@ def _draft(options: argparse.Namespace) -> Answer:
     kind = KINDS[options.kind]
     stated = {word: getattr(options, word) for word in {**kind.cells, **kind.figures}}
     text, lender = draft_target(
-        options.kind, options.out, subtype=options.subtype, frame=options.frame, about=options.about, **stated
+        options.kind,
+        options.out,
+        subtype=options.subtype,
+        frame=options.frame,
+        about=options.about,
+        **stated,
     )
     if options.out is None:
         return Answer({"file": None, "text": text}, text)

@@ -1,4 +1,6 @@
-"""Guesses on a mesh that the file does not state: its unit, its axes, and what its connected components may be."""
+"""Guesses on a mesh that the file does not state: its unit, its axes, and what its connected
+components may be.
+"""
 
 import re
 from collections.abc import Sequence
@@ -15,57 +17,77 @@ USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
 """Usual range (m) of the largest extent of a whole target, by category."""
 
 OTHER_SIZES_M = {"Vehicle": ((1.4, 2.7), (1.0, 4.0))}
-"""Usual ranges (m) of the second largest and of the smallest extent, for categories that have them."""
+"""Usual ranges (m) of the second largest and of the smallest extent, for categories that have them.
+"""
 
 UNUSUAL = 20
 """A target with its own table row may differ from USUAL_M by at most this factor."""
 
 ALIKE = 0.1
-"""Two pieces are alike if their extents differ by at most this share, as the four propellers of a craft do."""
+"""Two pieces are alike if their extents differ by at most this share, as the four propellers of a
+craft do.
+"""
 
 WIDE_ROTOR = 0.5
-"""A rotor wider than this share of the craft is the main rotor of a helicopter, not the propeller of a plane."""
+"""A rotor wider than this share of the craft is the main rotor of a helicopter, not the propeller
+of a plane.
+"""
 
 FLAT = 0.35
 """Largest thickness of a propeller divided by its length."""
 
 SMALLEST_ROTOR = 0.15
-"""Least width of a rotor as a share of the craft's largest extent; screws and motor caps are smaller."""
+"""Least width of a rotor as a share of the craft's largest extent; screws and motor caps are
+smaller.
+"""
 
 OFF_CENTRE = 0.3
-"""Largest distance between the centroid of a rotor's surface and the centre of its bounding box, as a share of its
-radius. A rotor of three blades has 0.25."""
+"""Largest distance between the centroid of a rotor's surface and the centre of its bounding box, as
+a share of its radius. A rotor of three blades has 0.25."""
 
 SYMMETRIC = 0.02
-"""A body is symmetric if the mean distance from its mirror image is at most this share of its size."""
+"""A body is symmetric if the mean distance from its mirror image is at most this share of its size.
+"""
 
 ASYMMETRIC = 0.01
-"""A body has no second mirror plane if its mean distance from its mirror image along the other horizontal axis is at
-least this share of its size."""
+"""A body has no second mirror plane if its mean distance from its mirror image along the other
+horizontal axis is at least this share of its size."""
 
-IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
-"""A mesh may hold one half of a target, which ends in a plane. IN_PLANE is the largest distance of its end points from
-that plane, AT_ZERO that of the plane from the origin of the file, both as shares of the size. CUT and OPEN_CUT are the
-least area that the end spans, as a share of the bounding box: CUT for a plane at the origin, OPEN_CUT for an open end
-anywhere."""
+IN_PLANE = 1e-3
+AT_ZERO = 0.01
+CUT = 0.05
+OPEN_CUT = 0.15
+"""A mesh may hold one half of a target, which ends in a plane. IN_PLANE is the largest distance of
+its end points from that plane, AT_ZERO that of the plane from the origin of the file, both as
+shares of the size. CUT and OPEN_CUT are the least area that the end spans, as a share of the
+bounding box: CUT for a plane at the origin, OPEN_CUT for an open end anywhere."""
 
-SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
-"""An arm, unlike a blade, is at most SLENDER times as wide as long (by spread). It points at the middle of the craft
-with a cosine of at least RADIAL, and its inner end is at most INWARD times as far from there as its centre."""
+SLENDER = 0.35
+RADIAL = 0.95
+INWARD = 0.4
+"""An arm, unlike a blade, is at most SLENDER times as wide as long (by spread). It points at the
+middle of the craft with a cosine of at least RADIAL, and its inner end is at most INWARD times as
+far from there as its centre."""
 
 IN_LINE = 0.9
 """Least cosine of the angle between a blade and the line to the other blade of the same rotor."""
 
 LONG = 0.75
-"""Largest ratio of width to length of a blade's bounding box. A blade at 30 degrees to the axes has 0.6, a disc 1."""
+"""Largest ratio of width to length of a blade's bounding box. A blade at 30 degrees to the axes has
+0.6, a disc 1.
+"""
 
 TOUCH = 0.1
-"""Two blades of a rotor are at most twice this share of the longer blade apart, since the hub lies between them."""
+"""Two blades of a rotor are at most twice this share of the longer blade apart, since the hub lies
+between them.
+"""
 
 ROUND = 0.12
 """The two extents of a wheel across its axis differ by at most this share."""
 
-_ROTOR = r"(?:(?<![a-z])|main|tail)(?:rotor(?!craft)|prop(?!ul|ert)|blade|fan(?![a-z])|puller|pusher)"
+_ROTOR = (
+    r"(?:(?<![a-z])|main|tail)(?:rotor(?!craft)|prop(?!ul|ert)|blade|fan(?![a-z])|puller|pusher)"
+)
 TURNING = {
     "rotor": re.compile(_ROTOR + r"(?!.*(?:guard|duct|mount|shroud))", re.I),
     "wheel": re.compile(r"wheel|tyre|tire(?!d)", re.I),
@@ -82,10 +104,11 @@ FIXED = re.compile(r"(?<![a-z])(motor|mount|arm(?![a-z])|leg|skid|land|frame|gua
 class Component:
     """A connected component of a mesh.
 
-    low, high: (3,) m, corners of its bounding box along the file's axes; triangles: their number; closed: whether its
-    surface is closed; piece: the names of the piece that it belongs to; guess: the kind of part that it may be (rotor,
-    wheel, or an empty text); middle: (3,) m, centroid of its surface; area: m2; along: (3,) direction in which it is
-    longest; slender: its spread across that direction over its spread along it.
+    low, high: (3,) m, corners of its bounding box along the file's axes; triangles: their number;
+    closed: whether its surface is closed; piece: the names of the piece that it belongs to; guess:
+    the kind of part that it may be (rotor, wheel, or an empty text); middle: (3,) m, centroid of
+    its surface; area: m2; along: (3,) direction in which it is longest; slender: its spread across
+    that direction over its spread along it.
     """
 
     number: int
@@ -112,7 +135,9 @@ class Component:
 
 
 class Group(tuple[Component, ...]):
-    """Components that may be one moving part, such as the blades of a rotor; properties as those of a component."""
+    """Components that may be one moving part, such as the blades of a rotor; properties as those of
+    a component.
+    """
 
     low = property(lambda self: np.min([part.low for part in self], axis=0))
     high = property(lambda self: np.max([part.high for part in self], axis=0))
@@ -126,25 +151,35 @@ class Group(tuple[Component, ...]):
 def guessed_unit(extents: np.ndarray, category: str, wanted_m: float | None = None) -> str:
     """Return the unit of UNITS_M in which the extents (3,) of a file fit a target best.
 
-    wanted_m: the target's largest extent, if it is known. Otherwise the best unit is the one in which the extents leave
-    the usual ranges of the category least, by the sum of the logarithms of the factors. Of several such units, it is
-    the one whose largest extent is nearest to the geometric mean of USUAL_M.
+    wanted_m: the target's largest extent, if it is known. Otherwise the best unit is the one in
+    which the extents leave the usual ranges of the category least, by the sum of the logarithms of
+    the factors. Of several such units, it is the one whose largest extent is nearest to the
+    geometric mean of USUAL_M.
     """
-    sizes, usual = np.sort(extents)[::-1], (USUAL_M[category], *OTHER_SIZES_M.get(category, ()))
+    sizes = np.sort(extents)[::-1]
+    usual = (USUAL_M[category], *OTHER_SIZES_M.get(category, ()))
     middle = wanted_m or float(np.sqrt(np.prod(USUAL_M[category])))
 
     def misfit(unit: str) -> tuple[float, float]:
         """How far the extents lie outside their ranges, and the largest one from the middle."""
         lengths = sizes * UNITS_M[unit]
-        outside = [max(low / size, size / high, 1.0) for size, (low, high) in zip(lengths, usual, strict=False)]
-        return 0.0 if wanted_m else float(np.log(outside).sum().round(6)), abs(np.log(lengths[0] / middle))
+        outside = [
+            max(low / size, size / high, 1.0)
+            for size, (low, high) in zip(lengths, usual, strict=False)
+        ]
+        return 0.0 if wanted_m else float(np.log(outside).sum().round(6)), abs(
+            np.log(lengths[0] / middle)
+        )
 
     return min(UNITS_M, key=misfit)
 
 
 def off_mirror(points: np.ndarray) -> np.ndarray:
-    """Return the mean distance (3,) of points (N, 3) from their mirror image along each axis, over their size."""
-    tree, off = cKDTree(points), []
+    """Return the mean distance (3,) of points (N, 3) from their mirror image along each axis, over
+    their size.
+    """
+    tree = cKDTree(points)
+    off = []
     for axis in range(3):
         mirrored = points.copy()
         mirrored[:, axis] = points[:, axis].min() + points[:, axis].max() - points[:, axis]
@@ -153,7 +188,8 @@ def off_mirror(points: np.ndarray) -> np.ndarray:
 
 
 def mirror_axis(points: np.ndarray) -> int | None:
-    """Return the only axis along which a body of points (N, 3) is its own mirror image: left and right of a bird.
+    """Return the only axis along which a body of points (N, 3) is its own mirror image: left and
+    right of a bird.
 
     Return None if there is no such axis or more than one."""
     off = off_mirror(points)
@@ -162,29 +198,38 @@ def mirror_axis(points: np.ndarray) -> int | None:
 
 
 def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
-    """Return the axis along which a target is cut in half, if the mesh holds one half only; None if it seems whole.
+    """Return the axis along which a target is cut in half, if the mesh holds one half only; None if
+    it seems whole.
 
-    points: (N, 3) m on its surface. A half is not its own mirror image along that axis. It ends in a plane, where its
-    surface is open or which passes through the origin of the file.
+    points: (N, 3) m on its surface. A half is not its own mirror image along that axis. It ends in
+    a plane, where its surface is open or which passes through the origin of the file.
     """
     edges, _, uses = edges_of(mesh.faces)
-    ends, extent = mesh.vertices[edges], np.ptp(mesh.vertices, axis=0)
-    off, size = off_mirror(points), extent.max()
+    ends = mesh.vertices[edges]
+    extent = np.ptp(mesh.vertices, axis=0)
+    off = off_mirror(points)
+    size = extent.max()
     for axis in axes:
         for limit in (mesh.vertices[:, axis].min(), mesh.vertices[:, axis].max()):
             there = (np.abs(ends[:, :, axis] - limit) < IN_PLANE * size).all(axis=1)
             if off[axis] < SYMMETRIC or not there.any():
                 continue
             span = np.prod(np.delete(np.ptp(ends[there].reshape(-1, 3), axis=0) / extent, axis))
-            if (span > CUT and abs(limit) < AT_ZERO * size) or (span > OPEN_CUT and (uses[there] == 1).all()):
+            if (span > CUT and abs(limit) < AT_ZERO * size) or (
+                span > OPEN_CUT and (uses[there] == 1).all()
+            ):
                 return axis
     return None
 
 
-def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
-    """Return the axes of the file that may point up and to the front, without signs, from the extents (3,) alone.
+def guessed_axes(
+    extent: np.ndarray, category: str, up: int | None = None, right: int | None = None
+) -> tuple[str, str]:
+    """Return the axes of the file that may point up and to the front, without signs, from the
+    extents (3,) alone.
 
-    The smallest extent points up. The largest points to the front of a vehicle, and across a bird with spread wings.
+    The smallest extent points up. The largest points to the front of a vehicle, and across a bird
+    with spread wings.
     up, right: numbers of axes that are already known.
     """
     order = [axis for axis in np.argsort(extent, kind="stable") if axis not in (up, right)]
@@ -199,27 +244,43 @@ def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right
 
 
 def alike(first: Component | Group, second: Component | Group) -> bool:
-    """Return whether two components are copies: of the same three sizes in any order, to within ALIKE, or of the same
-    number of triangles and area, as propellers at different angles are, whose boxes differ."""
-    a, b, areas = np.sort(first.extent), np.sort(second.extent), (first.area, second.area)
+    """Return whether two components are copies: of the same three sizes in any order, to within
+    ALIKE, or of the same number of triangles and area, as propellers at different angles are, whose
+    boxes differ."""
+    a = np.sort(first.extent)
+    b = np.sort(second.extent)
+    areas = (first.area, second.area)
     copies = first.triangles == second.triangles and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
     return copies or bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
 
 
 def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bool:
-    """Return whether two components turn about one hub: one is centred on the other, as a spinner on a propeller, and
-    they are not a pair of coaxial rotors. touching: whether long blades that touch, unlike discs, share a hub too."""
-    away, radius = np.abs(first.centre - second.centre), max(first.extent.max(), second.extent.max()) / 2
+    """Return whether two components turn about one hub: one is centred on the other, as a spinner
+    on a propeller, and they are not a pair of coaxial rotors. touching: whether long blades that
+    touch, unlike discs, share a hub too."""
+    away = np.abs(first.centre - second.centre)
+    radius = max(first.extent.max(), second.extent.max()) / 2
     same = alike(first, second)
     if same and away[up] > 2 * max(first.extent[up], second.extent[up]):
         return False
     slack = TOUCH * 2 * radius
-    near = bool((np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack).all())
+    near = bool(
+        (
+            np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack
+        ).all()
+    )
     long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (first, second))
-    # Two slender blades in one line, closer than their length, at any angle to the axes of the file.
-    between, length = second.centre - first.centre, float(np.linalg.norm(first.extent))
+    # Two slender blades in one line, closer than their length, at any angle to the axes of the
+    # file.
+    between = second.centre - first.centre
+    length = float(np.linalg.norm(first.extent))
     in_line = abs(float(between @ first.along)) > IN_LINE * float(np.linalg.norm(between))
-    if same and in_line and max(first.slender, second.slender) < SLENDER and np.linalg.norm(between) < length:
+    if (
+        same
+        and in_line
+        and max(first.slender, second.slender) < SLENDER
+        and np.linalg.norm(between) < length
+    ):
         return True
     away[up] = 0
     return near and (float(np.linalg.norm(away)) <= radius / 2 or (touching and same and long))
@@ -229,33 +290,40 @@ def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list
     """Return the components grouped by hub (`_one_hub`), such as the two blades of a propeller."""
     groups: list[Group] = []
     for part in parts:
-        near = [group for group in groups if any(_one_hub(part, other, up, touching) for other in group)]
-        groups = [group for group in groups if group not in near] + [Group((part, *chain.from_iterable(near)))]
+        near = [
+            group for group in groups if any(_one_hub(part, other, up, touching) for other in group)
+        ]
+        groups = [group for group in groups if group not in near] + [
+            Group((part, *chain.from_iterable(near)))
+        ]
     return groups
 
 
 def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
     """Return whether a group is flat along one of the axes, wide enough, and lies about one hub."""
-    # Groups named as rotors are tried along all axes and may be wider or smaller: a helicopter's main rotor may be as
-    # wide as the craft, and its tail rotor is small.
+    # Groups named as rotors are tried along all axes and may be wider or smaller: a helicopter's
+    # main rotor may be as wide as the craft, and its tail rotor is small.
     least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
     for axis in axes:
         across = np.delete(group.extent, axis).max()
         off = np.linalg.norm(np.delete(group.middle - group.centre, axis))
-        flat, wide = group.extent[axis] < FLAT * across, least * whole.max() <= across < most * whole.max()
+        flat = group.extent[axis] < FLAT * across
+        wide = least * whole.max() <= across < most * whole.max()
         if flat and wide and not off > OFF_CENTRE * across / 2:  # true for an unknown middle, NaN
             return True
     return False
 
 
 def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> int:
-    """Return the axis of the file about which a rotor or wheel turns: the one along which it is thinnest.
+    """Return the axis of the file about which a rotor or wheel turns: the one along which it is
+    thinnest.
 
-    Two blades may be thinner along their chord than along their axis. A rotor wider than half the craft is therefore
-    taken to turn about the axis `up`, and a tail rotor about the horizontal axis across the tail. low, high: (3,) m,
-    corners of the craft.
+    Two blades may be thinner along their chord than along their axis. A rotor wider than half the
+    craft is therefore taken to turn about the axis `up`, and a tail rotor about the horizontal axis
+    across the tail. low, high: (3,) m, corners of the craft.
     """
-    order, extent = np.argsort(group.extent, kind="stable"), high - low
+    order = np.argsort(group.extent, kind="stable")
+    extent = high - low
     if up in order[:2] and group.extent.max() > WIDE_ROTOR * extent.max():
         return up
     if TAIL.search(group[0].piece):
@@ -268,11 +336,13 @@ def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> in
 def rotors(
     parts: Sequence[Component], ups: Sequence[int], whole: np.ndarray, count: int | None
 ) -> tuple[int, list[Group]]:
-    """Return the axis that points up, and the groups of components that may be rotors: `count` of them, or none.
+    """Return the axis that points up, and the groups of components that may be rotors: `count` of
+    them, or none.
 
-    Pieces named as rotors are tried first, whatever their axes. Without such names, rotors are a set of at least three
-    alike flat groups, each around its own hub. Of several sets the one farthest out is taken, since motors stand at the
-    ends of arms. ups: axes that may point up, the likeliest first.
+    Pieces named as rotors are tried first, whatever their axes. Without such names, rotors are a
+    set of at least three alike flat groups, each around its own hub. Of several sets the one
+    farthest out is taken, since motors stand at the ends of arms. ups: axes that may point up, the
+    likeliest first.
     """
     named = [part for part in parts if TURNING["rotor"].search(part.piece)]
     for groups in _grouped(named, ups[0], count):
@@ -281,11 +351,19 @@ def rotors(
             return ups[0], good
     several = len({part.piece for part in parts}) > 1
     able = [part for part in parts if not (several and FIXED.search(part.piece))]
-    for up in ups if count is None or count > 2 else ():  # two alike pieces may be two blades, or skids
+    for up in (
+        ups if count is None or count > 2 else ()
+    ):  # two alike pieces may be two blades, or skids
         across = [np.delete(part.extent, up).max() for part in able]
-        flat = [part for part, width in zip(able, across, strict=True)
-                if part.extent[up] < FLAT * width and width > 0.04 * whole.max()]  # fmt: skip
-        sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in _grouped(flat, up, count)]
+        flat = [
+            part
+            for part, width in zip(able, across, strict=True)
+            if part.extent[up] < FLAT * width and width > 0.04 * whole.max()
+        ]
+        sets = [
+            [group for group in groups if _is_rotor(group, [up], whole)]
+            for groups in _grouped(flat, up, count)
+        ]
         best = _alike_set(sets, up, whole, count)
         if len(best) > 2:
             return up, best
@@ -293,9 +371,11 @@ def rotors(
 
 
 def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[list[Group]]:
-    """Return possible groupings of components by hub: by nearness and, where the number of rotors is known, also in
-    `count` groups with the same number of alike blades each, clustered by their centres."""
-    # If the number is known, propellers that touch stay apart; otherwise blades that touch are one rotor.
+    """Return possible groupings of components by hub: by nearness and, where the number of rotors
+    is known, also in `count` groups with the same number of alike blades each, clustered by their
+    centres."""
+    # If the number is known, propellers that touch stay apart; otherwise blades that touch are one
+    # rotor.
     ways = [clusters(parts, up, touching=not count)]
     for index, part in enumerate(parts if count else ()):
         same = [other for other in parts if alike(part, other)]
@@ -304,19 +384,30 @@ def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[lis
             continue
         places = np.delete(np.array([other.centre for other in same]), up, axis=1)
         label = fcluster(linkage(places, "average"), count, "maxclust")
-        groups = [Group(other for other, at in zip(same, label, strict=True) if at == hub) for hub in np.unique(label)]
+        groups = [
+            Group(other for other, at in zip(same, label, strict=True) if at == hub)
+            for hub in np.unique(label)
+        ]
         if [len(group) for group in groups] == [blades] * count:
             ways.append(groups)
     return ways
 
 
-def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: int | None) -> list[Group]:
-    """The set of alike groups but arms that is farthest out: `count` groups, or two or more at one height."""
+def _alike_set(
+    choices: list[list[Group]], up: int, whole: np.ndarray, count: int | None
+) -> list[Group]:
+    """The set of alike groups but arms that is farthest out: `count` groups, or two or more at one
+    height.
+    """
     best: tuple[float, list[Group]] = (0.0, [])
     for groups in choices:
         for group in groups:
             same = [other for other in groups if alike(group, other)]
-            level = [other for other in same if abs(other.centre[up] - group.centre[up]) < 0.1 * whole.max()]
+            level = [
+                other
+                for other in same
+                if abs(other.centre[up] - group.centre[up]) < 0.1 * whole.max()
+            ]
             for able in (level, same) if count else (level,):
                 away = np.delete(np.array([member.centre for member in able]), up, axis=1)
                 reach = np.linalg.norm(away - away.mean(axis=0), axis=1)
@@ -327,31 +418,50 @@ def _alike_set(choices: list[list[Group]], up: int, whole: np.ndarray, count: in
 
 
 def _are_arms(groups: list[Group], up: int) -> bool:
-    """Whether all groups are slender pieces that point at the middle between them and reach near it."""
+    """Whether all groups are slender pieces that point at the middle between them and reach near
+    it.
+    """
     centres, extents = (
-        np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1) for name in ("centre", "extent")
+        np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1)
+        for name in ("centre", "extent")
     )
     away = centres - centres.mean(axis=0)
     reach = np.linalg.norm(away, axis=1)
     along = np.array([np.delete(group[0].along, up) for group in groups])
     radial = np.abs((along * away).sum(axis=1)) > RADIAL * reach
     slender = [len(group) == 1 and group[0].slender < SLENDER for group in groups]
-    return bool((radial & slender & (reach - np.linalg.norm(extents, axis=1) / 2 < INWARD * reach)).all())
+    return bool(
+        (radial & slender & (reach - np.linalg.norm(extents, axis=1) / 2 < INWARD * reach)).all()
+    )
 
 
 def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
-    """Return the groups of components that may be wheels: those whose names say so, otherwise the largest set of at
-    least two alike round ones."""
-    named = [part for part in parts if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I)]
-    groups = [group for group in clusters(named, int(whole.argmin()), False) if _round(group.extent, whole)]
+    """Return the groups of components that may be wheels: those whose names say so, otherwise the
+    largest set of at least two alike round ones."""
+    named = [
+        part
+        for part in parts
+        if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I)
+    ]
+    groups = [
+        group
+        for group in clusters(named, int(whole.argmin()), False)
+        if _round(group.extent, whole)
+    ]
     if len(groups) >= 2:
         return groups
     able = [Group([part]) for part in parts if _round(part.extent, whole)]
-    best = max(([other for other in able if alike(group, other)] for group in able), key=len, default=[])
+    best = max(
+        ([other for other in able if alike(group, other)] for group in able), key=len, default=[]
+    )
     return best if len(best) >= 2 else []
 
 
 def _round(extent: np.ndarray, whole: np.ndarray) -> bool:
     """Whether extents (3,) are those of a wheel."""
     small, *large = np.sort(extent)
-    return bool(large[0] > (1 - ROUND) * large[1] and small < 0.8 * large[0] and 0.08 < large[1] / whole.max() < 0.3)
+    return bool(
+        large[0] > (1 - ROUND) * large[1]
+        and small < 0.8 * large[0]
+        and 0.08 < large[1] / whole.max() < 0.3
+    )

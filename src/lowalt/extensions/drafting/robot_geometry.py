@@ -1,4 +1,6 @@
-"""What descriptions of robots share: links and joints, files inside the folder of inputs, surfaces, places, numbers."""
+"""What descriptions of robots share: links and joints, files inside the folder of inputs, surfaces,
+places, numbers.
+"""
 
 import math
 import os
@@ -16,11 +18,16 @@ from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
 from lowalt.targets.mesh_files import SUFFIXES, selected
 
-LARGEST_BYTES, MOST_FILES = 16 << 20, 200
+LARGEST_BYTES = 16 << 20
+MOST_FILES = 200
 MOST_SEARCHED = 100_000
-"""Most files and folders below the folder of inputs that are searched for a package of another name."""
+"""Most files and folders below the folder of inputs that are searched for a package of another
+name.
+"""
 OPTIONAL = re.compile(r"\$\(optenv\s+\w+\s*([^()]*)\)")
-"""ROS: the value of an environment variable, or a default where it is not set; the default is always taken."""
+"""ROS: the value of an environment variable, or a default where it is not set; the default is
+always taken.
+"""
 DEEPEST = 50
 """Largest depth of a chain of links, frames or models."""
 MOST_TURN = 4 * math.pi
@@ -29,7 +36,9 @@ MOST_TURN = 4 * math.pi
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint that turns about its `hinge` (3,) m and `axis` (3,), `endless` or not; `parent` and `child` are links."""
+    """A joint that turns about its `hinge` (3,) m and `axis` (3,), `endless` or not; `parent` and
+    `child` are links.
+    """
 
     name: str
     parent: str
@@ -41,8 +50,9 @@ class Joint:
 
 @dataclass
 class Robot:
-    """A description: `surfaces` by link, each a list of triangles (K, 3, 3) m; `fixed` pairs of links, parent first,
-    that do not turn; `joints` that do; `senses` of rotors by joint, seen against the axis."""
+    """A description: `surfaces` by link, each a list of triangles (K, 3, 3) m; `fixed` pairs of
+    links, parent first, that do not turn; `joints` that do; `senses` of rotors by joint, seen
+    against the axis."""
 
     surfaces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     fixed: list[tuple[str, str]] = field(default_factory=list)
@@ -54,21 +64,33 @@ class Robot:
         pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
         links = [link]
         for name in links:
-            links += [child for parent, child in pairs if parent == name and child not in {*links, *others}]
+            links += [
+                child
+                for parent, child in pairs
+                if parent == name and child not in {*links, *others}
+            ]
         return links
 
     def turns(
-        self, name: str, links: tuple[str, str], hinge: np.ndarray, axis: np.ndarray,
+        self,
+        name: str,
+        links: tuple[str, str],
+        hinge: np.ndarray,
+        axis: np.ndarray,
         limits: tuple[str | None, str | None],
-    ) -> None:  # fmt: skip
-        """Add a joint that turns two links, parent first: without end where it has no limits (rad), or wide ones."""
+    ) -> None:
+        """Add a joint that turns two links, parent first: without end where it has no limits (rad),
+        or wide ones.
+        """
         low, high = limits
         endless = not (low and high) or float(high) - float(low) > MOST_TURN
         self.joints.append(Joint(name, *links, hinge, direction(axis), endless))
 
 
 def numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndarray:
-    """Numbers of a text; a single one stands for all. Raises: ValueError where they are not `count` finite ones."""
+    """Numbers of a text; a single one stands for all. Raises: ValueError where they are not `count`
+    finite ones.
+    """
     values = np.array([float(word) for word in text.split()] if text else default, float)
     values = np.repeat(values, count) if len(values) == 1 else values
     if len(values) != count or not np.isfinite(values).all():
@@ -84,24 +106,39 @@ def place_of(shift: np.ndarray, turn: Rotation) -> np.ndarray:
 
 
 class Files:
-    """The files of a description inside the folder of inputs, and the surfaces that its geometry names."""
+    """The files of a description inside the folder of inputs, and the surfaces that its geometry
+    names.
+    """
 
     def __init__(self, inputs: Path) -> None:
-        self.inputs, self.opened = inputs.resolve(), 0
-        self.listed: list[tuple[str, ...]] | None = None  # parts of every path below `inputs`, once they are needed
+        self.inputs = inputs.resolve()
+        self.opened = 0
+        self.listed: list[tuple[str, ...]] | None = (
+            None  # parts of every path below `inputs`, once they are needed
+        )
 
     def find(self, name: str, base: Path) -> Path:
-        """Return the file that a description in the folder `base` names: relative, package://, model://."""
+        """Return the file that a description in the folder `base` names: relative, package://,
+        model://.
+        """
         scheme, slashes, location = name.strip().partition("://")
         if not slashes or scheme == "file":
             places = [base / (location or name)]
         elif scheme in ("package", "model"):
             head, _, tail = location.partition("/")
-            above = [folder for folder in (base, *base.parents) if folder.is_relative_to(self.inputs)]
-            places = [place for folder in above for place in (folder / location, folder / "models" / location)]
+            above = [
+                folder for folder in (base, *base.parents) if folder.is_relative_to(self.inputs)
+            ]
+            places = [
+                place
+                for folder in above
+                for place in (folder / location, folder / "models" / location)
+            ]
             places += [folder / tail for folder in above if folder.name == head]
         else:
-            raise InputError(f"{name!r} is no file of the folder of inputs, expected a downloaded one")
+            raise InputError(
+                f"{name!r} is no file of the folder of inputs, expected a downloaded one"
+            )
         places = [place.resolve() for place in places]
         inside = [place for place in places if place.is_relative_to(self.inputs)]
         for place in inside:
@@ -110,45 +147,65 @@ class Files:
         if scheme in ("package", "model") and (place := self.elsewhere(name, location)):
             return place
         problem = "is not there" if inside else f"lies outside the folder of inputs {self.inputs}"
-        raise InputError(f"{name!r} {problem}, expected it inside, by the name that the description has")
+        raise InputError(
+            f"{name!r} {problem}, expected it inside, by the name that the description has"
+        )
 
     def elsewhere(self, name: str, location: str) -> Path | None:
-        """Return the one file or folder below the folder of inputs whose path ends as a package's `location` does, with
-        or without the package's own name: a clone often has another name. Return None where there is none.
+        """Return the one file or folder below the folder of inputs whose path ends as a package's
+        `location` does, with or without the package's own name: a clone often has another name.
+        Return None where there is none.
 
         Raises: InputError where several fit. Warns: InputWarning naming the file that is taken.
         """
         if self.listed is None:
-            found = (Path(folder, entry) for folder, folders, files in os.walk(self.inputs)
-                     for entry in (*folders, *files))  # fmt: skip
-            self.listed = [path.relative_to(self.inputs).parts for path in islice(found, MOST_SEARCHED)]
+            found = (
+                Path(folder, entry)
+                for folder, folders, files in os.walk(self.inputs)
+                for entry in (*folders, *files)
+            )
+            self.listed = [
+                path.relative_to(self.inputs).parts for path in islice(found, MOST_SEARCHED)
+            ]
         parts = Path(location).parts
         for tail in (parts, parts[1:]):
             fits = [path for path in self.listed if tail and path[-len(tail) :] == tail]
-            fits = [path for path in fits if self.inputs.joinpath(*path).resolve().is_relative_to(self.inputs)]
+            fits = [
+                path
+                for path in fits
+                if self.inputs.joinpath(*path).resolve().is_relative_to(self.inputs)
+            ]
             if len(fits) > 1:
                 shown = ", ".join(str(Path(*path)) for path in fits[:3])
-                raise InputError(f"{name!r}: {len(fits)} files below the folder of inputs fit ({shown}), expected one")
+                raise InputError(
+                    f"{name!r}: {len(fits)} files below the folder of inputs fit ({shown}), expected one"
+                )
             if fits:
                 warn(f"{name!r} is taken from {Path(*fits[0])}, the only file that fits")
                 return self.inputs.joinpath(*fits[0]).resolve()
         return None
 
     def parsed(self, path: Path) -> Element:
-        """Return the root of an XML file, bounded in size and count. Namespaces are dropped, except that of xacro, and
-        `$(optenv NAME DEFAULT)` becomes its default."""
+        """Return the root of an XML file, bounded in size and count. Namespaces are dropped, except
+        that of xacro, and `$(optenv NAME DEFAULT)` becomes its default."""
         self.opened += 1
         if self.opened > MOST_FILES or path.stat().st_size > LARGEST_BYTES:
-            raise InputError(f"{path}: expected at most {MOST_FILES} files of {LARGEST_BYTES >> 20} MiB")
+            raise InputError(
+                f"{path}: expected at most {MOST_FILES} files of {LARGEST_BYTES >> 20} MiB"
+            )
         root = parsed(path)
         for element in root.iter():
             element.tag = element.tag if "xacro" in element.tag else element.tag.rsplit("}", 1)[-1]
             element.text = OPTIONAL.sub(r"\1", element.text or "")
-            element.attrib.update({key: OPTIONAL.sub(r"\1", value) for key, value in element.attrib.items()})
+            element.attrib.update(
+                {key: OPTIONAL.sub(r"\1", value) for key, value in element.attrib.items()}
+            )
         return root
 
     def mesh(self, name: str, base: Path, scale: np.ndarray, part: str | None = None) -> np.ndarray:
-        """Return the triangles (K, 3, 3) m of a mesh file, scaled; a COLLADA file's own unit counts."""
+        """Return the triangles (K, 3, 3) m of a mesh file, scaled; a COLLADA file's own unit
+        counts.
+        """
         path = self.find(name, base)
         if path.suffix.lower() not in SUFFIXES:
             raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
@@ -161,7 +218,9 @@ class Files:
 
 
 def primitive(kind: str, size: np.ndarray) -> np.ndarray:
-    """Triangles (K, 3, 3) of a box (edges), cylinder, capsule (radius, length along z), sphere or ellipsoid (radii)."""
+    """Triangles (K, 3, 3) of a box (edges), cylinder, capsule (radius, length along z), sphere or
+    ellipsoid (radii).
+    """
     from trimesh import creation
 
     if kind == "box":

@@ -27,7 +27,9 @@ INNER = ("points", "owner", "groups", "sides_seen")
 
 
 def _unit(text: str) -> str | float:
-    """Unit of a command line: a name of UNITS_M, or metres. Raises: ArgumentTypeError for other text."""
+    """Unit of a command line: a name of UNITS_M, or metres. Raises: ArgumentTypeError for other
+    text.
+    """
     if text in UNITS_M:
         return text
     try:
@@ -45,28 +47,55 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     target = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     actions = target.add_subparsers(dest="action", required=True)
     meaning = "unit, sizes, pieces and possible moves of a mesh file, and a picture"
-    inspect = add_command(actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl")
+    inspect = add_command(
+        actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl"
+    )
     inspect.add_argument("--category", default="UAV", choices=KINDS)
-    inspect.add_argument("--out", type=Path, help="picture to write (default: the file's name and -inspect.png, here)")
+    inspect.add_argument(
+        "--out",
+        type=Path,
+        help="picture to write (default: the file's name and -inspect.png, here)",
+    )
     meaning = "draft a record of a mesh or a robot's description; figures to confirm are marked"
     example = 'lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml'
     new = add_command(actions, "new", _new, meaning, example)
-    new.add_argument("--subtype", help="the published target whose place it takes; another name (default: the file's) "
-                     "makes a row of its own")  # fmt: skip
+    new.add_argument(
+        "--subtype",
+        help="the published target whose place it takes; another name (default: the file's) "
+        "makes a row of its own",
+    )
     new.add_argument("--category", choices=KINDS, help="of a target with a row of its own")
     for line in (inspect, new):
-        line.add_argument("file", type=Path, help="mesh, or for `new` a robot's description: URDF, SDF or MJCF")
-        line.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
-        line.add_argument("--size", type=float, dest="size_m", help="largest extent of the target (m), not --unit")
+        line.add_argument(
+            "file", type=Path, help="mesh, or for `new` a robot's description: URDF, SDF or MJCF"
+        )
+        line.add_argument(
+            "--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres"
+        )
+        line.add_argument(
+            "--size", type=float, dest="size_m", help="largest extent of the target (m), not --unit"
+        )
     for axis in ("up", "front"):
         new.add_argument(
-            f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
+            f"--{axis}",
+            choices=AXES,
+            help=f"axis of the file that points {axis}; --{axis}=-y for a minus",
         )
     new.add_argument(
-        "--rotors", "--wheels", type=int, dest="count", metavar="N", help="number of its rotors or wheels, 0 for none"
+        "--rotors",
+        "--wheels",
+        type=int,
+        dest="count",
+        metavar="N",
+        help="number of its rotors or wheels, 0 for none",
     )
-    new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
-                     "for two that are one rotor or wheel")  # fmt: skip
+    new.add_argument(
+        "--moving",
+        nargs="+",
+        metavar="NUMBER",
+        help="pieces that turn, numbered as in the picture; 5+6 "
+        "for two that are one rotor or wheel",
+    )
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
     example = "lowalt target make mydrone.yaml --inputs inputs"
     make = add_command(actions, "make", _make, "one record to one cloud and a picture", example)
@@ -75,9 +104,15 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     make.add_argument("--seed", type=int, default=SEED)
     make.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
     for line in (new, make):
-        line.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
-        line.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
-                          help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
+        line.add_argument(
+            "--table", type=Path, default=TABLE, help="table of targets (default: the package's)"
+        )
+        line.add_argument(
+            "--inputs",
+            type=Path,
+            default=Path(os.environ.get("LOWALT_INPUTS", ".")),
+            help="folder that a record's files are in (default: $LOWALT_INPUTS or .)",
+        )
     add_sheets(actions)
     meaning = "picture of a cloud with axes, hinges, normals, its motion and its spectra"
     example = "lowalt target show results/default/clouds/crow.npz --out crow.png"
@@ -99,8 +134,13 @@ def _inspect(options: argparse.Namespace) -> Answer:
     seen = inspect_mesh(options.file, options.category, options.unit, size_m=options.size_m)
     out = _write(options.out or Path(f"{options.file.stem}-inspect.png"), inspection_picture(seen))
     facts = {name: value for name, value in vars(seen).items() if name not in INNER} | {
-        "components": [vars(part) | {"extent": part.extent, "centre": part.centre} for part in seen.components],
-        "pieces": [{"name": name, "triangles": count, "extent": extent} for name, count, extent in seen.pieces],
+        "components": [
+            vars(part) | {"extent": part.extent, "centre": part.centre} for part in seen.components
+        ],
+        "pieces": [
+            {"name": name, "triangles": count, "extent": extent}
+            for name, count, extent in seen.pieces
+        ],
         **({"wings_from_m": seen.shoulder_m} if seen.category == "Bird" else {}),
         "picture": out,
         "front_from": seen.front_from.words,
@@ -112,10 +152,20 @@ def _new(options: argparse.Namespace) -> Answer:
     """Draft a record of a mesh file or a robot's description."""
     stem = (options.out or options.file).stem
     asked = Asked(
-        options.file, options.inputs, load_table(options.table), options.subtype, options.category, options.unit,
-        options.size_m, options.up, options.front, options.count, options.moving, f"{stem}.glb",
+        options.file,
+        options.inputs,
+        load_table(options.table),
+        options.subtype,
+        options.category,
+        options.unit,
+        options.size_m,
+        options.up,
+        options.front,
+        options.count,
+        options.moving,
+        f"{stem}.glb",
         Path(f"{stem}-pieces.png"),
-    )  # fmt: skip
+    )
 
     def show(seen: Inspection) -> None:
         """Draw the numbered pieces of a mesh."""
@@ -131,12 +181,18 @@ def _new(options: argparse.Namespace) -> Answer:
             raise InputError(f"{path}: is there already, expected a new file")
     for path, data in files.items():
         _write(path, data)
-    moving, marks = len(yaml.safe_load(made.text)[asked.name]["parts"]) - 1, made.text.count("GUESSED")
+    moving = len(yaml.safe_load(made.text)[asked.name]["parts"]) - 1
+    marks = made.text.count("GUESSED")
     facts = {"file": options.out, "text": made.text, "moving_parts": moving, "marked_lines": marks}
     if options.out is None:
         return Answer(facts, made.text)
-    ask = re.search(r"  front: .*GUESSED", made.text) and "; which way is front is not sure: confirm it or give --front"
-    said = f"{options.out}: {moving} moving parts drafted; confirm the {marks} marked lines{ask or ''}"
+    ask = (
+        re.search(r"  front: .*GUESSED", made.text)
+        and "; which way is front is not sure: confirm it or give --front"
+    )
+    said = (
+        f"{options.out}: {moving} moving parts drafted; confirm the {marks} marked lines{ask or ''}"
+    )
     return Answer(facts, said)
 
 
@@ -147,13 +203,18 @@ def _make(options: argparse.Namespace) -> Answer:
     records = read_records(options.record)
     subtype = options.subtype or (next(iter(records)) if len(records) == 1 else None)
     if subtype not in records:
-        raise InputError(f"{options.record}: --subtype is {subtype!r}, expected one of {list(records)}")
-    where, record = f"{options.record}: {subtype}", records[subtype]
+        raise InputError(
+            f"{options.record}: --subtype is {subtype!r}, expected one of {list(records)}"
+        )
+    where = f"{options.record}: {subtype}"
+    record = records[subtype]
     row = load_table(options.table).get(subtype)
     if "row" in record:
         row = with_row(row, subtype, record.pop("row"), where)
     if row is None:
-        raise InputError(f"{where}: no row in {options.table}, expected a key `row` or the name of a published subtype")
+        raise InputError(
+            f"{where}: no row in {options.table}, expected a key `row` or the name of a published subtype"
+        )
     record = merge(row, record, where)
     cloud = make(record, options.inputs, options.seed)
     out = options.out or Path(f"{slug(subtype)}.npz")

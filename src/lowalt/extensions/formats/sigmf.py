@@ -1,6 +1,8 @@
-"""Signals as SigMF recordings: one per station, all samples one after the other, each with an annotation of its own.
+"""Signals as SigMF recordings: one per station, all samples one after the other, each with an
+annotation of its own.
 
-`python -m lowalt.extensions.formats.sigmf --index INDEX --out FOLDER`. The sample rate is the symbol
+`python -m lowalt.extensions.formats.sigmf --index INDEX --out FOLDER`. The sample rate is the
+symbol
 rate: the signals are the echoes' values symbol by symbol. Facts for
 which the standard has no field are in the namespace `lowalt`.
 Source: SigMF specification 1.2 (core namespace, annotations).
@@ -36,15 +38,21 @@ def metadata(shards: ShardSet, network: Network, place: int, digest: str) -> dic
     annotations = []
     for number in range(len(shards)):
         entry = shards.record(number)
-        annotations.append({
-            "core:sample_start": number * network.symbols,
-            "core:sample_count": network.symbols,
-            "core:label": entry["category"],
-            "core:comment": f"{entry['subtype']}, motion model {entry['model']}",
-            # JSON has no infinity: without noise the annotation names no SNR.
-            **{f"lowalt:{name}": entry[name] for name in KEPT if name != "snr_db" or entry["noise"]},
-            "lowalt:geometry": entry["geometry"][station.name],
-        })  # fmt: skip
+        annotations.append(
+            {
+                "core:sample_start": number * network.symbols,
+                "core:sample_count": network.symbols,
+                "core:label": entry["category"],
+                "core:comment": f"{entry['subtype']}, motion model {entry['model']}",
+                # JSON has no infinity: without noise the annotation names no SNR.
+                **{
+                    f"lowalt:{name}": entry[name]
+                    for name in KEPT
+                    if name != "snr_db" or entry["noise"]
+                },
+                "lowalt:geometry": entry["geometry"][station.name],
+            }
+        )
     return {
         "global": {
             "core:datatype": "cf32_le",
@@ -65,12 +73,15 @@ def metadata(shards: ShardSet, network: Network, place: int, digest: str) -> dic
 
 
 def export(shards: ShardSet, folder: str | Path) -> list[Path]:
-    """Write {station}.sigmf-data and {station}.sigmf-meta of each station into `folder`; return the metadata's paths.
+    """Write {station}.sigmf-data and {station}.sigmf-meta of each station into `folder`; return the
+    metadata's paths.
 
     Raises: InputError where the shards hold images, or naming a damaged sample.
     """
     if shards.kind == "image":
-        raise InputError(f"{shards.index_path}: shards of kind 'image', expected 'signal', 'recipe' or 'cube'")
+        raise InputError(
+            f"{shards.index_path}: shards of kind 'image', expected 'signal', 'recipe' or 'cube'"
+        )
     network = Network.from_settings(shards.index["render"]["network"])
     written = []
     for place, station in enumerate(network.stations):
@@ -83,14 +94,18 @@ def export(shards: ShardSet, folder: str | Path) -> list[Path]:
                 file.write(span)
         written.append(data.with_suffix(".sigmf-meta"))
         with replacing(written[-1]) as temporary:
-            text = json.dumps(metadata(shards, network, place, digest.hexdigest()), indent=1, allow_nan=False)
+            text = json.dumps(
+                metadata(shards, network, place, digest.hexdigest()), indent=1, allow_nan=False
+            )
             temporary.write_text(text + "\n")
     return written
 
 
 def main(arguments: Iterable[str]) -> None:
     """Export the signals of a data set as SigMF recordings, one per station."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.extensions.formats.sigmf", description=main.__doc__)
+    line = argparse.ArgumentParser(
+        prog="python -m lowalt.extensions.formats.sigmf", description=main.__doc__
+    )
     line.add_argument("--index", required=True, help="index of a data set of signals")
     line.add_argument("--groups", nargs="+", default=list(GROUPS), choices=GROUPS)
     line.add_argument("--folds", nargs="+", default=list(FOLDS), choices=FOLDS)

@@ -1,4 +1,6 @@
-"""Recordings: measured baseband as signals at a radar's symbol rate, and the twin that simulates the same radar."""
+"""Recordings: measured baseband as signals at a radar's symbol rate, and the twin that simulates
+the same radar.
+"""
 
 from lowalt.extensions.recordings.channel import SAMPLINGS, coherent_intervals, symbol_rate
 from lowalt.extensions.recordings.files import read

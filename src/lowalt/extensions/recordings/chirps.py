@@ -1,4 +1,6 @@
-"""Chirps of a frequency-modulated radar as one slow signal: the range transform, and the range of the moving target."""
+"""Chirps of a frequency-modulated radar as one slow signal: the range transform, and the range of
+the moving target.
+"""
 
 import numpy as np
 
@@ -6,9 +8,11 @@ from lowalt.files.errors import InputError
 
 
 def in_chirps(values: np.ndarray, samples: int, where: str) -> np.ndarray:
-    """Return an array of chirps as one stream (n,): its last axis, or else its first, has the samples of a chirp.
+    """Return an array of chirps as one stream (n,): its last axis, or else its first, has the
+    samples of a chirp.
 
-    values: any shape; an array of one axis is a stream already. Raises: InputError naming `where` for other shapes.
+    values: any shape; an array of one axis is a stream already. Raises: InputError naming `where`
+    for other shapes.
     """
     if values.ndim == 1 and len(values) % samples == 0:
         return values
@@ -16,18 +20,25 @@ def in_chirps(values: np.ndarray, samples: int, where: str) -> np.ndarray:
         return values.reshape(-1)
     if values.ndim > 1 and values.shape[0] == samples:
         return np.ascontiguousarray(values.T).reshape(-1)
-    raise InputError(f"{where}: array {values.shape}, expected the {samples} samples of a chirp along its "
-                     "last or first axis")  # fmt: skip
+    raise InputError(
+        f"{where}: array {values.shape}, expected the {samples} samples of a chirp along its "
+        "last or first axis"
+    )
 
 
-def slow_time(stream: np.ndarray, samples: int, receivers: int = 1, receiver: int = 0) -> np.ndarray:
-    """Return the signal (chirps,) complex128, one value per chirp, at the range where most power moves.
+def slow_time(
+    stream: np.ndarray, samples: int, receivers: int = 1, receiver: int = 0
+) -> np.ndarray:
+    """Return the signal (chirps,) complex128, one value per chirp, at the range where most power
+    moves.
 
-    stream: (chirps * receivers * samples,) real or complex, one receiver's chirp after the other's. The range is the
-    bin of the Hann-windowed transform over a chirp with the largest variance from chirp to chirp. A beat note whose
-    frequency rises with range has a phase that rises with range too, so bins at positive frequency are conjugated:
-    positive Doppler approaches, whichever way the mixer is wired.
-    Source: Richards 2014, Fundamentals of Radar Signal Processing, section 4.6 (stretch processing).
+    stream: (chirps * receivers * samples,) real or complex, one receiver's chirp after the other's.
+    The range is the bin of the Hann-windowed transform over a chirp with the largest variance from
+    chirp to chirp. A beat note whose frequency rises with range has a phase that rises with range
+    too, so bins at positive frequency are conjugated: positive Doppler approaches, whichever way
+    the mixer is wired.
+    Source: Richards 2014, Fundamentals of Radar Signal Processing, section 4.6 (stretch
+    processing).
     """
     chirps = stream.reshape(-1, receivers, samples)[:, receiver]
     chirps = (chirps - chirps.mean(axis=1, keepdims=True)) * np.hanning(samples)

@@ -11,7 +11,15 @@ ROLES = {
     "magnitude": {"mag", "magnitude", "abs", "amplitude", "amp"},
     "phase": {"phase", "phi", "arg", "angle"},
 }
-UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "deg": np.pi / 180, "degrees": np.pi / 180, "°": np.pi / 180}
+UNITS = {
+    "ms": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "ns": 1e-9,
+    "deg": np.pi / 180,
+    "degrees": np.pi / 180,
+    "°": np.pi / 180,
+}
 """Units in a name, in seconds or radians; others count as these."""
 EVEN = 1e-3
 """Largest relative difference between the steps of a column of sample times."""
@@ -19,7 +27,9 @@ EVEN = 1e-3
 
 def _words(name: str) -> list[str]:
     """The words of a name in lower case."""
-    return [word for word in re.split(r"[^a-zµ°]+", name.lower().replace("in-phase", "inphase")) if word]
+    return [
+        word for word in re.split(r"[^a-zµ°]+", name.lower().replace("in-phase", "inphase")) if word
+    ]
 
 
 def role(name: str) -> str:
@@ -29,7 +39,9 @@ def role(name: str) -> str:
 
 
 def unit(name: str) -> float:
-    """Return the unit in a name of sample times or phases, in seconds or radians; 1 where it names none."""
+    """Return the unit in a name of sample times or phases, in seconds or radians; 1 where it names
+    none.
+    """
     return next((UNITS[word] for word in _words(name) if word in UNITS), 1.0)
 
 
@@ -38,4 +50,6 @@ def rises_evenly(column: np.ndarray) -> bool:
     if np.iscomplexobj(column) or len(column) < 8:
         return False
     steps = np.diff(column.astype(np.float64))
-    return bool(steps.min() > 0 and np.ptp(steps) <= max(EVEN * steps.mean(), 8e-6 * abs(column).max()))
+    return bool(
+        steps.min() > 0 and np.ptp(steps) <= max(EVEN * steps.mean(), 8e-6 * abs(column).max())
+    )

@@ -1,17 +1,22 @@
 """Which layout fits a file's bytes: the one under which the samples take the fewest bits.
 
-A receiver's samples follow from the ones before them, and the noise of a complex channel is circular: in-phase and
-quadrature are equally strong and uncorrelated. Each reading of the same bytes is therefore coded by a linear predictor
-(real, or complex with circular innovations), and its code length is compared: a wrong width or byte order turns the
-samples into noise over their whole range, a wrong order breaks the prediction and the symmetry of I and Q.
-Source: minimum description length, Rissanen 1978, Automatica 14(5); circularity, Schreier and Scharf 2010, chapter 2.
+A receiver's samples follow from the ones before them, and the noise of a complex channel is
+circular: in-phase and quadrature are equally strong and uncorrelated. Each reading of the same
+bytes is therefore coded by a linear predictor (real, or complex with circular innovations), and its
+code length is compared: a wrong width or byte order turns the samples into noise over their whole
+range, a wrong order breaks the prediction and the symmetry of I and Q.
+Source: minimum description length, Rissanen 1978, Automatica 14(5); circularity, Schreier and
+Scharf 2010, chapter 2.
 """
 
 import numpy as np
 from scipy.signal import lfilter
 
-BLOCK, BLOCKS = 512, 16
-"""Samples that one predictor is fitted to, and the largest number of such blocks, spread over the recording."""
+BLOCK = 512
+BLOCKS = 16
+"""Samples that one predictor is fitted to, and the largest number of such blocks, spread over the
+recording.
+"""
 ORDER = 32
 """Number of earlier numbers that a prediction uses, the same under every reading."""
 REPEATS = 0.3
@@ -20,37 +25,50 @@ SHORTEST_CHIRP = 16
 STRETCHES = 16
 """Stretches over which the phase of a line and of its image is compared."""
 APART_CELLS = 4
-"""Least Doppler of a line, in cells of a stretch, at which a Hann window separates it from its image."""
+"""Least Doppler of a line, in cells of a stretch, at which a Hann window separates it from its
+image.
+"""
 
 SKEW = 0.9
 """Largest ratio of the median of powers to their mean."""
 FAR = 1e3
-"""Largest ratio of the 90th percentile of powers to the median, and of it to the 10th: misread numbers span more."""
+"""Largest ratio of the 90th percentile of powers to the median, and of it to the 10th: misread
+numbers span more.
+"""
 
 
 def _blocks(values: np.ndarray) -> np.ndarray:
     """Stretches (blocks, samples) of a channel, evenly spread, each without its mean."""
     length = min(BLOCK, len(values))
-    starts = np.linspace(0, len(values) - length, min(BLOCKS, max(1, len(values) // length))).astype(int)
+    starts = np.linspace(
+        0, len(values) - length, min(BLOCKS, max(1, len(values) // length))
+    ).astype(int)
     kind = np.complex128 if np.iscomplexobj(values) else np.float64
     stretches = np.stack([np.asarray(values[start : start + length], kind) for start in starts])
     return stretches - stretches.mean(axis=1, keepdims=True)
 
 
 def _fitted(stretches: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Predictor (blocks, order) of each stretch by least squares, and its innovations (blocks, samples - order)."""
+    """Predictor (blocks, order) of each stretch by least squares, and its innovations (blocks,
+    samples - order).
+    """
     views = np.lib.stride_tricks.sliding_window_view(stretches, order + 1, axis=1)
     # A constant part needs no tap: everything is centred, as in a regression with an intercept.
     views = views - views.mean(axis=1, keepdims=True)
-    past, present = views[..., :order], views[..., order]
+    past = views[..., :order]
+    present = views[..., order]
     gram = np.einsum("bti,btj->bij", past.conj(), past)
-    gram += 1e-12 * np.trace(gram, axis1=1, axis2=2).real[:, None, None] * np.eye(order) + 1e-300 * np.eye(order)
+    gram += 1e-12 * np.trace(gram, axis1=1, axis2=2).real[:, None, None] * np.eye(
+        order
+    ) + 1e-300 * np.eye(order)
     taps = np.linalg.solve(gram, np.einsum("bti,bt->bi", past.conj(), present)[..., None])[..., 0]
     return taps, present - np.einsum("bti,bi->bt", past, taps)
 
 
 def step_bits(numbers: np.ndarray) -> float:
-    """Return the binary logarithm of the step between neighbouring numbers of the array's type, its mean over them."""
+    """Return the binary logarithm of the step between neighbouring numbers of the array's type, its
+    mean over them.
+    """
     if numbers.dtype.kind in "iu":
         return 0.0
     parts = numbers.view(numbers.real.dtype)[:: max(1, len(numbers) // 65536)]
@@ -60,12 +78,15 @@ def step_bits(numbers: np.ndarray) -> float:
 
 
 def code_bits(channels: list[np.ndarray], step_log2: float) -> float:
-    """Return the bits per real number that channels (samples,), real or complex, take in steps of 2^step_log2.
+    """Return the bits per real number that channels (samples,), real or complex, take in steps of
+    2^step_log2.
 
-    A complex channel is two real numbers with one variance and no correlation, or, where it is the only one, two real
-    channels, whichever takes fewer bits. Infinite where a value is not finite or spans 1e100 steps.
+    A complex channel is two real numbers with one variance and no correlation, or, where it is the
+    only one, two real channels, whichever takes fewer bits. Infinite where a value is not finite or
+    spans 1e100 steps.
     """
-    bits, count = 0.0, 0
+    bits = 0.0
+    count = 0
     for values in channels:
         parts = 2 if np.iscomplexobj(values) else 1
         with np.errstate(all="ignore"):
@@ -93,10 +114,12 @@ def _coded(stretches: np.ndarray, order: int) -> float:
 
 
 def chirp_length(values: np.ndarray) -> tuple[int, float]:
-    """Return the samples from chirp to chirp of a stream (samples,) real or complex, and how well it repeats, 0 to 1.
+    """Return the samples from chirp to chirp of a stream (samples,) real or complex, and how well
+    it repeats, 0 to 1.
 
-    Where a chirp begins, the samples do not follow from the ones before. The innovations' power therefore has the
-    chirps' period, whatever the ranges of the targets; a continuous wave's has none. (0, 0.0) where none is found.
+    Where a chirp begins, the samples do not follow from the ones before. The innovations' power
+    therefore has the chirps' period, whatever the ranges of the targets; a continuous wave's has
+    none. (0, 0.0) where none is found.
     """
     values = np.asarray(values[: 1 << 17])
     if len(values) < 16 * SHORTEST_CHIRP:
@@ -120,7 +143,9 @@ def chirp_length(values: np.ndarray) -> tuple[int, float]:
 
 
 def receivers_of(values: np.ndarray, samples: int) -> int:
-    """Return after how many chirps of `samples` a stream (samples,) repeats: receivers whose chirps stand in turn."""
+    """Return after how many chirps of `samples` a stream (samples,) repeats: receivers whose chirps
+    stand in turn.
+    """
     values = np.asarray(values[: len(values) // samples * samples][: 1 << 18])
     chirps = values.reshape(-1, samples)
     chirps = chirps - chirps.mean(axis=1, keepdims=True)
@@ -128,17 +153,22 @@ def receivers_of(values: np.ndarray, samples: int) -> int:
     for receivers in (1, 2, 3, 4):
         if len(chirps) <= 2 * receivers:
             break
-        one, other = chirps[:-receivers], chirps[receivers:]
-        alike.append(abs(np.vdot(one, other)) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-300))
+        one = chirps[:-receivers]
+        other = chirps[receivers:]
+        alike.append(
+            abs(np.vdot(one, other)) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-300)
+        )
     return 1 + int(np.flatnonzero(np.array(alike) > 0.95 * max(alike))[0]) if alike else 1
 
 
 def image_of(values: np.ndarray, cycles: float) -> tuple[float, float]:
-    """Return how strong the image of a line of a complex signal (samples,) is at the opposite Doppler.
+    """Return how strong the image of a line of a complex signal (samples,) is at the opposite
+    Doppler.
 
-    cycles: the line's Doppler in cycles per sample. Returned are the image's power over the line's, and their squared
-    coherence over `STRETCHES` stretches: near 1 for an image, the line's conjugate, and on average 1 / `STRETCHES` for
-    noise of any spectrum; (0.0, 0.0) where the line is too slow to separate both.
+    cycles: the line's Doppler in cycles per sample. Returned are the image's power over the line's,
+    and their squared coherence over `STRETCHES` stretches: near 1 for an image, the line's
+    conjugate, and on average 1 / `STRETCHES` for noise of any spectrum; (0.0, 0.0) where the line
+    is too slow to separate both.
     Source: spectral circularity coefficient, Schreier and Scharf 2010, chapter 9.
     """
     length = len(values) // STRETCHES
@@ -147,16 +177,20 @@ def image_of(values: np.ndarray, cycles: float) -> tuple[float, float]:
         return 0.0, 0.0
     stretches = (values[: length * STRETCHES] - values.mean()).reshape(STRETCHES, length)
     spectra = np.fft.fft(stretches * np.hanning(length), axis=1)
-    line, image = spectra[:, place], spectra[:, -place]
+    line = spectra[:, place]
+    image = spectra[:, -place]
     powers = [float(np.vdot(side, side).real) for side in (line, image)]
     together = abs(np.sum(line * image)) ** 2
     return powers[1] / max(powers[0], 1e-300), float(together / max(powers[0] * powers[1], 1e-300))
 
 
 def are_powers(values: np.ndarray) -> bool:
-    """Return whether real numbers (n,) are powers or magnitudes: none is negative, and few large ones outweigh many
-    small ones. Samples of a receiver lie to both sides of their mean, also where they are unsigned."""
+    """Return whether real numbers (n,) are powers or magnitudes: none is negative, and few large
+    ones outweigh many small ones. Samples of a receiver lie to both sides of their mean, also where
+    they are unsigned."""
     if np.iscomplexobj(values) or values.min() < 0:
         return False
     low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
-    return bool(middle < SKEW * values.mean() and low > 0 and high < FAR * middle and middle < FAR * low)
+    return bool(
+        middle < SKEW * values.mean() and low > 0 and high < FAR * middle and middle < FAR * low
+    )

@@ -1,9 +1,10 @@
 """Faults that make a recording unusable; each has a name and is found before anything is computed.
 
-Swapped channels cannot be recognised in general. Exchanging I and Q gives the conjugate signal, which could as well be
-a recording of a target that moves the other way; and a hovering or reciprocating target has Doppler of both signs. Two
-cases are recognised: both channels hold the same signal (there is no quadrature), or the record says whether the target
-moves towards the radar or away and the energy lies on the other side.
+Swapped channels cannot be recognised in general. Exchanging I and Q gives the conjugate signal,
+which could as well be a recording of a target that moves the other way; and a hovering or
+reciprocating target has Doppler of both signs. Two cases are recognised: both channels hold the
+same signal (there is no quadrature), or the record says whether the target moves towards the radar
+or away and the energy lies on the other side.
 """
 
 from pathlib import Path
@@ -21,35 +22,45 @@ ROUND_STEPS = 2.5
 ROUND_RUN = 8
 """Times that a smooth wave may stay longer at its highest level than at the next."""
 MIRRORED = 0.9
-"""Least correlation of a spectrum with its mirror about a quarter of the rate that shows I and Q in turn."""
+"""Least correlation of a spectrum with its mirror about a quarter of the rate that shows I and Q in
+turn.
+"""
 SAME_SHARE = 0.999
 """Least squared correlation of I and Q that makes them the same signal."""
 SIDE_RATIO = 4.0
-"""How many times stronger the wrong side of the Doppler axis must be to call the channels swapped (6 dB)."""
+"""How many times stronger the wrong side of the Doppler axis must be to call the channels swapped
+(6 dB).
+"""
 
 
 def agreed_rate(
     path: Path, stated_hz: float | None, header_hz: float | None, times_s: np.ndarray | None
-) -> float:  # fmt: skip
+) -> float:
     """Return the sampling rate (Hz) on which record, file header and sample times (s) agree.
 
-    Raises: InputError where nothing says the rate, two sources differ, or the times are not evenly spaced.
+    Raises: InputError where nothing says the rate, two sources differ, or the times are not evenly
+    spaced.
     """
     rates: dict[str, float | None] = {"record": stated_hz, "file": header_hz}
     if times_s is not None:
         steps = np.diff(times_s)
         if len(steps) < 1 or not np.isfinite(steps).all() or steps.min() <= 0:
-            raise InputError(f"{path}: the sample times do not increase, expected evenly spaced seconds")
+            raise InputError(
+                f"{path}: the sample times do not increase, expected evenly spaced seconds"
+            )
         middle = (times_s[-1] - times_s[0]) / len(steps)
         if abs(steps - middle).max() > 0.5 * middle:
             place = int(abs(steps - middle).argmax())
-            raise InputError(f"{path}: the sample times jump by {steps[place]:.4g} s at sample {place + 1}, expected "
-                             f"{middle:.4g} s everywhere")  # fmt: skip
+            raise InputError(
+                f"{path}: the sample times jump by {steps[place]:.4g} s at sample {place + 1}, expected "
+                f"{middle:.4g} s everywhere"
+            )
         rates["times"] = float(1 / middle)
     known = {name: rate for name, rate in rates.items() if rate is not None}
     if not known:
         raise InputError(f"{path}: nothing says the sampling rate, expected rate_hz in the record")
-    low, high = min(known.values()), max(known.values())
+    low = min(known.values())
+    high = max(known.values())
     if high > low * (1 + RATE_SHARE):
         words = ", ".join(f"{name} {rate:.6g} Hz" for name, rate in known.items())
         raise InputError(f"{path}: wrong rate, {words}, expected one rate")
@@ -58,16 +69,24 @@ def agreed_rate(
 
 
 def _cut(values: np.ndarray) -> np.ndarray:
-    """Which samples of one channel lie in cut tops: runs of equal samples at the largest or the smallest value.
+    """Which samples of one channel lie in cut tops: runs of equal samples at the largest or the
+    smallest value.
 
-    The rounded top of a smooth wave is flat too, but a rounded parabola stays at its highest level at most five times
-    as long as at the next level on either side, one step below; samples in between may miss a level. A cut wave leaves
-    its top as steeply as it reached it, so it falls by more steps or stays far longer than one step lasts.
+    The rounded top of a smooth wave is flat too, but a rounded parabola stays at its highest level
+    at most five times as long as at the next level on either side, one step below; samples in
+    between may miss a level. A cut wave leaves its top as steeply as it reached it, so it falls by
+    more steps or stays far longer than one step lasts.
     """
     starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
-    levels, lengths = values[starts], np.diff(starts, append=len(values))
-    step = max(float(np.diff(np.unique(values)).min()), float(np.abs(values).max()) * np.finfo(np.float32).eps)
-    top = np.flatnonzero((lengths >= CLIPPED_RUN) & ((levels == values.max()) | (levels == values.min())))
+    levels = values[starts]
+    lengths = np.diff(starts, append=len(values))
+    step = max(
+        float(np.diff(np.unique(values)).min()),
+        float(np.abs(values).max()) * np.finfo(np.float32).eps,
+    )
+    top = np.flatnonzero(
+        (lengths >= CLIPPED_RUN) & ((levels == values.max()) | (levels == values.min()))
+    )
     cut = np.zeros(len(levels), bool)
     for side in (-1, 1):
         inside = (top + side >= 0) & (top + side < len(levels))
@@ -78,22 +97,27 @@ def _cut(values: np.ndarray) -> np.ndarray:
 
 
 def clipped(values: np.ndarray) -> np.ndarray:
-    """Return which samples (samples,) of a recording, real or complex, the receiver has clipped, (samples,) bool."""
+    """Return which samples (samples,) of a recording, real or complex, the receiver has clipped,
+    (samples,) bool.
+    """
     return _cut(values.real) | _cut(values.imag) if np.iscomplexobj(values) else _cut(values)
 
 
 def _mirrored(values: np.ndarray) -> float:
-    """Correlation of a real channel's power spectrum with itself mirrored about a quarter of the rate.
+    """Correlation of a real channel's power spectrum with itself mirrored about a quarter of the
+    rate.
 
-    In-phase and quadrature in turn are two slow sequences: with w the frequency in radians a number, the spectrum is
-    E(2w) + exp(-jw) O(2w), and its value at pi - w is the conjugate of E(2w) - exp(-jw) O(2w). For a Doppler far below
-    the rate both have one magnitude, since O is E turned by a quarter. One channel sampled as it is has nothing there.
+    In-phase and quadrature in turn are two slow sequences: with w the frequency in radians a
+    number, the spectrum is E(2w) + exp(-jw) O(2w), and its value at pi - w is the conjugate of
+    E(2w) - exp(-jw) O(2w). For a Doppler far below the rate both have one magnitude, since O is E
+    turned by a quarter. One channel sampled as it is has nothing there.
     """
     count = len(values) // 4 * 4
     if count < 64:
         return 0.0
     power = np.abs(np.fft.rfft((values[:count] - values[:count].mean()) * np.hanning(count))) ** 2
-    edge, quarter = max(2, count // 2000), count // 4
+    edge = max(2, count // 2000)
+    quarter = count // 4
     low = power[edge : quarter - max(2, count // 100)]
     high = power[::-1][edge : edge + len(low)]
     spreads = low.std() * high.std()
@@ -116,24 +140,35 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
     if not np.isfinite(values).all():
         place = int(np.flatnonzero(~np.isfinite(values))[0])
         raise InputError(f"{path}: sample {place} is {values[place]}, expected finite numbers")
-    channels = {"channel": values} if not np.iscomplexobj(values) else {"I": values.real, "Q": values.imag}
+    channels = (
+        {"channel": values} if not np.iscomplexobj(values) else {"I": values.real, "Q": values.imag}
+    )
     for name, channel in channels.items():
         if np.ptp(channel) == 0:
-            raise InputError(f"{path}: silent, all {len(channel)} samples of {name} are {channel[0]}")
+            raise InputError(
+                f"{path}: silent, all {len(channel)} samples of {name} are {channel[0]}"
+            )
     if not np.iscomplexobj(values) and _mirrored(values) > MIRRORED:
-        raise InputError(f"{path}: the spectrum is mirrored about a quarter of the rate, as where I and Q stand in "
-                         "turn; expected channel 'complex' with layout 'iqiq', or one real channel")  # fmt: skip
+        raise InputError(
+            f"{path}: the spectrum is mirrored about a quarter of the rate, as where I and Q stand in "
+            "turn; expected channel 'complex' with layout 'iqiq', or one real channel"
+        )
     if np.iscomplexobj(values):
         shifted = values - values.mean()
-        alike = np.mean(shifted.real * shifted.imag) ** 2 / (np.mean(shifted.real**2) * np.mean(shifted.imag**2))
+        alike = np.mean(shifted.real * shifted.imag) ** 2 / (
+            np.mean(shifted.real**2) * np.mean(shifted.imag**2)
+        )
         if alike > SAME_SHARE:
-            raise InputError(f"{path}: I and Q hold the same signal (squared correlation {alike:.6f}), expected "
-                             "in-phase and quadrature, or channel 'real'")  # fmt: skip
+            raise InputError(
+                f"{path}: I and Q hold the same signal (squared correlation {alike:.6f}), expected "
+                "in-phase and quadrature, or channel 'real'"
+            )
         refuse_swapped(path, values, moves)
 
 
 def refuse_swapped(path: Path, values: np.ndarray, moves: str | None) -> None:
-    """Refuse a complex signal (samples,) whose energy lies on the other side of the Doppler axis than `moves` says.
+    """Refuse a complex signal (samples,) whose energy lies on the other side of the Doppler axis
+    than `moves` says.
 
     Raises: InputError naming the file.
     """
@@ -141,6 +176,8 @@ def refuse_swapped(path: Path, values: np.ndarray, moves: str | None) -> None:
         towards, away = _sides(values)
         right, wrong = (towards, away) if moves == "towards" else (away, towards)
         if wrong > SIDE_RATIO * right:
-            raise InputError(f"{path}: channels swapped, the record says the target moves {moves}, but the other "
-                                 f"side of the Doppler axis holds {wrong / max(right, 1e-300):.3g} times the energy; "
-                                 "expected the two columns in the order I, Q")  # fmt: skip
+            raise InputError(
+                f"{path}: channels swapped, the record says the target moves {moves}, but the other "
+                f"side of the Doppler axis holds {wrong / max(right, 1e-300):.3g} times the energy; "
+                "expected the two columns in the order I, Q"
+            )

@@ -1,4 +1,6 @@
-"""A recording's samples as one checked baseband channel, out of a file of any kind in `formats.READERS`."""
+"""A recording's samples as one checked baseband channel, out of a file of any kind in
+`formats.READERS`.
+"""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -9,7 +11,14 @@ from lowalt.extensions.recordings import faults
 from lowalt.extensions.recordings.chirps import slow_time
 from lowalt.extensions.recordings.column_names import rises_evenly, role, unit
 from lowalt.extensions.recordings.formats import RAW, READERS, Table
-from lowalt.extensions.recordings.layouts import GROUPS, TYPES, contradiction, parted, raw_readings, readings
+from lowalt.extensions.recordings.layouts import (
+    GROUPS,
+    TYPES,
+    contradiction,
+    parted,
+    raw_readings,
+    readings,
+)
 from lowalt.extensions.recordings.record import Record
 from lowalt.files.array_files import UNREADABLE
 from lowalt.files.atomic import existing
@@ -37,12 +46,20 @@ def _column(table: Table, name: int | str, path: Path) -> np.ndarray:
 
 def _named(table: Table, name: int | str) -> str:
     """What the name of a column says, as `column_names.role`."""
-    text = name if name in table.names else table.names[name] if table.names and isinstance(name, int) else ""
+    text = (
+        name
+        if name in table.names
+        else table.names[name]
+        if table.names and isinstance(name, int)
+        else ""
+    )
     return role(str(text))
 
 
 def times_of(table: Table, record: Record) -> np.ndarray | None:
-    """Sample times (samples,) s in the record's column of times, or in the only one whose name says so."""
+    """Sample times (samples,) s in the record's column of times, or in the only one whose name says
+    so.
+    """
     name = record.times
     if name is None:
         named = [each for each in table.names if role(each) == "time"]
@@ -51,22 +68,32 @@ def times_of(table: Table, record: Record) -> np.ndarray | None:
 
 
 def _chosen(table: Table, record: Record) -> tuple[tuple[int | str, ...], str | None]:
-    """Columns of the channel and their layout: those of the record, or else those that their names say.
+    """Columns of the channel and their layout: those of the record, or else those that their names
+    say.
 
     Raises: InputError where the record contradicts the names and does not say that it is right.
     """
-    path, columns, layout = record.file, record.columns, record.layout
+    path = record.file
+    columns = record.columns
+    layout = record.layout
     if columns is None:
-        free = [name for name in table.names or range(len(table.columns))
-                if not table.names or (name != record.times and _named(table, name) != "time")]  # fmt: skip
+        free = [
+            name
+            for name in table.names or range(len(table.columns))
+            if not table.names or (name != record.times and _named(table, name) != "time")
+        ]
         for pair, order in ((("i", "q"), layout), (("magnitude", "phase"), "polar")):
             by_role = [[name for name in free if _named(table, name) == part] for part in pair]
             if record.channel == "complex" and [len(names) for names in by_role] == [1, 1]:
                 return (by_role[0][0], by_role[1][0]), order
         columns = tuple(free)
     said = tuple(_named(table, name) for name in columns) if record.trust is None else ()
-    wrong = "time" in said or said in (("q", "i"), ("phase", "magnitude")) or (
-        said == ("magnitude", "phase") and layout != "polar") or (layout == "polar" and said == ("i", "q"))  # fmt: skip
+    wrong = (
+        "time" in said
+        or said in (("q", "i"), ("phase", "magnitude"))
+        or (said == ("magnitude", "phase") and layout != "polar")
+        or (layout == "polar" and said == ("i", "q"))
+    )
     if wrong:
         raise InputError(
             f"{path}: the columns {list(columns)} are {' and '.join(said)} by their names, expected in-phase and "
@@ -82,11 +109,15 @@ def channel_of(table: Table, record: Record) -> np.ndarray:
     parts = [_column(table, name, path) for name in columns]
     if len(table.columns) > 1 and record.trust is None and any(map(rises_evenly, parts)):
         name = columns[[*map(rises_evenly, parts)].index(True)]
-        raise InputError(f"{path}: column {name!r} rises by equal steps, as sample times do, expected `columns` "
-                         "without it")  # fmt: skip
+        raise InputError(
+            f"{path}: column {name!r} rises by equal steps, as sample times do, expected `columns` "
+            "without it"
+        )
     if layout == "polar":
         if len(parts) != 2 or any(map(np.iscomplexobj, parts)):
-            raise InputError(f"{path}: {len(parts)} columns, expected magnitude and phase for layout 'polar'")
+            raise InputError(
+                f"{path}: {len(parts)} columns, expected magnitude and phase for layout 'polar'"
+            )
         turn = unit(str(columns[1] if columns[1] in table.names else ""))
         parts = [parts[0] * np.exp(1j * turn * parts[1])]
     elif layout is None and record.dtype is None and len(parts) == 1:
@@ -96,34 +127,50 @@ def channel_of(table: Table, record: Record) -> np.ndarray:
             raise InputError(f"{path}: {len(parts)} columns, expected one for layout {layout!r}")
         parts = parted(parts[0], layout, str(path))
         if record.receiver >= len(parts):
-            raise InputError(f"{path}: receiver is {record.receiver}, expected less than {len(parts)} for layout "
-                             f"{layout!r}")  # fmt: skip
+            raise InputError(
+                f"{path}: receiver is {record.receiver}, expected less than {len(parts)} for layout "
+                f"{layout!r}"
+            )
         parts = [parts[record.receiver]] if record.chirps is None or layout == "dca4" else parts
     complex_already = len(parts) == 1 and np.iscomplexobj(parts[0])
     if record.channel == "real" or (record.chirps and len(parts) == 1 and not complex_already):
         if len(parts) != 1 or complex_already:
-            raise InputError(f"{path}: {len(parts)} columns of {parts[0].dtype}, expected one real column for channel "
-                             "'real'; name it as `columns`")  # fmt: skip
+            raise InputError(
+                f"{path}: {len(parts)} columns of {parts[0].dtype}, expected one real column for channel "
+                "'real'; name it as `columns`"
+            )
         return parts[0].astype(np.float64)
     if complex_already:
         return parts[0].astype(np.complex128)
     if len(parts) != 2 or any(map(np.iscomplexobj, parts)):
-        raise InputError(f"{path}: {len(parts)} columns, expected one complex or two (in-phase, quadrature) for "
-                         "channel 'complex'; name them as `columns`, or say `layout`")  # fmt: skip
+        raise InputError(
+            f"{path}: {len(parts)} columns, expected one complex or two (in-phase, quadrature) for "
+            "channel 'complex'; name them as `columns`, or say `layout`"
+        )
     return parts[0].astype(np.float64) + 1j * parts[1].astype(np.float64)
 
 
 def _refuse_misread(table: Table, record: Record) -> None:
-    """Refuse a record under which the numbers of a file make far less sense than under another reading."""
-    path, raw = record.file, record.file.suffix.lower() in RAW
-    if record.trust or record.chirps or not (raw or record.layout in GROUPS) or len(table.columns[0]) < FEWEST:
+    """Refuse a record under which the numbers of a file make far less sense than under another
+    reading.
+    """
+    path = record.file
+    raw = record.file.suffix.lower() in RAW
+    if (
+        record.trust
+        or record.chirps
+        or not (raw or record.layout in GROUPS)
+        or len(table.columns[0]) < FEWEST
+    ):
         return
     own = RAW.get(path.suffix.lower(), ())
-    dtype, layout = record.dtype or next(iter(own), ""), record.layout
+    dtype = record.dtype or next(iter(own), "")
+    layout = record.layout
     if layout is None and record.dtype is None:
         layout = next(iter(own[1:]), None)
     if dtype in ("complex64", "complex128"):
-        dtype, layout = {"complex64": "float32", "complex128": "float64"}[dtype], "iqiq"
+        dtype = {"complex64": "float32", "complex128": "float64"}[dtype]
+        layout = "iqiq"
     if (raw and dtype not in TYPES) or (np.iscomplexobj(table.columns[0]) and not raw):
         return
     found = raw_readings(str(path)) if raw else readings(table.columns[0])
@@ -138,14 +185,19 @@ def _refuse_misread(table: Table, record: Record) -> None:
 def table_of(record: Record) -> Table:
     """Return the columns of a record's file as they stand in it.
 
-    Raises: InputError naming the file where it is missing, of an unknown kind, damaged, or holds no sample.
+    Raises: InputError naming the file where it is missing, of an unknown kind, damaged, or holds no
+    sample.
     """
     path = existing(record.file, "recording")
     kind = path.suffix.lower()
     if not record.recorded:
-        raise InputError(f"{path}: the record of a radar without any recording, expected the key `file`")
+        raise InputError(
+            f"{path}: the record of a radar without any recording, expected the key `file`"
+        )
     if kind not in READERS:
-        raise InputError(f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}")
+        raise InputError(
+            f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}"
+        )
     try:
         table = READERS[kind](path, record)
     except InputError:
@@ -160,12 +212,14 @@ def table_of(record: Record) -> Table:
 def read(record: Record) -> Baseband:
     """Return the checked samples of a recording and their rate.
 
-    Raises: InputError naming the file where it is missing, of an unknown kind, damaged, has no such column or variable,
-    states another rate, carrier or names of columns than the record, or has samples that are not finite, clipped or
-    silent, make sense in another layout alone, whose I and Q are the same signal or stand in turn in a real channel, or
-    whose Doppler contradicts the known direction of motion.
+    Raises: InputError naming the file where it is missing, of an unknown kind, damaged, has no such
+    column or variable, states another rate, carrier or names of columns than the record, or has
+    samples that are not finite, clipped or silent, make sense in another layout alone, whose I and
+    Q are the same signal or stand in turn in a real channel, or whose Doppler contradicts the known
+    direction of motion.
     """
-    path, table = record.file, table_of(record)
+    path = record.file
+    table = table_of(record)
     times = times_of(table, record)
     if record.trust == "record":
         rate = float(record.rate_hz)
@@ -176,11 +230,16 @@ def read(record: Record) -> Baseband:
     faults.check(path, values, None if record.chirps else record.moves)
     if record.chirps is None:
         return Baseband(values, rate)
-    samples, receivers = record.chirps["samples"], record.chirps.get("receivers", 1)
+    samples = record.chirps["samples"]
+    receivers = record.chirps.get("receivers", 1)
     whole = len(values) // (samples * receivers) * samples * receivers
     if not whole or (record.receiver >= receivers and record.layout != "dca4"):
-        raise InputError(f"{path}: {len(values)} samples and receiver {record.receiver}, expected chirps of {samples} "
-                         f"samples of {receivers} receivers")  # fmt: skip
-    values = slow_time(values[:whole], samples, receivers, 0 if record.layout == "dca4" else record.receiver)
+        raise InputError(
+            f"{path}: {len(values)} samples and receiver {record.receiver}, expected chirps of {samples} "
+            f"samples of {receivers} receivers"
+        )
+    values = slow_time(
+        values[:whole], samples, receivers, 0 if record.layout == "dca4" else record.receiver
+    )
     faults.refuse_swapped(path, values, record.moves)
     return Baseband(values, rate)

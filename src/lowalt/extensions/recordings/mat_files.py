@@ -1,9 +1,10 @@
-"""Variables of MATLAB files, read in a process of their own: scipy's and HDF5's readers crash on some damaged files.
+"""Variables of MATLAB files, read in a process of their own: scipy's and HDF5's readers crash on
+some damaged files.
 
     python mat_files.py FILE.mat OUT.npz
 
-The archive holds the numeric variables as `0`, `1`, ... and `names`, a JSON list of their names. A field of a struct is
-named `struct.field`. Files of version 7.3 are HDF5.
+The archive holds the numeric variables as `0`, `1`, ... and `names`, a JSON list of their names. A
+field of a struct is named `struct.field`. Files of version 7.3 are HDF5.
 """
 
 import json
@@ -22,7 +23,9 @@ NUMERIC = "biufc"
 DEEPEST = 8
 """Structs inside structs that are followed."""
 INFLATED = 1100
-"""Largest size of a variable over its file's: HDF5 compresses to a thousandth at most, more is not in the file."""
+"""Largest size of a variable over its file's: HDF5 compresses to a thousandth at most, more is not
+in the file.
+"""
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -37,7 +40,9 @@ def read_mat(path: Path) -> dict[str, np.ndarray]:
         line = [sys.executable, "-P", __file__, str(path), str(out)]
         ended = subprocess.run(line, capture_output=True, text=True, errors="replace")
         if ended.returncode:
-            reason = ended.stderr.strip().splitlines()[-1:] or [f"the reader ended with {ended.returncode}"]
+            reason = ended.stderr.strip().splitlines()[-1:] or [
+                f"the reader ended with {ended.returncode}"
+            ]
             raise InputError(f"{path}: not a readable .mat file ({reason[0][:200]})")
         with np.load(out, allow_pickle=False) as data:
             names = json.loads(str(data["names"]))
@@ -59,17 +64,25 @@ def _old(source: str) -> dict[str, np.ndarray]:
     from scipy.io import loadmat
 
     variables = loadmat(source).items()
-    return dict(pair for name, value in variables if not name.startswith("__") for pair in _fields(name, value))
+    return dict(
+        pair
+        for name, value in variables
+        if not name.startswith("__")
+        for pair in _fields(name, value)
+    )
 
 
 def _below(group, name: str, largest: int, depth: int = 0) -> Iterator[tuple[str, np.ndarray]]:
-    """Name and array of each numeric value below a group; links and data outside the file are not followed."""
+    """Name and array of each numeric value below a group; links and data outside the file are not
+    followed.
+    """
     import h5py
 
     for key in group:
         if key.startswith("#") or not isinstance(group.get(key, getlink=True), h5py.HardLink):
             continue
-        item, path = group[key], f"{name}{key}"
+        item = group[key]
+        path = f"{name}{key}"
         if isinstance(item, h5py.Group):
             if depth < DEEPEST:
                 yield from _below(item, f"{path}.", largest, depth + 1)
@@ -88,7 +101,9 @@ def _new(source: str) -> dict[str, np.ndarray]:
     try:
         import h5py
     except ImportError:
-        sys.exit(f"version 7.3 needs h5py, expected `{install_command('matlab')}` or a file saved with -v7")
+        sys.exit(
+            f"version 7.3 needs h5py, expected `{install_command('matlab')}` or a file saved with -v7"
+        )
     with h5py.File(source) as file:
         return dict(_below(file, "", INFLATED * Path(source).stat().st_size))
 

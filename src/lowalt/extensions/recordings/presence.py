@@ -1,8 +1,9 @@
 """Which windows hold a target: those with a line above the recording's own noise floor.
 
-The noise of a cheap receiver is not white: slow noise rises towards zero speed. Where targets move, a line is therefore
-compared with the noise at its own speed, which is heard while that speed is empty. A target that hovers never leaves
-its speeds, so its lines are compared with what lies between them.
+The noise of a cheap receiver is not white: slow noise rises towards zero speed. Where targets move,
+a line is therefore compared with the noise at its own speed, which is heard while that speed is
+empty. A target that hovers never leaves its speeds, so its lines are compared with what lies
+between them.
 """
 
 import math
@@ -24,19 +25,22 @@ BETWEEN_SHARE = 0.25
 AROUND = 0.25
 """Speeds to either side of a line with which it is compared, over the whole band."""
 PASSES = 10.0
-"""A target passes where a window stands this many times `detect_db` above the recording's quiet time, while half of the
-windows hold no line."""
+"""A target passes where a window stands this many times `detect_db` above the recording's quiet
+time, while half of the windows hold no line."""
 BEYOND_DB = 10.0
-"""How far a line beyond the speeds that windows show must stand above all that they show: rotors' lines do by less."""
+"""How far a line beyond the speeds that windows show must stand above all that they show: rotors'
+lines do by less.
+"""
 SLOW_CELLS = 4
 """Doppler cells about zero speed that hold slow noise and are no line beyond a window's speeds."""
 
 
 def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of the speeds that are shown, in order of display, and the speeds (m/s) that they mean.
+    """Return the indices of the speeds that are shown, in order of display, and the speeds (m/s)
+    that they mean.
 
-    speeds: (n,) m/s, ascending; sides: "both"; "positive", only those above zero; "wrapped", a speed v < 0 means v + 2
-    edge_mps.
+    speeds: (n,) m/s, ascending; sides: "both"; "positive", only those above zero; "wrapped", a
+    speed v < 0 means v + 2 edge_mps.
     """
     if sides == "positive":
         shown = np.flatnonzero(speeds > 0)
@@ -51,36 +55,46 @@ def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.nd
 def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:
     """Return the mean power of the noise (speeds,) in windows (n, speeds), `step_mps` (m/s) apart.
 
-    At each speed the windows with the least power hold noise alone, if a target keeps to one speed for less than nine
-    tenths of the time. Of n exponential powers the k-th smallest has the mean 1 / n + ... + 1 / (n - k + 1). A running
-    median over speed makes the floor smooth. With `ENOUGH` windows or more, a line that stays in nearly all of them is
-    added to the floor, since a line that never moves is interference.
+    At each speed the windows with the least power hold noise alone, if a target keeps to one speed
+    for less than nine tenths of the time. Of n exponential powers the k-th smallest has the mean 1
+    / n + ... + 1 / (n - k + 1). A running median over speed makes the floor smooth. With `ENOUGH`
+    windows or more, a line that stays in nearly all of them is added to the floor, since a line
+    that never moves is interference.
     Source: minimum statistics, Martin 2001, IEEE Trans. Speech Audio Processing 9(5).
     """
     count = len(power)
     least = math.ceil(QUIET_SHARE * count)
-    quiet = np.partition(power, least - 1, axis=0)[least - 1] / sum(1 / (count - k) for k in range(least))
+    quiet = np.partition(power, least - 1, axis=0)[least - 1] / sum(
+        1 / (count - k) for k in range(least)
+    )
     smooth = median_filter(quiet, 2 * round(FLOOR_MPS / step_mps) + 1, mode="nearest")
-    return smooth if count < ENOUGH else np.maximum(smooth, maximum_filter(quiet, 3, mode="nearest"))
+    return (
+        smooth if count < ENOUGH else np.maximum(smooth, maximum_filter(quiet, 3, mode="nearest"))
+    )
 
 
 def floor_between(power: np.ndarray) -> np.ndarray:
-    """Return the mean power of the noise (speeds,) between the lines of windows (n, speeds) over a whole Doppler band.
+    """Return the mean power of the noise (speeds,) between the lines of windows (n, speeds) over a
+    whole Doppler band.
 
-    The least quarter of all powers of all windows within a quarter of the band to either side is noise alone, if lines
-    take up less than three quarters of it. Of exponential powers a share q lies below -ln(1 - q) times their mean.
+    The least quarter of all powers of all windows within a quarter of the band to either side is
+    noise alone, if lines take up less than three quarters of it. Of exponential powers a share q
+    lies below -ln(1 - q) times their mean.
     Source: order statistics, Rohling 1983, IEEE Trans. Aerospace Electronic Systems 19(4).
     """
     count = power.shape[1]
     reach = max(round(AROUND * count), 1)
     wrapped = np.concatenate([power[:, -reach:], power, power[:, :reach]], axis=1)
-    least = [np.quantile(wrapped[:, place : place + 2 * reach + 1], BETWEEN_SHARE) for place in range(count)]
+    least = [
+        np.quantile(wrapped[:, place : place + 2 * reach + 1], BETWEEN_SHARE)
+        for place in range(count)
+    ]
     return np.array(least) / -math.log(1 - BETWEEN_SHARE)
 
 
 def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndarray]:
-    """Return the powers (n, speeds) of intervals (n, symbols) at the speeds that the twin hears, and which of these
-    (speeds,) a target may have; Hann window."""
+    """Return the powers (n, speeds) of intervals (n, symbols) at the speeds that the twin hears,
+    and which of these (speeds,) a target may have; Hann window."""
     count = intervals.shape[1]
     power = np.abs(np.fft.fft(intervals * np.hanning(count), axis=1)) ** 2
     speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * twin.edge_mps
@@ -91,18 +105,20 @@ def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndar
 
 
 def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) -> np.ndarray:
-    """Return which intervals (n, symbols) of one recording hold a target, (n,) bool: a line, Hann window, that stands
-    `detect_db` above the recording's own noise floor.
+    """Return which intervals (n, symbols) of one recording hold a target, (n,) bool: a line, Hann
+    window, that stands `detect_db` above the recording's own noise floor.
 
-    Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other windows, and the line
-    is at or above slowest_mps. Where they may hover it is the floor between lines. A recording of `ENOUGH` windows
-    through which a target passes is also judged by its quiet time, so that hum next to it is no target.
-    noise: intervals (m, symbols) of the receiver's noise alone, hum included, where they are known: a line must stand
-    above their mean at its own speed, too.
+    Where targets move (slowest_mps above 0) it is the floor at the line's own speed, in the other
+    windows, and the line is at or above slowest_mps. Where they may hover it is the floor between
+    lines. A recording of `ENOUGH` windows through which a target passes is also judged by its quiet
+    time, so that hum next to it is no target.
+    noise: intervals (m, symbols) of the receiver's noise alone, hum included, where they are known:
+    a line must stand above their mean at its own speed, too.
     """
     power, heard = heard_powers(intervals, twin)
     quiet = heard_powers(noise, twin)[0] if noise is not None else power
-    level, step_mps = 10 ** (twin.detect_db / 10), 2 * twin.edge_mps / intervals.shape[1]
+    level = 10 ** (twin.detect_db / 10)
+    step_mps = 2 * twin.edge_mps / intervals.shape[1]
 
     def over(floor: np.ndarray) -> np.ndarray:
         """How far the strongest line of each window stands above a floor (speeds,), as a ratio."""
@@ -111,7 +127,12 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
     if twin.slowest_mps:
         return over(noise_floor(quiet, step_mps)) >= level
     if noise is not None:
-        return over(np.maximum(floor_between(quiet), maximum_filter(quiet.mean(axis=0), 3, mode="wrap"))) >= level
+        return (
+            over(
+                np.maximum(floor_between(quiet), maximum_filter(quiet.mean(axis=0), 3, mode="wrap"))
+            )
+            >= level
+        )
     found = over(floor_between(quiet)) >= level
     if len(power) >= ENOUGH:
         passing = over(noise_floor(quiet, step_mps))
@@ -121,16 +142,20 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
 
 
 def beyond_mps(values: np.ndarray, rate_hz: float, twin: Twin, count: int) -> np.ndarray:
-    """Return the speed (count,) m/s of a line of each window that lies beyond the speeds that the twin's windows show,
-    NaN where there is none.
+    """Return the speed (count,) m/s of a line of each window that lies beyond the speeds that the
+    twin's windows show, NaN where there is none.
 
-    values: samples (samples,) of a recording at `rate_hz`. The line stands `BEYOND_DB` above all that windows show.
+    values: samples (samples,) of a recording at `rate_hz`. The line stands `BEYOND_DB` above all
+    that windows show.
     """
     long = twin.symbols * twin.symbol_interval_s * rate_hz
     length = min(math.floor(long), len(values))
     starts = np.minimum(np.rint(np.arange(count) * long).astype(int), len(values) - length)
     cut = values[starts[:, None] + np.arange(length)]
-    power = np.abs(np.fft.fft((cut - cut.mean(axis=1, keepdims=True)) * np.hanning(length), axis=1)) ** 2
+    power = (
+        np.abs(np.fft.fft((cut - cut.mean(axis=1, keepdims=True)) * np.hanning(length), axis=1))
+        ** 2
+    )
     cells = np.abs(np.fft.fftfreq(length, 1 / length))
     speeds = cells * rate_hz / length * SPEED_OF_LIGHT / twin.carrier_hz / 2
     outside = np.where(speeds > twin.fastest_mps, power, 0.0)

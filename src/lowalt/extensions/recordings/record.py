@@ -1,6 +1,7 @@
 """The record of a recording: a short YAML file with the facts that the samples do not hold.
 
-Its keys stand in the definition `recording` of `lowalt/config/brought.schema.yaml`, each with its unit and meaning.
+Its keys stand in the definition `recording` of `lowalt/config/brought.schema.yaml`, each with its
+unit and meaning.
 """
 
 from dataclasses import dataclass
@@ -51,22 +52,33 @@ def record(block: dict, folder: Path, where: str) -> Record:
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
-    block = with_numbers({key: value for key, value in block.items() if value is not None}, of_brought("recording"))
+    block = with_numbers(
+        {key: value for key, value in block.items() if value is not None}, of_brought("recording")
+    )
     check_brought("recording", block, where)
     if "file" not in block and not {"twin", "rate_hz"} <= set(block):
-        raise InputError(f"{where}: missing key(s) ['file'], expected it, or twin and rate_hz of a radar without any "
-                         "recording")  # fmt: skip
+        raise InputError(
+            f"{where}: missing key(s) ['file'], expected it, or twin and rate_hz of a radar without any "
+            "recording"
+        )
     columns = tuple(block.get("columns", ()))
     if block["channel"] == "real":
         for key in ("moves", "layout", "chirps"):
             if key in block:
-                raise InputError(f"{where}: {key} is {block[key]!r}, expected channel 'complex' with it: a real "
-                                 "channel has no sign of Doppler and no second part")  # fmt: skip
+                raise InputError(
+                    f"{where}: {key} is {block[key]!r}, expected channel 'complex' with it: a real "
+                    "channel has no sign of Doppler and no second part"
+                )
         if len(columns) > 1:
-            raise InputError(f"{where}: columns is {list(columns)}, expected one for channel 'real'")
+            raise InputError(
+                f"{where}: columns is {list(columns)}, expected one for channel 'real'"
+            )
     hertz = {key: float(block[key]) for key in ("carrier_hz", "rate_hz") if key in block}
     if "targets" in block.get("twin", {}):
-        block["twin"] = {**block["twin"], "targets": [str(folder / name) for name in block["twin"]["targets"]]}
+        block["twin"] = {
+            **block["twin"],
+            "targets": [str(folder / name) for name in block["twin"]["targets"]],
+        }
     file = folder / block["file"] if "file" in block else Path(where)
     return Record(**{**block, **hertz, "file": file, "columns": columns or None})
 

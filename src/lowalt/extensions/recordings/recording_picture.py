@@ -1,4 +1,6 @@
-"""A picture of a recording of unknown layout: its spectrogram under each of the readings that fit best."""
+"""A picture of a recording of unknown layout: its spectrogram under each of the readings that fit
+best.
+"""
 
 import math
 
@@ -19,10 +21,20 @@ ROWS = 64
 
 
 def _levels(one: Seen, length: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Frequencies (rows,) Hz ascending, times (columns,) s and levels (rows, columns) dB of a reading's samples."""
+    """Frequencies (rows,) Hz ascending, times (columns,) s and levels (rows, columns) dB of a
+    reading's samples.
+    """
     values = one.values - one.values.mean()
-    hertz, times, power = spectrogram(values, one.rate_hz, "hann", length, length // 2, detrend=False,
-                                      return_onesided=np.isrealobj(values), mode="psd")  # fmt: skip
+    hertz, times, power = spectrogram(
+        values,
+        one.rate_hz,
+        "hann",
+        length,
+        length // 2,
+        detrend=False,
+        return_onesided=np.isrealobj(values),
+        mode="psd",
+    )
     order = np.argsort(hertz)
     return hertz[order], times, 10 * np.log10(np.maximum(power[order], 1e-300))
 
@@ -34,10 +46,11 @@ def _reach(hertz: np.ndarray, level: np.ndarray) -> float:
 
 
 def recording_picture(inspection: FileInspection, words: list[str]) -> bytes:
-    """Return a PNG of the spectrograms of the first readings, over radial speed (m/s) or, without a carrier, Hz.
+    """Return a PNG of the spectrograms of the first readings, over radial speed (m/s) or, without a
+    carrier, Hz.
 
-    words: a title for each reading. Colours span `RANGE_DB` below the strongest line, without the constant part, and
-    speeds that they do not show are left out.
+    words: a title for each reading. Colours span `RANGE_DB` below the strongest line, without the
+    constant part, and speeds that they do not show are left out.
     """
     seen = inspection.readings[:PANELS]
     figure, panels = plt.subplots(1, len(seen), figsize=(5 * len(seen), 4.2), squeeze=False)
@@ -49,11 +62,15 @@ def recording_picture(inspection: FileInspection, words: list[str]) -> bytes:
         finer = 2 ** math.ceil(math.log2(max(ROWS * one.rate_hz / reach, 1)))
         hertz, times, level = _levels(one, max(length, min(finer, count // 16)))
         top = float(level.max())
-        panel.pcolormesh(times, hertz * scale, level, vmin=top - RANGE_DB, vmax=top, shading="nearest")
+        panel.pcolormesh(
+            times, hertz * scale, level, vmin=top - RANGE_DB, vmax=top, shading="nearest"
+        )
         least = 0.0 if np.isrealobj(one.values) else -reach * scale
         panel.set_ylim(max(1.2 * least, hertz[0] * scale), min(1.2 * reach, hertz[-1]) * scale)
         panel.set(title=title, xlabel="time (s)" if inspection.rate_hz else "samples")
     sign = "sign lost" if np.isrealobj(seen[0].values) else "approaching is positive"
-    panels[0][0].set(ylabel=f"radial speed (m/s), {sign}" if inspection.carrier_hz else "Doppler (Hz)")
+    panels[0][0].set(
+        ylabel=f"radial speed (m/s), {sign}" if inspection.carrier_hz else "Doppler (Hz)"
+    )
     figure.tight_layout()
     return png(figure)

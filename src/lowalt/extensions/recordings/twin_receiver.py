@@ -1,9 +1,10 @@
-"""A cheap continuous-wave receiver: wander, leak, noise, flicker, hum, high pass and clipping, a setting each.
+"""A cheap continuous-wave receiver: wander, leak, noise, flicker, hum, high pass and clipping, a
+setting each.
 
-Everything is relative to the echo's own mean power over the stretch, behind the high pass, so that a setting means the
-same near and far.
-The order is that of the parts: antenna and mixer (wander, leak), noise of the mixer, hum that the amplifier picks up,
-the amplifier's coupling capacitors (high pass), its supply rails (clipping).
+Everything is relative to the echo's own mean power over the stretch, behind the high pass, so that
+a setting means the same near and far.
+The order is that of the parts: antenna and mixer (wander, leak), noise of the mixer, hum that the
+amplifier picks up, the amplifier's coupling capacitors (high pass), its supply rails (clipping).
 """
 
 from dataclasses import MISSING, dataclass, fields
@@ -18,12 +19,14 @@ from lowalt.numerics.portable import rms
 
 @dataclass(frozen=True)
 class Receiver:
-    """snr_db: echo over white noise within the receiver's band; flicker_db and flicker_hz: slow noise with a 1/f^2
-    spectrum above its corner, over the white noise's density at the corner; wander_db: rms of a slow change of the
-    amplitude; leak_db: a constant, over the echo; hum_db and hum_hz: a line, over the echo.
+    """snr_db: echo over white noise within the receiver's band; flicker_db and flicker_hz: slow
+    noise with a 1/f^2 spectrum above its corner, over the white noise's density at the corner;
+    wander_db: rms of a slow change of the amplitude; leak_db: a constant, over the echo; hum_db and
+    hum_hz: a line, over the echo.
 
-    May be left out: hum_lines, how many harmonics the line has, each 1 / number as strong; highpass_hz, corner of a
-    Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude over the rms of all samples, 0 for no limit.
+    May be left out: hum_lines, how many harmonics the line has, each 1 / number as strong;
+    highpass_hz, corner of a Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude
+    over the rms of all samples, 0 for no limit.
     """
 
     snr_db: float
@@ -43,7 +46,9 @@ class Receiver:
 
         Raises: InputError naming a missing or unknown key.
         """
-        defaults = {field.name: field.default for field in fields(cls) if field.default is not MISSING}
+        defaults = {
+            field.name: field.default for field in fields(cls) if field.default is not MISSING
+        }
         return cls(*map(float, pick(defaults | block, *(field.name for field in fields(cls)))))
 
 
@@ -52,31 +57,43 @@ ORDER = 2
 
 
 def shaped(count: int, rate_hz: float, corner_hz: float, rng: np.random.Generator) -> np.ndarray:
-    """Return complex Gaussian noise (count,) whose density falls as 1 / (1 + (f / corner)^2) from unity at f = 0.
+    """Return complex Gaussian noise (count,) whose density falls as 1 / (1 + (f / corner)^2) from
+    unity at f = 0.
 
     Unity is the density of white noise of unit power.
     """
     white = rng.standard_normal((2, count))
     frequency = np.fft.fftfreq(count, 1 / rate_hz)
-    spectrum = np.fft.fft(white[0] + 1j * white[1]) * np.sqrt(0.5 / (1 + (frequency / corner_hz) ** 2))
+    spectrum = np.fft.fft(white[0] + 1j * white[1]) * np.sqrt(
+        0.5 / (1 + (frequency / corner_hz) ** 2)
+    )
     return np.fft.ifft(spectrum)
 
 
 def received(
-    echo: np.ndarray, rate_hz: float, settings: Receiver, real: bool, rng: np.random.Generator, target: bool = True
+    echo: np.ndarray,
+    rate_hz: float,
+    settings: Receiver,
+    real: bool,
+    rng: np.random.Generator,
+    target: bool = True,
 ) -> np.ndarray:
-    """Return the receiver's samples (N,) of a complex echo (N,): float64 where the channel is real, else complex128.
+    """Return the receiver's samples (N,) of a complex echo (N,): float64 where the channel is real,
+    else complex128.
 
     target: False leaves the echo out; everything else stays as with the echo, except clipping.
     """
     count = len(echo)
-    # The coupling capacitors suppress the echo of a slow target, so its power is measured behind them.
+    # The coupling capacitors suppress the echo of a slow target, so its power is measured behind
+    # them.
     power = rms(highpassed(echo, rate_hz, settings.highpass_hz)) ** 2
     slow = shaped(count, rate_hz, 0.5, rng).real
     spread = slow.std() or 1.0
     result = (echo if target else 0 * echo) * 10 ** (settings.wander_db / 20 * slow / spread)
     level = np.sqrt(power) * 10 ** (-settings.snr_db / 20)
-    flicker = 10 ** (settings.flicker_db / 20) * level * shaped(count, rate_hz, settings.flicker_hz, rng)
+    flicker = (
+        10 ** (settings.flicker_db / 20) * level * shaped(count, rate_hz, settings.flicker_hz, rng)
+    )
     angle = rng.uniform(0, 2 * np.pi, 2)
     static = np.sqrt(power) * 10 ** (settings.leak_db / 20) * np.exp(1j * angle[0])
     time = np.arange(count) / rate_hz
@@ -93,17 +110,21 @@ def received(
 def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float) -> np.ndarray:
     """Return samples (N,) behind a Butterworth high pass of order 2, 0 Hz for none.
 
-    Audio amplifiers and sound cards with coupling capacitors have one (Horowitz and Hill 2015, section 1.7). In the
-    recordings at 24 GHz it lies below 12 Hz (0.08 m/s), where it shows at all.
+    Audio amplifiers and sound cards with coupling capacitors have one (Horowitz and Hill 2015,
+    section 1.7). In the recordings at 24 GHz it lies below 12 Hz (0.08 m/s), where it shows at all.
     """
     if not corner_hz:
         return values
     # Subtract the first value, so that a constant part causes no transient at the start.
-    return sosfilt(butter(ORDER, corner_hz, "highpass", fs=rate_hz, output="sos"), values - values[0])
+    return sosfilt(
+        butter(ORDER, corner_hz, "highpass", fs=rate_hz, output="sos"), values - values[0]
+    )
 
 
 def clipped(values: np.ndarray, limit_rms: float) -> np.ndarray:
-    """Return samples (N,) with each component limited to `limit_rms` times the rms of all samples; 0 for no limit."""
+    """Return samples (N,) with each component limited to `limit_rms` times the rms of all samples;
+    0 for no limit.
+    """
     if not limit_rms:
         return values
     limit = limit_rms * rms(values)

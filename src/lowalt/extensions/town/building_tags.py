@@ -1,7 +1,8 @@
-"""What the tags of a building say: heights in several units and spellings, and whether a feature is a building.
+"""What the tags of a building say: heights in several units and spellings, and whether a feature is
+a building.
 
-Source: OpenStreetMap wiki, Simple 3D Buildings (height, min_height, building:levels, building:min_level, building:part)
-and Map features/Units.
+Source: OpenStreetMap wiki, Simple 3D Buildings (height, min_height, building:levels,
+building:min_level, building:part) and Map features/Units.
 """
 
 import re
@@ -9,7 +10,8 @@ from typing import NamedTuple
 
 STOREY_M = 3.0
 """Height of a storey, for buildings that state storeys alone. Source: Simple 3D Buildings."""
-FOOT_M, INCH_M = 0.3048, 0.0254
+FOOT_M = 0.3048
+INCH_M = 0.0254
 NUMBER = r"~?\s*([0-9]+(?:\.[0-9]+|,[0-9]{1,2})?)"
 """A number, with a decimal comma where one or two digits follow: three might be thousands."""
 ONE_UNIT = re.compile(rf"{NUMBER}\s*([a-z']*)")
@@ -17,7 +19,9 @@ FEET_AND_INCHES = re.compile(rf"{NUMBER}\s*(?:'|ft)\s*([0-9]+(?:\.[0-9]+)?)\s*(?
 UNITS_M = (
     dict.fromkeys(["", "m", "metre", "metres", "meter", "meters"], 1.0)
     | dict.fromkeys(["'", "ft", "foot", "feet"], FOOT_M)
-    | dict.fromkeys(["storey", "storeys", "stories", "level", "levels", "floor", "floors"], STOREY_M)
+    | dict.fromkeys(
+        ["storey", "storeys", "stories", "level", "levels", "floor", "floors"], STOREY_M
+    )
 )
 
 
@@ -29,7 +33,9 @@ class Height(NamedTuple):
 
 
 def metres(value: object) -> float | None:
-    """Return a height such as "12.5 m", "12,5", "~15", "40'6\\"" or "3 storeys" in metres, None for another value."""
+    """Return a height such as "12.5 m", "12,5", "~15", "40'6\\"" or "3 storeys" in metres, None for
+    another value.
+    """
     text = str(value).strip().lower()
     if match := FEET_AND_INCHES.fullmatch(text):
         return float(match[1].replace(",", ".")) * FOOT_M + float(match[2]) * INCH_M
@@ -40,7 +46,9 @@ def metres(value: object) -> float | None:
 
 
 def _stated(properties: dict, keys: dict[str, str], least_m: float) -> Height:
-    """The first height of at least least_m (m) that the keys state; keys: each with the unit of a bare number."""
+    """The first height of at least least_m (m) that the keys state; keys: each with the unit of a
+    bare number.
+    """
     unread = []
     for key, unit in keys.items():
         value = properties.get(key)
@@ -55,17 +63,25 @@ def _stated(properties: dict, keys: dict[str, str], least_m: float) -> Height:
 
 def height_of(properties: dict) -> Height:
     """Return the height (m) of a building's top over the ground."""
-    return _stated(properties, {"height": "", "building:height": "", "building:levels": "levels"}, 0.01)
+    return _stated(
+        properties, {"height": "", "building:height": "", "building:levels": "levels"}, 0.01
+    )
 
 
 def low_of(properties: dict) -> Height:
-    """Return the height (m) over the ground at which a building begins, such as that of a bridge between two."""
+    """Return the height (m) over the ground at which a building begins, such as that of a bridge
+    between two.
+    """
     return _stated(properties, {"min_height": "", "building:min_level": "levels"}, 0.0)
 
 
 def is_building(properties: dict) -> bool:
-    """Return whether a feature is a building and not, say, a road: it is called one, or has a height."""
-    kinds = [properties[key] for key in ("building", "building:part") if properties.get(key) is not None]
+    """Return whether a feature is a building and not, say, a road: it is called one, or has a
+    height.
+    """
+    kinds = [
+        properties[key] for key in ("building", "building:part") if properties.get(key) is not None
+    ]
     if kinds:
         return any(kind != "no" for kind in kinds)
     return height_of(properties).metres is not None
@@ -73,4 +89,7 @@ def is_building(properties: dict) -> bool:
 
 def is_part(properties: dict) -> bool:
     """Return whether a feature is a part of a building whose outline is another feature."""
-    return properties.get("building:part") not in (None, "no") and properties.get("building") in (None, "no")
+    return properties.get("building:part") not in (None, "no") and properties.get("building") in (
+        None,
+        "no",
+    )

@@ -1,4 +1,6 @@
-"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene; in metres, z up."""
+"""Buildings from a file: a mesh, footprints with heights (GeoJSON), or a Mitsuba scene; in metres,
+z up.
+"""
 
 from functools import lru_cache
 from pathlib import Path
@@ -18,15 +20,21 @@ FLOOR_M = 0.05
 """Triangles whose corners are all lower than this are the ground, which is a plane of its own."""
 LOWEST_M = -1.0
 """A triangle that reaches deeper is refused: the ground is flat."""
-TALLEST_M, SMALLEST_M, LARGEST_M = (2.0, 900.0), 3.0, 20_000.0
-"""Heights of the tallest building, and least and largest extents of a town, outside of which the unit is wrong."""
+TALLEST_M = (2.0, 900.0)
+SMALLEST_M = 3.0
+LARGEST_M = 20_000.0
+"""Heights of the tallest building, and least and largest extents of a town, outside of which the
+unit is wrong.
+"""
 
 KEYS = ("height_m", "unit", "up", "material", "ground", "left_out")
 """Settings of the effect `town` that say how a file is read, beside its origin."""
 
 
 class Buildings(NamedTuple):
-    """A town that was read: its paths' `town`, its triangles' corners (F, 3, 3) m, and what was merged or dropped."""
+    """A town that was read: its paths' `town`, its triangles' corners (F, 3, 3) m, and what was
+    merged or dropped.
+    """
 
     town: Town
     corners: np.ndarray
@@ -35,7 +43,8 @@ class Buildings(NamedTuple):
 
 def _surfaces(path: Path, settings: dict) -> Surfaces:
     """The surfaces of a file by its ending, moved so that the origin of the settings is (0, 0, 0)."""
-    kind, origin = path.suffix.lower(), settings["origin"]
+    kind = path.suffix.lower()
+    origin = settings["origin"]
     if kind in (".geojson", ".json"):
         from lowalt.extensions.town.footprints import read_footprints
 
@@ -46,28 +55,38 @@ def _surfaces(path: Path, settings: dict) -> Surfaces:
         found = read_mitsuba(path, settings["unit"])
     elif kind in SUFFIXES:
         # glTF states its axes: y is up.
-        parts, unknown = mesh_parts(path, settings["unit"], "y" if kind == ".glb" else settings["up"])
+        parts, unknown = mesh_parts(
+            path, settings["unit"], "y" if kind == ".glb" else settings["up"]
+        )
         found = joined(parts, {}, {}, unknown)
     else:
         known = (".geojson", ".xml", *SUFFIXES)
-        raise InputError(f"{path}: ends in {kind!r}, expected a file of buildings that ends in one of {known}")
+        raise InputError(
+            f"{path}: ends in {kind!r}, expected a file of buildings that ends in one of {known}"
+        )
     return found._replace(corners=found.corners - np.array([*(origin or [0.0, 0.0]), 0.0]))
 
 
 def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
-    """Corners (F, 3, 3) and materials (F,) without the ground, triangles without an area and repeated ones.
+    """Corners (F, 3, 3) and materials (F,) without the ground, triangles without an area and
+    repeated ones.
 
-    Raises: InputError for no triangle, too many, numbers that are not finite, or a town of the wrong size.
+    Raises: InputError for no triangle, too many, numbers that are not finite, or a town of the
+    wrong size.
     """
-    corners, material, dropped = found.corners, found.material, dict(found.left_out)
+    corners = found.corners
+    material = found.material
+    dropped = dict(found.left_out)
     if not len(corners):
         raise InputError(f"{path}: has no surface of a building, expected some")
     if len(corners) > MOST_TRIANGLES:
         raise InputError(f"{path}: {len(corners)} triangles, expected at most {MOST_TRIANGLES}")
     if not np.isfinite(corners).all() or abs(corners).max() > 1e9:
         raise InputError(f"{path}: a corner is NaN, infinite or beyond 1e9 m, expected finite ones")
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    extent, tallest = float((high - low)[:2].max()), float(high[2])
+    low = corners.min(axis=(0, 1))
+    high = corners.max(axis=(0, 1))
+    extent = float((high - low)[:2].max())
+    tallest = float(high[2])
     advice = "expected a town in metres, z up, on ground z = 0: set unit and up of effects.town"
     if not SMALLEST_M <= extent <= LARGEST_M or not TALLEST_M[0] <= tallest <= TALLEST_M[1]:
         raise InputError(f"{path}: {extent:.3g} m wide and up to {tallest:.3g} m high, {advice}")
@@ -78,12 +97,15 @@ def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[
         """Keep some triangles and count the others."""
         nonlocal corners, material
         dropped[reason] = dropped.get(reason, 0) + int(len(which) - which.sum())
-        corners, material = corners[which], material[which]
+        corners = corners[which]
+        material = material[which]
 
     keep(corners[..., 2].max(axis=1) >= FLOOR_M, "triangles of the ground")
     ordered = np.sort(corner_numbers(corners), axis=1)
     keep(
-        (sizes(corners)[1] > 5e-7) & (ordered[:, 0] < ordered[:, 1]) & (ordered[:, 1] < ordered[:, 2]),
+        (sizes(corners)[1] > 5e-7)
+        & (ordered[:, 0] < ordered[:, 1])
+        & (ordered[:, 1] < ordered[:, 2]),
         "triangles without an area",
     )
     _, first = np.unique(np.sort(corner_numbers(corners), axis=1), axis=0, return_index=True)
@@ -107,13 +129,18 @@ def files_of(buildings: str | Path) -> list[str]:
 
 
 def read(settings: dict) -> Buildings:
-    """Return the buildings of the file that the settings of the effect `town` name; the last few are kept.
+    """Return the buildings of the file that the settings of the effect `town` name; the last few
+    are kept.
 
     Raises: InputError naming the file and what is wrong with it, or a material that is not known.
     """
     if settings["buildings"] is None:
-        raise InputError("effects.town.buildings: not set, expected the file of the buildings, such as town.geojson")
-    path, origin = existing(settings["buildings"], "file of buildings"), settings["origin"]
+        raise InputError(
+            "effects.town.buildings: not set, expected the file of the buildings, such as "
+            "town.geojson"
+        )
+    path = existing(settings["buildings"], "file of buildings")
+    origin = settings["origin"]
     key = tuple(settings[name] for name in KEYS)
     return _read(path, path.stat().st_mtime_ns, None if origin is None else tuple(origin), key)
 
@@ -124,7 +151,9 @@ def _read(path: Path, changed_ns: int, origin: tuple[float, float] | None, key: 
     settings = dict(zip(KEYS, key, strict=True)) | {"origin": origin}
     for name in ("material", "ground"):
         if settings[name] not in MATERIALS:
-            raise InputError(f"effects.town.{name}: {settings[name]!r}, expected one of {list(MATERIALS)}")
+            raise InputError(
+                f"effects.town.{name}: {settings[name]!r}, expected one of {list(MATERIALS)}"
+            )
     with reading(path, "file of buildings"):
         found = _surfaces(path, settings)
         corners, material, dropped = _cleaned(path, found)
@@ -138,10 +167,16 @@ def _read(path: Path, changed_ns: int, origin: tuple[float, float] | None, key: 
         lacking = f"surfaces of materials that no table has{such_as(found.unknown)}"
         notes[f"{lacking}: {settings['material']} stands for them"] = len(found.unknown)
     facts = {
-        "low_m": corners.min(axis=(0, 1)).tolist(), "high_m": corners.max(axis=(0, 1)).tolist(),
-        "buildings": int(made.building.max()) + 1, "triangles": len(corners), "facets": count, "walls": walls,
-        "roofs": count - walls, "materials": used, "ground": settings["ground"],
+        "low_m": corners.min(axis=(0, 1)).tolist(),
+        "high_m": corners.max(axis=(0, 1)).tolist(),
+        "buildings": int(made.building.max()) + 1,
+        "triangles": len(corners),
+        "facets": count,
+        "walls": walls,
+        "roofs": count - walls,
+        "materials": used,
+        "ground": settings["ground"],
         "dropped": {reason: number for reason, number in dropped.items() if number},
         "notes": notes,
-    }  # fmt: skip
+    }
     return Buildings(made, corners, facts)

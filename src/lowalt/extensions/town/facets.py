@@ -1,4 +1,6 @@
-"""The plane facets of a town's triangles, and the tree of boxes in which rays look for triangles that block them."""
+"""The plane facets of a town's triangles, and the tree of boxes in which rays look for triangles
+that block them.
+"""
 
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,19 +13,26 @@ from scipy.spatial import ConvexHull
 from lowalt.scene import rays
 
 GRID_M = 1e-3
-"""Corners in the same cell of this grid are one corner: files in single precision repeat corners with other digits."""
-FLAT_M, PARALLEL = 0.02, 1e-3
-"""Corners of a facet are at most this far off its plane; normals of neighbouring triangles differ by at most this."""
+"""Corners in the same cell of this grid are one corner: files in single precision repeat corners
+with other digits.
+"""
+FLAT_M = 0.02
+PARALLEL = 1e-3
+"""Corners of a facet are at most this far off its plane; normals of neighbouring triangles differ
+by at most this.
+"""
 
 
 class Facets(NamedTuple):
     """K plane facets, the ground z = 0 last, as the compiled loops take them.
 
-    normal (K, 3) and offset (K,) m: a facet's plane is normal . x = offset; centre (K, 3) m, across and up (K, 3), half
-    (K, 2) m: a rectangle in the plane that holds the facet, infinite for the ground; first (K + 1,): a facet's
-    triangles are rows first[k] to first[k + 1] of triangles (F, 9) m, a corner and two edges; the ground has none;
-    convex: (K,) bool, whether the triangles fill a convex polygon; outward: (K,), 1 or -1 where the normal points out
-    of or into a closed convex building, within which there are no rays, and 0 for other facets.
+    normal (K, 3) and offset (K,) m: a facet's plane is normal . x = offset; centre (K, 3) m, across
+    and up (K, 3), half (K, 2) m: a rectangle in the plane that holds the facet, infinite for the
+    ground; first (K + 1,): a facet's triangles are rows first[k] to first[k + 1] of triangles (F,
+    9) m, a corner and two edges; the ground has none;
+    convex: (K,) bool, whether the triangles fill a convex polygon; outward: (K,), 1 or -1 where the
+    normal points out of or into a closed convex building, within which there are no rays, and 0 for
+    other facets.
     """
 
     normal: np.ndarray
@@ -39,7 +48,9 @@ class Facets(NamedTuple):
 
 
 class Occluders(NamedTuple):
-    """The triangles (F, 9) in a tree of boxes (2 B, 6) as `rays.tree` makes it, and the facet (F,) of each."""
+    """The triangles (F, 9) in a tree of boxes (2 B, 6) as `rays.tree` makes it, and the facet (F,)
+    of each.
+    """
 
     boxes: np.ndarray
     triangles: np.ndarray
@@ -49,9 +60,11 @@ class Occluders(NamedTuple):
 class Town(NamedTuple):
     """A town as paths need it.
 
-    material: (K,) number of each facet's material in `materials`; building: (F,) number of the building of each
-    triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet, and of_building (E,), their buildings;
-    pairs: cache, by the station's place (3,) m, of the pairs (P, 2) of facets that may reflect its rays in turn.
+    material: (K,) number of each facet's material in `materials`; building: (F,) number of the
+    building of each triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet,
+    and of_building (E,), their buildings;
+    pairs: cache, by the station's place (3,) m, of the pairs (P, 2) of facets that may reflect its
+    rays in turn.
     """
 
     facets: Facets
@@ -65,7 +78,9 @@ class Town(NamedTuple):
 
 
 def corner_numbers(corners: np.ndarray) -> np.ndarray:
-    """Return the number (F, 3) of each corner of triangles (F, 3, 3) m, equal for corners in one cell of GRID_M."""
+    """Return the number (F, 3) of each corner of triangles (F, 3, 3) m, equal for corners in one
+    cell of GRID_M.
+    """
     cells = np.rint(corners.reshape(-1, 3) / GRID_M).astype(np.int64)
     return np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1, 3)
 
@@ -79,24 +94,31 @@ def sizes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _edges(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The edges (3 F, 2) of triangles by their corners' numbers, the smaller first, and the triangle (3 F,) of each."""
+    """The edges (3 F, 2) of triangles by their corners' numbers, the smaller first, and the
+    triangle (3 F,) of each.
+    """
     edges = np.concatenate([numbers[:, [0, 1]], numbers[:, [1, 2]], numbers[:, [2, 0]]])
     return np.sort(edges, axis=1), np.tile(np.arange(len(numbers)), 3)
 
 
 def labels(corners: np.ndarray, numbers: np.ndarray, material: np.ndarray) -> np.ndarray:
-    """Return the facet (F,) of each triangle: neighbours in one plane and of one material share a facet.
+    """Return the facet (F,) of each triangle: neighbours in one plane and of one material share a
+    facet.
 
     A facet that is not flat, such as a finely divided dome, falls apart into its triangles.
     """
     (normal, area), (edges, owner) = sizes(corners), _edges(numbers)
     order = np.lexsort(edges.T)
-    edges, owner = edges[order], owner[order]
+    edges = edges[order]
+    owner = owner[order]
     met = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
-    first, second = owner[met], owner[met + 1]
+    first = owner[met]
+    second = owner[met + 1]
     alike = abs((normal[first] * normal[second]).sum(axis=1)) > 1.0 - PARALLEL**2 / 2
     alike &= material[first] == material[second]
-    first, second, count = first[alike], second[alike], len(corners)
+    first = first[alike]
+    second = second[alike]
+    count = len(corners)
     graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     # The plane of a facet is that of its largest triangle.
@@ -122,7 +144,11 @@ def _convex(along: np.ndarray, area: np.ndarray, first: np.ndarray) -> np.ndarra
 
 
 def _outward(
-    corners: np.ndarray, numbers: np.ndarray, building: np.ndarray, label: np.ndarray, planes: np.ndarray
+    corners: np.ndarray,
+    numbers: np.ndarray,
+    building: np.ndarray,
+    label: np.ndarray,
+    planes: np.ndarray,
 ) -> np.ndarray:
     """Which way the facets' planes (K, 4), normals and offsets, are turned, (K,): see `Facets`.
 
@@ -132,9 +158,11 @@ def _outward(
     _, which = np.unique(edges, axis=0, return_inverse=True)
     high = np.empty(int(numbers.max()) + 1)
     high[numbers.reshape(-1)] = corners[..., 2].reshape(-1)
-    # A surface is closed if each of its edges belongs to two triangles; edges on the ground need only one.
+    # A surface is closed if each of its edges belongs to two triangles; edges on the ground need
+    # only one.
     lone = (np.bincount(which)[which] != 2) & (high[edges].max(axis=1) > FLAT_M)
-    result, order = np.zeros(len(planes)), np.argsort(building, kind="stable")
+    result = np.zeros(len(planes))
+    order = np.argsort(building, kind="stable")
     starts = np.searchsorted(building[order], np.arange(int(building.max()) + 2))
     for number in np.setdiff1d(building, building[owner[lone]]):
         mine = order[starts[number] : starts[number + 1]]
@@ -144,7 +172,9 @@ def _outward(
     return result
 
 
-def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], ground: str) -> Town:
+def town(
+    corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], ground: str
+) -> Town:
     """Return the town of triangles (F, 3, 3) m with materials (F,), on ground of another material.
 
     Triangles that share corners are one building.
@@ -152,7 +182,10 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
     numbers = corner_numbers(corners)
     label = labels(corners, numbers, material)
     order = np.argsort(label, kind="stable")
-    corners, numbers, material, label = corners[order], numbers[order], material[order], label[order]
+    corners = corners[order]
+    numbers = numbers[order]
+    material = material[order]
+    label = label[order]
     first = np.searchsorted(label, np.arange(label.max() + 2))
     normal, area = sizes(corners)
     largest = np.array([a + area[a:b].argmax() for a, b in pairwise(first)])
@@ -163,31 +196,52 @@ def town(corners: np.ndarray, material: np.ndarray, materials: tuple[str, ...], 
     across /= np.linalg.norm(across, axis=1)[:, None]
     up = np.cross(normal, across)
     offset = (normal * corners[largest, 0]).sum(axis=1)
-    along = np.stack([(corners * axis[label][:, None]).sum(axis=2) for axis in (across, up)], axis=2)
+    along = np.stack(
+        [(corners * axis[label][:, None]).sum(axis=2) for axis in (across, up)], axis=2
+    )
     low = np.minimum.reduceat(along.min(axis=1), first[:-1])
     high = np.maximum.reduceat(along.max(axis=1), first[:-1])
     middle = 0.5 * (low + high)
     centre = offset[:, None] * normal + middle[:, :1] * across + middle[:, 1:] * up
-    triangles = np.concatenate([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
+    triangles = np.concatenate(
+        [corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1
+    )
     edges, owner, building = _ridges(corners, numbers, label)
     outward = _outward(corners, numbers, building, label, np.column_stack([normal, offset]))
     facets = Facets(
-        np.vstack([normal, [0.0, 0.0, 1.0]]), np.append(offset, 0.0), np.vstack([centre, np.zeros(3)]),
-        np.vstack([across, [1.0, 0.0, 0.0]]), np.vstack([up, [0.0, 1.0, 0.0]]),
-        np.vstack([0.5 * (high - low) + FLAT_M, [np.inf, np.inf]]), np.append(first, first[-1]), triangles,
-        np.append(_convex(along, area, first), False), np.append(outward, 1.0),
-    )  # fmt: skip
-    tree, facet = rays.tree(corners, False), {row.tobytes(): k for row, k in zip(triangles, label, strict=True)}
+        np.vstack([normal, [0.0, 0.0, 1.0]]),
+        np.append(offset, 0.0),
+        np.vstack([centre, np.zeros(3)]),
+        np.vstack([across, [1.0, 0.0, 0.0]]),
+        np.vstack([up, [0.0, 1.0, 0.0]]),
+        np.vstack([0.5 * (high - low) + FLAT_M, [np.inf, np.inf]]),
+        np.append(first, first[-1]),
+        triangles,
+        np.append(_convex(along, area, first), False),
+        np.append(outward, 1.0),
+    )
+    tree = rays.tree(corners, False)
+    facet = {row.tobytes(): k for row, k in zip(triangles, label, strict=True)}
     of_tree = np.array([facet[row.tobytes()] for row in np.ascontiguousarray(tree.triangles)])
     names = tuple(dict.fromkeys((*materials, ground)))
     return Town(
-        facets, Occluders(tree.boxes, tree.triangles, of_tree), np.append(material[first[:-1]], names.index(ground)),
-        names, building, edges, owner, {},
-    )  # fmt: skip
+        facets,
+        Occluders(tree.boxes, tree.triangles, of_tree),
+        np.append(material[first[:-1]], names.index(ground)),
+        names,
+        building,
+        edges,
+        owner,
+        {},
+    )
 
 
-def _ridges(corners: np.ndarray, numbers: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The edges (E, 2, 3) m at the rims of facets, their buildings (E,), and the building (F,) of each triangle."""
+def _ridges(
+    corners: np.ndarray, numbers: np.ndarray, label: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The edges (E, 2, 3) m at the rims of facets, their buildings (E,), and the building (F,) of
+    each triangle.
+    """
     links = np.concatenate([numbers[:, :2], numbers[:, 1:]])
     size = int(numbers.max()) + 1
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(size, size))

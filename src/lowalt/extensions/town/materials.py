@@ -36,7 +36,9 @@ MATERIALS = {
 
 
 def named(text: str) -> str | None:
-    """Return the material that a name such as `mat-itu_concrete` or `Brick.001` means, None for none that is known."""
+    """Return the material that a name such as `mat-itu_concrete` or `Brick.001` means, None for
+    none that is known.
+    """
     plain = text.lower().replace("-", "_").replace(" ", "_")
     return max((name for name in MATERIALS if name in plain), key=len, default=None)
 
@@ -44,12 +46,15 @@ def named(text: str) -> str | None:
 def properties(name: str, frequency_hz: float, where: str) -> tuple[float, float]:
     """Return relative permittivity and conductivity (S/m) of a material at a frequency.
 
-    where: the key or file that names the material, for the message. Source: ITU-R P.2040-3, section 3 and Table 3.
-    Raises: InputError for an unknown name, or a frequency at which the material's properties are not known.
+    where: the key or file that names the material, for the message. Source: ITU-R P.2040-3, section
+    3 and Table 3.
+    Raises: InputError for an unknown name, or a frequency at which the material's properties are
+    not known.
     """
     if name not in MATERIALS:
         raise InputError(f"{where}: material {name!r}, expected {instead([name], MATERIALS)}")
-    law, ghz = MATERIALS[name], frequency_hz / 1e9
+    law = MATERIALS[name]
+    ghz = frequency_hz / 1e9
     if not law.low <= ghz <= law.high:
         raise InputError(
             f"{where}: {name} is known from {law.low:g} to {law.high:g} GHz, the carrier is {ghz:.3g} GHz; expected "

@@ -1,7 +1,8 @@
-"""Reading Mitsuba scenes: shapes that are meshes, their places and the names of their materials. Nothing is run.
+"""Reading Mitsuba scenes: shapes that are meshes, their places and the names of their materials.
+Nothing is run.
 
-Source: Mitsuba 3, scene format (shape, transform, bsdf, ref) and plugins ply and obj; Sionna RT's scenes and their
-materials, whose names are those of ITU-R P.2040.
+Source: Mitsuba 3, scene format (shape, transform, bsdf, ref) and plugins ply and obj; Sionna RT's
+scenes and their materials, whose names are those of ITU-R P.2040.
 """
 
 from pathlib import Path
@@ -16,19 +17,26 @@ from lowalt.files.errors import InputError
 from lowalt.targets.mesh_collada import parsed
 
 KINDS = ("ply", "obj")
-MOST_SHAPES, LARGEST_BYTES = 20_000, 64 << 20
+MOST_SHAPES = 20_000
+LARGEST_BYTES = 64 << 20
 
 
 def _numbers(element: Element, size: int, default: float) -> np.ndarray:
     """The numbers of an element: `value` with one or all, or x, y and z."""
-    text = element.get("value", "").replace(",", " ").split() or [element.get(axis, str(default)) for axis in "xyz"]
+    text = element.get("value", "").replace(",", " ").split() or [
+        element.get(axis, str(default)) for axis in "xyz"
+    ]
     if len(text) not in (1, size):
-        raise InputError(f"<{element.tag}> has {element.get('value')!r}, expected as many numbers as it takes")
+        raise InputError(
+            f"<{element.tag}> has {element.get('value')!r}, expected as many numbers as it takes"
+        )
     return np.broadcast_to(np.array([float(part) for part in text]), size).copy()
 
 
 def _place(shape: Element) -> np.ndarray:
-    """The place (4, 4) of a shape in the scene; each step of its transform acts after those before it."""
+    """The place (4, 4) of a shape in the scene; each step of its transform acts after those before
+    it.
+    """
     result = np.eye(4)
     for transform in shape.findall("transform"):
         for step in transform if transform.get("name") == "to_world" else ():
@@ -44,7 +52,9 @@ def _place(shape: Element) -> np.ndarray:
             elif step.tag == "matrix":
                 matrix = _numbers(step, 16, 0.0).reshape(4, 4)
             else:
-                raise InputError(f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or matrix")
+                raise InputError(
+                    f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or matrix"
+                )
             result = matrix @ result
     return result
 
@@ -56,7 +66,8 @@ def _names(bsdf: Element) -> list[str]:
 
 
 def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
-    """The material of a shape, "" for none that is known, and the name of one that is not known, "" for none.
+    """The material of a shape, "" for none that is known, and the name of one that is not known, ""
+    for none.
 
     scene: the names of the materials of the scene by their identifiers.
     """
@@ -72,8 +83,17 @@ def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
 
 
 def _file_of(shape: Element, path: Path) -> Path:
-    """The mesh file of a shape. Raises: InputError where it is not in the folder of the scene, or not there."""
-    name = next((text.get("value", "") for text in shape.findall("string") if text.get("name") == "filename"), "")
+    """The mesh file of a shape. Raises: InputError where it is not in the folder of the scene, or
+    not there.
+    """
+    name = next(
+        (
+            text.get("value", "")
+            for text in shape.findall("string")
+            if text.get("name") == "filename"
+        ),
+        "",
+    )
     folder = path.resolve().parent
     try:
         file = (folder / name).resolve()
@@ -81,29 +101,42 @@ def _file_of(shape: Element, path: Path) -> Path:
     except (OSError, ValueError):
         inside = False
     if not inside:
-        raise InputError(f"{path}: names the mesh {name[:80]!r}, expected a file in the folder of the scene")
+        raise InputError(
+            f"{path}: names the mesh {name[:80]!r}, expected a file in the folder of the scene"
+        )
     return file
 
 
 def meshes_of(path: Path) -> list[Path]:
     """Return the mesh files that a Mitsuba scene names. Raises: InputError as `read_mitsuba`."""
-    return [_file_of(shape, path) for shape in parsed(path).findall("shape") if shape.get("type") in KINDS]
+    return [
+        _file_of(shape, path)
+        for shape in parsed(path).findall("shape")
+        if shape.get("type") in KINDS
+    ]
 
 
 def read_mitsuba(path: Path, unit: str) -> Surfaces:
     """Return the surfaces of a Mitsuba scene, whose axis z is up; unit: of its numbers.
 
     Shapes other than PLY and OBJ meshes are left out and counted.
-    Raises: InputError naming the file: no scene, too large, a mesh outside its folder, or what a mesh's reader refuses.
+    Raises: InputError naming the file: no scene, too large, a mesh outside its folder, or what a
+    mesh's reader refuses.
     """
     if path.stat().st_size > LARGEST_BYTES:
-        raise InputError(f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a scene whose meshes are files")
+        raise InputError(
+            f"{path}: over {LARGEST_BYTES >> 20} MiB, expected a scene whose meshes are files"
+        )
     root = parsed(path)
     shapes = root.findall("shape")
     if root.tag != "scene" or len(shapes) > MOST_SHAPES:
-        raise InputError(f"{path}: <{root.tag}> with {len(shapes)} shapes, expected a scene with at most {MOST_SHAPES}")
+        raise InputError(
+            f"{path}: <{root.tag}> with {len(shapes)} shapes, expected a scene with at most {MOST_SHAPES}"
+        )
     materials = {bsdf.get("id", ""): _names(bsdf) for bsdf in root.findall("bsdf")}
-    parts, left_out, unknown = [], {}, []
+    parts = []
+    left_out = {}
+    unknown = []
     for shape in shapes:
         if shape.get("type") not in KINDS:
             label = f"shapes of type {str(shape.get('type'))[:20]}"

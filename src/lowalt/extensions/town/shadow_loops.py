@@ -1,7 +1,7 @@
 """The compiled loops of `image_paths`: whether a ray by some facets passes all buildings.
 
-Rays that end near each other are traced in blocks. A block that no ray can reach is dropped, and one with a triangle
-that may be in the way is halved until single rays decide.
+Rays that end near each other are traced in blocks. A block that no ray can reach is dropped, and
+one with a triangle that may be in the way is halved until single rays decide.
 """
 
 import numpy as np
@@ -16,10 +16,14 @@ ALLOCATING = kernel(inner=True)
 
 @INNER
 def _meets(bundle, box):
-    """Whether a bundle of rays may meet a box (6,) between the rays' starts and ends, see `rays_loops.can_meet`."""
+    """Whether a bundle of rays may meet a box (6,) between the rays' starts and ends, see
+    `rays_loops.can_meet`.
+    """
     for i in range(3):
-        low, high = bundle[i] - bundle[6 + i], bundle[i] + bundle[6 + i]
-        low, high = low + min(0.0, bundle[3 + i] - bundle[9 + i]), high + max(0.0, bundle[3 + i] + bundle[9 + i])
+        low = bundle[i] - bundle[6 + i]
+        high = bundle[i] + bundle[6 + i]
+        low = low + min(0.0, bundle[3 + i] - bundle[9 + i])
+        high = high + max(0.0, bundle[3 + i] + bundle[9 + i])
         if box[i] > high or box[3 + i] < low:
             return False
     return can_meet(bundle, box)
@@ -40,8 +44,11 @@ def between(occluders, bundle, found):
 
     bundle: the first twelve as in `rays_loops.can_meet`, the others are work space.
     """
-    boxes, count, box = occluders.boxes, 0, bundle[12:18]
-    leaves, node = len(boxes) // 2, 1
+    boxes = occluders.boxes
+    count = 0
+    box = bundle[12:18]
+    leaves = len(boxes) // 2
+    node = 1
     size = len(occluders.triangles) // leaves
     while True:
         if _meets(bundle, boxes[node]):
@@ -81,8 +88,14 @@ def _widen(start, end, span):
 def _span(span, bundle):
     """Fill bundle (18,) with the middles and half widths of the starts and ways of a span (12,)."""
     for i in range(3):
-        bundle[i], bundle[6 + i] = 0.5 * (span[i] + span[3 + i]), 0.5 * (span[3 + i] - span[i]) + 1e-9
-        bundle[3 + i], bundle[9 + i] = 0.5 * (span[6 + i] + span[9 + i]), 0.5 * (span[9 + i] - span[6 + i]) + 1e-9
+        bundle[i], bundle[6 + i] = (
+            0.5 * (span[i] + span[3 + i]),
+            0.5 * (span[3 + i] - span[i]) + 1e-9,
+        )
+        bundle[3 + i], bundle[9 + i] = (
+            0.5 * (span[6 + i] + span[9 + i]),
+            0.5 * (span[9 + i] - span[6 + i]) + 1e-9,
+        )
 
 
 @INNER
@@ -97,7 +110,9 @@ def bundled(starts, ends, count, bundle):
 
 @PLAIN
 def near(occluders, starts, ends, room, found):
-    """Fill found (F,) with the triangles within about `room` (m) of rays between places (P, 3) m; return how many."""
+    """Fill found (F,) with the triangles within about `room` (m) of rays between places (P, 3) m;
+    return how many.
+    """
     bundle = np.empty(30)
     bundled(starts, ends, len(starts), bundle)
     for i in range(3):
@@ -108,7 +123,9 @@ def near(occluders, starts, ends, room, found):
 @PLAIN
 def blocked(occluders, starts, ends):
     """Return whether a triangle stands between starts and ends, (P, 3) m each, as (P,) bool."""
-    result, found, bundle = np.zeros(len(starts), np.bool_), np.empty(len(occluders.triangles), np.int64), np.empty(30)
+    result = np.zeros(len(starts), np.bool_)
+    found = np.empty(len(occluders.triangles), np.int64)
+    bundle = np.empty(30)
     for p in range(len(starts)):
         bundled(starts[p : p + 1], ends[p : p + 1], 1, bundle)
         for f in range(between(occluders, bundle, found)):
@@ -127,7 +144,9 @@ def _own(occluders, row, route, leg):
 
 @INNER
 def _shadowed(occluders, work, held, counts):
-    """Whether a triangle of the lists held (legs, most) blocks a leg of a traced ray; that one is tried first next."""
+    """Whether a triangle of the lists held (legs, most) blocks a leg of a traced ray; that one is
+    tried first next.
+    """
     for leg in range(len(counts)):
         for f in range(counts[leg]):
             row = held[leg, f]
@@ -143,11 +162,14 @@ def _gather_leg(occluders, route, leg, bundle, older, found):
 
     older: a list that holds them all, empty to look for them in the tree.
     """
-    kept, box = 0, bundle[12:18]
+    kept = 0
+    box = bundle[12:18]
     if len(older) == 0:
         older = found[: between(occluders, bundle, found)]
     for f in range(len(older)):
-        if not _own(occluders, older[f], route, leg) and _can_cross(bundle, occluders.triangles[older[f]], box):
+        if not _own(occluders, older[f], route, leg) and _can_cross(
+            bundle, occluders.triangles[older[f]], box
+        ):
             found[kept] = older[f]
             kept += 1
     return kept
@@ -155,7 +177,9 @@ def _gather_leg(occluders, route, leg, bundle, older, found):
 
 @INNER
 def _stops(facets, occluders, row, start, end):
-    """Whether the triangle of this row, or its facet where that is convex, lies between two points (3,)."""
+    """Whether the triangle of this row, or its facet where that is convex, lies between two points
+    (3,).
+    """
     facet = occluders.facet[row]
     if not facets.convex[facet]:
         return crosses(occluders.triangles[row], start, end)
@@ -167,9 +191,11 @@ def _stops(facets, occluders, row, start, end):
 
 @INNER
 def _dark(facets, occluders, starts, ends, rows):
-    """Whether one of the triangles `rows`, alone or with its convex facet, blocks all rays of a block.
+    """Whether one of the triangles `rows`, alone or with its convex facet, blocks all rays of a
+    block.
 
-    starts, ends: (C, 3), of the rays to a box's corners; these decide, since the shadow of a convex shape is convex.
+    starts, ends: (C, 3), of the rays to a box's corners; these decide, since the shadow of a convex
+    shape is convex.
     """
     for row in rows:
         every = True
@@ -182,18 +208,26 @@ def _dark(facets, occluders, starts, ends, rows):
 
 @PLAIN
 def hidden(facets, occluders, which, corners):
-    """Return for facets `which` (B,) whether one convex surface hides all of it from a whole box, corners (8, 3) m."""
-    result, bundle = np.zeros(len(which), np.bool_), np.empty(30)
-    held, rays = np.empty(len(occluders.triangles), np.int64), np.empty((32, 2, 3))
+    """Return for facets `which` (B,) whether one convex surface hides all of it from a whole box,
+    corners (8, 3) m.
+    """
+    result = np.zeros(len(which), np.bool_)
+    bundle = np.empty(30)
+    held = np.empty(len(occluders.triangles), np.int64)
+    rays = np.empty((32, 2, 3))
     for b in range(len(which)):
-        facet, kept = which[b], 0
+        facet = which[b]
+        kept = 0
         if facets.first[facet] == facets.first[facet + 1]:
             continue
         for k in range(32):
-            a, b_ = facets.half[facet, 0] * (1 - 2 * (k // 8 % 2)), facets.half[facet, 1] * (1 - 2 * (k // 16))
+            a = facets.half[facet, 0] * (1 - 2 * (k // 8 % 2))
+            b_ = facets.half[facet, 1] * (1 - 2 * (k // 16))
             for i in range(3):
                 rays[k, 0, i] = corners[k % 8, i]
-                rays[k, 1, i] = facets.centre[facet, i] + a * facets.across[facet, i] + b_ * facets.up[facet, i]
+                rays[k, 1, i] = (
+                    facets.centre[facet, i] + a * facets.across[facet, i] + b_ * facets.up[facet, i]
+                )
         bundled(rays[:, 0], rays[:, 1], 32, bundle)
         for f in range(between(occluders, bundle, held)):
             if occluders.facet[held[f]] != facet:
@@ -211,7 +245,10 @@ def _trace_rays(scene, places, work, depth, known, present, first_only):
     """
     facets, occluders, route, station = scene
     held, counts, _, _, ray, bundle, _ = work
-    legs, met, any_ray, spans = len(route) + 1, False, False, bundle[18:]
+    legs = len(route) + 1
+    met = False
+    any_ray = False
+    spans = bundle[18:]
     for leg in range(legs):
         _no_span(spans[12 * leg : 12 * leg + 12])
     for n in range(len(places)):
@@ -221,11 +258,16 @@ def _trace_rays(scene, places, work, depth, known, present, first_only):
                 _widen(ray[leg], ray[leg + 1], spans[12 * leg : 12 * leg + 12])
     if not any_ray:
         return False
-    lists, lengths = held[depth + 1], counts[depth + 1, :legs]
+    lists = held[depth + 1]
+    lengths = counts[depth + 1, :legs]
     for leg in range(legs):
         _span(spans[12 * leg : 12 * leg + 12], bundle)
         older = held[depth, leg, : counts[depth, leg] if known else 0]
-        lengths[leg] = 0 if known and len(older) == 0 else _gather_leg(occluders, route, leg, bundle, older, lists[leg])
+        lengths[leg] = (
+            0
+            if known and len(older) == 0
+            else _gather_leg(occluders, route, leg, bundle, older, lists[leg])
+        )
     for n in range(len(places)):
         if trace_ray(facets, route, station, places[n, 0], ray, True) == 0 and not _shadowed(
             occluders, ray, lists, lengths
@@ -240,23 +282,38 @@ def _trace_rays(scene, places, work, depth, known, present, first_only):
 def _cut(facets, k, low, high):
     """Cut a box (3,) to (3,) to that around facet k; return whether they meet."""
     for i in range(3):
-        reach = abs(facets.across[k, i]) * facets.half[k, 0] + abs(facets.up[k, i]) * facets.half[k, 1] + 1e-6
-        low[i], high[i] = max(low[i], facets.centre[k, i] - reach), min(high[i], facets.centre[k, i] + reach)
+        reach = (
+            abs(facets.across[k, i]) * facets.half[k, 0]
+            + abs(facets.up[k, i]) * facets.half[k, 1]
+            + 1e-6
+        )
+        low[i], high[i] = (
+            max(low[i], facets.centre[k, i] - reach),
+            min(high[i], facets.centre[k, i] + reach),
+        )
     return low[0] <= high[0] and low[1] <= high[1] and low[2] <= high[2]
 
 
 @INNER
 def _leg_bundled(facets, route, leg, corners, bundle):
-    """Fill bundle (54,) with the rays of one leg of a block between corners (8, 5, 3), as far as they meet the facets.
+    """Fill bundle (54,) with the rays of one leg of a block between corners (8, 5, 3), as far as
+    they meet the facets.
 
-    Near the plane of a facet the corners' rays meet it far outside of its rim. Returns whether any ray is left.
+    Near the plane of a facet the corners' rays meet it far outside of its rim. Returns whether any
+    ray is left.
     """
-    span, low, high = bundle[18:30], bundle[30:33], bundle[33:36]
+    span = bundle[18:30]
+    low = bundle[30:33]
+    high = bundle[33:36]
     bundled(corners[:, leg], corners[:, leg + 1], 8, bundle)
     for i in range(3):
-        low[i], high[i] = np.inf, -np.inf
+        low[i] = np.inf
+        high[i] = -np.inf
         for k in range(8):
-            low[i], high[i] = min(low[i], corners[k, leg + 1, i]), max(high[i], corners[k, leg + 1, i])
+            low[i], high[i] = (
+                min(low[i], corners[k, leg + 1, i]),
+                max(high[i], corners[k, leg + 1, i]),
+            )
     for end in range(2):
         at = leg - 1 + end
         if at < 0 or at == len(route) or facets.first[route[at]] == facets.first[route[at] + 1]:
@@ -264,15 +321,18 @@ def _leg_bundled(facets, route, leg, corners, bundle):
         if not _cut(facets, route[at], low if end else span[:3], high if end else span[3:6]):
             return False
     for i in range(3):
-        span[6 + i], span[9 + i] = max(span[6 + i], low[i] - span[3 + i]), min(span[9 + i], high[i] - span[i])
+        span[6 + i], span[9 + i] = (
+            max(span[6 + i], low[i] - span[3 + i]),
+            min(span[9 + i], high[i] - span[i]),
+        )
     _span(span, bundle)
     return True
 
 
 @INNER
 def _shadow_lists(scene, work, depth, parent):
-    """Fill the lists at a depth with the triangles that can be in the way of a block; return their number, -1 where one
-    convex surface is in the way of all rays, or where no ray meets all facets.
+    """Fill the lists at a depth with the triangles that can be in the way of a block; return their
+    number, -1 where one convex surface is in the way of all rays, or where no ray meets all facets.
 
     parent: the depth of lists that hold them all, -1 for none.
     """
@@ -294,27 +354,35 @@ def _shadow_lists(scene, work, depth, parent):
 
 @INNER
 def _bounds(scene, boxes, begin, end, work):
-    """Trace the rays to the corners of the box around blocks `begin` to `end`, and keep their corners in work.
+    """Trace the rays to the corners of the box around blocks `begin` to `end`, and keep their
+    corners in work.
 
-    Returns 0 where no ray can reach the box by all facets of the route, 1 where the corners bound all rays between
-    them, and 2 where they do not.
+    Returns 0 where no ray can reach the box by all facets of the route, 1 where the corners bound
+    all rays between them, and 2 where they do not.
     """
     facets, _, route, station = scene
     _, _, _, corners, ray, _, box = work
-    low, high, middle = box[0], box[1], box[2]
+    low = box[0]
+    high = box[1]
+    middle = box[2]
     for i in range(3):
-        low[i], high[i] = np.inf, -np.inf
+        low[i] = np.inf
+        high[i] = -np.inf
         for c in range(begin, end):
             low[i], high[i] = min(low[i], boxes[c, 0, i]), max(high[i], boxes[c, 1, i])
     if misses(facets, route, station, low, high, corners, ray):
         return 0
-    most, least, whole = 0, 9, True
+    most = 0
+    least = 9
+    whole = True
     for k in range(8):
         for i in range(3):
             middle[i] = high[i] if (k >> i) & 1 else low[i]
         fault = trace_ray(facets, route, station, middle, ray, False)
         # Rays that only end on the wrong side of a facet still bound those between them.
-        most, least, whole = max(most, fault), min(least, fault), whole and (fault == 0 or fault > 4)
+        most = max(most, fault)
+        least = min(least, fault)
+        whole = whole and (fault == 0 or fault > 4)
         for row in range(5):
             for i in range(3):
                 corners[k, row, i] = ray[row, i]
@@ -327,15 +395,20 @@ def _bounds(scene, boxes, begin, end, work):
 def _trace_blocks(scene, places, boxes, block, work, present, first_only):
     """Set present (R, 1) to True where a ray reaches a place, see `trace`; return whether any does.
 
-    scene: facets, occluders, route and station; work: lists held (D, 3, F) and their lengths counts (D, 3) by depth,
-    stack (64, 4), all int64; corners (8, 5, 3), ray (8, 3), bundle (54,), box (3, 3); first_only: stop at the first
-    place.
+    scene: facets, occluders, route and station; work: lists held (D, 3, F) and their lengths counts
+    (D, 3) by depth, stack (64, 4), all int64; corners (8, 5, 3), ray (8, 3), bundle (54,), box (3,
+    3); first_only: stop at the first place.
     """
-    stack, top, met = work[2], 1, False
+    stack = work[2]
+    top = 1
+    met = False
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, len(boxes), 0, -1
     while top > 0 and not (met and first_only):
         top -= 1
-        begin, end, depth, parent = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
+        begin = stack[top, 0]
+        end = stack[top, 1]
+        depth = stack[top, 2]
+        parent = stack[top, 3]
         bounded = _bounds(scene, boxes, begin, end, work)
         found = _shadow_lists(scene, work, depth, parent) if bounded == 1 else 1
         if bounded == 0 or found < 0:
@@ -347,7 +420,8 @@ def _trace_blocks(scene, places, boxes, block, work, present, first_only):
                 stack[top, 2], stack[top, 3] = depth + 1, depth if bounded == 1 else -1
                 top += 1
             continue
-        some, free = places[begin * block : end * block], present[begin * block : end * block]
+        some = places[begin * block : end * block]
+        free = present[begin * block : end * block]
         met = _trace_rays(scene, some, work, depth, bounded == 1, free, first_only) or met
     return met
 
@@ -357,19 +431,26 @@ def _work(count, blocks):
     """The work space of `_trace_blocks` for `count` triangles and a number of blocks."""
     depths = 3
     while blocks > 0:
-        depths, blocks = depths + 1, blocks // 2
+        depths = depths + 1
+        blocks = blocks // 2
     return (
-        np.empty((depths, 3, count), np.int64), np.zeros((depths, 3), np.int64),
-        np.empty((64, 4), np.int64), np.empty((8, 5, 3)), np.empty((8, 3)), np.empty(54), np.empty((3, 3)),
-    )  # fmt: skip
+        np.empty((depths, 3, count), np.int64),
+        np.zeros((depths, 3), np.int64),
+        np.empty((64, 4), np.int64),
+        np.empty((8, 5, 3)),
+        np.empty((8, 3)),
+        np.empty(54),
+        np.empty((3, 3)),
+    )
 
 
 @PLAIN
 def trace(facets, occluders, route, station, places, boxes, block, present):
-    """Set present (R, 1) to True where a ray from the station by the facets of a route reaches a place.
+    """Set present (R, 1) to True where a ray from the station by the facets of a route reaches a
+    place.
 
-    route: (0 to 2,) facets from the station on; places: (R, 1, 3) m; boxes (C, 2, 3): low and high corners around
-    `block` places each.
+    route: (0 to 2,) facets from the station on; places: (R, 1, 3) m; boxes (C, 2, 3): low and high
+    corners around `block` places each.
     """
     work = _work(len(occluders.triangles), len(boxes))
     _trace_blocks((facets, occluders, route, station), places, boxes, block, work, present, False)
@@ -377,9 +458,12 @@ def trace(facets, occluders, route, station, places, boxes, block, present):
 
 @PLAIN
 def reaching(facets, occluders, routes, station, places, boxes, block):
-    """Return which routes (P, 1 or 2), facets from the station on, reach any place, (P,) bool; others as in `trace`."""
+    """Return which routes (P, 1 or 2), facets from the station on, reach any place, (P,) bool;
+    others as in `trace`.
+    """
     work = _work(len(occluders.triangles), len(boxes))
-    present, result = np.empty(places.shape[:2], np.bool_), np.zeros(len(routes), np.bool_)
+    present = np.empty(places.shape[:2], np.bool_)
+    result = np.zeros(len(routes), np.bool_)
     for p in range(len(routes)):
         scene = facets, occluders, routes[p], station
         result[p] = _trace_blocks(scene, places, boxes, block, work, present, True)

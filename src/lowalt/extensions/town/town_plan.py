@@ -1,4 +1,6 @@
-"""The plan of a town with stations and the region of the targets, what it is in words, and the draft of an overlay."""
+"""The plan of a town with stations and the region of the targets, what it is in words, and the
+draft of an overlay.
+"""
 
 from pathlib import Path
 
@@ -14,7 +16,9 @@ AROUND_M = 100.0
 
 
 def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> None:
-    """Write a picture of a town seen from above, with the stations and the region (C, 2) m of the targets."""
+    """Write a picture of a town seen from above, with the stations and the region (C, 2) m of the
+    targets.
+    """
     import matplotlib
 
     matplotlib.use("agg")
@@ -23,21 +27,33 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
 
     masts = np.array([station.position_m for station in network.stations])
     shown = np.concatenate([masts[:, :2], region])
-    low, high = shown.min(axis=0) - AROUND_M, shown.max(axis=0) + AROUND_M
+    low = shown.min(axis=0) - AROUND_M
+    high = shown.max(axis=0) + AROUND_M
     corners = found.corners[np.argsort(found.corners[..., 2].max(axis=1), kind="stable")]
     figure, axes = pyplot.subplots(figsize=(8, 7), layout="constrained")
     # Walls are lines from above, roofs are areas.
-    faces = PolyCollection(corners[..., :2], array=corners[..., 2].max(axis=1), cmap="viridis", edgecolors="face",
-                           linewidths=0.4)  # fmt: skip
+    faces = PolyCollection(
+        corners[..., :2],
+        array=corners[..., 2].max(axis=1),
+        cmap="viridis",
+        edgecolors="face",
+        linewidths=0.4,
+    )
     axes.add_collection(faces)
     figure.colorbar(faces, label="height above ground (m)", shrink=0.8)
     axes.plot(*np.vstack([region, region[:1]]).T, "k--", linewidth=1, label="region of the targets")
     for station in network.stations:
         if station.transmitter is None:
             axes.plot(*station.position_m[:2], "r^", markersize=9)
-            axes.annotate(f" {station.name}, {station.position_m[2]:g} m", station.position_m[:2], color="red")
+            axes.annotate(
+                f" {station.name}, {station.position_m[2]:g} m", station.position_m[:2], color="red"
+            )
     axes.set(
-        xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, east (m)", ylabel="y, north (m)", aspect="equal"
+        xlim=(low[0], high[0]),
+        ylim=(low[1], high[1]),
+        xlabel="x, east (m)",
+        ylabel="y, north (m)",
+        aspect="equal",
     )
     axes.legend(loc="upper right")
     with replacing(path) as temporary:
@@ -61,6 +77,10 @@ def described(path: Path, found: Buildings) -> list[str]:
 
 
 def overlay(settings: dict, name: str, comments: list[str]) -> str:
-    """Return the overlay of a scene in a town, with comments before it; settings: those that are not default."""
-    block = yaml.safe_dump({"run": name, "effects": {"town": settings}}, sort_keys=False, allow_unicode=True)
+    """Return the overlay of a scene in a town, with comments before it; settings: those that are
+    not default.
+    """
+    block = yaml.safe_dump(
+        {"run": name, "effects": {"town": settings}}, sort_keys=False, allow_unicode=True
+    )
     return "".join(f"# {line}\n" for line in comments) + block

@@ -1,1 +1,3 @@
-"""Double-double numbers: constants, arithmetic and sines that give the same bits on every processor."""
+"""Double-double numbers: constants, arithmetic and sines that give the same bits on every
+processor.
+"""

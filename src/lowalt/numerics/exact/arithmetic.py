@@ -1,9 +1,12 @@
-"""Double-double arithmetic for compiled loops: numbers of about 32 digits as pairs (high, low) of doubles.
+"""Double-double arithmetic for compiled loops: numbers of about 32 digits as pairs (high, low) of
+doubles.
 
-All operations, including fused multiply-add, are specified by IEEE 754 and must not be reordered, so results have the
-same bits on every processor. A processor without fused multiply-add uses the C library, slowly but equally.
-Relative errors are below 2^-100 for products, quotients and roots; a sum's error is below 2^-103 of its larger term.
-Source: Dekker 1971; Hida, Li and Bailey 2001, "Algorithms for quad-double precision floating point arithmetic".
+All operations, including fused multiply-add, are specified by IEEE 754 and must not be reordered,
+so results have the same bits on every processor. A processor without fused multiply-add uses the C
+library, slowly but equally. Relative errors are below 2^-100 for products, quotients and roots; a
+sum's error is below 2^-103 of its larger term.
+Source: Dekker 1971; Hida, Li and Bailey 2001, "Algorithms for quad-double precision floating point
+arithmetic".
 """
 
 import math

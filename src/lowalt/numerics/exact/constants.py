@@ -1,4 +1,6 @@
-"""Constants as double-doubles, from exact fractions and long decimals: pi, sines and Taylor coefficients."""
+"""Constants as double-doubles, from exact fractions and long decimals: pi, sines and Taylor
+coefficients.
+"""
 
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -27,7 +29,8 @@ def sine_cosine(angle_rad: float) -> tuple[Fraction, Fraction]:
     with localcontext() as context:
         context.prec = DIGITS + 45
         x = decimal_of(angle_rad)
-        term, sums = Decimal(1), [Decimal(0), Decimal(0)]
+        term = Decimal(1)
+        sums = [Decimal(0), Decimal(0)]
         for order in range(400):
             sums[order % 2] += term if order % 4 < 2 else -term
             term *= x / (order + 1)
@@ -35,10 +38,13 @@ def sine_cosine(angle_rad: float) -> tuple[Fraction, Fraction]:
 
 
 def taylor(first: int, factor: int, count: int) -> tuple[Pair, ...]:
-    """Return the first `count` coefficients, in x^2, of sin(factor pi x) / x (first = 1) or cos(factor pi x) (0)."""
+    """Return the first `count` coefficients, in x^2, of sin(factor pi x) / x (first = 1) or
+    cos(factor pi x) (0).
+    """
     with localcontext() as context:
         context.prec = DIGITS
-        term, result = Decimal(1), []
+        term = Decimal(1)
+        result = []
         for order in range(1, first + 1):
             term *= factor * PI / order
         for index in range(count):

@@ -1,6 +1,7 @@
 """Sines and cosines of double-doubles by Taylor series, for arguments in turns or half turns.
 
-Terms below 10^-6 of the sum are computed in double; the series stop below 10^-22, so errors are below 2^-71.
+Terms below 10^-6 of the sum are computed in double; the series stop below 10^-22, so errors are
+below 2^-71.
 """
 
 import numpy as np
@@ -11,7 +12,9 @@ from lowalt.numerics.exact.constants import taylor
 
 
 def _split(first: int, factor: int, exact: int, count: int) -> tuple[tuple, tuple, tuple]:
-    """Return Taylor coefficients in reverse: (high, low) of the first `exact`, and the others as doubles."""
+    """Return Taylor coefficients in reverse: (high, low) of the first `exact`, and the others as
+    doubles.
+    """
     coefficients = taylor(first, factor, count)[::-1]
     high, low = zip(*coefficients[count - exact :], strict=True)
     return high, low, tuple(value for value, _ in coefficients[: count - exact])
@@ -27,7 +30,9 @@ COSINE_HIGH, COSINE_LOW, COSINE_REST = _split(0, 2, 5, 11)
 
 @INLINED
 def series(x, high, low, rest):
-    """Return a sum of powers of the double-double x: the lowest orders in double-double, the others in double."""
+    """Return a sum of powers of the double-double x: the lowest orders in double-double, the others
+    in double.
+    """
     total = rest[0]
     for k in range(1, len(rest)):
         total = total * x[0] + rest[k]
@@ -65,8 +70,10 @@ def sine_cosine(x):
     odd = q == 1.0 or q == 3.0
     sign_s = -1.0 if q >= 2.0 else 1.0
     sign_c = -1.0 if q == 1.0 or q == 2.0 else 1.0
-    s0, s1 = (c[0] if odd else s[0]), (c[1] if odd else s[1])
-    c0, c1 = (s[0] if odd else c[0]), (s[1] if odd else c[1])
+    s0 = c[0] if odd else s[0]
+    s1 = c[1] if odd else s[1]
+    c0 = s[0] if odd else c[0]
+    c1 = s[1] if odd else c[1]
     return (sign_s * s0, sign_s * s1), (sign_c * c0, sign_c * c1)
 
 
@@ -80,12 +87,15 @@ def odd_sign(whole):
 def dirichlet(x, count):
     """Return sin(pi count x) / sin(pi x), with its limits at whole x; count: a whole double.
 
-    `echo.pointwise.terms.dirichlet` in double-double: the sines, the quotient and the limits need their own arithmetic.
+    `echo.pointwise.terms.dirichlet` in double-double: the sines, the quotient and the limits need
+    their own arithmetic.
     """
     f, whole = fraction(x)
     top, turns = fraction(scale(f, count))
     zero = f[0] == 0.0
     below = sine_half(f)
     ratio = divide(sine_half(top), (1.0 if zero else below[0], below[1]))
-    sign = odd_sign(turns) * (odd_sign(whole) if count - 2.0 * np.floor(0.5 * count) == 0.0 else 1.0)
+    sign = odd_sign(turns) * (
+        odd_sign(whole) if count - 2.0 * np.floor(0.5 * count) == 0.0 else 1.0
+    )
     return sign * (count if zero else ratio[0]), sign * (0.0 if zero else ratio[1])

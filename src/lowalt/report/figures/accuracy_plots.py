@@ -10,59 +10,96 @@ from matplotlib.lines import Line2D
 from lowalt.report.figures.style import COLOURS, SNR_LABELS, plain
 from lowalt.report.plots import Plot, drawn
 
-PAGE_WIDTH, CELL = 960, 46
+PAGE_WIDTH = 960
+CELL = 46
 """Width of the page's column, and of a cell of a matrix, in pixels; 100.0 fits into a cell."""
 SOURCES = {"this run": "-", "paper": "--"}
 """Style of the lines of each source."""
 
 
 def over_snr(ours: dict, published: dict) -> Plot:
-    """Return accuracy over SNR, one panel per protocol; dashed: the published values on the paper's data.
+    """Return accuracy over SNR, one panel per protocol; dashed: the published values on the paper's
+    data.
 
     ours, published: protocol -> scheme -> SNR label -> percent.
     """
     rows = [
-        {"protocol": f"{protocol} subtypes", "scheme": scheme, "snr_db": SNR_LABELS.get(label, label),
-         "accuracy_percent": round(value, 3), "source": source}
+        {
+            "protocol": f"{protocol} subtypes",
+            "scheme": scheme,
+            "snr_db": SNR_LABELS.get(label, label),
+            "accuracy_percent": round(value, 3),
+            "source": source,
+        }
         for source, table in zip(SOURCES, (ours, published), strict=True)
-        for protocol, schemes in table.items() if protocol in ours
-        for scheme, values in schemes.items() if scheme in ours[protocol]
-        for label, value in values.items() if label != "avg"
-    ]  # fmt: skip
+        for protocol, schemes in table.items()
+        if protocol in ours
+        for scheme, values in schemes.items()
+        if scheme in ours[protocol]
+        for label, value in values.items()
+        if label != "avg"
+    ]
     infinite = set(SNR_LABELS.values())
-    levels = sorted({row["snr_db"] for row in rows}, key=lambda snr: float("inf" if snr in infinite else snr))
+    levels = sorted(
+        {row["snr_db"] for row in rows}, key=lambda snr: float("inf" if snr in infinite else snr)
+    )
     schemes = list(dict.fromkeys(row["scheme"] for row in rows))
     colours = {scheme: COLOURS[number % len(COLOURS)] for number, scheme in enumerate(schemes)}
     names = [f"{protocol} subtypes" for protocol in ours]
-    figure = Figure(figsize=(6.5 * len(names), 4 + 0.2 * math.ceil(len(schemes) / 4)), layout="constrained")
-    for panel, name in zip(plain(figure.subplots(1, len(names), sharey=True, squeeze=False)), names, strict=True):
+    figure = Figure(
+        figsize=(6.5 * len(names), 4 + 0.2 * math.ceil(len(schemes) / 4)), layout="constrained"
+    )
+    for panel, name in zip(
+        plain(figure.subplots(1, len(names), sharey=True, squeeze=False)), names, strict=True
+    ):
         for scheme, source in dict.fromkeys((row["scheme"], row["source"]) for row in rows):
-            line = [(levels.index(row["snr_db"]), row["accuracy_percent"]) for row in rows
-                    if (row["protocol"], row["scheme"], row["source"]) == (name, scheme, source)]  # fmt: skip
-            panel.plot(*np.array(line).reshape(-1, 2).T, SOURCES[source], marker="o", ms=4, color=colours[scheme])
+            line = [
+                (levels.index(row["snr_db"]), row["accuracy_percent"])
+                for row in rows
+                if (row["protocol"], row["scheme"], row["source"]) == (name, scheme, source)
+            ]
+            panel.plot(
+                *np.array(line).reshape(-1, 2).T,
+                SOURCES[source],
+                marker="o",
+                ms=4,
+                color=colours[scheme],
+            )
         panel.set(title=name, xlabel="SNR (dB)", xticks=range(len(levels)), xticklabels=levels)
     figure.axes[0].set_ylabel("accuracy (%)")
     handles = [Line2D([], [], color=colour, label=scheme) for scheme, colour in colours.items()]
-    handles += [Line2D([], [], linestyle=style, color="0.5", label=source) for source, style in SOURCES.items()]
+    handles += [
+        Line2D([], [], linestyle=style, color="0.5", label=source)
+        for source, style in SOURCES.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
-    return drawn("accuracy_over_snr", "recognition accuracy over SNR by scheme and protocol", figure, rows)
+    return drawn(
+        "accuracy_over_snr", "recognition accuracy over SNR by scheme and protocol", figure, rows
+    )
 
 
 def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
-    """Return row-normalised confusion matrices, one per (protocol, scheme); counts as returned by `pivots.confusion`.
+    """Return row-normalised confusion matrices, one per (protocol, scheme); counts as returned by
+    `pivots.confusion`.
 
-    A class without samples has dashes in its row. With more classes, fewer matrices are placed side by side.
+    A class without samples has dashes in its row. With more classes, fewer matrices are placed side
+    by side.
     """
     count = len(categories)
     columns = max(1, min(len(counts), PAGE_WIDTH // (CELL * count + 40)))
     side = (CELL * count + 40) / 72
-    figure = Figure(figsize=(columns * side, math.ceil(len(counts) / columns) * (side + 0.6)), layout="constrained")
+    figure = Figure(
+        figsize=(columns * side, math.ceil(len(counts) / columns) * (side + 0.6)),
+        layout="constrained",
+    )
     panels = plain(figure.subplots(math.ceil(len(counts) / columns), columns, squeeze=False))
     rows: list[dict] = []
     for panel, ((protocol, scheme), cells) in zip(panels, counts.items(), strict=False):
         totals = [sum(cells.get((true, guess), 0) for guess in categories) for true in categories]
-        shares = [[100 * cells.get((true, guess), 0) / total if total else 0.0 for guess in categories]
-                  for true, total in zip(categories, totals, strict=True)]  # fmt: skip
+        shares = [
+            [100 * cells.get((true, guess), 0) / total if total else 0.0 for guess in categories]
+            for true, total in zip(categories, totals, strict=True)
+        ]
         panel.pcolormesh(shares, cmap="Blues", vmin=0, vmax=100, edgecolors="white")
         for line, (true, total) in enumerate(zip(categories, totals, strict=True)):
             for column, guess in enumerate(categories):
@@ -70,9 +107,16 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
                 shown = f"{percent:.1f}" if total else "-"
                 ink = {"color": "white" if percent > 50 else "0.2", "ha": "center", "va": "center"}
                 panel.text(column + 0.5, line + 0.5, shown, **ink)
-                rows.append({"panel": f"{protocol}: {scheme}", "true": true, "recognised_as": guess,
-                             "samples": cells.get((true, guess), 0), "percent": round(percent, 2),
-                             "shown": shown})  # fmt: skip
+                rows.append(
+                    {
+                        "panel": f"{protocol}: {scheme}",
+                        "true": true,
+                        "recognised_as": guess,
+                        "samples": cells.get((true, guess), 0),
+                        "percent": round(percent, 2),
+                        "shown": shown,
+                    }
+                )
         centres = [number + 0.5 for number in range(count)]
         panel.set_title(f"{protocol}: {scheme}", fontsize=9)
         panel.set(xlabel="recognised as (%)", ylabel="true", aspect="equal")
@@ -86,10 +130,14 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
 
 
 def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) -> Plot:
-    """Return what each class is taken for at each SNR: a row of panels per protocol, a panel per true class, and in it
-    a bar per SNR of the shares (percent) of all answers; rows: those of confusion_by_snr.csv, one scheme per protocol.
+    """Return what each class is taken for at each SNR: a row of panels per protocol, a panel per
+    true class, and in it a bar per SNR of the shares (percent) of all answers; rows: those of
+    confusion_by_snr.csv, one scheme per protocol.
     """
-    counts = {(row["protocol"], row["snr_db"], row["category"], row["predicted"]): int(row["samples"]) for row in rows}
+    counts = {
+        (row["protocol"], row["snr_db"], row["category"], row["predicted"]): int(row["samples"])
+        for row in rows
+    }
     schemes = {row["protocol"]: row["scheme"] for row in rows}
     levels = sorted({row["snr_db"] for row in rows}, key=float)
     places = [(protocol, true) for protocol in schemes for true in categories]
@@ -99,13 +147,30 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
     panels = plain(figure.subplots(height, columns, sharex=True, sharey=True, squeeze=False))
     shown: list[dict] = []
     for panel, (protocol, true) in zip(panels, places, strict=False):
-        samples = np.array([[counts.get((protocol, snr, true, answer), 0) for snr in levels] for answer in categories])
+        samples = np.array(
+            [
+                [counts.get((protocol, snr, true, answer), 0) for snr in levels]
+                for answer in categories
+            ]
+        )
         shares = 100 * samples / np.maximum(samples.sum(axis=0), 1)
-        for answer, colour, part, below in zip(categories, cycle(COLOURS), shares, shares.cumsum(axis=0) - shares):
+        for answer, colour, part, below in zip(
+            categories, cycle(COLOURS), shares, shares.cumsum(axis=0) - shares
+        ):
             panel.bar(range(len(levels)), part, bottom=below, color=colour, label=answer)
-        shown += [{"protocol": protocol, "scheme": schemes[protocol], "snr_db": snr, "true": true,
-                   "recognised_as": answer, "samples": samples[line, column], "percent": shares[line, column].round(2)}
-                  for line, answer in enumerate(categories) for column, snr in enumerate(levels)]  # fmt: skip
+        shown += [
+            {
+                "protocol": protocol,
+                "scheme": schemes[protocol],
+                "snr_db": snr,
+                "true": true,
+                "recognised_as": answer,
+                "samples": samples[line, column],
+                "percent": shares[line, column].round(2),
+            }
+            for line, answer in enumerate(categories)
+            for column, snr in enumerate(levels)
+        ]
         panel.set(title=f"{true}, {protocol} subtypes", ylim=(0, 100))
         panel.set_xticks(range(len(levels)), [SNR_LABELS.get(snr, snr) for snr in levels])
         panel.grid(visible=False)
@@ -113,6 +178,8 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
         panel.set_axis_off()
     figure.supxlabel("SNR (dB)")
     figure.supylabel("recognised as (%)")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=8, frameon=False)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=8, frameon=False
+    )
     words = "what each class is taken for at each SNR, in percent of its samples"
     return drawn("confusion_by_snr", words, figure, shown)

@@ -14,7 +14,17 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.style import COLOURS, plain
 from lowalt.report.plots import Plot, drawn
 
-RECOGNITION = ("scheme", "preset", "kind", "unseen_percent", "low", "high", "core_s_data", "core_s_training", "front")
+RECOGNITION = (
+    "scheme",
+    "preset",
+    "kind",
+    "unseen_percent",
+    "low",
+    "high",
+    "core_s_data",
+    "core_s_training",
+    "front",
+)
 PRESET = ("command", "macro_f1_low", "macro_f1_high")
 ECHO = ("method", "tolerance", "points", "seconds", "relative_error")
 STORED = 2.0**-24
@@ -22,24 +32,38 @@ STORED = 2.0**-24
 
 
 def _rows(rows: list[dict[str, str]]) -> list[dict]:
-    """The trained rows of accuracy_cost.csv as numbers, sorted by time; the first row of the table is the default."""
+    """The trained rows of accuracy_cost.csv as numbers, sorted by time; the first row of the table
+    is the default.
+    """
     base = next(row for row in rows if row["kind"] == "trained")
-    first, data = float(base["unseen_percent"]), []
+    first = float(base["unseen_percent"])
+    data = []
     for row in sorted((row for row in rows if row["kind"] == "trained"), key=seconds):
-        low, high = float(row["low"]), float(row["high"])
-        data.append({
-            "scheme": row["scheme"], "name": row["preset"] or row["scheme"], "core_s": seconds(row),
-            "accuracy_percent": float(row["unseen_percent"]), "low": first + low, "high": min(first + high, 100.0),
-            "front": row["front"], "same": low <= 0 <= high, "first": row is base,
-        })  # fmt: skip
+        low = float(row["low"])
+        high = float(row["high"])
+        data.append(
+            {
+                "scheme": row["scheme"],
+                "name": row["preset"] or row["scheme"],
+                "core_s": seconds(row),
+                "accuracy_percent": float(row["unseen_percent"]),
+                "low": first + low,
+                "high": min(first + high, 100.0),
+                "front": row["front"],
+                "same": low <= 0 <= high,
+                "first": row is base,
+            }
+        )
     return data
 
 
 def recognition(rows: list[dict[str, str]]) -> Plot:
-    """Plot unseen accuracy against the time for data and training, with Pareto front and a ring on the first scheme.
+    """Plot unseen accuracy against the time for data and training, with Pareto front and a ring on
+    the first scheme.
 
-    rows: of accuracy_cost.csv (keys RECOGNITION); trained ones are drawn. Bars are 95 % intervals of the difference to
-    the first scheme; if they contain zero the point is grey. The band spans all points not significantly different.
+    rows: of accuracy_cost.csv (keys RECOGNITION); trained ones are drawn. Bars are 95 % intervals
+    of the difference to the first scheme; if they contain zero the point is grey. The band spans
+    all points not significantly different.
     """
     data = _rows(rows)
     figure = Figure(figsize=(9.4, 6), layout="constrained")
@@ -47,29 +71,61 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
     same = [row["accuracy_percent"] for row in data if row["same"]]
     panel.axhspan(min(same), max(same), color="0.5", alpha=0.2, linewidth=0)
     base = next(row for row in data if row["first"])
-    for apart, colour, label in ((False, "#6e7781", f"cannot be told apart from {base['name']}"),
-                                 (True, COLOURS[1], "differs")):  # fmt: skip
+    for apart, colour, label in (
+        (False, "#6e7781", f"cannot be told apart from {base['name']}"),
+        (True, COLOURS[1], "differs"),
+    ):
         some = [row for row in data if row["same"] != apart]
         times, values = ([row[name] for row in some] for name in ("core_s", "accuracy_percent"))
-        panel.vlines(times, *([row[end] for row in some] for end in ("low", "high")), color=colour, alpha=0.5)
+        panel.vlines(
+            times, *([row[end] for row in some] for end in ("low", "high")), color=colour, alpha=0.5
+        )
         panel.plot(times, values, "o", color=colour, label=label)
-    panel.plot(base["core_s"], base["accuracy_percent"], "o", markersize=13, fillstyle="none", color=COLOURS[0])
+    panel.plot(
+        base["core_s"],
+        base["accuracy_percent"],
+        "o",
+        markersize=13,
+        fillstyle="none",
+        color=COLOURS[0],
+    )
     front = [row for row in data if row["front"] == "yes"]
-    panel.step([row["core_s"] for row in front], [row["accuracy_percent"] for row in front], where="post", color="0.5")
-    # There is no point to the upper left of a front point, so names placed there do not overlap points.
+    panel.step(
+        [row["core_s"] for row in front],
+        [row["accuracy_percent"] for row in front],
+        where="post",
+        color="0.5",
+    )
+    # There is no point to the upper left of a front point, so names placed there do not overlap
+    # points.
     least = min(row["low"] for row in data)
     level = 0.0
     for row in front:
         level = max(row["accuracy_percent"], level) + (100 - least) / 18
         place = row["core_s"], level
-        panel.annotate(row["name"], (row["core_s"], row["accuracy_percent"]), place, ha="right",
-                       arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5})  # fmt: skip
+        panel.annotate(
+            row["name"],
+            (row["core_s"], row["accuracy_percent"]),
+            place,
+            ha="right",
+            arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5},
+        )
     for row in data:
         if row["front"] != "yes":
-            panel.annotate(row["name"], (row["core_s"], row["accuracy_percent"]), (7, -7), textcoords="offset points",
-                           va="top", bbox={"color": "white", "alpha": 0.7, "pad": 0.5})  # fmt: skip
-    panel.set(xscale="log", ylim=(math.floor(least), max(100.0, level) + 1), ylabel="accuracy, unseen subtypes (%)",
-              xlabel="processor-seconds of data and training")  # fmt: skip
+            panel.annotate(
+                row["name"],
+                (row["core_s"], row["accuracy_percent"]),
+                (7, -7),
+                textcoords="offset points",
+                va="top",
+                bbox={"color": "white", "alpha": 0.7, "pad": 0.5},
+            )
+    panel.set(
+        xscale="log",
+        ylim=(math.floor(least), max(100.0, level) + 1),
+        ylabel="accuracy, unseen subtypes (%)",
+        xlabel="processor-seconds of data and training",
+    )
     for axis in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
         axis("{x:g}")
     panel.tick_params(axis="x", which="both", length=3.5, pad=3.5)
@@ -85,30 +141,58 @@ def seconds(row: dict[str, str]) -> float:
 
 
 def echo(measured: list[dict[str, str]]) -> Plot:
-    """Plot the error of a signal against its time, one line per method and tolerance through the numbers of points.
+    """Plot the error of a signal against its time, one line per method and tolerance through the
+    numbers of points.
 
     measured: rows of cost.csv (keys ECHO).
     """
     rows = [
-        {"method": row["method"], "name": ", ".join(filter(None, (row["method"], row["tolerance"]))),
-         "points": int(row["points"]), "ms": 1e3 * float(row["seconds"]), "error": float(row["relative_error"])}
+        {
+            "method": row["method"],
+            "name": ", ".join(filter(None, (row["method"], row["tolerance"]))),
+            "points": int(row["points"]),
+            "ms": 1e3 * float(row["seconds"]),
+            "error": float(row["relative_error"]),
+        }
         for row in measured
-    ]  # fmt: skip
+    ]
     methods = list(dict.fromkeys(row["method"] for row in rows))
     figure = Figure(figsize=(9.4, 6), layout="constrained")
     (panel,) = plain(figure.subplots(squeeze=False))
     panel.axhline(STORED, color="0.5", linestyle="--")
-    panel.annotate("float32 rounding of what is stored", (0, STORED), (4, -11), xycoords=("axes fraction", "data"),
-                   textcoords="offset points", color="0.5", fontsize=8)  # fmt: skip
-    sizes = {points: 16 + 28 * place for place, points in enumerate(sorted({row["points"] for row in rows}))}
+    panel.annotate(
+        "float32 rounding of what is stored",
+        (0, STORED),
+        (4, -11),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        color="0.5",
+        fontsize=8,
+    )
+    sizes = {
+        points: 16 + 28 * place
+        for place, points in enumerate(sorted({row["points"] for row in rows}))
+    }
     for name in dict.fromkeys(row["name"] for row in rows):
         line = sorted((row for row in rows if row["name"] == name), key=lambda row: row["points"])
         colour = COLOURS[methods.index(line[0]["method"])]
         times, errors = ([row[key] for row in line] for key in ("ms", "error"))
         panel.plot(times, errors, color=colour, linewidth=1)
         panel.scatter(times, errors, [sizes[row["points"]] for row in line], color=colour)
-        panel.annotate(name, (times[-1], errors[-1]), (8, 9), textcoords="offset points", ha="right", color=colour)
-    panel.set(xscale="log", yscale="log", xlabel="ms per signal, 1 core", ylabel="error / largest value of the signal")
+        panel.annotate(
+            name,
+            (times[-1], errors[-1]),
+            (8, 9),
+            textcoords="offset points",
+            ha="right",
+            color=colour,
+        )
+    panel.set(
+        xscale="log",
+        yscale="log",
+        xlabel="ms per signal, 1 core",
+        ylabel="error / largest value of the signal",
+    )
     for size in sizes.items():
         panel.scatter([], [], size[1], color="0.5", label=f"{size[0]} points")
     panel.legend(frameon=False)
@@ -118,14 +202,18 @@ def echo(measured: list[dict[str, str]]) -> Plot:
 
 def main(arguments: list[str]) -> None:
     """Write one of the plots as SVG."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.report.figures.cost_plots", description=__doc__)
+    line = argparse.ArgumentParser(
+        prog="python -m lowalt.report.figures.cost_plots", description=__doc__
+    )
     line.add_argument("plot", choices=("echo", "recognition"), help="the echo, or the networks")
     line.add_argument("--table", required=True, help="cost.csv or accuracy_cost.csv")
     line.add_argument("--figure", required=True, help="picture to write (.svg)")
     options = line.parse_args(arguments)
     draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[options.plot]
     # A document may have any background colour.
-    text = draw(read_csv(options.table, *columns)).svg.replace("<svg", '<svg style="background: white"', 1)
+    text = draw(read_csv(options.table, *columns)).svg.replace(
+        "<svg", '<svg style="background: white"', 1
+    )
     write_file(options.figure, text)
 
 

@@ -15,16 +15,32 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-DPI, SVG_DPI = 110, 72
-"""Dots per inch of PNG figures; points per inch of SVG ones, which matplotlib lays out at that resolution."""
+DPI = 110
+SVG_DPI = 72
+"""Dots per inch of PNG figures; points per inch of SVG ones, which matplotlib lays out at that
+resolution.
+"""
 
 SNR_LABELS = {"inf": "∞"}
-COLOURS = ["#0969da", "#bc4c00", "#1a7f37", "#8250df", "#bf3989", "#9a6700", "#6e7781", "#1b7c83", "#cf222e", "#953800"]
+COLOURS = [
+    "#0969da",
+    "#bc4c00",
+    "#1a7f37",
+    "#8250df",
+    "#bf3989",
+    "#9a6700",
+    "#6e7781",
+    "#1b7c83",
+    "#cf222e",
+    "#953800",
+]
 """Colours of lines, which stand out on white and on black."""
 
 
 def plain(panels: np.ndarray) -> list[Axes]:
-    """Return the panels of a plot as a list, in a look for light and dark pages: grey lines and a faint grid."""
+    """Return the panels of a plot as a list, in a look for light and dark pages: grey lines and a
+    faint grid.
+    """
     for panel in panels.flat:
         panel.patch.set_visible(False)
         panel.grid(alpha=0.4)
@@ -35,9 +51,11 @@ def plain(panels: np.ndarray) -> list[Axes]:
 
 
 def png(figure: Figure, colours: int = 0) -> bytes:
-    """Return the figure as PNG bytes and close it; no dates inside, so equal figures are equal bytes.
+    """Return the figure as PNG bytes and close it; no dates inside, so equal figures are equal
+    bytes.
 
-    colours: largest number of colours (0: no limit); a limit halves the bytes of figures full of spectra.
+    colours: largest number of colours (0: no limit); a limit halves the bytes of figures full of
+    spectra.
     """
     buffer = io.BytesIO()
     settle(figure, DPI)
@@ -59,7 +77,9 @@ def svg(figure: Figure) -> str:
     with plt.rc_context({"svg.hashsalt": "lowalt", "svg.fonttype": "none"}):
         settle(figure, SVG_DPI)
         nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-        figure.savefig(buffer, format="svg", bbox_inches="tight", metadata=nothing, facecolor="none")
+        figure.savefig(
+            buffer, format="svg", bbox_inches="tight", metadata=nothing, facecolor="none"
+        )
     plt.close(figure)
     text = buffer.getvalue()
     return re.sub(r'(width|height)="([\d.]+)pt"', r'\1="\2"', text[text.index("<svg") :])

@@ -1,4 +1,6 @@
-"""Pictures of one target: points by part with hinges, axes and normals, motion over a cycle, the three spectra."""
+"""Pictures of one target: points by part with hinges, axes and normals, motion over a cycle, the
+three spectra.
+"""
 
 from pathlib import Path
 
@@ -33,7 +35,10 @@ CONFIG = SHIPPED / "config/default.yaml"
 def _colours(cloud: Cloud) -> np.ndarray:
     """RGBA colour of each point (L, 4), by its part."""
     table = plt.get_cmap("tab20")
-    parts = [(0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20) for i, kind in enumerate(cloud.kinds)]
+    parts = [
+        (0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20)
+        for i, kind in enumerate(cloud.kinds)
+    ]
     return np.array(parts)[cloud.part]
 
 
@@ -43,23 +48,42 @@ def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
     return (flat.min(axis=0) + flat.max(axis=0)) / 2, 0.58 * float(np.ptp(flat, axis=0).max())
 
 
-def _view(panel, cloud: Cloud, points: np.ndarray, view: tuple[str, int, int], middle: np.ndarray, half: float) -> None:
-    """Draw points (L, 3) m and the bones between them as seen along one axis, in a square of half width `half`."""
+def _view(
+    panel,
+    cloud: Cloud,
+    points: np.ndarray,
+    view: tuple[str, int, int],
+    middle: np.ndarray,
+    half: float,
+) -> None:
+    """Draw points (L, 3) m and the bones between them as seen along one axis, in a square of half
+    width `half`.
+    """
     title, across, up = view
     panel.scatter(points[:, across], points[:, up], s=6, c=_colours(cloud), linewidths=0)
     for bone in bones(cloud.names):
         x, y = points[list(bone)][:, [across, up]].T
         panel.plot(x, y, color="0.6", linewidth=0.8, zorder=0)
-    panel.set(xlim=middle[across] + np.array([-half, half]), ylim=middle[up] + np.array([-half, half]), aspect="equal")
+    panel.set(
+        xlim=middle[across] + np.array([-half, half]),
+        ylim=middle[up] + np.array([-half, half]),
+        aspect="equal",
+    )
     panel.set(title=title, xlabel=AXES[across], ylabel=AXES[up])
     panel.grid(alpha=0.25)
 
 
-def _marks(panel, cloud: Cloud, view: tuple[str, int, int], middle: np.ndarray, half: float) -> None:
+def _marks(
+    panel, cloud: Cloud, view: tuple[str, int, int], middle: np.ndarray, half: float
+) -> None:
     """Hinges with their axes, some normals, and an arrow to the front where the view shows it."""
     _, across, up = view
     known = np.flatnonzero(np.isfinite(cloud.normals).all(axis=1))
-    some = known[np.linspace(0, len(known) - 1, min(NORMALS, len(known))).round().astype(int)] if len(known) else known
+    some = (
+        known[np.linspace(0, len(known) - 1, min(NORMALS, len(known))).round().astype(int)]
+        if len(known)
+        else known
+    )
     tips = cloud.points[some] + 0.05 * half * cloud.normals[some]
     ends = np.stack([cloud.points[some], tips])
     panel.plot(ends[..., across], ends[..., up], color="0.75", linewidth=0.5, zorder=0)
@@ -69,18 +93,35 @@ def _marks(panel, cloud: Cloud, view: tuple[str, int, int], middle: np.ndarray, 
             panel.plot(ends[:, across], ends[:, up], color="black", linewidth=0.9)
             panel.plot(hinge[across], hinge[up], "k.", markersize=4)
     if 1 in (across, up):
-        start = np.array([middle[across], middle[up]]) - (0.9 * half if across != 1 else 0) * np.array([1, 0])
+        start = np.array([middle[across], middle[up]]) - (
+            0.9 * half if across != 1 else 0
+        ) * np.array([1, 0])
         step = 0.8 * half * (np.array([0, 1]) if up == 1 else np.array([1, 0]))
         start = start - (step / 2 if up == 1 else np.array([0.4 * half, 0.92 * half]))
-        panel.annotate("front", xy=start + step, xytext=start, color="tab:red", fontsize=8, ha="center", va="center",
-                       arrowprops={"arrowstyle": "->", "color": "tab:red"})  # fmt: skip
+        panel.annotate(
+            "front",
+            xy=start + step,
+            xytext=start,
+            color="tab:red",
+            fontsize=8,
+            ha="center",
+            va="center",
+            arrowprops={"arrowstyle": "->", "color": "tab:red"},
+        )
 
 
 def _motion_row(cloud: Cloud, config: dict, seed: int) -> dict:
     """One motion model of the target, drawn as the motion stage draws them."""
     masts = np.array(masts_m(config["network"]))
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
-    row = draw(stream(seed, "show", cloud.subtype), cloud, cloud.record["published"], masts, corners, config["motion"])
+    row = draw(
+        stream(seed, "show", cloud.subtype),
+        cloud,
+        cloud.record["published"],
+        masts,
+        corners,
+        config["motion"],
+    )
     return {**row, "group": cloud.record.get("group", "seen"), "model": 0}
 
 
@@ -95,7 +136,8 @@ def _decibel(values: np.ndarray) -> np.ndarray:
 def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
     """Up to three spectra of the first station, axes in seconds and metres a second."""
     network = Network.from_settings(config["network"])
-    station, settings = network.stations[0], Spectra.from_settings(config["spectra"])
+    station = network.stations[0]
+    settings = Spectra.from_settings(config["spectra"])
     motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
     aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
     signal = echo_signal(network, station, motion, cloud.rcs_m2, aim).signal
@@ -111,24 +153,38 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
             top = float(abs(values).max()) or 1.0
             scale = {"vmin": -top, "vmax": top, "cmap": "RdBu_r"}
         extent = *times_s(windows, network), *kind.speeds(windows, network, station)
-        picture = panel.imshow(values, origin="lower", aspect="auto", extent=extent, interpolation="nearest", **scale)
-        panel.set(title=kind.TITLE, xlabel="time (s)", ylabel="radial speed (m/s)\nreceding upwards, folded")
+        picture = panel.imshow(
+            values, origin="lower", aspect="auto", extent=extent, interpolation="nearest", **scale
+        )
+        panel.set(
+            title=kind.TITLE,
+            xlabel="time (s)",
+            ylabel="radial speed (m/s)\nreceding upwards, folded",
+        )
         panel.set_ylim(sorted(extent[2:]))
-        panel.figure.colorbar(picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05)
+        panel.figure.colorbar(
+            picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05
+        )
 
 
 def most_moved(cloud: Cloud, frames: np.ndarray) -> np.ndarray:
-    """Return the numbers of the points whose paths are drawn, of frames (T, L, 3) m: the point of each moving part that
-    travels farthest, or the four nodes of a recording that do. Empty where nothing moves."""
+    """Return the numbers of the points whose paths are drawn, of frames (T, L, 3) m: the point of
+    each moving part that travels farthest, or the four nodes of a recording that do. Empty where
+    nothing moves."""
     travelled = np.linalg.norm(np.diff(frames, axis=0), axis=2).sum(axis=0)
     if len(cloud.track):
         return np.argsort(-travelled, kind="stable")[:4]
-    parts = [np.flatnonzero(cloud.part == part) for part, kind in enumerate(cloud.kinds) if kind != "body"]
+    parts = [
+        np.flatnonzero(cloud.part == part)
+        for part, kind in enumerate(cloud.kinds)
+        if kind != "body"
+    ]
     return np.array([part[travelled[part].argmax()] for part in parts if len(part)], int)
 
 
 def _instants(panels, cloud: Cloud, row: dict) -> None:
-    """The target at four instants of a cycle, and the paths of the tips of its moving parts over the whole cycle.
+    """The target at four instants of a cycle, and the paths of the tips of its moving parts over
+    the whole cycle.
 
     A part that turns is seen along its axis, wings from behind, and a recording from the right.
     """
@@ -137,23 +193,29 @@ def _instants(panels, cloud: Cloud, row: dict) -> None:
     tips = most_moved(cloud, frames)
     along = np.array([1.0, 0, 0])
     if not len(cloud.track):  # the axes of larger parts count more
-        sizes = [np.ptp(cloud.points[cloud.part == part], axis=0).max() for part in range(len(cloud.kinds))]
+        sizes = [
+            np.ptp(cloud.points[cloud.part == part], axis=0).max()
+            for part in range(len(cloud.kinds))
+        ]
         along = np.array(sizes) @ np.abs(np.nan_to_num(cloud.axes))
     view = {2: DIRECTIONS[0], 0: DIRECTIONS[1], 1: DIRECTIONS[2]}[int(along.argmax())]
     _, across, up = view
     middle, half = _limits(frames)
     for panel, step in zip(panels, (np.arange(len(panels)) * STEPS) // len(panels), strict=True):
-        # Two blades look the same after half a turn, so an eighth of the cycle is added in each panel.
+        # Two blades look the same after half a turn, so an eighth of the cycle is added in each
+        # panel.
         step = int(step / 2) if "rotor" in cloud.kinds or "wheel" in cloud.kinds else int(step)
         _view(panel, cloud, frames[step], view, middle, half)
         panel.plot(frames[:, tips, across], frames[:, tips, up], color="tab:red", linewidth=0.7)
-        panel.plot(frames[step, tips, across], frames[step, tips, up], "o", color="tab:red", markersize=4)
+        panel.plot(
+            frames[step, tips, across], frames[step, tips, up], "o", color="tab:red", markersize=4
+        )
         panel.set(title=f"{view[0]}, {1000 * step / STEPS * length:.4g} of {1000 * length:.4g} ms")
 
 
 def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:
-    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, the target at four instants of a
-    cycle with the paths of its tips, and one motion model's spectra.
+    """Return a PNG of a cloud: three views in metres with hinges, axes and normals, the target at
+    four instants of a cycle with the paths of its tips, and one motion model's spectra.
 
     The motion model is drawn as the workflow draws them, for the network of the configuration.
     Raises: InputError where there is no such configuration, or the target's motion cannot be drawn.
@@ -162,7 +224,8 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     row = _motion_row(cloud, config, seed)
     figure = plt.figure(figsize=(14, 13), layout="constrained")
     views, instants, spectra = (
-        row_of.subplots(1, count) for row_of, count in zip(figure.subfigures(3, 1), (3, 4, 3), strict=True)
+        row_of.subplots(1, count)
+        for row_of, count in zip(figure.subfigures(3, 1), (3, 4, 3), strict=True)
     )
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
@@ -174,5 +237,7 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     size = " x ".join(f"{value:.3g}" for value in np.ptp(points, axis=0))
     doubts = "".join(f"\nwarning: {text}" for text in cloud.record.get("warnings", []))
     about = f"{cloud.subtype} ({cloud.category}, {cloud.record['source']})"
-    figure.suptitle(f"{about}: {len(points)} points, {len(cloud.kinds)} parts, {size} m{doubts}", fontsize=11)
+    figure.suptitle(
+        f"{about}: {len(points)} points, {len(cloud.kinds)} parts, {size} m{doubts}", fontsize=11
+    )
     return png(figure)

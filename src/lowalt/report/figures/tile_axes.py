@@ -1,4 +1,6 @@
-"""One sample as a picture with axes, a row for each station, a column for each spectrum; and samples of each class."""
+"""One sample as a picture with axes, a row for each station, a column for each spectrum; and
+samples of each class.
+"""
 
 from typing import NamedTuple
 
@@ -14,7 +16,9 @@ from lowalt.tiles.render import Renderer, split
 
 
 class Axes(NamedTuple):
-    """The scales of an image: name, first and last value of its columns, and of its rows from below."""
+    """The scales of an image: name, first and last value of its columns, and of its rows from
+    below.
+    """
 
     across: tuple[str, float, float]
     upwards: tuple[str, float, float]
@@ -23,38 +27,57 @@ class Axes(NamedTuple):
 def times_s(settings: Fourier | Transfer, network: Network) -> tuple[float, float]:
     """Return the times (s) of a spectrum's first and last column, each at the middle of its window."""
     middle = (settings.window - 1) / 2
-    return network.symbol_interval_s * middle, network.symbol_interval_s * (network.symbols - 1 - middle)
+    return network.symbol_interval_s * middle, network.symbol_interval_s * (
+        network.symbols - 1 - middle
+    )
 
 
 def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
-    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom."""
-    settings, network, kind = renderer.spectra[name], renderer.network, spectrum(name)
+    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first
+    row at the bottom.
+    """
+    settings = renderer.spectra[name]
+    network = renderer.network
+    kind = spectrum(name)
     if isinstance(kind, OfCells):
         return Axes(*kind.axes(settings, network, station))
     first, last = kind.speeds(settings, network, station)
-    return Axes(("time (s)", *times_s(settings, network)), ("radial speed (m/s)\nreceding upwards", first, last))
+    return Axes(
+        ("time (s)", *times_s(settings, network)),
+        ("radial speed (m/s)\nreceding upwards", first, last),
+    )
 
 
 def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
-    """Return the picture (PNG bytes) of a tile of index values (rows, columns) uint8, with time and speed on its axes.
+    """Return the picture (PNG bytes) of a tile of index values (rows, columns) uint8, with time and
+    speed on its axes.
 
-    Where a spectrum's top row approaches, its image is turned over, so that receding is upwards everywhere. Speeds
-    beyond the largest that a spectrum shows fold back into it: the phase then turns by more than half a circle from
-    symbol to symbol.
+    Where a spectrum's top row approaches, its image is turned over, so that receding is upwards
+    everywhere. Speeds beyond the largest that a spectrum shows fold back into it: the phase then
+    turns by more than half a circle from symbol to symbol.
     """
-    network, names = renderer.network, list(renderer.spectra)
+    network = renderer.network
+    names = list(renderer.spectra)
     shape = len(network.stations), len(names)
     images = split(tile, len(names))
-    drawn, panels = plt.subplots(*shape, figsize=(3.3 * shape[1], 2.6 * shape[0]), squeeze=False, layout="constrained")
+    drawn, panels = plt.subplots(
+        *shape, figsize=(3.3 * shape[1], 2.6 * shape[0]), squeeze=False, layout="constrained"
+    )
     drawn.suptitle(title, fontsize=10)
     for number, panel in enumerate(panels.flat):
         row, column = divmod(number, shape[1])
-        station, name = network.stations[row], names[column]
+        station = network.stations[row]
+        name = names[column]
         axes = axes_of(name, station, renderer)
         panel.imshow(
-            images[number], cmap=renderer.images.colour_map, vmin=0, vmax=255, aspect="auto", interpolation="nearest",
+            images[number],
+            cmap=renderer.images.colour_map,
+            vmin=0,
+            vmax=255,
+            aspect="auto",
+            interpolation="nearest",
             extent=(*axes.across[1:], *axes.upwards[1:]),
-        )  # fmt: skip
+        )
         panel.set_ylim(sorted(axes.upwards[1:]))
         cells = isinstance(spectrum(name), OfCells)
         folds = "" if cells else f"folds beyond {max(map(abs, axes.upwards[1:])):.1f} m/s"
@@ -67,16 +90,22 @@ def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
 
 
 def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
-    """Return (caption, PNG bytes) of the sample of highest SNR of each category's first motion model in the set."""
+    """Return (caption, PNG bytes) of the sample of highest SNR of each category's first motion
+    model in the set.
+    """
     chosen = []
     for label, category in enumerate(shards.classes):
         numbers = np.flatnonzero(shards.labels == label)
         if len(numbers):
             best = numbers[np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))[0]]
             record = shards.record(int(best))
-            noise = "no noise" if np.isinf(shards.snrs_db[best]) else f"SNR {shards.snrs_db[best]:g} dB"
+            noise = (
+                "no noise" if np.isinf(shards.snrs_db[best]) else f"SNR {shards.snrs_db[best]:g} dB"
+            )
             caption = f"{category}: {record['subtype']}, motion model {record['model']}, {noise}"
             stored = shards.kind == "image"
-            picture = shards.png(int(best)) if stored else encode(shards.tile(int(best)), shards.palette)
+            picture = (
+                shards.png(int(best)) if stored else encode(shards.tile(int(best)), shards.palette)
+            )
             chosen.append((caption, picture))
     return chosen

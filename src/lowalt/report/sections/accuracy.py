@@ -12,9 +12,12 @@ COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
 
 def network_words(block: dict) -> str:
     """Return the network and its training in words, from the configuration's `recognition` block."""
-    network, training = block["network"], block["training"]
+    network = block["network"]
+    training = block["training"]
     start = {"none": "random initial weights", "hub": "ImageNet weights from the hub"}
-    weights = start.get(network["weights"], f"weights from the file {Path(network['weights']).name}")
+    weights = start.get(
+        network["weights"], f"weights from the file {Path(network['weights']).name}"
+    )
     seeds = len(block["seeds"])
     return (
         f"{network['backbone']} at {block['size']} pixels, {weights}, at most {training['steps']} steps of "
@@ -26,11 +29,18 @@ def values(run: ReportedRun) -> dict:
     """Return accuracies of this run and of the paper, their figure, and the network in words."""
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     ours = by_scheme(measured)
-    paper = by_scheme(read_csv(run.inputs.path("published"), *COLUMNS)) if "published" in run.inputs else {}
+    paper = (
+        by_scheme(read_csv(run.inputs.path("published"), *COLUMNS))
+        if "published" in run.inputs
+        else {}
+    )
     return {
         "classes": len(run.shards.classes),
-        "ours": ours, "published": paper, "spreads": spreads(measured), "snrs": run.snr_labels,
+        "ours": ours,
+        "published": paper,
+        "spreads": spreads(measured),
+        "snrs": run.snr_labels,
         "macro_f1": macro_f1(measured),
         "network": network_words(run.config["recognition"]),
         "plot": over_snr(ours, paper) if ours else None,
-    }  # fmt: skip
+    }

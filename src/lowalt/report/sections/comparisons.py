@@ -1,8 +1,19 @@
-"""Section: which scheme is better than which, paired on the same samples, and whether the paper's orderings hold."""
+"""Section: which scheme is better than which, paired on the same samples, and whether the paper's
+orderings hold.
+"""
 
 from lowalt.report.reported_run import ReportedRun
 
-COMPARISONS = ("protocol", "scheme", "over", "difference_points", "low", "high", "resampled", "seeds")
+COMPARISONS = (
+    "protocol",
+    "scheme",
+    "over",
+    "difference_points",
+    "low",
+    "high",
+    "resampled",
+    "seeds",
+)
 ORDERINGS = ("protocol", "scheme", "over", "claim", "paper_points", "difference_points", "ordering")
 
 
@@ -19,17 +30,26 @@ def ordering_words(rows: list[dict[str, str]]) -> str:
     }
     for verdict, phrase in phrases.items():
         names = [
-            f"{row['scheme']} over {row['over']} ({row['protocol']})" for row in rows if row["ordering"] == verdict
+            f"{row['scheme']} over {row['over']} ({row['protocol']})"
+            for row in rows
+            if row["ordering"] == verdict
         ]
         words += f"; {phrase}: {', '.join(names)}" if names else ""
     return words + "."
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the paired comparisons and the paper's orderings; None where no two compared schemes were trained."""
+    """Return the paired comparisons and the paper's orderings; None where no two compared schemes
+    were trained.
+    """
     comparisons = run.inputs.table("comparisons", *COMPARISONS)
     orderings = run.inputs.table("orderings", *ORDERINGS)
     if not comparisons:
         return None
     words = ordering_words(orderings) if orderings else ""
-    return {"comparisons": comparisons, "orderings": orderings, "words": words, "published": "published" in run.inputs}
+    return {
+        "comparisons": comparisons,
+        "orderings": orderings,
+        "words": words,
+        "published": "published" in run.inputs,
+    }

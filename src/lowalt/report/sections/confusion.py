@@ -9,8 +9,11 @@ COLUMNS = ("protocol", "scheme", "snr_db", "category", "predicted", "samples")
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return both plots, that by SNR of the best scheme of each protocol; None where nothing was predicted."""
-    rows, classes = run.inputs.table("confusion_by_snr", *COLUMNS), run.shards.classes
+    """Return both plots, that by SNR of the best scheme of each protocol; None where nothing was
+    predicted.
+    """
+    rows = run.inputs.table("confusion_by_snr", *COLUMNS)
+    classes = run.shards.classes
     if not rows:
         return None
     best = best_schemes(by_scheme(run.inputs.table("accuracy", *accuracy.COLUMNS)))

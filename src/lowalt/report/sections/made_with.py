@@ -1,4 +1,6 @@
-"""Section: what made the run: revision, seeds, machines, versions, checksums, configuration, and the commands again."""
+"""Section: what made the run: revision, seeds, machines, versions, checksums, configuration, and
+the commands again.
+"""
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
@@ -12,9 +14,21 @@ from lowalt.report.provenance import changes, checksums, code_sum, commands, rev
 from lowalt.report.reported_run import ReportedRun
 
 NAMES = (
-    "lowalt", "snakemake", "numpy", "scipy", "numba", "llvmlite", "pillow", "deflate", "trimesh", "pymeshlab", "torch",
-    "torchvision", "timm", "matplotlib",
-)  # fmt: skip
+    "lowalt",
+    "snakemake",
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "pillow",
+    "deflate",
+    "trimesh",
+    "pymeshlab",
+    "torch",
+    "torchvision",
+    "timm",
+    "matplotlib",
+)
 """Packages whose version can change a run's outputs, or the page."""
 BASE = "config/default.yaml"
 
@@ -34,17 +48,30 @@ def machines(run: ReportedRun) -> list[tuple[str, str]]:
     """Return (product, machine) of the trainings, by their own records, and of the page."""
     rows = run.inputs.table("seeds")
     trained = {
-        f"training: {row['protocol']} {row['scheme']}, seed {row['seed']}": row.get("hardware", "") for row in rows
+        f"training: {row['protocol']} {row['scheme']}, seed {row['seed']}": row.get("hardware", "")
+        for row in rows
     }
-    return [("this page", describe()), *((name, machine) for name, machine in trained.items() if machine)]
+    return [
+        ("this page", describe()),
+        *((name, machine) for name, machine in trained.items() if machine),
+    ]
 
 
 def values(run: ReportedRun) -> dict:
-    """Return the revision, the seeds, machines, versions, checksums, the configuration and the commands again."""
+    """Return the revision, the seeds, machines, versions, checksums, the configuration and the
+    commands again.
+    """
     commit = revision()
     lines, overlay = commands(commit, changes(load_yaml(shipped(BASE)), as_named(run.config)))
     return {
-        "commit": commit, "code": code_sum(), "seed": run.config["seed"], "seeds": run.config["recognition"]["seeds"],
-        "machines": machines(run), "versions": versions(), "files": checksums(run.inputs.files), "commands": lines,
-        "overlay": overlay, "configuration": yaml.safe_dump(run.config, sort_keys=False, allow_unicode=True),
-    }  # fmt: skip
+        "commit": commit,
+        "code": code_sum(),
+        "seed": run.config["seed"],
+        "seeds": run.config["recognition"]["seeds"],
+        "machines": machines(run),
+        "versions": versions(),
+        "files": checksums(run.inputs.files),
+        "commands": lines,
+        "overlay": overlay,
+        "configuration": yaml.safe_dump(run.config, sort_keys=False, allow_unicode=True),
+    }

@@ -1,4 +1,6 @@
-"""Section: what the run is, its accuracies beside the paper's in one sentence each, and a tile of each category."""
+"""Section: what the run is, its accuracies beside the paper's in one sentence each, and a tile of
+each category.
+"""
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.machine.hardware import describe
@@ -14,39 +16,65 @@ TILES = 4
 
 
 def verdict(paper: float | None, classes: int, seeds: int) -> str:
-    """Return sentences that help to judge an average accuracy (percent); paper: the published one, or None."""
+    """Return sentences that help to judge an average accuracy (percent); paper: the published one,
+    or None.
+    """
     words = [f"Chance level is {100 / classes:.0f} %."]
     if paper is not None:
-        words.append(f"The paper reports {paper:.1f} %; its data are not public, so the figures are not comparable.")
+        words.append(
+            f"The paper reports {paper:.1f} %; its data are not public, so the figures are not comparable."
+        )
     if seeds < 3:
         words.append("One training seed; another seed changes this by about one point.")
     return " ".join(words)
 
 
-def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]], classes: int) -> list[dict]:
-    """Return one entry per protocol: scheme of highest average, its accuracy, interval of macro F1, and a verdict."""
-    ours, paper, intervals = by_scheme(rows), by_scheme(published), macro_f1(rows)
+def accuracies(
+    rows: list[dict[str, str]], published: list[dict[str, str]], classes: int
+) -> list[dict]:
+    """Return one entry per protocol: scheme of highest average, its accuracy, interval of macro F1,
+    and a verdict.
+    """
+    ours = by_scheme(rows)
+    paper = by_scheme(published)
+    intervals = macro_f1(rows)
     entries = []
     for protocol, scheme in best_schemes(ours).items():
-        here, there = ours[protocol][scheme]["avg"], paper.get(protocol, {}).get(scheme, {}).get("avg")
+        here = ours[protocol][scheme]["avg"]
+        there = paper.get(protocol, {}).get(scheme, {}).get("avg")
         seeds = max(int(row["seeds"]) for row in rows)
-        entries.append({
-            "protocol": protocol, "scheme": scheme, "percent": here, "paper": there,
-            "interval": intervals.get(protocol, {}).get(scheme, ""), "words": verdict(there, classes, seeds),
-        })  # fmt: skip
+        entries.append(
+            {
+                "protocol": protocol,
+                "scheme": scheme,
+                "percent": here,
+                "paper": there,
+                "interval": intervals.get(protocol, {}).get(scheme, ""),
+                "words": verdict(there, classes, seeds),
+            }
+        )
     return entries
 
 
 def values(run: ReportedRun) -> dict:
     """Return the run's size, its accuracies with a verdict, and tiles of its first classes."""
-    published = read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
+    published = (
+        read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
+    )
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     tiles = [(caption, embedded(data)) for caption, data in example_tiles(run.shards)[:TILES]]
     return {
-        "seed": run.config["seed"], "stations": len(run.stations), "snrs": len(run.snr_labels),
-        "models": len(run.shards) // len(run.snr_labels), "subtypes": len(run.inputs.paths("clouds")),
-        "samples": len(run.shards), "kind": run.shards.kind, "sample_bytes": run.sample_bytes,
-        "hardware": describe(), "station_names": run.stations,
+        "seed": run.config["seed"],
+        "stations": len(run.stations),
+        "snrs": len(run.snr_labels),
+        "models": len(run.shards) // len(run.snr_labels),
+        "subtypes": len(run.inputs.paths("clouds")),
+        "samples": len(run.shards),
+        "kind": run.shards.kind,
+        "sample_bytes": run.sample_bytes,
+        "hardware": describe(),
+        "station_names": run.stations,
         "spectra": [name.upper() for name in named(run.config["spectra"])],
-        "accuracies": accuracies(measured, published, len(run.shards.classes)), "tiles": tiles,
-    }  # fmt: skip
+        "accuracies": accuracies(measured, published, len(run.shards.classes)),
+        "tiles": tiles,
+    }

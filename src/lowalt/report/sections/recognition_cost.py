@@ -1,18 +1,35 @@
-"""Section: recognition accuracy against computing time, from this run's table or the stored reference."""
+"""Section: recognition accuracy against computing time, from this run's table or the stored
+reference.
+"""
 
 from lowalt.report.figures import cost_plots
 from lowalt.report.reported_run import ReportedRun
 
-SHOWN = (*cost_plots.PRESET, "pixels", "train_samples", "steps", "seen_percent", "inference_ms_1", "inference_ms_64",
-         "hardware")  # fmt: skip
+SHOWN = (
+    *cost_plots.PRESET,
+    "pixels",
+    "train_samples",
+    "steps",
+    "seen_percent",
+    "inference_ms_1",
+    "inference_ms_64",
+    "hardware",
+)
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the plot, the presets and all rows; None where neither run nor reference has the table."""
+    """Return the plot, the presets and all rows; None where neither run nor reference has the
+    table.
+    """
     name = run.inputs.own_or_kept("accuracy_cost")
     if name is None:
         return None
     rows = run.inputs.table(name, *cost_plots.RECOGNITION, *SHOWN)
     presets = sorted((row for row in rows if row["preset"]), key=cost_plots.seconds)
-    return {"own": name == "accuracy_cost", "rows": rows, "presets": presets,
-            "hardware": rows[0]["hardware"], "plot": cost_plots.recognition(rows)}  # fmt: skip
+    return {
+        "own": name == "accuracy_cost",
+        "rows": rows,
+        "presets": presets,
+        "hardware": rows[0]["hardware"],
+        "plot": cost_plots.recognition(rows),
+    }

@@ -16,10 +16,15 @@ def values(run: ReportedRun) -> dict:
 
     inputs = run.config["inputs"] or os.environ.get("LOWALT_INPUTS")
     try:
-        scene, chosen = explanation.scene_of(run.config), explanation.samples(run.config, inputs and Path(inputs), [])
+        scene = explanation.scene_of(run.config)
+        chosen = explanation.samples(run.config, inputs and Path(inputs), [])
     except InputError as error:
         # Show the page without the verdict where, for example, the recordings have been moved.
         return {"lines": [f"not explained: {error}"]}
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
-    findings = [explanation.finding(scene, end, sample, clouds) for sample in chosen for end in scene.network.stations]
+    findings = [
+        explanation.finding(scene, end, sample, clouds)
+        for sample in chosen
+        for end in scene.network.stations
+    ]
     return {"lines": explanation.verdict(findings)}

@@ -8,7 +8,9 @@ USUAL = 300
 
 
 def sentence(rows: list[dict[str, str]]) -> str:
-    """Return what a tolerance saves; "" where the exact mode or tolerances were not timed. rows: of cost.csv."""
+    """Return what a tolerance saves; "" where the exact mode or tolerances were not timed. rows: of
+    cost.csv.
+    """
     times: dict[int, dict[str, float]] = {}
     for row in rows:
         if row["tolerance"]:
@@ -20,10 +22,13 @@ def sentence(rows: list[dict[str, str]]) -> str:
     }
     if not pairs:
         return ""
-    usual, most = min(pairs, key=lambda points: abs(points - USUAL)), max(pairs)
+    usual = min(pairs, key=lambda points: abs(points - USUAL))
+    most = max(pairs)
     exact, saved = pairs[usual]
     words = f"Exact costs {exact:.2f} ms per signal of {usual} points, and tolerances save at most {saved:.2f} ms of it"
-    of_the_largest = "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
+    of_the_largest = (
+        "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
+    )
     return f"{words}{of_the_largest}" + (", so use exact." if saved < exact / 2 else ".")
 
 
@@ -33,5 +38,9 @@ def values(run: ReportedRun) -> dict | None:
     if name is None:
         return None
     rows = run.inputs.table(name, *cost_plots.ECHO, "hardware")
-    return {"own": name == "echo_cost", "hardware": rows[0]["hardware"], "plot": cost_plots.echo(rows),
-            "sentence": sentence(rows)}  # fmt: skip
+    return {
+        "own": name == "echo_cost",
+        "hardware": rows[0]["hardware"],
+        "plot": cost_plots.echo(rows),
+        "sentence": sentence(rows),
+    }

@@ -16,23 +16,37 @@ DISTANCES = ("category", "subtype", "nearest_trained", "trained_distance", "trai
 WORST = 6
 """Subtypes that are shown with a reason."""
 TRAITS = {
-    "speed": ("faster", "slower", " m/s"), "distance": ("farther away", "nearer", " m"),
-    "height": ("higher up", "lower down", " m"), "rate": ("with quicker parts", "with slower parts", " Hz"),
-    "aspect": ("seen more from the side", "seen more from the front or rear", "° from nose or tail"),
-}  # fmt: skip
-"""What may set motion models apart: words where it is larger and where it is smaller, and its unit."""
-FEWEST, CHANCE = 5, 0.05
+    "speed": ("faster", "slower", " m/s"),
+    "distance": ("farther away", "nearer", " m"),
+    "height": ("higher up", "lower down", " m"),
+    "rate": ("with quicker parts", "with slower parts", " Hz"),
+    "aspect": (
+        "seen more from the side",
+        "seen more from the front or rear",
+        "° from nose or tail",
+    ),
+}
+"""What may set motion models apart: words where it is larger and where it is smaller, and its unit.
+"""
+FEWEST = 5
+CHANCE = 0.05
 """Fewest motion models of a kind that are compared; how often chance alone may name a trait."""
 
 
-def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
-    """Return (columns, rows) of accuracy by subtype: one column per protocol and scheme, one row per subtype."""
+def subtype_table(
+    rows: list[dict[str, str]],
+) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
+    """Return (columns, rows) of accuracy by subtype: one column per protocol and scheme, one row
+    per subtype.
+    """
     columns: dict[str, None] = {}
     table: dict[tuple[str, str], dict[str, str]] = {}
     for row in rows:
         column = f"{row['protocol']} {row['scheme']}"
         columns[column] = None
-        table.setdefault((row["subtype"], row["category"]), {})[column] = f"{float(row['accuracy_percent']):.1f}"
+        table.setdefault((row["subtype"], row["category"]), {})[column] = (
+            f"{float(row['accuracy_percent']):.1f}"
+        )
     return list(columns), [(name, category, values) for (name, category), values in table.items()]
 
 
@@ -60,11 +74,14 @@ def reasons(
 
 
 def _apart(always: list[str], sometimes: list[str], traits: Mapping[str, dict[str, float]]) -> str:
-    """Words for the trait that tells motion models that are always wrong from those that are sometimes right.
+    """Words for the trait that tells motion models that are always wrong from those that are
+    sometimes right.
 
     "" where there are too few of either, or where chance may well be the cause.
     """
-    wrong, right = ([traits[model] for model in models if model in traits] for models in (always, sometimes))
+    wrong, right = (
+        [traits[model] for model in models if model in traits] for models in (always, sometimes)
+    )
     if min(len(wrong), len(right)) < FEWEST:
         return ""
     values = {name: ([of[name] for of in wrong], [of[name] for of in right]) for name in TRAITS}
@@ -79,10 +96,14 @@ def _apart(always: list[str], sometimes: list[str], traits: Mapping[str, dict[st
 
 
 def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str, float]]:
-    """Return the numbers of TRAITS by motion model, seen from the first station; none where nothing says the motion."""
+    """Return the numbers of TRAITS by motion model, seen from the first station; none where nothing
+    says the motion.
+    """
     numbers = {key.decode(): number for number, key in enumerate(shards.keys.tolist())}
     result = {}
-    for name, first in zip(*(part.tolist() for part in np.unique(predictions.motion, return_index=True)), strict=True):
+    for name, first in zip(
+        *(part.tolist() for part in np.unique(predictions.motion, return_index=True)), strict=True
+    ):
         motion = shards.record(numbers[str(predictions.key[first])])["motion"]
         if motion.get("x_m") is not None:
             result[name] = {
@@ -96,7 +117,9 @@ def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str,
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the pivoted table, the worst subtype of the last column first, distances and reasons; None without any."""
+    """Return the pivoted table, the worst subtype of the last column first, distances and reasons;
+    None without any.
+    """
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}
     rows.sort(key=lambda row: float([*row[2].values()][-1]))
@@ -108,7 +131,13 @@ def values(run: ReportedRun) -> dict | None:
         predictions = read(files[-1], run.shards.classes).of(tested)
         in_common = reasons(predictions, run.shards.classes, traits_of(run.shards, predictions))
     return (
-        {"columns": columns, "rows": rows, "distances": distances, "reasons": in_common, "worst": WORST}
+        {
+            "columns": columns,
+            "rows": rows,
+            "distances": distances,
+            "reasons": in_common,
+            "worst": WORST,
+        }
         if rows
         else None
     )

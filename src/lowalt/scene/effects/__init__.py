@@ -1,6 +1,7 @@
 """The effects of a scene, one file each in the folder of its place, and the order of all.
 
-What such a file offers: `lowalt.scene.contract`. An effect is imported when a scene names it, and never otherwise.
+What such a file offers: `lowalt.scene.contract`. An effect is imported when a scene names it, and
+never otherwise.
 """
 
 import importlib
@@ -20,12 +21,15 @@ LISTED = {
     "motion": "rotor_spread gusts",
     "transmitter": "slow_time data_symbols power_amplifier comb_pilots",
     "channel": (
-        "pointing_error element_pattern mean_cross_section fluctuation cross_sections occlusion line_of_sight "
-        "ground_reflection walls reflected_aspect squint wavefront symbol_motion cyclic_prefix companions "
+        "pointing_error element_pattern mean_cross_section fluctuation cross_sections occlusion "
+        "line_of_sight "
+        "ground_reflection walls reflected_aspect squint wavefront symbol_motion cyclic_prefix "
+        "companions "
         "direct_path interference clutter background_channel"
     ),
     "receiver": (
-        "receiver_noise cell_noise link_offset timing_offset clock_offset carrier_offset phase_noise transmit_leakage "
+        "receiver_noise cell_noise link_offset timing_offset clock_offset carrier_offset "
+        "phase_noise transmit_leakage "
         "iq_imbalance adc"
     ),
     "detection": "canceller detector cell_error",
@@ -38,14 +42,21 @@ ADDED: dict[str, AddedEffect] = offered("effects")
 
 
 def _places() -> dict[str, str]:
-    """The place of every effect: those LISTED, then the others of its folder, and extensions' between."""
-    folder, result = Path(__file__).parent, {}
+    """The place of every effect: those LISTED, then the others of its folder, and extensions'
+    between.
+    """
+    folder = Path(__file__).parent
+    result = {}
     for place in PLACE_ORDER:
-        files = sorted(path.stem for path in (folder / place).glob("*.py") if path.stem != "__init__")
+        files = sorted(
+            path.stem for path in (folder / place).glob("*.py") if path.stem != "__init__"
+        )
         names = [*dict.fromkeys((*LISTED[place].split(), *files))]
         for name, added in ADDED.items():
             if added.place == place:
-                names.insert(names.index(added.after) + 1 if added.after in names else len(names), name)
+                names.insert(
+                    names.index(added.after) + 1 if added.after in names else len(names), name
+                )
         result |= dict.fromkeys(names, place)
     return result
 
@@ -66,11 +77,15 @@ class NamedEffect(NamedTuple):
     def idle(self) -> bool:
         """Whether the settings change nothing."""
         entries = getattr(self.module, "IDLE", ())
-        return any(all(self.settings[key] == value for key, value in entry.items()) for entry in entries)
+        return any(
+            all(self.settings[key] == value for key, value in entry.items()) for entry in entries
+        )
 
     @property
     def snr_db(self) -> float | None:
-        """The SNR at which the effect adds noise; None for each of noise.snr_db, and for effects without one."""
+        """The SNR at which the effect adds noise; None for each of noise.snr_db, and for effects
+        without one.
+        """
         return self.settings.get(getattr(self.module, "SET_SNR", None))
 
     def at_snr(self, snr_db: float) -> "NamedEffect":
@@ -80,7 +95,8 @@ class NamedEffect(NamedTuple):
 
 
 def dotted(name: str) -> str:
-    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc, or the path of the user's own.
+    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc, or the path of the
+    user's own.
 
     Raises: InputError for a name that belongs to no effect.
     """
@@ -102,17 +118,22 @@ def module_of(name: str) -> ModuleType:
 
 
 def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
-    """Return the effects of a scene's `effects` block in the chain's order, without those that are idle.
+    """Return the effects of a scene's `effects` block in the chain's order, without those that are
+    idle.
 
-    Raises: InputError for an unknown effect or parameter, or two effects that offer a function of which a scene has
-    one (`contract.OFFERS`).
+    Raises: InputError for an unknown effect or parameter, or two effects that offer a function of
+    which a scene has one (`contract.OFFERS`).
     """
     modules = {name: module_of(name) for name in block}
-    own, result = own_effects(block), []
+    own = own_effects(block)
+    result = []
     if len({Path(name).name for name in own}) < len(own):
-        raise InputError(f"effects: {own}, expected files of different names, after which random streams are called")
+        raise InputError(
+            f"effects: {own}, expected files of different names, after which random streams are called"
+        )
     for name in (*filter(block.__contains__, PLACES), *own):
-        module, changed = modules[name], block[name] or {}
+        module = modules[name]
+        changed = block[name] or {}
         unknown = sorted(set(changed) - set(module.DEFAULTS))
         if unknown:
             raise InputError(
@@ -120,7 +141,11 @@ def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
             )
         brought = name in own or name in ADDED
         settings = checked(name, module, changed) if brought else {**module.DEFAULTS, **changed}
-        result.append(NamedEffect(name, place_of(name, module) if name in own else PLACES[name], module, settings))
+        result.append(
+            NamedEffect(
+                name, place_of(name, module) if name in own else PLACES[name], module, settings
+            )
+        )
     result.sort(key=lambda effect: PLACE_ORDER.index(effect.place))
     acting = [effect for effect in result if not effect.idle]
     for function in OFFERS:
@@ -129,7 +154,9 @@ def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
 
 
 def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[..., Any]]:
-    """Return the functions of this name that effects offer, with their settings, by effect in the order given."""
+    """Return the functions of this name that effects offer, with their settings, by effect in the
+    order given.
+    """
     return {
         effect.name: partial(getattr(effect.module, function), effect.settings)
         for effect in effects
@@ -138,20 +165,26 @@ def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[.
 
 
 def offering(block: Mapping[str, dict | None], place: str, name: str) -> dict[str, dict]:
-    """Return the part of an `effects` block that acts at a place and has a function, or another name, of the contract.
+    """Return the part of an `effects` block that acts at a place and has a function, or another
+    name, of the contract.
 
     Only shipped effects of that place are imported; idle ones are left out.
     """
     asked = called({key: value for key, value in block.items() if PLACES.get(key) == place})
-    return {effect.name: block[effect.name] or {} for effect in asked if hasattr(effect.module, name)}
+    return {
+        effect.name: block[effect.name] or {} for effect in asked if hasattr(effect.module, name)
+    }
 
 
 def only(effects: Iterable[NamedEffect], function: str) -> Callable[..., Any] | None:
-    """Return the function of this name that one of the effects offers, with its settings, None where none does.
+    """Return the function of this name that one of the effects offers, with its settings, None
+    where none does.
 
     Raises: InputError where several effects offer a function of which a scene has one.
     """
     found = every(effects, function)
     if len(found) > 1 and OFFERS[function].one:
-        raise InputError(f"effects: {' and '.join(found)} both offer {function}, expected one of them in a scene")
+        raise InputError(
+            f"effects: {' and '.join(found)} both offer {function}, expected one of them in a scene"
+        )
     return next(iter(found.values()), None)

@@ -1,1 +1,3 @@
-"""Laws that effects share: fast fading, wind-blown land, flight in wind, linear Gaussian processes, clocks."""
+"""Laws that effects share: fast fading, wind-blown land, flight in wind, linear Gaussian processes,
+clocks.
+"""

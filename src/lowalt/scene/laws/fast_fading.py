@@ -1,7 +1,8 @@
 """Clusters and rays of a link without line of sight, drawn as the tables of 3GPP TR 38.901 say.
 
-Steps 3 to 8 of clause 7.5 for one link from a base station to a point, and the absolute delay of clause 7.6.9. Only
-directions of departure are drawn; one polarisation. Frequencies are in GHz and angles in degrees, as in the tables.
+Steps 3 to 8 of clause 7.5 for one link from a base station to a point, and the absolute delay of
+clause 7.6.9. Only directions of departure are drawn; one polarisation. Frequencies are in GHz and
+angles in degrees, as in the tables.
 """
 
 import math
@@ -14,7 +15,9 @@ from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.numerics import portable
 from lowalt.numerics.large_matrices import upper_root
 
-OFFSETS = np.repeat([0.0447, 0.1413, 0.2492, 0.3715, 0.5129, 0.6797, 0.8844, 1.1481, 1.5195, 2.1551], 2)
+OFFSETS = np.repeat(
+    [0.0447, 0.1413, 0.2492, 0.3715, 0.5129, 0.6797, 0.8844, 1.1481, 1.5195, 2.1551], 2
+)
 OFFSETS[1::2] *= -1
 """Angles (20,) of a cluster's rays, in units of its spread. Source: Table 7.5-3."""
 PARTS = (np.r_[0:8, 18, 19], np.r_[8:12, 16, 17], np.r_[12:16])
@@ -52,18 +55,38 @@ class Fading(NamedTuple):
 
 ENVIRONMENTS = {
     "UMa": Fading(
-        6.0, lambda f: (-6.47 - 0.134 * math.log10(f), 0.39), lambda f: (1.09, 0.44), 0.49, 6.0,
-        (-0.4, -0.6, 0.0, 0.4, -0.5, 0.5), 2.3, 20, 1.8, lambda f: max(0.25, 6.5622 - 3.4084 * math.log10(f)), 1.289,
-        1.178, (-7.4, 0.2),
+        6.0,
+        lambda f: (-6.47 - 0.134 * math.log10(f), 0.39),
+        lambda f: (1.09, 0.44),
+        0.49,
+        6.0,
+        (-0.4, -0.6, 0.0, 0.4, -0.5, 0.5),
+        2.3,
+        20,
+        1.8,
+        lambda f: max(0.25, 6.5622 - 3.4084 * math.log10(f)),
+        1.289,
+        1.178,
+        (-7.4, 0.2),
     ),
     "UMi": Fading(
-        2.0, lambda f: (-0.22 * math.log10(1 + f) - 6.87, 0.19 * math.log10(1 + f) + 0.22),
-        lambda f: (-0.24 * math.log10(1 + f) + 1.54, 0.10 * math.log10(1 + f) + 0.33), 0.35, 7.82,
-        (-0.7, 0.0, 0.0, 0.0, -0.5, 0.5), 2.1, 19, 10.0, lambda f: 11.0, 1.273, 1.184, (-7.5, 0.5),
+        2.0,
+        lambda f: (-0.22 * math.log10(1 + f) - 6.87, 0.19 * math.log10(1 + f) + 0.22),
+        lambda f: (-0.24 * math.log10(1 + f) + 1.54, 0.10 * math.log10(1 + f) + 0.33),
+        0.35,
+        7.82,
+        (-0.7, 0.0, 0.0, 0.0, -0.5, 0.5),
+        2.1,
+        19,
+        10.0,
+        lambda f: 11.0,
+        1.273,
+        1.184,
+        (-7.5, 0.5),
     ),
-}  # fmt: skip
-"""Source: TR 38.901 V19, Tables 7.4.1-1, 7.5-2, 7.5-4, 7.5-6 (notes: UMa below 6 GHz as at 6, UMi below 2 as at 2),
-7.5-7, 7.5-8 and 7.6.9-1."""
+}
+"""Source: TR 38.901 V19, Tables 7.4.1-1, 7.5-2, 7.5-4, 7.5-6 (notes: UMa below 6 GHz as at 6, UMi
+below 2 as at 2), 7.5-7, 7.5-8 and 7.6.9-1."""
 
 
 class Link(NamedTuple):
@@ -81,7 +104,9 @@ class Link(NamedTuple):
 
 
 class Large(NamedTuple):
-    """Large-scale parameters: delay spread (s), spreads in azimuth and zenith (degrees), shadowing (dB)."""
+    """Large-scale parameters: delay spread (s), spreads in azimuth and zenith (degrees), shadowing
+    (dB).
+    """
 
     delay_s: float
     azimuth_deg: float
@@ -90,7 +115,9 @@ class Large(NamedTuple):
 
 
 class Rays(NamedTuple):
-    """Rays (K,) of a link: delay after the first (s), azimuth from the link's, zenith angle (degrees), power."""
+    """Rays (K,) of a link: delay after the first (s), azimuth from the link's, zenith angle
+    (degrees), power.
+    """
 
     delay_s: np.ndarray
     azimuth_deg: np.ndarray
@@ -99,8 +126,11 @@ class Rays(NamedTuple):
 
 
 def path_loss_db(environment: str, link: Link) -> float:
-    """Return the path loss (dB) without line of sight, at least that with it. Source: Table 7.4.1-1."""
-    lg, f = math.log10(link.range_m), 20 * math.log10(link.ghz)
+    """Return the path loss (dB) without line of sight, at least that with it. Source: Table
+    7.4.1-1.
+    """
+    lg = math.log10(link.range_m)
+    f = 20 * math.log10(link.ghz)
     # The surface's effective height is 1 m, as for points below 13 m.
     bend = 4 * (link.station_m - 1) * max(link.height_m - 1, 0.0) * link.ghz * 1e9 / SPEED_OF_LIGHT
     square = math.log10(max(bend**2 + (link.station_m - link.height_m) ** 2, 1.0))
@@ -112,35 +142,55 @@ def path_loss_db(environment: str, link: Link) -> float:
 
 
 def zenith_spread(environment: str, link: Link) -> tuple[float, float]:
-    """Return the mean of lg(ZSD / 1 degree) and the zenith angles' offset (degrees). Source: Tables 7.5-7 and 7.5-8."""
-    flat, high = link.flat_m, link.height_m
+    """Return the mean of lg(ZSD / 1 degree) and the zenith angles' offset (degrees). Source: Tables
+    7.5-7 and 7.5-8.
+    """
+    flat = link.flat_m
+    high = link.height_m
     if environment == "UMi":
         mean = max(-0.5, -3.1 * flat / 1000 + 0.01 * max(high - link.station_m, 0.0) + 0.2)
         return mean, -(10 ** (-1.5 * math.log10(max(10.0, flat)) + 3.3))
     lg = math.log10(max(link.ghz, ENVIRONMENTS["UMa"].lowest_ghz))
-    power = (0.208 * lg - 0.782) * math.log10(max(25.0, flat)) - 0.13 * lg + 2.03 - 0.07 * (high - 1.5)
+    power = (
+        (0.208 * lg - 0.782) * math.log10(max(25.0, flat)) - 0.13 * lg + 2.03 - 0.07 * (high - 1.5)
+    )
     return max(-0.5, -2.1 * flat / 1000 - 0.01 * (high - 1.5) + 0.9), 7.66 * lg - 5.96 - 10**power
 
 
 def large_scale(environment: str, link: Link, rng: np.random.Generator) -> Large:
-    """Return a link's spreads and shadowing, correlated as Table 7.5-6 says; positive shadowing means more power."""
+    """Return a link's spreads and shadowing, correlated as Table 7.5-6 says; positive shadowing
+    means more power.
+    """
     table = ENVIRONMENTS[environment]
     ghz = max(link.ghz, table.lowest_ghz)
     matrix = np.eye(4)
-    for (row, column), value in zip([(1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2)], table.correlation, strict=True):
+    for (row, column), value in zip(
+        [(1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2)], table.correlation, strict=True
+    ):
         matrix[row, column] = matrix[column, row] = value
     shadow, delay, azimuth, zenith = portable.applied(upper_root(matrix).T, rng.standard_normal(4))
-    (delay_mean, delay_dev), (azimuth_mean, azimuth_dev) = table.delay_spread(ghz), table.azimuth_spread(ghz)
+    (delay_mean, delay_dev), (azimuth_mean, azimuth_dev) = (
+        table.delay_spread(ghz),
+        table.azimuth_spread(ghz),
+    )
     wide = min(10 ** (azimuth_mean + azimuth_dev * azimuth), WIDEST_DEG[0])
-    tall = min(10 ** (zenith_spread(environment, link)[0] + table.zenith_deviation * zenith), WIDEST_DEG[1])
+    tall = min(
+        10 ** (zenith_spread(environment, link)[0] + table.zenith_deviation * zenith), WIDEST_DEG[1]
+    )
     return Large(10 ** (delay_mean + delay_dev * delay), wide, tall, table.shadow_db * shadow)
 
 
-def rays(environment: str, link: Link, large: Large, rng: np.random.Generator, clusters: int | None = None) -> Rays:
+def rays(
+    environment: str,
+    link: Link,
+    large: Large,
+    rng: np.random.Generator,
+    clusters: int | None = None,
+) -> Rays:
     """Return a link's rays. Their powers sum to one before the faintest clusters are left out.
 
-    clusters: as many clusters of one ray each instead of the table's of 20 rays. Source: clause 7.5, steps 5 to 8,
-    Eqs. 7.5-1, 7.5-5, 7.5-9, 7.5-11, 7.5-13, 7.5-14, 7.5-19, 7.5-20 and 7.5-26.
+    clusters: as many clusters of one ray each instead of the table's of 20 rays. Source: clause
+    7.5, steps 5 to 8, Eqs. 7.5-1, 7.5-5, 7.5-9, 7.5-11, 7.5-13, 7.5-14, 7.5-19, 7.5-20 and 7.5-26.
     """
     table = ENVIRONMENTS[environment]
     count = clusters or table.clusters
@@ -154,18 +204,27 @@ def rays(environment: str, link: Link, large: Large, rng: np.random.Generator, c
     sign = np.where(rng.random((2, count)) < 0.5, -1.0, 1.0)
     spread = np.array([large.azimuth_deg, large.zenith_deg])[:, None]
     jitter = spread / 7 * rng.standard_normal((2, count))
-    azimuth = sign[0] * 2 * (large.azimuth_deg / 1.4) * np.sqrt(depth) / table.scale_azimuth + jitter[0]
+    azimuth = (
+        sign[0] * 2 * (large.azimuth_deg / 1.4) * np.sqrt(depth) / table.scale_azimuth + jitter[0]
+    )
     straight = math.degrees(math.acos((link.height_m - link.station_m) / link.range_m))
     zenith = sign[1] * large.zenith_deg * depth / table.scale_zenith + jitter[1] + straight + offset
     kept = power > power.max() * 10 ** (-FAINTEST_DB / 10)
-    delay, azimuth, zenith, power = delay[kept], azimuth[kept], zenith[kept], power[kept]
+    delay = delay[kept]
+    azimuth = azimuth[kept]
+    zenith = zenith[kept]
+    power = power[kept]
     if clusters:
         return Rays(delay, azimuth, zenith, power)
     return _split(table, link, mean_zenith, Rays(delay, azimuth, zenith, power), rng)
 
 
-def _split(table: Fading, link: Link, mean_zenith: float, clusters: Rays, rng: np.random.Generator) -> Rays:
-    """The rays of clusters, coupled at random in azimuth and zenith; the two strongest clusters have three parts."""
+def _split(
+    table: Fading, link: Link, mean_zenith: float, clusters: Rays, rng: np.random.Generator
+) -> Rays:
+    """The rays of clusters, coupled at random in azimuth and zenith; the two strongest clusters
+    have three parts.
+    """
     count = len(OFFSETS)
     delay = np.repeat(clusters.delay_s[:, None], count, axis=1)
     azimuth = clusters.azimuth_deg[:, None] + table.cluster_azimuth_deg * OFFSETS
@@ -184,6 +243,8 @@ def _split(table: Fading, link: Link, mean_zenith: float, clusters: Rays, rng: n
 
 
 def later_s(environment: str, rng: np.random.Generator) -> float:
-    """Return the delay (s) of the first ray beyond that of the distance. Source: clause 7.6.9, Table 7.6.9-1."""
+    """Return the delay (s) of the first ray beyond that of the distance. Source: clause 7.6.9,
+    Table 7.6.9-1.
+    """
     mean, deviation = ENVIRONMENTS[environment].later
     return 10 ** (mean + deviation * float(rng.standard_normal()))

@@ -8,24 +8,31 @@ from lowalt.scene.target_classes import size_m
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "masses: makers' 0.249 kg at 0.2192 m (DJI Mini 2) and 620 kg at 5.2704 m (EH216-S), straight between in log over "
-    "log size; rotor drag 0.465/s: Faessler, Franchi & Scaramuzza, IEEE Robot. Autom. Lett. 3, 2018, both axes; "
-    "flat plate of 0.15 L^2: estimate; birds: Rayner, Current Ornithology 5, 1988 (span 1.17 m^0.39, wing area 0.16 "
-    "m^0.72), lift to drag 6: Pennycuick, J. Exp. Biol. 49, 1968; slower with the root of the length: Froude's scaling"
+    "masses: makers' 0.249 kg at 0.2192 m (DJI Mini 2) and 620 kg at 5.2704 m (EH216-S), straight "
+    "between in log over "
+    "log size; rotor drag 0.465/s: Faessler, Franchi & Scaramuzza, IEEE Robot. Autom. Lett. 3, "
+    "2018, both axes; "
+    "flat plate of 0.15 L^2: estimate; birds: Rayner, Current Ornithology 5, 1988 (span 1.17 "
+    "m^0.39, wing area 0.16 "
+    "m^0.72), lift to drag 6: Pennycuick, J. Exp. Biol. 49, 1968; slower with the root of the "
+    "length: Froude's scaling"
 )
 
 AIR_KG_M3 = 1.225
 GRAVITY_MPS2 = 9.80665
-SMALL_UAV, LARGE_UAV = (0.2192, 0.249), (5.2704, 620.0)
+SMALL_UAV = (0.2192, 0.249)
+LARGE_UAV = (5.2704, 620.0)
 """Length (m) and mass (kg) of two multirotors."""
 PLATE = 0.15
 """Drag area of a multirotor's body over the square of its length."""
-ROTOR_DRAG_HZ, ROTOR_DRAG_M = 0.465, 0.3
+ROTOR_DRAG_HZ = 0.465
+ROTOR_DRAG_M = 0.3
 """Rotor drag over mass and speed (1/s), of a craft of this length (m)."""
 LIFT_SLOPE = 4.5
 """Lift coefficient per radian of a bird's wing."""
 LIFT_TO_DRAG = 6.0
-ATTITUDE_S, ATTITUDE_M = 0.1, 0.4
+ATTITUDE_S = 0.1
+ATTITUDE_M = 0.4
 """Lag of the attitude (s) of a craft of this length (m): estimate."""
 
 
@@ -53,10 +60,12 @@ def mass_kg(cloud: Cloud) -> float:
 
 
 def response_s(cloud: Cloud, airspeed_mps: float) -> tuple[float, float]:
-    """Return the time constants (s) with which the air carries a target along: horizontally, and vertically.
+    """Return the time constants (s) with which the air carries a target along: horizontally, and
+    vertically.
 
-    A body's drag, linear in small gusts, accelerates it by rho C_D A V / m times the gust. Rotors add theirs. A bird's
-    drag is its weight over its lift-to-drag ratio; vertically its wing's lift acts, with the rate rho S V C_L' / (2 m).
+    A body's drag, linear in small gusts, accelerates it by rho C_D A V / m times the gust. Rotors
+    add theirs. A bird's drag is its weight over its lift-to-drag ratio; vertically its wing's lift
+    acts, with the rate rho S V C_L' / (2 m).
     """
     mass = mass_kg(cloud)
     if cloud.like == "Bird":

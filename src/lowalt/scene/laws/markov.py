@@ -1,11 +1,13 @@
-"""Linear Gaussian processes driven by white noise, discretised exactly; the motion effects use them.
+"""Linear Gaussian processes driven by white noise, discretised exactly; the motion effects use
+them.
 
 A process x' = F x + g n with white noise n of unit intensity changes over a step h to
 
     x <- exp(F h) x + w,
 
-where the covariance of w is known in closed form. This is exact for steps of any length. Only operations that IEEE 754
-defines are used, in a fixed order, so every processor draws the same walks.
+where the covariance of w is known in closed form. This is exact for steps of any length. Only
+operations that IEEE 754 defines are used, in a fixed order, so every processor draws the same
+walks.
 """
 
 from typing import NamedTuple
@@ -16,7 +18,8 @@ from lowalt.machine.jit import PLAIN
 from lowalt.numerics import portable
 
 _ORDER = 24
-"""Orders of the exponential's Taylor series; of norms up to 2 the rest is below 2^25 / 25! = 2e-18."""
+"""Orders of the exponential's Taylor series; of norms up to 2 the rest is below 2^25 / 25! = 2e-18.
+"""
 _LEAST = 1e-15
 """Pivots of a covariance of unit variances that are smaller than this are roundings of zero."""
 _FORGOTTEN = 1e-12
@@ -24,7 +27,9 @@ _FORGOTTEN = 1e-12
 
 
 class Steps(NamedTuple):
-    """A process of K states over one step: transition (K, K), and the covariance (K, K) of the noise that it adds."""
+    """A process of K states over one step: transition (K, K), and the covariance (K, K) of the
+    noise that it adds.
+    """
 
     transition: np.ndarray
     added: np.ndarray
@@ -33,12 +38,14 @@ class Steps(NamedTuple):
 def root_of(covariance: np.ndarray) -> np.ndarray:
     """Return B (K, K) with B B^T = `covariance`, positive semidefinite to rounding.
 
-    States of very different size are scaled alike first, so that the small ones keep their digits. Source: Cholesky's
-    decomposition, the largest pivot first, so that those left out are the smallest: Higham 2002, section 10.3.
+    States of very different size are scaled alike first, so that the small ones keep their digits.
+    Source: Cholesky's decomposition, the largest pivot first, so that those left out are the
+    smallest: Higham 2002, section 10.3.
     """
     size = np.sqrt(np.diag(covariance))
     scale = np.where(size > 0, size, 1.0)
-    left, root = covariance / (scale[:, None] * scale), np.zeros_like(covariance)
+    left = covariance / (scale[:, None] * scale)
+    root = np.zeros_like(covariance)
     # Ones, and no roundings of one: the first pivot is then the same on every processor.
     np.fill_diagonal(left, size > 0)
     for column in range(len(left)):
@@ -52,7 +59,9 @@ def root_of(covariance: np.ndarray) -> np.ndarray:
 
 
 def exponential(matrix: np.ndarray) -> np.ndarray:
-    """Return the exponential of a matrix (K, K) whose largest column sum of sizes is at most 2, by its series."""
+    """Return the exponential of a matrix (K, K) whose largest column sum of sizes is at most 2, by
+    its series.
+    """
     unit = np.eye(len(matrix))
     result = unit
     for order in range(_ORDER, 0, -1):
@@ -68,12 +77,15 @@ def _twice(process: Steps) -> Steps:
 
 
 def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
-    """Return the exact discretisation over one unit of time of x' = drift x + noise n; (K, K) and (K,).
+    """Return the exact discretisation over one unit of time of x' = drift x + noise n; (K, K) and
+    (K,).
 
-    Source: Van Loan 1978, "Computing integrals involving the matrix exponential", IEEE Trans. Automatic Control 23.
+    Source: Van Loan 1978, "Computing integrals involving the matrix exponential", IEEE Trans.
+    Automatic Control 23.
     """
     count = len(drift)
-    # Compute a part of the step so short that its exponentials neither grow nor cancel, then double it repeatedly.
+    # Compute a part of the step so short that its exponentials neither grow nor cancel, then double
+    # it repeatedly.
     halvings = max(0, int(np.frexp(portable.total(np.abs(drift), axis=0).max())[1]))
     block = np.zeros((2 * count, 2 * count))
     block[:count, :count] = -drift
@@ -88,7 +100,9 @@ def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
 
 
 def stationary(process: Steps) -> np.ndarray:
-    """Return the stationary covariance (K, K) of a stable process: after so many steps, its start is forgotten."""
+    """Return the stationary covariance (K, K) of a stable process: after so many steps, its start
+    is forgotten.
+    """
     while abs(process.transition).max() > _FORGOTTEN:
         process = _twice(process)
     return 0.5 * (process.added + process.added.T)
@@ -103,7 +117,9 @@ def _walk(transition, root, normal, out):
             for i in range(count):
                 total = 0.0
                 for j in range(count):
-                    total += transition[b, i, j] * out[b, n - 1, j] + root[b, i, j] * normal[b, n - 1, j]
+                    total += (
+                        transition[b, i, j] * out[b, n - 1, j] + root[b, i, j] * normal[b, n - 1, j]
+                    )
                 out[b, n, i] = total
 
 
@@ -112,7 +128,12 @@ def walk(processes: list[Steps], start: np.ndarray, normal: np.ndarray) -> np.nd
     out = np.empty((len(start), normal.shape[1] + 1, start.shape[1]))
     out[:, 0] = start
     transition = np.ascontiguousarray([process.transition for process in processes])
-    _walk(transition, np.ascontiguousarray([root_of(process.added) for process in processes]), normal, out)
+    _walk(
+        transition,
+        np.ascontiguousarray([root_of(process.added) for process in processes]),
+        normal,
+        out,
+    )
     return out
 
 

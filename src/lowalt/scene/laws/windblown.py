@@ -19,7 +19,8 @@ LARGEST = 700.0
 def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
     """Return the ratio of still to moving power and the exponential spectrum's slope beta (s/m).
 
-    Below a wind of one mile per hour, where the formula ends, the slope keeps its value at that wind.
+    Below a wind of one mile per hour, where the formula ends, the slope keeps its value at that
+    wind.
     Source: Billingsley 2002, chapter 6 (wind in miles per hour, frequency in GHz).
     """
     miles = wind_mps / MPH
@@ -31,30 +32,42 @@ def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
 
 
 def spectrum(count: int, step_s: float, slope_s: np.ndarray) -> np.ndarray:
-    """Return the root of the power (cells, count) of spectra exp(-slope |f|), slope (cells,) s, sampled every step.
+    """Return the root of the power (cells, count) of spectra exp(-slope |f|), slope (cells,) s,
+    sampled every step.
 
-    The images of a spectrum, 1 / step_s apart, are a geometric series. The powers of a cell add to 1.
+    The images of a spectrum, 1 / step_s apart, are a geometric series. The powers of a cell add to
+    1.
     """
-    frequency, period, slope_s = abs(fft.fftfreq(count, step_s)), 1.0 / step_s, slope_s[:, None]
-    near, far = slope_s * frequency, slope_s * (period - frequency)
+    frequency = abs(fft.fftfreq(count, step_s))
+    period = 1.0 / step_s
+    slope_s = slope_s[:, None]
+    near = slope_s * frequency
+    far = slope_s * (period - frequency)
     power = portable.exp(-np.minimum(near, LARGEST)) + portable.exp(-np.minimum(far, LARGEST))
     return np.sqrt(power / power.sum(axis=1, keepdims=True))
 
 
 def speckle(
-    rng: np.random.Generator, cells: int, count: int, step_s: float, wind: tuple[float, float], wavelength_m: float,
+    rng: np.random.Generator,
+    cells: int,
+    count: int,
+    step_s: float,
+    wind: tuple[float, float],
+    wavelength_m: float,
     slow: np.ndarray | float = 1.0,
-) -> np.ndarray:  # fmt: skip
-    """Return unit-power speckle (cells, count): a constant part plus a part with a two-sided exponential spectrum.
+) -> np.ndarray:
+    """Return unit-power speckle (cells, count): a constant part plus a part with a two-sided
+    exponential spectrum.
 
-    wind: ratio of their powers and slope beta of the spectrum over radial speed (s/m), as of `windblown`; slow: factor
-    on Doppler frequencies, a number or (cells,).
+    wind: ratio of their powers and slope beta of the spectrum over radial speed (s/m), as of
+    `windblown`; slow: factor on Doppler frequencies, a number or (cells,).
     """
     still, beta = wind
     constant = white(rng, 1.0, (cells,))[:, None]
     if not np.isfinite(still):
         return np.repeat(constant, count, axis=1)
-    decay_s, slope_s = beta * wavelength_m / (4 * np.pi), 0.5 * beta * wavelength_m
+    decay_s = beta * wavelength_m / (4 * np.pi)
+    slope_s = 0.5 * beta * wavelength_m
     long = fft.next_fast_len(count + int(decay_s / np.sqrt(TAIL) / step_s))
     # Lines whose power is negligible, with any `slow` up to 1, are not drawn.
     strong = spectrum(long, step_s, np.array([slope_s]))[0] ** 2 > FAINT

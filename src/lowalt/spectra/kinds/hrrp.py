@@ -1,6 +1,7 @@
 """HRRP: the range profile over slow time, range cells around the chosen one by symbols.
 
-It is computed from the cube (`lowalt.tiles.cubes`), not from a station's signal, which contains only one cell.
+It is computed from the cube (`lowalt.tiles.cubes`), not from a station's signal, which contains
+only one cell.
 """
 
 import numpy as np
@@ -23,12 +24,18 @@ def rows(settings: Settings) -> int:
 
 
 def columns(settings: Settings, symbols: int) -> int:
-    """Return the number of symbols at which a window is computed. Raises: InputError where a look is too short."""
+    """Return the number of symbols at which a window is computed. Raises: InputError where a look
+    is too short.
+    """
     return (windows(symbols, settings.window, settings.hop, "hrrp") - 1) * settings.hop + 1
 
 
-def axes(settings: Settings, network: Network, station: Station) -> tuple[tuple[str, float, float], ...]:
-    """Return name, first and last value of the columns (time, s) and of the rows (range from the chosen cell, m)."""
+def axes(
+    settings: Settings, network: Network, station: Station
+) -> tuple[tuple[str, float, float], ...]:
+    """Return name, first and last value of the columns (time, s) and of the rows (range from the
+    chosen cell, m).
+    """
     reach = settings.cells // 2 * network.cell_m
     last = (network.symbols - settings.window) * network.symbol_interval_s
     return ("time (s)", 0.0, last), ("range (m from the chosen cell)", -reach, reach)
@@ -37,15 +44,20 @@ def axes(settings: Settings, network: Network, station: Station) -> tuple[tuple[
 def definition(cube: Cube, settings: Settings) -> np.ndarray:
     """Return root mean square magnitudes (ranges, symbols) of a cube, range ascending.
 
-    The chosen cell is the middle at each symbol, and a window begins at every symbol. Raises: InputError where the look
-    is no longer than the window.
+    The chosen cell is the middle at each symbol, and a window begins at every symbol. Raises:
+    InputError where the look is no longer than the window.
     """
-    cells, chosen = cube.cells, cube.chosen
+    cells = cube.cells
+    chosen = cube.chosen
     steps = np.arange(-(settings.cells // 2), settings.cells // 2 + 1)
-    near = cells[np.arange(len(cells))[:, None], (chosen[:, None] + steps) % cells.shape[1]].astype(np.complex128)
+    near = cells[np.arange(len(cells))[:, None], (chosen[:, None] + steps) % cells.shape[1]].astype(
+        np.complex128
+    )
     power = near.real**2 + near.imag**2
     count = columns(settings, len(cells))
-    return np.sqrt(sum(power[step : step + count] for step in range(settings.window)) / settings.window).T
+    return np.sqrt(
+        sum(power[step : step + count] for step in range(settings.window)) / settings.window
+    ).T
 
 
 def fill_cells(cube: Cube, settings: Settings, out: np.ndarray) -> None:

@@ -1,6 +1,8 @@
-"""Range-Doppler map: the range cells of a look against radial speed, by one Fourier transform over all its symbols.
+"""Range-Doppler map: the range cells of a look against radial speed, by one Fourier transform over
+all its symbols.
 
-It is computed from the cube (`lowalt.tiles.cubes`), not from a station's signal, which contains only one cell.
+It is computed from the cube (`lowalt.tiles.cubes`), not from a station's signal, which contains
+only one cell.
 """
 
 import numpy as np
@@ -25,7 +27,9 @@ def rows(settings: Settings) -> int:
 
 
 def columns(settings: Settings, symbols: int) -> int:
-    """Return the number of speeds. Raises: InputError where they are fewer than the symbols of a look."""
+    """Return the number of speeds. Raises: InputError where they are fewer than the symbols of a
+    look.
+    """
     if settings.points < symbols:
         raise InputError(
             f"spectra.range_doppler.points is {settings.points}, expected at least the {symbols} symbols of a look"
@@ -33,29 +37,43 @@ def columns(settings: Settings, symbols: int) -> int:
     return settings.points
 
 
-def axes(settings: Settings, network: Network, station: Station) -> tuple[tuple[str, float, float], ...]:
-    """Return name, first and last value of the columns (radial speed, m/s) and of the rows (range, m).
+def axes(
+    settings: Settings, network: Network, station: Station
+) -> tuple[tuple[str, float, float], ...]:
+    """Return name, first and last value of the columns (radial speed, m/s) and of the rows (range,
+    m).
 
-    Ranges count from the cell that the receiver chose in the middle of the look; speeds are positive away from the
-    station, at the effective carrier.
+    Ranges count from the cell that the receiver chose in the middle of the look; speeds are
+    positive away from the station, at the effective carrier.
     """
     speeds = network.bin_speeds_mps(settings.points, station)
     reach = settings.cells // 2 * network.cell_m
-    return ("radial speed (m/s)", speeds[0], speeds[-1]), ("range (m from the chosen cell)", -reach, reach)
+    return ("radial speed (m/s)", speeds[0], speeds[-1]), (
+        "range (m from the chosen cell)",
+        -reach,
+        reach,
+    )
 
 
 def definition(cube: Cube, settings: Settings) -> np.ndarray:
     """Return magnitudes (ranges, speeds) of a cube, both ascending.
 
-    The look is weighted with a Hann window of sum one, so a static echo has the same magnitude as in a single symbol.
+    The look is weighted with a Hann window of sum one, so a static echo has the same magnitude as
+    in a single symbol.
     Raises: InputError where the look has more symbols than there are speeds.
     """
-    cells, chosen = cube.cells, cube.chosen
+    cells = cube.cells
+    chosen = cube.chosen
     count = columns(settings, len(cells))
-    middle, reach = chosen[len(chosen) // 2], settings.cells // 2
-    near = cells[:, np.arange(middle - reach, middle + reach + 1) % cells.shape[1]].astype(np.complex128)
+    middle = chosen[len(chosen) // 2]
+    reach = settings.cells // 2
+    near = cells[:, np.arange(middle - reach, middle + reach + 1) % cells.shape[1]].astype(
+        np.complex128
+    )
     weights = hann(len(cells), sym=False)
-    spectrum = fft.fftshift(fft.fft(near * (weights / weights.sum())[:, None], count, axis=0), axes=0)
+    spectrum = fft.fftshift(
+        fft.fft(near * (weights / weights.sum())[:, None], count, axis=0), axes=0
+    )
     # A receding echo has a negative frequency, so the most negative frequency is the largest speed.
     turned = spectrum[::-1].T
     return np.sqrt(turned.real**2 + turned.imag**2)

@@ -25,33 +25,51 @@ def rows(settings: Transfer) -> int:
 def speeds(settings: Transfer, network: Network, station: Station) -> tuple[float, float]:
     """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`.
 
-    The filters are matched at f_k, as in the paper's Eq. 32, but the Doppler frequency is that at the effective carrier
-    f_e. The filter of speed v therefore responds to an echo of speed v f_k / f_e.
+    The filters are matched at f_k, as in the paper's Eq. 32, but the Doppler frequency is that at
+    the effective carrier f_e. The filter of speed v therefore responds to an echo of speed v f_k /
+    f_e.
     """
     ratio = station.frequency_hz / network.effective_hz(station)
     return float(settings.speeds_mps[0] * ratio), float(settings.speeds_mps[-1] * ratio)
 
 
 def definition(
-    signals: np.ndarray, settings: Transfer, name: str, frequency_hz: float, symbol_interval_s: float
+    signals: np.ndarray,
+    settings: Transfer,
+    name: str,
+    frequency_hz: float,
+    symbol_interval_s: float,
 ) -> np.ndarray:
-    """Return the spectrum in float64, (..., symbols) -> (..., speeds, windows); the unit is that of |signal|^2.
+    """Return the spectrum in float64, (..., symbols) -> (..., speeds, windows); the unit is that of
+    |signal|^2.
 
     Raises: InputError where the signal is no longer than the window or is not finite.
     """
     length = settings.window
-    # The published number of windows is one less than the shorter segment allows, so each window can be one longer.
+    # The published number of windows is one less than the shorter segment allows, so each window
+    # can be one longer.
     parts = segments(signals, length, settings.hop, name, extra=1)
     steps = np.arange(length + 1)
-    phase = 4 * np.pi * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * np.outer(settings.speeds_mps, steps)
+    phase = (
+        4
+        * np.pi
+        * frequency_hz
+        * symbol_interval_s
+        / SPEED_OF_LIGHT
+        * np.outer(settings.speeds_mps, steps)
+    )
     matched = np.exp(1j * phase)
     short = np.einsum("vl,...gl->...vg", matched[:, :length], parts[..., :length])
     longer = np.einsum("vl,...gl->...vg", matched, parts)
     return (np.abs(longer) * length / (length + 1)) ** 2 - np.abs(short) ** 2
 
 
-def tables(settings: Transfer, frequency_hz: float, symbol_interval_s: float) -> tuple[np.ndarray, ...]:
-    """Return cosines and sines (speeds, window + 1) of the matched filters and the longer window's share (1,)."""
+def tables(
+    settings: Transfer, frequency_hz: float, symbol_interval_s: float
+) -> tuple[np.ndarray, ...]:
+    """Return cosines and sines (speeds, window + 1) of the matched filters and the longer window's
+    share (1,).
+    """
     length = settings.window
     steps = np.outer(settings.speeds_mps, np.arange(length + 1))
     phase = 4 * np.pi * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * steps
@@ -60,20 +78,33 @@ def tables(settings: Transfer, frequency_hz: float, symbol_interval_s: float) ->
     return cosine.astype(np.float32), sine.astype(np.float32), share
 
 
-def fill(re: np.ndarray, im: np.ndarray, settings: Transfer, tables: tuple, out: np.ndarray) -> None:
-    """Fill out (speeds, starts) float32 with the spectrum of the windows that start at symbols 0 .. starts - 1."""
+def fill(
+    re: np.ndarray, im: np.ndarray, settings: Transfer, tables: tuple, out: np.ndarray
+) -> None:
+    """Fill out (speeds, starts) float32 with the spectrum of the windows that start at symbols 0 ..
+    starts - 1.
+    """
     transfer(re, im, settings.window, *tables, out)
 
 
 def fill_known(
-    signal: np.ndarray, times: np.ndarray, settings: Transfer, frequency_hz: float, symbol_interval_s: float,
+    signal: np.ndarray,
+    times: np.ndarray,
+    settings: Transfer,
+    frequency_hz: float,
+    symbol_interval_s: float,
     out: np.ndarray,
-) -> None:  # fmt: skip
-    """Fill out (speeds, starts) as `fill`, with the lines that fit a signal (N,) received at `times` (N,) intervals."""
-    starts, length = out.shape[1], settings.window
+) -> None:
+    """Fill out (speeds, starts) as `fill`, with the lines that fit a signal (N,) received at
+    `times` (N,) intervals.
+    """
+    starts = out.shape[1]
+    length = settings.window
     turns = -2 * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * settings.speeds_mps
     short, longer = (
-        length * shares(signal, count, starts) * np.abs(line_sums(signal, times, turns, count, starts))
+        length
+        * shares(signal, count, starts)
+        * np.abs(line_sums(signal, times, turns, count, starts))
         for count in (length, length + 1)
     )
     out[:] = longer**2 - short**2

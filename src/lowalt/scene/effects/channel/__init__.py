@@ -1,1 +1,3 @@
-"""Effects between the antennas and the target: amplitudes, paths, physics of waves, further echoes and signals."""
+"""Effects between the antennas and the target: amplitudes, paths, physics of waves, further echoes
+and signals.
+"""

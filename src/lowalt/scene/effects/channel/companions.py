@@ -1,10 +1,12 @@
-"""Other targets in the beam, such as a flock, or a bird next to a drone. The label is that of the primary target.
+"""Other targets in the beam, such as a flock, or a bird next to a drone. The label is that of the
+primary target.
 
-At the first symbol, companions stand around the target with a standard deviation of `spread_m` on each axis. Members of
-a flock have the target's velocity plus a normal error of standard deviation `speed_mps`. Each companion is a complete
-target with its own points, moving parts, cross sections, motion effects and paths. Its complex echo adds to the
-target's before a range cell is chosen, so the chosen cell may be that of a companion. Beams point at the primary
-target, and the SNRs of the configuration refer to its echo alone. The record of a sample lists the companions.
+At the first symbol, companions stand around the target with a standard deviation of `spread_m` on
+each axis. Members of a flock have the target's velocity plus a normal error of standard deviation
+`speed_mps`. Each companion is a complete target with its own points, moving parts, cross sections,
+motion effects and paths. Its complex echo adds to the target's before a range cell is chosen, so
+the chosen cell may be that of a companion. Beams point at the primary target, and the SNRs of the
+configuration refer to its echo alone. The record of a sample lists the companions.
 """
 
 import math
@@ -20,7 +22,8 @@ from lowalt.scene.checks import CheckedScene
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "several scatterers add as their echoes: M. I. Skolnik, Introduction to Radar Systems, 3rd ed. 2001, 2.7 (complex "
+    "several scatterers add as their echoes: M. I. Skolnik, Introduction to Radar Systems, 3rd ed. "
+    "2001, 2.7 (complex "
     "targets); the spread of a flock: estimate"
 )
 DEFAULTS = {"subtypes": [], "count": [1, 3], "spread_m": 4.0, "speed_mps": 1.0}
@@ -31,13 +34,18 @@ TRIES = 200
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a range of counts that falls, or companions whose surfaces the scene would need."""
+    """Raise InputError for a range of counts that falls, or companions whose surfaces the scene
+    would need.
+    """
     low, high = settings["count"]
     if low > high:
-        raise InputError(f"effects.companions.count: {settings['count']}, expected the smaller number first")
+        raise InputError(
+            f"effects.companions.count: {settings['count']}, expected the smaller number first"
+        )
     if "occlusion" in scene.effects and settings["subtypes"]:
         raise InputError(
-            "effects.companions.subtypes: surfaces are known for the target's own subtype only, expected [] in a "
+            "effects.companions.subtypes: surfaces are known for the target's own subtype only, "
+            "expected [] in a "
             "scene with effects.occlusion"
         )
 
@@ -59,12 +67,14 @@ def listed(settings: dict, seed: int, row: dict) -> list[str]:
 def companions(
     settings: dict, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud], rng: np.random.Generator
 ) -> list[tuple[Cloud, dict]]:
-    """Return the companions of the motion model `row`: their clouds, and their rows as in the motion table.
+    """Return the companions of the motion model `row`: their clouds, and their rows as in the
+    motion table.
 
-    clouds: the clouds of the other subtypes, by name. Raises: InputError naming a subtype without a cloud, or a spread
-    that leaves no room for the targets.
+    clouds: the clouds of the other subtypes, by name. Raises: InputError naming a subtype without a
+    cloud, or a spread that leaves no room for the targets.
     """
-    taken, result = [(_place(row), _reach(cloud))], []
+    taken = [(_place(row), _reach(cloud))]
+    result = []
     for number, name in enumerate(named(settings, row["subtype"], rng)):
         if name != row["subtype"] and name not in clouds:
             raise InputError(
@@ -78,7 +88,8 @@ def companions(
                 mine[f"{axis}_m"] = row[f"{axis}_m"] + float(shift)
             if other.like not in AIRBORNE:
                 mine["z_m"] = other.record["origin_height_m"]
-            place, reach = _place(mine), _reach(other)
+            place = _place(mine)
+            reach = _reach(other)
             if place[2] > reach * (other.like in AIRBORNE) and all(
                 np.linalg.norm(place - away) > reach + size for away, size in taken
             ):
@@ -107,11 +118,20 @@ def _reach(cloud: Cloud) -> float:
 
 
 def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -> dict:
-    """A companion's row without its place: in a flock nearly the target's motion, otherwise its subtype's own."""
-    mine = {**dict.fromkeys(NUMBERS, math.nan), "subtype": other.subtype, "category": other.category}
-    published, flying = other.record["published"], other.like in AIRBORNE
+    """A companion's row without its place: in a flock nearly the target's motion, otherwise its
+    subtype's own.
+    """
+    mine = {
+        **dict.fromkeys(NUMBERS, math.nan),
+        "subtype": other.subtype,
+        "category": other.category,
+    }
+    published = other.record["published"]
+    flying = other.like in AIRBORNE
     flock = other.category == row["category"]
-    mine |= {f"{angle}_rad": row[f"{angle}_rad"] if flock else 0.0 for angle in ("yaw", "pitch", "roll")}
+    mine |= {
+        f"{angle}_rad": row[f"{angle}_rad"] if flock else 0.0 for angle in ("yaw", "pitch", "roll")
+    }
     speed = 0.0
     if flying:
         for axis in "xyz":
@@ -120,7 +140,9 @@ def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -
             mine[f"v{axis}_mps"] = shared if flock else alone
     else:
         alone = rng.uniform(published["speed_lo"], published["speed_hi"])
-        shared = math.hypot(row["vx_mps"], row["vy_mps"]) + settings["speed_mps"] * float(rng.standard_normal())
+        shared = math.hypot(row["vx_mps"], row["vy_mps"]) + settings["speed_mps"] * float(
+            rng.standard_normal()
+        )
         speed = max(shared, 0.0) if flock else alone
     if not flock:
         mine["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)

@@ -1,8 +1,10 @@
-"""Cross sections that follow the aspect: a point shines along its normal, and a turning blade flashes.
+"""Cross sections that follow the aspect: a point shines along its normal, and a turning blade
+flashes.
 
-Bodies are diffuse: a point's cross section goes with a power of the cosine between its normal and the line of sight.
-Blades are flat facets in physical optics, as large as a point's share of its part. Each lobe's mean over all directions
-is one, so that a target keeps its mean cross section; points without a normal stay isotropic.
+Bodies are diffuse: a point's cross section goes with a power of the cosine between its normal and
+the line of sight. Blades are flat facets in physical optics, as large as a point's share of its
+part. Each lobe's mean over all directions is one, so that a target keeps its mean cross section;
+points without a normal stay isotropic.
 """
 
 from functools import lru_cache
@@ -18,9 +20,12 @@ from lowalt.numerics.quadrature import gauss_legendre
 from lowalt.scene.view import View
 
 SOURCE = (
-    "diffuse: Phong-type cosine lobes, Lafortune & Willems 1994; flat circular plate in physical optics, "
-    "sigma = 4 pi A^2 / lambda^2 (cos 2 J1(x) / x)^2, x = 2 k a sin: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd "
-    "ed. 1993, chapter 6; on links: R. E. Kell, On the derivation of bistatic RCS from monostatic measurements, Proc. "
+    "diffuse: Phong-type cosine lobes, Lafortune & Willems 1994; flat circular plate in physical "
+    "optics, "
+    "sigma = 4 pi A^2 / lambda^2 (cos 2 J1(x) / x)^2, x = 2 k a sin: Knott, Shaeffer & Tuley, "
+    "Radar Cross Section, 2nd "
+    "ed. 1993, chapter 6; on links: R. E. Kell, On the derivation of bistatic RCS from monostatic "
+    "measurements, Proc. "
     "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
 DEFAULTS = {"power": 1.0, "blades": "facet"}
@@ -32,25 +37,30 @@ def diffuse(cosine: np.ndarray, power: float) -> np.ndarray:
 
 
 def _plate(cosine: np.ndarray, sine: np.ndarray, size: float) -> np.ndarray:
-    """Lobe of a circular plate of k a = `size`, one at its normal; cosine and sine of the angle to it."""
+    """Lobe of a circular plate of k a = `size`, one at its normal; cosine and sine of the angle to
+    it.
+    """
     x = np.maximum(2.0 * size * sine, 1e-9)
     return (cosine * 2.0 * j1(x) / x) ** 2
 
 
 @lru_cache(maxsize=256)
 def _plate_mean(size: float) -> float:
-    """Mean of a plate's lobe over the sphere, by Gauss-Legendre quadrature fine enough for its side lobes."""
+    """Mean of a plate's lobe over the sphere, by Gauss-Legendre quadrature fine enough for its side
+    lobes.
+    """
     node, weight = gauss_legendre(32 + int(2 * size))
     sine, cosine = portable.sine_cosine(0.25 * np.pi * (node + 1.0))
     return float(0.25 * np.pi * portable.dot(weight, _plate(cosine, sine, size) * sine) / 2.0)
 
 
 def facet(cosine: np.ndarray, size: float, half_angle: np.ndarray | float = 1.0) -> np.ndarray:
-    """Return the lobe of a flat circular facet, of mean 1 over the sphere, dark where the cosine is not above 0.
+    """Return the lobe of a flat circular facet, of mean 1 over the sphere, dark where the cosine is
+    not above 0.
 
-    cosine: of the angle between its normal and the line of sight, on a link the mean of both ends' cosines; size: k a,
-    its radius in rad; half_angle: on a link cos(beta / 2), half the length of the sum of the unit vectors toward both
-    ends. Source: Kell 1965; Crispin and Siegel 1968.
+    cosine: of the angle between its normal and the line of sight, on a link the mean of both ends'
+    cosines; size: k a, its radius in rad; half_angle: on a link cos(beta / 2), half the length of
+    the sum of the unit vectors toward both ends. Source: Kell 1965; Crispin and Siegel 1968.
     """
     sine = np.sqrt(np.maximum(half_angle * half_angle - cosine * cosine, 0.0))
     return np.where(cosine > 0, _plate(cosine, sine, size), 0.0) / _plate_mean(size)
@@ -66,15 +76,22 @@ def facet_radius_m(points: np.ndarray) -> float:
 
 
 def aspect_cosine(view: View, place_m: np.ndarray) -> np.ndarray:
-    """Return the cosine (N, L) between every point's normal and its way to a place (3,) m, NaN without a normal."""
+    """Return the cosine (N, L) between every point's normal and its way to a place (3,) m, NaN
+    without a normal.
+    """
     way = place_m - view.places
     return portable.dot(view.normals, way) / portable.norm(way)
 
 
-def blade(view: View, mine: np.ndarray, cosines: list[np.ndarray], places_m: list[np.ndarray]) -> np.ndarray:
-    """Return the facets' lobe (N, points) of a rotor's points `mine`; cosines (N, L) toward both ends at places_m."""
+def blade(
+    view: View, mine: np.ndarray, cosines: list[np.ndarray], places_m: list[np.ndarray]
+) -> np.ndarray:
+    """Return the facets' lobe (N, points) of a rotor's points `mine`; cosines (N, L) toward both
+    ends at places_m.
+    """
     wave = 2 * np.pi * radar(view.network, view.station).centre_hz / SPEED_OF_LIGHT
-    size, seen = wave * facet_radius_m(view.cloud.points[mine]), [cosine[:, mine] for cosine in cosines]
+    size = wave * facet_radius_m(view.cloud.points[mine])
+    seen = [cosine[:, mine] for cosine in cosines]
     if len(seen) == 1:
         return facet(seen[0], size)
     ways = [place_m - view.places[:, mine] for place_m in places_m]
@@ -84,11 +101,12 @@ def blade(view: View, mine: np.ndarray, cosines: list[np.ndarray], places_m: lis
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
-    """Return the factor (N, L) on every point's amplitude: the root of its relative cross section at this aspect.
+    """Return the factor (N, L) on every point's amplitude: the root of its relative cross section
+    at this aspect.
 
-    On a link a diffuse point has the geometric mean of the lobes toward both ends, exact for a Lambert surface (power
-    2). A facet has its lobe at the bisector and at the frequency times cos(beta / 2), where beta is the angle between
-    the directions toward both ends.
+    On a link a diffuse point has the geometric mean of the lobes toward both ends, exact for a
+    Lambert surface (power 2). A facet has its lobe at the bisector and at the frequency times
+    cos(beta / 2), where beta is the angle between the directions toward both ends.
     """
     cloud, known = view.cloud, np.isfinite(view.cloud.normals).all(axis=1)
     if not known.any():

@@ -1,13 +1,15 @@
-"""Echoes later than the cyclic prefix: the receive window then begins with the end of the previous symbol.
+"""Echoes later than the cyclic prefix: the receive window then begins with the end of the previous
+symbol.
 
-Symbols follow each other without a pause. In the receive window, an echo of delay tau > T_cp carries the previous
-symbol, with other random data, until tau - T_cp, and its own symbol from then on. It loses a share
+Symbols follow each other without a pause. In the receive window, an echo of delay tau > T_cp
+carries the previous symbol, with other random data, until tau - T_cp, and its own symbol from then
+on. It loses a share
 
     e = (tau - T_cp) / T_u
 
-of the window: its amplitude falls to 1 - e, and 1 - (1 - e)^2 of its power becomes interference in all range cells.
-Each point of a target is cut at its direct delay, on reflected paths too; still echoes are cut at the delay of their
-range cell.
+of the window: its amplitude falls to 1 - e, and 1 - (1 - e)^2 of its power becomes interference in
+all range cells. Each point of a target is cut at its direct delay, on reflected paths too; still
+echoes are cut at the delay of their range cell.
 """
 
 from collections.abc import Callable
@@ -20,8 +22,10 @@ from lowalt.scene.view import View
 from lowalt.scene.waveform import prefix_length_s
 
 SOURCE = (
-    "3GPP TS 38.211, 5.3.1 (normal cyclic prefix, 144 of 2048 samples); interference beyond it: D. Kim, G. L. Stuber, "
-    "Residual ISI cancellation for OFDM with applications to HDTV broadcasting, IEEE J. Sel. Areas Commun. 16(8), 1998"
+    "3GPP TS 38.211, 5.3.1 (normal cyclic prefix, 144 of 2048 samples); interference beyond it: D. "
+    "Kim, G. L. Stuber, "
+    "Residual ISI cancellation for OFDM with applications to HDTV broadcasting, IEEE J. Sel. Areas "
+    "Commun. 16(8), 1998"
 )
 DEFAULTS = {"prefix_s": None}
 UNMODELLED = ("fmcw", "cw")
@@ -45,30 +49,49 @@ def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
 
 
 def late_samples(settings: dict, view: View) -> np.ndarray:
-    """Return how many samples (N, L) of each point's echo, at the start of the window, carry the previous symbol."""
+    """Return how many samples (N, L) of each point's echo, at the start of the window, carry the
+    previous symbol.
+    """
     network = view.network
-    late_s = view.ways_m(view.places) / SPEED_OF_LIGHT - prefix_length_s(settings["prefix_s"], network)
+    late_s = view.ways_m(view.places) / SPEED_OF_LIGHT - prefix_length_s(
+        settings["prefix_s"], network
+    )
     rate_hz = network.subcarriers * network.subcarrier_spacing_hz
     return np.clip(np.ceil(late_s * rate_hz), 0, network.subcarriers).astype(np.int64)
 
 
 def convolved(
-    settings: dict, network: Network, response: np.ndarray, on_air: Callable[[str], np.ndarray], offset_cells: float
+    settings: dict,
+    network: Network,
+    response: np.ndarray,
+    on_air: Callable[[str], np.ndarray],
+    offset_cells: float,
 ) -> np.ndarray:
-    """Return the time samples (N, M) of still echoes: the linear convolution of the sent stream with the range cells.
+    """Return the time samples (N, M) of still echoes: the linear convolution of the sent stream
+    with the range cells.
 
-    response: (N, M) of all echoes; on_air: subcarriers (N, M) on the air in the "waveform" and the "previous waveform";
-    offset_cells: distance of the echoes beyond their cells' centres. The prefix counts in whole samples.
+    response: (N, M) of all echoes; on_air: subcarriers (N, M) on the air in the "waveform" and the
+    "previous waveform";
+    offset_cells: distance of the echoes beyond their cells' centres. The prefix counts in whole
+    samples.
     """
     count = response.shape[1]
-    prefix = min(round(prefix_length_s(settings["prefix_s"], network) * count * network.subcarrier_spacing_hz), count)
+    prefix = min(
+        round(
+            prefix_length_s(settings["prefix_s"], network) * count * network.subcarrier_spacing_hz
+        ),
+        count,
+    )
     later = np.exp(-2j * np.pi * offset_cells * np.arange(count) / count)
     now, before = (
-        fft.ifft(fft.ifftshift(on_air(name) * later, axes=1), axis=1) for name in ("waveform", "previous waveform")
+        fft.ifft(fft.ifftshift(on_air(name) * later, axes=1), axis=1)
+        for name in ("waveform", "previous waveform")
     )
-    # Frequencies count from the lowest subcarrier in range cells, from the oscillator's, M // 2 higher, in samples.
+    # Frequencies count from the lowest subcarrier in range cells, from the oscillator's, M // 2
+    # higher, in samples.
     cells = fft.ifft(fft.ifftshift(response * later.conj(), axes=1), axis=1)
-    # From one symbol length before the window: the previous symbol's end, the prefix, and the symbol itself.
+    # From one symbol length before the window: the previous symbol's end, the prefix, and the
+    # symbol itself.
     stream = np.concatenate([before[:, prefix:], now[:, count - prefix :], now], axis=1)
     spectrum = fft.fft(stream, axis=1) * fft.fft(cells, 2 * count, axis=1)
     return fft.ifft(spectrum, axis=1)[:, count:]

@@ -1,7 +1,9 @@
-"""The direct path of a link between two stations: the sent signal reaches the receiving station without the target.
+"""The direct path of a link between two stations: the sent signal reaches the receiving station
+without the target.
 
-It has the delay of the distance between the masts and no Doppler shift, and it enters through the side lobes of both
-arrays, whose beams point at the target. A station that receives its own signal has `transmit_leakage` instead.
+It has the delay of the distance between the masts and no Doppler shift, and it enters through the
+side lobes of both arrays, whose beams point at the target. A station that receives its own signal
+has `transmit_leakage` instead.
 """
 
 import numpy as np
@@ -12,7 +14,8 @@ from lowalt.scene.crossing import crossing
 from lowalt.scene.view import Still, View
 
 SOURCE = (
-    "H. T. Friis, A note on a simple transmission formula, Proc. IRE 34, 1946; N. J. Willis, Bistatic Radar, 2nd ed. "
+    "H. T. Friis, A note on a simple transmission formula, Proc. IRE 34, 1946; N. J. Willis, "
+    "Bistatic Radar, 2nd ed. "
     "1995, ch. 3 (range sum, direct path) and ch. 6 (Doppler of the bisector)"
 )
 DEFAULTS = {"loss_db": 0.0}
@@ -23,7 +26,9 @@ STILL = True
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a network without links."""
     if all(station.transmitter is None for station in scene.network.stations):
-        raise InputError("effects.direct_path: no station of the network is a link, expected {transmit, receive}")
+        raise InputError(
+            "effects.direct_path: no station of the network is a link, expected {transmit, receive}"
+        )
 
 
 def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
@@ -37,10 +42,12 @@ def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:
 def from_sender(settings: dict, view: View) -> Still:
     """Return the direct path, zero for a station that receives its own signal.
 
-    Both array sums toward the other mast, in the units of the echo: the amplitude is sqrt(P / elements) lambda /
-    (4 pi d) times both sums. Source: Friis 1946.
+    Both array sums toward the other mast, in the units of the echo: the amplitude is sqrt(P /
+    elements) lambda / (4 pi d) times both sums. Source: Friis 1946.
     """
-    network, hears, sends = view.network, view.station, view.station.transmitter
+    network = view.network
+    hears = view.station
+    sends = view.station.transmitter
     shape = len(view.times_s), network.subcarriers
     if sends is None:
         return Still(np.zeros(shape, np.complex128))

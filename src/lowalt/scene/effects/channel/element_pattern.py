@@ -1,6 +1,8 @@
-"""The gain pattern of the antenna elements, which weights every echo on the way out and on the way back.
+"""The gain pattern of the antenna elements, which weights every echo on the way out and on the way
+back.
 
-Without this effect elements are isotropic. Reflected paths and the land have the gain in their own direction.
+Without this effect elements are isotropic. Reflected paths and the land have the gain in their own
+direction.
 """
 
 import numpy as np
@@ -19,7 +21,8 @@ def element(settings: dict) -> Element:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
-    """Return the factor (N, L) on every point's two-way amplitude: the element's power gain in its direction.
+    """Return the factor (N, L) on every point's two-way amplitude: the element's power gain in its
+    direction.
 
     On a link it is the geometric mean of both stations' gains.
     """

@@ -1,9 +1,11 @@
-"""Fluctuation of a target's cross section: an angular pattern (B1) and a log-normal factor (B2) on its mean (A).
+"""Fluctuation of a target's cross section: an angular pattern (B1) and a log-normal factor (B2) on
+its mean (A).
 
-Both act on all points alike. The log-normal factor is drawn once per look and station; both directions of a link share
-one draw. The pattern depends on the direction of the station in the frame of the body; TR 38.901 has none for small
-UAVs, people and birds. On a link, the pattern is taken at the bisector of both ends. All classes then also have a loss
-that depends on the bistatic angle.
+Both act on all points alike. The log-normal factor is drawn once per look and station; both
+directions of a link share one draw. The pattern depends on the direction of the station in the
+frame of the body; TR 38.901 has none for small UAVs, people and birds. On a link, the pattern is
+taken at the bisector of both ends. All classes then also have a loss that depends on the bistatic
+angle.
 """
 
 import numpy as np
@@ -11,13 +13,22 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.target_classes import LARGE_UAV, LARGE_UAV_DBSM, VEHICLE, VEHICLE_DBSM, Lobe, large
+from lowalt.scene.target_classes import (
+    LARGE_UAV,
+    LARGE_UAV_DBSM,
+    VEHICLE,
+    VEHICLE_DBSM,
+    Lobe,
+    large,
+)
 from lowalt.scene.view import View
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "3GPP TR 38.901 V19.4.0, Eqs. 7.9.2-1 to 7.9.2-3, Tables 7.9.2.1-1, -2 and -4 (A, B1, B2 are sigma_M, sigma_D, "
-    "sigma_S there); on links, no forward scattering (sigma_FS of minus infinity) and one draw for both directions "
+    "3GPP TR 38.901 V19.4.0, Eqs. 7.9.2-1 to 7.9.2-3, Tables 7.9.2.1-1, -2 and -4 (A, B1, B2 are "
+    "sigma_M, sigma_D, "
+    "sigma_S there); on links, no forward scattering (sigma_FS of minus infinity) and one draw for "
+    "both directions "
     "(reciprocity): estimates; birds take the small UAV's spread and loss: estimate"
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
@@ -25,7 +36,9 @@ DRAWN = "pair"
 IDLE = [{"pattern": False, "spread_db": 0}]
 
 CUT = 3.0
-"""Standard deviations above its mean at which the log-normal factor is cut (TR 38.901, Eq. 7.9.4-1)."""
+"""Standard deviations above its mean at which the log-normal factor is cut (TR 38.901, Eq.
+7.9.4-1).
+"""
 
 
 BISTATIC = {LARGE_UAV: (6.05, 1.33), VEHICLE: (6.0, 1.65)}
@@ -38,7 +51,8 @@ def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for two patterns at once."""
     if settings["pattern"] and "cross_sections" in scene.effects:
         raise InputError(
-            "effects.fluctuation: pattern is true and effects.cross_sections gives every point a pattern of its own, "
+            "effects.fluctuation: pattern is true and effects.cross_sections gives every point a "
+            "pattern of its own, "
             "expected pattern: false in a scene with both"
         )
 
@@ -53,17 +67,21 @@ def spread_db(cloud: Cloud) -> float:
 def pattern_dbsm(
     faces: tuple[Lobe, ...], azimuth_deg: np.ndarray, zenith_deg: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return 10 lg(sigma_M sigma_D) of a target's face in a direction (any shape), and its least value (dBsm).
+    """Return 10 lg(sigma_M sigma_D) of a target's face in a direction (any shape), and its least
+    value (dBsm).
 
     azimuth: 0 front, 90 left.
 
-    Faces share the directions as the tables say: the roof above 45 degrees (30 for vehicles), then quarters of azimuth.
+    Faces share the directions as the tables say: the roof above 45 degrees (30 for vehicles), then
+    quarters of azimuth.
     """
     roof, floor = (45.0, 135.0) if len(faces) == len(LARGE_UAV) else (30.0, 181.0)
     face = (np.floor((azimuth_deg + 45.0) / 90.0) % 4).astype(int)
     face = np.where(zenith_deg < roof, 4, np.where(zenith_deg >= floor, 5, face))
     centre, width, high, tall, peak, depth = (
-        np.array([0.0 if lobe[k] is None else lobe[k] for lobe in faces])[np.minimum(face, len(faces) - 1)]
+        np.array([0.0 if lobe[k] is None else lobe[k] for lobe in faces])[
+            np.minimum(face, len(faces) - 1)
+        ]
         for k in range(6)
     )
     off = (azimuth_deg - centre + 180.0) % 360.0 - 180.0
@@ -73,7 +91,8 @@ def pattern_dbsm(
 
 
 def bistatic_loss_db(faces: tuple[Lobe, ...] | None, angle_rad: np.ndarray) -> np.ndarray:
-    """Return the loss (dB) at bistatic angles of 0 to pi (any shape); faces: None for a target without a pattern.
+    """Return the loss (dB) at bistatic angles of 0 to pi (any shape); faces: None for a target
+    without a pattern.
 
     Source: TR 38.901, Eq. 7.9.2-3, without its floor, and Eq. 7.9.2-2.
     """
@@ -81,23 +100,31 @@ def bistatic_loss_db(faces: tuple[Lobe, ...] | None, angle_rad: np.ndarray) -> n
         return BISTATIC_DB * np.sin(0.5 * angle_rad)
     k1, k2 = BISTATIC[faces]
     with np.errstate(divide="ignore"):
-        return k1 * np.sin(0.5 * k2 * angle_rad) - 5.0 * np.log10(np.maximum(np.cos(0.5 * angle_rad), 0.0))
+        return k1 * np.sin(0.5 * k2 * angle_rad) - 5.0 * np.log10(
+            np.maximum(np.cos(0.5 * angle_rad), 0.0)
+        )
 
 
 def pattern(view: View) -> np.ndarray:
-    """Return B1 (N, 1), relative to the mean cross section, in the station's direction or at a link's bisector."""
+    """Return B1 (N, 1), relative to the mean cross section, in the station's direction or at a
+    link's bisector.
+    """
     cloud = view.cloud
-    faces, mean = None, 0.0
+    faces = None
+    mean = 0.0
     if "body" in cloud.kinds and cloud.like == "Vehicle":
-        faces, mean = VEHICLE, VEHICLE_DBSM
+        faces = VEHICLE
+        mean = VEHICLE_DBSM
     elif "body" in cloud.kinds and cloud.like == "UAV" and large(cloud):
-        faces, mean = LARGE_UAV, LARGE_UAV_DBSM
+        faces = LARGE_UAV
+        mean = LARGE_UAV_DBSM
     ends = view.ends()
     if faces is None and len(ends) == 1:
         return np.ones((len(view.times_s), 1))
     body = cloud.kinds.index("body") if "body" in cloud.kinds else 0
     ways = [np.asarray(end.station.position_m) - view.motion.translation[:, body] for end in ends]
-    away, angle = ways[0], np.zeros(len(view.times_s))
+    away = ways[0]
+    angle = np.zeros(len(view.times_s))
     if len(ends) == 2:
         units = [way / portable.norm(way)[:, None] for way in ways]
         away = units[0] + units[1]
@@ -114,7 +141,8 @@ def pattern(view: View) -> np.ndarray:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: the root of B1 B2, with one draw per look and station or pair.
+    """Return the factor (N, 1) on all amplitudes: the root of B1 B2, with one draw per look and
+    station or pair.
 
     B2 is log-normal with mean one: its mean in dB is -ln(10) / 20 times its variance (Eq. 7.9.2-1).
     """

@@ -1,10 +1,12 @@
-"""Interference: the signals of other stations, from mast to mast and by the target, with data unknown to the receiver.
+"""Interference: the signals of other stations, from mast to mast and by the target, with data
+unknown to the receiver.
 
-A station hears every other station: its subcarriers at full level where sub-bands overlap (`guard_subcarriers` below
-0), and its leakage elsewhere. The receiver divides both by its own data, which makes them noise: subcarriers of power
-|Y_m|^2 give every range cell a noise power of sum_m |Y_m|^2 / M^2. All beams point at the same target. Symbols follow
-each other without a pause, so a signal that is later than the cyclic prefix, or early by the error of a clock, contains
-part of another symbol.
+A station hears every other station: its subcarriers at full level where sub-bands overlap
+(`guard_subcarriers` below 0), and its leakage elsewhere. The receiver divides both by its own data,
+which makes them noise: subcarriers of power |Y_m|^2 give every range cell a noise power of sum_m
+|Y_m|^2 / M^2. All beams point at the same target. Symbols follow each other without a pause, so a
+signal that is later than the cyclic prefix, or early by the error of a clock, contains part of
+another symbol.
 """
 
 from collections.abc import Callable
@@ -23,8 +25,10 @@ from lowalt.scene.set_noise import white
 from lowalt.scene.waveform import baseband_hz, windowed
 
 SOURCE = (
-    "3GPP TS 38.104, 6.6.3 (adjacent channel leakage ratio of base stations, 45 dB below 7 GHz; here the same at any "
-    "distance in frequency); H. T. Friis 1946 (from mast to mast); M. Braun, OFDM Radar Algorithms in Mobile "
+    "3GPP TS 38.104, 6.6.3 (adjacent channel leakage ratio of base stations, 45 dB below 7 GHz; "
+    "here the same at any "
+    "distance in frequency); H. T. Friis 1946 (from mast to mast); M. Braun, OFDM Radar Algorithms "
+    "in Mobile "
     "Communication Networks, KIT 2014, ch. 4 and 5 (other nodes as noise)"
 )
 DEFAULTS = {"leakage_db": 45.0, "loss_db": 0.0, "sigma_ppm": 0.017, "sigma_s": 2e-8}
@@ -40,15 +44,20 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def arrivals(settings: dict, sample: SceneSample, sends: Station) -> list[tuple[np.ndarray, float]]:
     """Return both ways of a station's signal to the receiver, from mast to mast and by the target.
 
-    A way is a pair: its response (N or 1, M) on the receiver's subcarriers, as if the sender used all of them, and its
-    delay (s).
+    A way is a pair: its response (N or 1, M) on the receiver's subcarriers, as if the sender used
+    all of them, and its delay (s).
     """
     view, hears = sample.view, sample.view.station
     there = replace(sends, frequency_hz=hears.frequency_hz)
-    seen = view.of(replace(hears, name=f"{sends.name}-{hears.name}", transmitter=there, receiver=hears))
+    seen = view.of(
+        replace(hears, name=f"{sends.name}-{hears.name}", transmitter=there, receiver=hears)
+    )
     direct, delay_s = crossing(view, there, hears)
     by_target_s = float(seen.ways_m(view.origin_m)) / SPEED_OF_LIGHT
-    return [(direct[None] * 10 ** (-settings["loss_db"] / 20), delay_s), (sample.direct_echo(seen), by_target_s)]
+    return [
+        (direct[None] * 10 ** (-settings["loss_db"] / 20), delay_s),
+        (sample.direct_echo(seen), by_target_s),
+    ]
 
 
 def heard(settings: dict, sample: SceneSample) -> np.ndarray:
@@ -59,18 +68,26 @@ def heard(settings: dict, sample: SceneSample) -> np.ndarray:
     view, network = sample.view, sample.view.network
     total = np.zeros((network.symbols, network.subcarriers), np.complex128)
     errors = of_stations(settings, network, sample.scene.stream("link_offset", view.row))
-    step_hz, middle, count = network.subcarrier_spacing_hz, network.subcarriers // 2, network.subcarriers
-    number, rate_hz = np.arange(count), count * step_hz
+    step_hz = network.subcarrier_spacing_hz
+    middle = network.subcarriers // 2
+    count = network.subcarriers
+    number = np.arange(count)
+    rate_hz = count * step_hz
     for sends in network.stations:
         if sends.name == view.station.name:
             continue
         ppm, shift_s = np.subtract(errors[sends.name], errors[view.station.name])
-        ramp, data = np.exp(-2j * np.pi * baseband_hz(network) * shift_s), sent(settings, sample, sends)
+        ramp = np.exp(-2j * np.pi * baseband_hz(network) * shift_s)
+        data = sent(settings, sample, sends)
         samples = np.zeros_like(total)
         for response, delay_s in arrivals(settings, sample, sends):
             late_s = delay_s + shift_s
-            late = min(np.ceil(late_s * rate_hz), 0) + max(np.ceil((late_s - sample.prefix_s) * rate_hz), 0)
-            samples += windowed(network, sample.prefix_s, response * ramp, int(np.clip(late, -count, count)), data)
+            late = min(np.ceil(late_s * rate_hz), 0) + max(
+                np.ceil((late_s - sample.prefix_s) * rate_hz), 0
+            )
+            samples += windowed(
+                network, sample.prefix_s, response * ramp, int(np.clip(late, -count, count)), data
+            )
         turn_hz = 1e-6 * ppm * (view.station.frequency_hz + middle * step_hz)
         within = np.exp(2j * np.pi * turn_hz * number / rate_hz)
         total += samples * within * np.exp(2j * np.pi * turn_hz * view.times_s)[:, None]
@@ -83,15 +100,20 @@ def sent(settings: dict, sample: SceneSample, sends: Station) -> Callable[[str],
     Where sub-bands overlap they are its subcarriers, elsewhere its leakage, which is noise.
     """
     network = sample.view.network
-    first = round((sends.frequency_hz - sample.view.station.frequency_hz) / network.subcarrier_spacing_hz)
+    first = round(
+        (sends.frequency_hz - sample.view.station.frequency_hz) / network.subcarrier_spacing_hz
+    )
     number = np.arange(network.subcarriers) - first
     whole = np.flatnonzero((number >= 0) & (number < network.subcarriers))
 
     def data(symbol: str) -> np.ndarray:
-        """Those of the "waveform", or of the symbols before and after, the "previous" and the "next waveform"."""
+        """Those of the "waveform", or of the symbols before and after, the "previous" and the "next
+        waveform".
+        """
         result = np.zeros((network.symbols, network.subcarriers), np.complex128)
         if len(whole) < network.subcarriers:
-            rng, power = sample.draws(f"leakage of {sends.name}, {symbol}"), 10 ** (-settings["leakage_db"] / 10)
+            rng = sample.draws(f"leakage of {sends.name}, {symbol}")
+            power = 10 ** (-settings["leakage_db"] / 10)
             result = white(rng, power, result.shape)
         if len(whole):
             result[:, whole] = sample.on_air(f"{symbol} of {sends.name}")[:, whole - first]

@@ -1,8 +1,10 @@
-"""Blocked line of sight: buildings hide a target from a station with the probability of a 3GPP environment.
+"""Blocked line of sight: buildings hide a target from a station with the probability of a 3GPP
+environment.
 
-One draw per sample and station decides for the whole look. A blocked echo loses `blocked_db` on the way out and again
-on the way back. A target that is hidden from a station is also hidden on that station's way of every link. The SNRs of
-the configuration refer to the echo as it arrives, so blocking does not change the ratio of echo to noise at a set SNR.
+One draw per sample and station decides for the whole look. A blocked echo loses `blocked_db` on the
+way out and again on the way back. A target that is hidden from a station is also hidden on that
+station's way of every link. The SNRs of the configuration refer to the echo as it arrives, so
+blocking does not change the ratio of echo to noise at a set SNR.
 """
 
 import math
@@ -12,8 +14,10 @@ import numpy as np
 from lowalt.scene.view import View
 
 SOURCE = (
-    "3GPP TR 36.777, Table B-1 (UMa-AV, UMi-AV, RMa-AV), below them TR 38.901, Table 7.4.2-1; 20 dB one way: estimate, "
-    "near the 17 dB between TR 36.777's path losses without and with line of sight at 300 m, height 50 m, 4.9 GHz"
+    "3GPP TR 36.777, Table B-1 (UMa-AV, UMi-AV, RMa-AV), below them TR 38.901, Table 7.4.2-1; 20 "
+    "dB one way: estimate, "
+    "near the 17 dB between TR 36.777's path losses without and with line of sight at 300 m, "
+    "height 50 m, 4.9 GHz"
 )
 DEFAULTS = {"environment": "UMa", "blocked_db": 20.0}
 IDLE = [{"blocked_db": 0}]
@@ -34,7 +38,9 @@ def probability(environment: str, flat_m: float, height_m: float) -> float:
     if height_m > 22.5:
         if environment == "UMi":
             return _falling(flat_m, max(294.05 * lg - 432.94, 18.0), 233.98 * lg - 0.95)
-        return 1.0 if height_m > 100 else _falling(flat_m, max(460 * lg - 700, 18.0), 4300 * lg - 3800)
+        return (
+            1.0 if height_m > 100 else _falling(flat_m, max(460 * lg - 700, 18.0), 4300 * lg - 3800)
+        )
     plain = _falling(flat_m, 18.0, 36.0 if environment == "UMi" else 63.0)
     if environment == "UMi" or height_m <= 13 or flat_m <= 18:
         return plain
@@ -43,16 +49,22 @@ def probability(environment: str, flat_m: float, height_m: float) -> float:
 
 
 def _falling(flat_m: float, near_m: float, decay_m: float) -> float:
-    """1 up to the distance d = `near_m`; beyond it d / D + exp(-D / p) (1 - d / D), D = `flat_m`, p = `decay_m`."""
+    """1 up to the distance d = `near_m`; beyond it d / D + exp(-D / p) (1 - d / D), D = `flat_m`, p
+    = `decay_m`.
+    """
     if flat_m <= near_m:
         return 1.0
     return near_m / flat_m + math.exp(-flat_m / decay_m) * (1 - near_m / flat_m)
 
 
 def visible_one_way(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 10) for two blocked ways; one draw."""
+    """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 10) for two blocked
+    ways; one draw.
+    """
     x, y, height = (view.row[f"{axis}_m"] for axis in "xyz")
     place = view.station.position_m
     flat = math.hypot(x - place[0], y - place[1])
     blocked = float(rng.random()) >= probability(settings["environment"], flat, height)
-    return np.full((len(view.times_s), 1), 10 ** (-2 * settings["blocked_db"] / 20) if blocked else 1.0)
+    return np.full(
+        (len(view.times_s), 1), 10 ** (-2 * settings["blocked_db"] / 20) if blocked else 1.0
+    )

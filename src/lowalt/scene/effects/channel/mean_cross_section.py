@@ -1,8 +1,10 @@
-"""Absolute mean cross sections: a target has the mean cross section of its class and size, shared by its points.
+"""Absolute mean cross sections: a target has the mean cross section of its class and size, shared
+by its points.
 
-The paper gives every point 1 m2, so a sparrow of 158 points has 158 m2. With this effect, the points share the target's
-mean cross section: all blades together are `blades_db` below the rest, and the points of each group keep their ratios.
-A common factor makes the power of their coherent sum, averaged over aspects and motion, equal to the stated mean.
+The paper gives every point 1 m2, so a sparrow of 158 points has 158 m2. With this effect, the
+points share the target's mean cross section: all blades together are `blades_db` below the rest,
+and the points of each group keep their ratios. A common factor makes the power of their coherent
+sum, averaged over aspects and motion, equal to the stated mean.
 """
 
 import hashlib
@@ -24,20 +26,28 @@ from lowalt.scene.target_classes import (
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "3GPP TR 38.901 V19.4.0, Tables 7.9.2.1-1 to 7.9.2.1-4, 10 lg sigma_M: UAV of small size (0.4 m) -12.81 dBsm, of "
-    "large size (1.6 m) -5.85, human -1.37, vehicle 11.25; other UAV sizes straight in dB over log size: estimate; "
-    "birds: pigeon at 4.9 GHz between its S- and X-band values of Konrad, Hicks & Dobson, Science 159, 1968, "
+    "3GPP TR 38.901 V19.4.0, Tables 7.9.2.1-1 to 7.9.2.1-4, 10 lg sigma_M: UAV of small size (0.4 "
+    "m) -12.81 dBsm, of "
+    "large size (1.6 m) -5.85, human -1.37, vehicle 11.25; other UAV sizes straight in dB over log "
+    "size: estimate; "
+    "birds: pigeon at 4.9 GHz between its S- and X-band values of Konrad, Hicks & Dobson, Science "
+    "159, 1968, "
     "with the square of the length: estimate"
 )
 DEFAULTS = {"dbsm": {}, "blades_db": -15.0}
 
-PIGEON_M, PIGEON_DBSM = 0.22, -24.6
+PIGEON_M = 0.22
+PIGEON_DBSM = -24.6
 _KEPT: dict[bytes, np.ndarray] = {}
-"""Cross sections of clouds by their content: the mean over thousands of looks takes longer than a sample."""
+"""Cross sections of clouds by their content: the mean over thousands of looks takes longer than a
+sample.
+"""
 
 
 def mean_dbsm(category: str, size: float) -> float:
-    """Return a target's mean cross section (dBsm) by its class and the largest dimension of its body (m)."""
+    """Return a target's mean cross section (dBsm) by its class and the largest dimension of its
+    body (m).
+    """
     if category == "UAV":
         slope = (LARGE_UAV_DBSM - SMALL_UAV_DBSM) / np.log10(LARGE_UAV_M / SMALL_UAV_M)
         return float(SMALL_UAV_DBSM + slope * np.log10(size / SMALL_UAV_M))
@@ -47,12 +57,15 @@ def mean_dbsm(category: str, size: float) -> float:
 
 
 def cross_sections(settings: dict, cloud: Cloud, wavelength_m: float) -> np.ndarray:
-    """Return each point's cross section (L,) m2; `motion.cross_section.mean_cross_section` of them is the target's.
+    """Return each point's cross section (L,) m2; `motion.cross_section.mean_cross_section` of them
+    is the target's.
 
     Raises: InputError for a flying target whose size is not known.
-    settings: dbsm: {subtype: dBsm} replaces the class's value; blades_db: all blades together against the rest.
+    settings: dbsm: {subtype: dBsm} replaces the class's value; blades_db: all blades together
+    against the rest.
     """
-    size, dbsm = size_m(cloud), settings["dbsm"].get(cloud.subtype)
+    size = size_m(cloud)
+    dbsm = settings["dbsm"].get(cloud.subtype)
     if dbsm is None and size == 0 and cloud.like in ("UAV", "Bird"):
         raise InputError(
             f"effects.mean_cross_section: the body of {cloud.subtype} is one point, which has no size, expected its "
@@ -61,16 +74,21 @@ def cross_sections(settings: dict, cloud: Cloud, wavelength_m: float) -> np.ndar
     total = 10 ** ((mean_dbsm(cloud.like, size) if dbsm is None else dbsm) / 10)
     arrays = cloud.points, cloud.part, cloud.hinges, cloud.axes, cloud.track, cloud.rcs_m2
     text = repr((cloud.like, cloud.kinds, total, settings["blades_db"], wavelength_m))
-    key = hashlib.sha256(text.encode() + b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).digest()
+    key = hashlib.sha256(
+        text.encode() + b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
+    ).digest()
     if key not in _KEPT:
         _KEPT[key] = shared(cloud, total, settings["blades_db"], wavelength_m)
     return _KEPT[key]
 
 
 def shared(cloud: Cloud, total_m2: float, blades_db: float, wavelength_m: float) -> np.ndarray:
-    """Return cross sections (L,) m2 in the ratios of the cloud's and of `blades_db`, whose mean is `total_m2`."""
+    """Return cross sections (L,) m2 in the ratios of the cloud's and of `blades_db`, whose mean is
+    `total_m2`.
+    """
     blades = np.isin(cloud.part, cloud.parts_of("rotor"))
-    weight, shares = np.asarray(cloud.rcs_m2, float), np.zeros(len(cloud.rcs_m2))
+    weight = np.asarray(cloud.rcs_m2, float)
+    shares = np.zeros(len(cloud.rcs_m2))
     for mine, share in ((~blades, 1.0), (blades, 10 ** (blades_db / 10))):
         if weight[mine].sum() > 0:
             shares[mine] = share * weight[mine] / weight[mine].sum()

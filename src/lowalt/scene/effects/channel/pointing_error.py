@@ -1,9 +1,10 @@
-"""Beams that miss the target: an error of their direction, drawn at every update, and a target that flies on between.
+"""Beams that miss the target: an error of their direction, drawn at every update, and a target that
+flies on between.
 
-Both beams point where the tracker last saw the target, off by the error. Without updates they keep pointing at the
-target's place at the first symbol, as the paper's do. An update turns the beams about the arrays' middles, so a target
-in mid-beam keeps its phase. The land keeps the first beam. Every station has one error, in its own look and as either
-end of its links.
+Both beams point where the tracker last saw the target, off by the error. Without updates they keep
+pointing at the target's place at the first symbol, as the paper's do. An update turns the beams
+about the arrays' middles, so a target in mid-beam keeps its phase. The land keeps the first beam.
+Every station has one error, in its own look and as either end of its links.
 """
 
 import numpy as np
@@ -14,7 +15,8 @@ from lowalt.scene.checks import CheckedScene
 from lowalt.scene.view import Beams, View
 
 SOURCE = (
-    "R. J. Mailloux, Phased Array Antenna Handbook, 3rd ed. 2018, ch. 1 and 7 (pattern and pointing error of a steered "
+    "R. J. Mailloux, Phased Array Antenna Handbook, 3rd ed. 2018, ch. 1 and 7 (pattern and "
+    "pointing error of a steered "
     "array); standard deviation of a tenth of the default array's 6.4 degrees beam: estimate"
 )
 DEFAULTS = {"sigma_deg": 0.64, "update_s": None}
@@ -32,7 +34,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def turned(aim_m: np.ndarray, station_m: np.ndarray, angles_rad: np.ndarray) -> np.ndarray:
-    """Return aims (K, 3) m turned about the station by angles (K, 2) rad, azimuth and elevation; their range stays."""
+    """Return aims (K, 3) m turned about the station by angles (K, 2) rad, azimuth and elevation;
+    their range stays.
+    """
     d = aim_m - station_m
     azimuth = portable.arctan2(d[:, 1], d[:, 0]) + angles_rad[:, 0]
     elevation = portable.arctan2(d[:, 2], portable.norm(d[:, :2])) + angles_rad[:, 1]
@@ -43,7 +47,9 @@ def turned(aim_m: np.ndarray, station_m: np.ndarray, angles_rad: np.ndarray) -> 
 
 
 def beams(settings: dict, view: View, rng: np.random.Generator) -> Beams:
-    """Return the beams of the look: one, or one an update; two draws each. The tracker follows the mean course."""
+    """Return the beams of the look: one, or one an update; two draws each. The tracker follows the
+    mean course.
+    """
     last = float(view.network.times_s[-1])
     update = settings["update_s"]
     starts = np.zeros(1) if update is None else np.arange(0.0, last + 1e-9, update)

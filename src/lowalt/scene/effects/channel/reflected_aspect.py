@@ -1,9 +1,10 @@
-"""Aspect and occlusion along reflected paths: the ground and a facade see another side of a target than the station.
+"""Aspect and occlusion along reflected paths: the ground and a facade see another side of a target
+than the station.
 
-A point sees a reflected path come from the station's mirror image. Out and back on that path, the target has the aspect
-and the shadows that a station at the mirror image would see. Where the outward and the return path differ, the factor
-is the root of the product of both two-way factors. Without this effect, all paths have the aspect and the shadows of
-the direct path.
+A point sees a reflected path come from the station's mirror image. Out and back on that path, the
+target has the aspect and the shadows that a station at the mirror image would see. Where the
+outward and the return path differ, the factor is the root of the product of both two-way factors.
+Without this effect, all paths have the aspect and the shadows of the direct path.
 """
 
 from collections.abc import Callable
@@ -16,8 +17,10 @@ from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
 SOURCE = (
-    "images of the station: Balanis, Advanced Engineering Electromagnetics, section 7.4; product of one factor for "
-    "each way: reciprocity, exact for a Lambert surface (Lambert's cosine law, cos i cos s) and for opaque shadows, an "
+    "images of the station: Balanis, Advanced Engineering Electromagnetics, section 7.4; product "
+    "of one factor for "
+    "each way: reciprocity, exact for a Lambert surface (Lambert's cosine law, cos i cos s) and "
+    "for opaque shadows, an "
     "estimate for facets"
 )
 DEFAULTS: dict[str, float] = {}
@@ -30,25 +33,35 @@ def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError where the scene has no reflected route, or none of FOLLOWED."""
     if not {"ground_reflection", "walls", "town"} & set(scene.effects):
         raise InputError(
-            "effects.reflected_aspect: there is no reflected route, expected ground_reflection, walls or town in the "
+            "effects.reflected_aspect: there is no reflected route, expected ground_reflection, "
+            "walls or town in the "
             "same scene"
         )
     if not set(FOLLOWED) & set(scene.effects):
-        raise InputError(f"effects.reflected_aspect: no side to follow, expected one of {list(FOLLOWED)} in the scene")
+        raise InputError(
+            f"effects.reflected_aspect: no side to follow, expected one of {list(FOLLOWED)} in the scene"
+        )
 
 
-def routes(settings: dict, view: View, paths: list[ImagePath], weight: Callable[..., np.ndarray]) -> np.ndarray:
-    """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the direct one first.
+def routes(
+    settings: dict, view: View, paths: list[ImagePath], weight: Callable[..., np.ndarray]
+) -> np.ndarray:
+    """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the
+    direct one first.
 
-    weight(view, names, but): product (N, L) of the effects' amplitude factors as `view` sees them. On a link,
-    both ways by the same kind of path are the link between both images. A path without an image of the station shows
-    the direct one's side: in a town it is the change of the direct path, which must cancel a blocked direct path.
+    weight(view, names, but): product (N, L) of the effects' amplitude factors as `view` sees them.
+    On a link, both ways by the same kind of path are the link between both images. A path without
+    an image of the station shows the direct one's side: in a town it is the change of the direct
+    path, which must cancel a blocked direct path.
     """
-    rest, ends = weight(view, but=FOLLOWED), view.ends()
+    rest = weight(view, but=FOLLOWED)
+    ends = view.ends()
     heard = [None, *(path.station_m for path in paths)]
     sent = [None, *(path.outward.station_m for path in paths)]
 
-    def two_way(end: View, image_m: np.ndarray | None, sender_m: np.ndarray | None = None) -> np.ndarray:
+    def two_way(
+        end: View, image_m: np.ndarray | None, sender_m: np.ndarray | None = None
+    ) -> np.ndarray:
         """The followed effects' factor (N, L) for a station, or a link, that stands at its image."""
         if image_m is None and sender_m is None:
             return weight(end, FOLLOWED)
@@ -56,7 +69,8 @@ def routes(settings: dict, view: View, paths: list[ImagePath], weight: Callable[
         return weight(end.seen_from(place_m, sender_m), FOLLOWED)
 
     back = [two_way(ends[-1], image_m) for image_m in heard]
-    out, same = back, back
+    out = back
+    same = back
     if len(ends) == 2:
         out = [two_way(ends[0], image_m) for image_m in sent]
         same = [two_way(view, *images_m) for images_m in zip(heard, sent, strict=True)]

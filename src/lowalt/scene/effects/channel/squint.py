@@ -1,7 +1,9 @@
-"""Beam squint: the arrays' phases follow each subcarrier's frequency, the beams' weights are set for the lowest one.
+"""Beam squint: the arrays' phases follow each subcarrier's frequency, the beams' weights are set
+for the lowest one.
 
-Element i of a row then has the phase pi i (kappa_m x - kappa_k x_0) instead of pi i kappa_k (x - x_0). `scene.response`
-sums the arrays at a few frequencies of the band where a scene names this effect.
+Element i of a row then has the phase pi i (kappa_m x - kappa_k x_0) instead of pi i kappa_k (x -
+x_0). `scene.response` sums the arrays at a few frequencies of the band where a scene names this
+effect.
 """
 
 import numpy as np
@@ -19,5 +21,7 @@ def waves(settings: dict) -> dict[str, bool]:
 
 
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
-    """Return how early the arrays' middles hear an echo; without squint they turn all subcarriers alike."""
+    """Return how early the arrays' middles hear an echo; without squint they turn all subcarriers
+    alike.
+    """
     return Displacement(delay_s=-array_turns(view) / view.station.frequency_hz)

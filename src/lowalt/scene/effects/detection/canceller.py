@@ -1,10 +1,11 @@
 """Canceller of the land's echoes on range cells, over the symbols of a look.
 
-`mean` and `pulse` cancel what stands still; land that the wind moves passes them. `clutter` is made for the spectrum of
-windblown land at one carrier and symbol interval: of the covariance that land has over the symbols, it removes every
-component that lies less than `depth_db` below the land's power, and leaves all else as it is. What it costs a target
-follows from the target's radial speed alone. `pulse` and `clutter` are scaled to unit noise gain, so that a set SNR
-means the same before and behind them. `mean` is not scaled: of N symbols it takes one part in N of the noise's power,
+`mean` and `pulse` cancel what stands still; land that the wind moves passes them. `clutter` is made
+for the spectrum of windblown land at one carrier and symbol interval: of the covariance that land
+has over the symbols, it removes every component that lies less than `depth_db` below the land's
+power, and leaves all else as it is. What it costs a target follows from the target's radial speed
+alone. `pulse` and `clutter` are scaled to unit noise gain, so that a set SNR means the same before
+and behind them. `mean` is not scaled: of N symbols it takes one part in N of the noise's power,
 0.01 dB of 400.
 """
 
@@ -23,22 +24,32 @@ from lowalt.scene.laws.markov import root_of
 from lowalt.scene.laws.windblown import windblown
 
 SOURCE = (
-    "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, their response and "
-    "noise gain); A. M. Haimovich, Y. Bar-Ness, An eigenanalysis interference canceler, IEEE Trans. Signal Process. "
-    "39(1), 1991 (clutter); its covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
+    "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, "
+    "their response and "
+    "noise gain); A. M. Haimovich, Y. Bar-Ness, An eigenanalysis interference canceler, IEEE "
+    "Trans. Signal Process. "
+    "39(1), 1991 (clutter); its covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, "
+    "chapter 6; depth: estimate"
 )
 DEFAULTS = {
-    "kind": "mean", "order": 1,
-    "wind_mps": 4.5, "depth_db": 50.0, "carrier_hz": 4.9e9, "symbol_interval_s": 2.5e-3,
-}  # fmt: skip
+    "kind": "mean",
+    "order": 1,
+    "wind_mps": 4.5,
+    "depth_db": 50.0,
+    "carrier_hz": 4.9e9,
+    "symbol_interval_s": 2.5e-3,
+}
 IDLE = [{"kind": "none"}, {"kind": "pulse", "order": 0}]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError where nothing stands still, and for `clutter` where symbols are missing or of another radar."""
+    """Raise InputError where nothing stands still, and for `clutter` where symbols are missing or
+    of another radar.
+    """
     if not any(getattr(module, "STILL", False) for module in scene.modules.values()):
         raise InputError(
-            "effects.canceller: there is no clutter to cancel, expected an effect in the same scene whose echoes stand "
+            "effects.canceller: there is no clutter to cancel, expected an effect in the same "
+            "scene whose echoes stand "
             "still: clutter, background_channel, direct_path or transmit_leakage"
         )
     if settings["kind"] != "clutter":
@@ -46,7 +57,8 @@ def check(settings: dict, scene: CheckedScene) -> None:
     timing = scene.effects.get("slow_time", {"downlink": 1, "missing": 0})
     if timing["downlink"] < 1 or timing["missing"] > 0:
         raise InputError(
-            "effects.canceller.kind: 'clutter' needs all symbols, and effects.slow_time leaves gaps, expected mean "
+            "effects.canceller.kind: 'clutter' needs all symbols, and effects.slow_time leaves "
+            "gaps, expected mean "
             "or pulse"
         )
     for key in ("carrier_hz", "symbol_interval_s"):
@@ -60,12 +72,14 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:
     """Return range cells (N, M) without the echoes of land.
 
-    mean: subtracts the look's mean. pulse: `order` first differences over symbols, which start as if the first symbol
-    had lasted forever, so that clutter leaves no transient. clutter: projects on what `land` leaves.
+    mean: subtracts the look's mean. pulse: `order` first differences over symbols, which start as
+    if the first symbol had lasted forever, so that clutter leaves no transient. clutter: projects
+    on what `land` leaves.
     Source: Richards 2014, 5.2; Haimovich and Bar-Ness 1991.
     """
     if settings["kind"] == "mean":
-        # Without the first symbol before the mean, an echo that stands still cancels to the last bit.
+        # Without the first symbol before the mean, an echo that stands still cancels to the last
+        # bit.
         moved = cells - cells[0]
         return moved - moved.mean(axis=0)
     if settings["kind"] == "pulse":
@@ -81,12 +95,15 @@ def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def land(symbols: int, carrier_hz: float, interval_s: float, wind_mps: float, depth_db: float) -> np.ndarray:
-    """Return the components (N, K) of windblown land's echoes over N symbols that lie above its power less `depth_db`.
+def land(
+    symbols: int, carrier_hz: float, interval_s: float, wind_mps: float, depth_db: float
+) -> np.ndarray:
+    """Return the components (N, K) of windblown land's echoes over N symbols that lie above its
+    power less `depth_db`.
 
-    They are orthonormal: the constant, in which all that stands still lies however loud it is, and the eigenvectors of
-    the moving part's covariance beside it. The exponential Doppler spectrum of slope beta has the covariance
-    1 / (1 + (4 pi t / (beta lambda))^2) at a lag t.
+    They are orthonormal: the constant, in which all that stands still lies however loud it is, and
+    the eigenvectors of the moving part's covariance beside it. The exponential Doppler spectrum of
+    slope beta has the covariance 1 / (1 + (4 pi t / (beta lambda))^2) at a lag t.
     """
     constant = np.full((symbols, 1), symbols**-0.5)
     still, beta = windblown(wind_mps, carrier_hz)
@@ -98,6 +115,7 @@ def land(symbols: int, carrier_hz: float, interval_s: float, wind_mps: float, de
     beside = moving - portable.mean(moving, axis=0)
     covariance = beside - portable.mean(beside)[:, None]
     root = root_of(covariance)
-    # Rounding would leave a little of the constant in faint axes, and what stands still may be loud.
+    # Rounding would leave a little of the constant in faint axes, and what stands still may be
+    # loud.
     power, basis = principal_axes(root - portable.mean(root, axis=0))
     return np.hstack([constant, basis[:, power > 10 ** (-depth_db / 10)]])

@@ -7,7 +7,8 @@ from lowalt.scene.checks import CheckedScene
 from lowalt.scene.waveform import Look
 
 SOURCE = (
-    "this project's own error model, for the imperfect range-bin selection that the paper leaves out (Luo et al., "
+    "this project's own error model, for the imperfect range-bin selection that the paper leaves "
+    "out (Luo et al., "
     "footnote to Eq. 7's signal model); wrong cells that follow from noise are receiver_noise"
 )
 DEFAULTS = {"probability": 0.1, "spread_cells": 2}
@@ -16,13 +17,19 @@ IDLE = [{"probability": 0}, {"spread_cells": 0}]
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a spread that reaches around all range cells."""
-    cells, spread = scene.network.subcarriers, settings["spread_cells"]
+    cells = scene.network.subcarriers
+    spread = settings["spread_cells"]
     if 2 * spread >= cells:
-        raise InputError(f"effects.cell_error.spread_cells: {spread}, expected less than half of {cells} range cells")
+        raise InputError(
+            f"effects.cell_error.spread_cells: {spread}, expected less than half of {cells} range cells"
+        )
 
 
-def choose(settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return chosen cells (N,) int64, each wrong with `probability`; cells (N, M) wrap around as ranges do.
+def choose(
+    settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator
+) -> np.ndarray:
+    """Return chosen cells (N,) int64, each wrong with `probability`; cells (N, M) wrap around as
+    ranges do.
 
     A wrong cell is off by a whole number, uniform on -spread .. spread without 0. 2 N draws.
     """

@@ -1,10 +1,12 @@
-"""Gusts: Dryden turbulence pushes a flying target, which leans against the push to keep its place and course.
+"""Gusts: Dryden turbulence pushes a flying target, which leans against the push to keep its place
+and course.
 
-Turbulence is a frozen field that moves with the mean wind, and the target flies through it at its airspeed. Drag
-accelerates the target along with the air. Its controller commands a thrust against the velocity and the displacement,
-and the attitude follows with a lag: a multirotor tilts by atan(a / g), where a is the acceleration by its thrust; a
-bird banks. Turbulence, velocity, displacement and thrust form one linear process, which is discretised exactly.
-`wind_mps` is the mean wind 20 ft (6 m) above ground.
+Turbulence is a frozen field that moves with the mean wind, and the target flies through it at its
+airspeed. Drag accelerates the target along with the air. Its controller commands a thrust against
+the velocity and the displacement, and the attitude follows with a lag: a multirotor tilts by atan(a
+/ g), where a is the acceleration by its thrust; a bird banks. Turbulence, velocity, displacement
+and thrust form one linear process, which is discretised exactly. `wind_mps` is the mean wind 20 ft
+(6 m) above ground.
 """
 
 from functools import lru_cache
@@ -19,16 +21,21 @@ from lowalt.scene.laws.markov import Steps, root_of, stationary, step_s, steps, 
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "Dryden spectra, scale lengths, intensities and wind profile below 1000 ft: MIL-F-8785C, 1980, section 3.7 "
-    "(the same spectra as MIL-HDBK-1797 with its half scale lengths); tilt: balance of thrust and weight; control: "
-    "gains 0.95/s on place and 1.8/s on speed of PX4 (MPC_XY_P, MPC_XY_VEL_P_ACC) at a lag of 0.1 s, scaled with it; "
-    + flight.SOURCE
+    "Dryden spectra, scale lengths, intensities and wind profile below 1000 ft: MIL-F-8785C, 1980, "
+    "section 3.7 "
+    "(the same spectra as MIL-HDBK-1797 with its half scale lengths); tilt: balance of thrust and "
+    "weight; control: "
+    "gains 0.95/s on place and 1.8/s on speed of PX4 (MPC_XY_P, MPC_XY_VEL_P_ACC) at a lag of 0.1 "
+    "s, scaled with it; " + flight.SOURCE
 )
 DEFAULTS = {"wind_mps": 7.7}
 IDLE = [{"wind_mps": 0}]
 
-SPEED_GAIN, PLACE_GAIN = 0.18, 0.0171
-"""Thrust against speed times the attitude's lag, and against displacement times its square; stable at any drag."""
+SPEED_GAIN = 0.18
+PLACE_GAIN = 0.0171
+"""Thrust against speed times the attitude's lag, and against displacement times its square; stable
+at any drag.
+"""
 
 FOOT_M = 0.3048
 HEIGHTS_FT = (10.0, 1000.0)
@@ -49,41 +56,59 @@ def turbulence(height_m: float, wind_mps: float) -> tuple[np.ndarray, np.ndarray
     ratio = 0.177 + 0.000823 * feet
     up = 0.1 * wind_mps
     along = feet * FOOT_M / portable.power(ratio, 1.2)
-    return np.array([along, along, feet * FOOT_M]), np.array([up / portable.power(ratio, 0.4)] * 2 + [up])
+    return np.array([along, along, feet * FOOT_M]), np.array(
+        [up / portable.power(ratio, 0.4)] * 2 + [up]
+    )
 
 
 def mean_wind_mps(height_m: float, wind_mps: float) -> float:
-    """Return the mean wind's speed (m/s) at a height, from that at 20 ft. Source: MIL-F-8785C, section 3.7."""
+    """Return the mean wind's speed (m/s) at a height, from that at 20 ft. Source: MIL-F-8785C,
+    section 3.7.
+    """
     feet = float(np.clip(height_m / FOOT_M, *HEIGHTS_FT))
     return float(wind_mps * portable.log(feet / ROUGHNESS_FT) / portable.log(20.0 / ROUGHNESS_FT))
 
 
-def process(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[np.ndarray, ...]:
-    """Return drift (5, 5), noise (5,) and outputs (4, 5) of unit turbulence and the target's response; times in steps.
+def process(
+    scale: float, longitudinal: bool, response: float, lag: float
+) -> tuple[np.ndarray, ...]:
+    """Return drift (5, 5), noise (5,) and outputs (4, 5) of unit turbulence and the target's
+    response; times in steps.
 
-    scale: the turbulence's time L / V; response: of the velocity to the air; lag: of the attitude. Outputs: gust, the
-    target's velocity (both of unit turbulence), its displacement (that times a step) and its thrust's acceleration
-    (that over a step). Each state is an integral of those before it with weights near one, so that their steps'
-    covariances stay well conditioned however short a step is.
+    scale: the turbulence's time L / V; response: of the velocity to the air; lag: of the attitude.
+    Outputs: gust, the target's velocity (both of unit turbulence), its displacement (that times a
+    step) and its thrust's acceleration (that over a step). Each state is an integral of those
+    before it with weights near one, so that their steps' covariances stay well conditioned however
+    short a step is.
     """
-    a, b, c = 1.0 / scale, 1.0 / response, 1.0 / lag
-    # The lateral filter (1 + sqrt(3) t s) / (1 + t s)^2 is a mix of a first- and a second-order lag.
+    a = 1.0 / scale
+    b = 1.0 / response
+    c = 1.0 / lag
+    # The lateral filter (1 + sqrt(3) t s) / (1 + t s)^2 is a mix of a first- and a second-order
+    # lag.
     mix = 0.0 if longitudinal else (1.0 / np.sqrt(3.0) - 1.0) * a
     gain = np.sqrt(2.0 * a) if longitudinal else np.sqrt(3.0 * a)
-    drift = np.array([
-        [-a, 0, 0, 0, 0],
-        [1, -a, 0, 0, 0],
-        [1, mix, -b, 0, 1],
-        [0, 0, 1, 0, 0],
-        [0, 0, -SPEED_GAIN * c * c, -PLACE_GAIN * c * c * c, -c],
-    ])  # fmt: skip
-    outputs = gain * np.array([[1, mix, 0, 0, 0], [0, 0, b, 0, 0], [0, 0, 0, b, 0], [0, 0, 0, 0, b]])
+    drift = np.array(
+        [
+            [-a, 0, 0, 0, 0],
+            [1, -a, 0, 0, 0],
+            [1, mix, -b, 0, 1],
+            [0, 0, 1, 0, 0],
+            [0, 0, -SPEED_GAIN * c * c, -PLACE_GAIN * c * c * c, -c],
+        ]
+    )
+    outputs = gain * np.array(
+        [[1, mix, 0, 0, 0], [0, 0, b, 0, 0], [0, 0, 0, b, 0], [0, 0, 0, 0, b]]
+    )
     return drift, np.array([1.0, 0, 0, 0, 0]), outputs
 
 
 @lru_cache(maxsize=4096)
-def axis(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[Steps, np.ndarray, np.ndarray]:
-    """Return one axis's steps, the root (5, 5) of its states' stationary covariance, and its outputs (4, 5).
+def axis(
+    scale: float, longitudinal: bool, response: float, lag: float
+) -> tuple[Steps, np.ndarray, np.ndarray]:
+    """Return one axis's steps, the root (5, 5) of its states' stationary covariance, and its
+    outputs (4, 5).
 
     Answers are kept: all stations ask for the same axes of a target.
     """
@@ -92,8 +117,11 @@ def axis(scale: float, longitudinal: bool, response: float, lag: float) -> tuple
     return over_step, root_of(stationary(over_step)), outputs
 
 
-def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator) -> Perturbation:
-    """Return a flying target's offset (N, 3) m and tilt (N, 3) rad at `times_s` (N,) s, equally spaced.
+def perturb(
+    settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator
+) -> Perturbation:
+    """Return a flying target's offset (N, 3) m and tilt (N, 3) rad at `times_s` (N,) s, equally
+    spaced.
 
     The motion table's place is the target's place at the first of the times.
     The wind's direction is drawn. Nothing for targets on the ground.
@@ -114,20 +142,29 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
         axis(scale / airspeed / step, number == 0, response / step, lag / step)
         for number, (scale, response) in enumerate(zip(scales, (level, level, up), strict=True))
     ]
-    start = np.stack([portable.applied(root, normals) for (_, root, _), normals in zip(axes, first, strict=True)])
+    start = np.stack(
+        [portable.applied(root, normals) for (_, root, _), normals in zip(axes, first, strict=True)]
+    )
     states = walk([over_step for over_step, _, _ in axes], start, normal)
-    answer = np.stack([portable.product(states[i], axes[i][2].T) for i in range(3)]) * intensities[:, None, None]
+    answer = (
+        np.stack([portable.product(states[i], axes[i][2].T) for i in range(3)])
+        * intensities[:, None, None]
+    )
     wind = np.stack([forward, [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]])
     offset = portable.product((answer[..., 2] - answer[:, :1, 2]).T, wind) * step
     acceleration = portable.product(answer[..., 3].T, wind) / step
     ahead = attitude(row["yaw_rad"], 0.0, 0.0)
-    return Perturbation({}, offset, tilt(portable.product(acceleration, ahead), pitches=cloud.like == "UAV"))
+    return Perturbation(
+        {}, offset, tilt(portable.product(acceleration, ahead), pitches=cloud.like == "UAV")
+    )
 
 
 def tilt(acceleration_mps2: np.ndarray, pitches: bool) -> np.ndarray:
-    """Return yaw, pitch and roll (N, 3) rad that give the thrust an acceleration (N, 3): right, front, up.
+    """Return yaw, pitch and roll (N, 3) rad that give the thrust an acceleration (N, 3): right,
+    front, up.
 
-    pitches: whether the body also pitches for its acceleration to the front, as a multirotor does and a bird does not.
+    pitches: whether the body also pitches for its acceleration to the front, as a multirotor does
+    and a bird does not.
     """
     result = np.zeros((len(acceleration_mps2), 3))
     if pitches:

@@ -1,9 +1,10 @@
 """Analogue-to-digital converter: a uniform mid-rise quantiser with clipping, on I and Q alike.
 
-The gain is set once per look, by the look's root mean square. A look whose level changes from symbol to symbol has
-symbols far above it, which clip: where a twentieth of the symbols is 6 dB stronger, 8 bits at the default back-off of
-12 dB give 29 dB of signal to error instead of the 41 dB of quantisation alone. A larger `backoff_db` removes the
-clipping and costs 1 dB of quantisation per dB: at 18 dB the same look has 35 dB.
+The gain is set once per look, by the look's root mean square. A look whose level changes from
+symbol to symbol has symbols far above it, which clip: where a twentieth of the symbols is 6 dB
+stronger, 8 bits at the default back-off of 12 dB give 29 dB of signal to error instead of the 41 dB
+of quantisation alone. A larger `backoff_db` removes the clipping and costs 1 dB of quantisation per
+dB: at 18 dB the same look has 35 dB.
 """
 
 import numpy as np
@@ -12,7 +13,8 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "W. R. Bennett, Spectra of quantized signals, Bell Syst. Tech. J. 27(3), 1948; "
-    "A. Gersho, R. M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise quantiser, overload)"
+    "A. Gersho, R. M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise "
+    "quantiser, overload)"
 )
 DEFAULTS = {"bits": 12, "backoff_db": 12.0}
 IDLE = [{"bits": None}, {"bits": 0}]
@@ -30,11 +32,15 @@ def quantise(samples: np.ndarray, bits: int, full_scale: float) -> np.ndarray:
 
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:
-    """Return the converter's range: a component's root mean square over the look, times the back-off."""
+    """Return the converter's range: a component's root mean square over the look, times the
+    back-off.
+    """
     return float(np.sqrt(np.mean(samples.real**2 + samples.imag**2) / 2)) * 10 ** (backoff_db / 20)
 
 
-def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+def receive(
+    settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
+) -> np.ndarray:
     """Return the converter's output (N, M); the gain before it is set once for the whole look.
 
     A look of zeros stays zeros. Source: Bennett 1948; nothing is drawn.

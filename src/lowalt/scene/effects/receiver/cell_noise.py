@@ -1,8 +1,10 @@
-"""White noise in all range cells at set SNRs, added before range compression: the strongest cell may be a wrong one.
+"""White noise in all range cells at set SNRs, added before range compression: the strongest cell
+may be a wrong one.
 
-The paper's SNRs say how far the noise is below the target in its range cell, which is then known. Here the same SNR
-holds in that cell, the other cells have as much noise, and cancellers and detectors act on both. The noise stage adds
-none. An SNR refers to the target's echo as it arrives (`Look.reference`).
+The paper's SNRs say how far the noise is below the target in its range cell, which is then known.
+Here the same SNR holds in that cell, the other cells have as much noise, and cancellers and
+detectors act on both. The noise stage adds none. An SNR refers to the target's echo as it arrives
+(`Look.reference`).
 """
 
 import math
@@ -15,8 +17,10 @@ from lowalt.scene.set_noise import white
 from lowalt.scene.waveform import Look
 
 SOURCE = (
-    "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 6.2 (noise in all range cells); S. M. Kay, "
-    "Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter gain M of M subcarriers)"
+    "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 6.2 (noise in all "
+    "range cells); S. M. Kay, "
+    "Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter gain M of M "
+    "subcarriers)"
 )
 DEFAULTS = {"snr_db": None}
 IDLE = [{"snr_db": math.inf}]
@@ -27,7 +31,8 @@ def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for two sources of noise."""
     if "receiver_noise" in scene.effects:
         raise InputError(
-            "effects.cell_noise: effects.receiver_noise is named too, expected one of them: set SNRs or a link budget"
+            "effects.cell_noise: effects.receiver_noise is named too, expected one of them: set "
+            "SNRs or a link budget"
         )
     if settings["snr_db"] is not None and scene.snr_db != (math.inf,):
         raise InputError(
@@ -36,11 +41,15 @@ def check(settings: dict, scene: CheckedScene) -> None:
         )
 
 
-def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) plus circular white Gaussian noise, `snr_db` below the target's echo in each range cell.
+def receive(
+    settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
+) -> np.ndarray:
+    """Return samples (N, M) plus circular white Gaussian noise, `snr_db` below the target's echo in
+    each range cell.
 
-    A range cell is the mean of M subcarriers and each of these the sum of M samples, so a sample has a cell's noise.
-    Nothing is added while snr_db is null: the scene gives each of noise.snr_db in turn.
+    A range cell is the mean of M subcarriers and each of these the sum of M samples, so a sample
+    has a cell's noise. Nothing is added while snr_db is null: the scene gives each of noise.snr_db
+    in turn.
     """
     if settings["snr_db"] is None:
         return samples

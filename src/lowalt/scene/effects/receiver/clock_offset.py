@@ -1,4 +1,5 @@
-"""Sampling-clock offset: the converter's clock runs fast or slow against the one that made the symbols.
+"""Sampling-clock offset: the converter's clock runs fast or slow against the one that made the
+symbols.
 
 Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift.
 """
@@ -15,7 +16,8 @@ from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 
 SOURCE = (
-    "T. Pollet, P. Spruyt, M. Moeneclaey, The BER performance of OFDM systems using non-synchronized sampling, "
+    "T. Pollet, P. Spruyt, M. Moeneclaey, The BER performance of OFDM systems using "
+    "non-synchronized sampling, "
     "IEEE GLOBECOM 1994; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
@@ -28,7 +30,9 @@ ROUNDING = 1e-14
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for another oscillator than the carrier's, or a slip beyond the cyclic prefix in the look."""
+    """Raise InputError for another oscillator than the carrier's, or a slip beyond the cyclic
+    prefix in the look.
+    """
     offsets.check_oscillator("clock_offset", scene)
     carrier = scene.effects.get("carrier_offset")
     for key in ("fixed_ppm", "sigma_ppm"):
@@ -37,7 +41,8 @@ def check(settings: dict, scene: CheckedScene) -> None:
                 f"effects.clock_offset: {key} is {settings[key]} and effects.carrier_offset has {carrier[key]}, "
                 "expected the same: carrier and sampling clock come from one oscillator"
             )
-    network, timing = scene.network, scene.effects.get("timing_offset")
+    network = scene.network
+    timing = scene.effects.get("timing_offset")
     rate = 1e-6 * offsets.largest(settings["fixed_ppm"], settings["sigma_ppm"])
     slip_s = rate * network.symbols * network.symbol_interval_s
     # A window that is late as well slips from there.
@@ -45,18 +50,21 @@ def check(settings: dict, scene: CheckedScene) -> None:
     offsets.check_slip("clock_offset", slip_s, settings["prefix_slack_s"])
 
 
-def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+def receive(
+    settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
+) -> np.ndarray:
     """Return samples (N, M) of the same band-limited signal, taken at t / (1 + e) instead of t.
 
-    Each sample is the exact sum of the symbol's M subcarriers at its own instant, in the symbol's cyclic extension. A
-    fast clock samples earlier from symbol to symbol, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994. One
-    draw per sample and station.
+    Each sample is the exact sum of the symbol's M subcarriers at its own instant, in the symbol's
+    cyclic extension. A fast clock samples earlier from symbol to symbol, so ranges grow by c n T_r
+    e / 2. Source: Pollet et al. 1994. One draw per sample and station.
     """
     rate = _rate(settings, rng)
     early = -rate / (1 + rate)
     middle = samples.shape[1] // 2
     shift_hz = early * fft.ifftshift(look.baseband_hz)
-    # The shift of the middle sample moves the whole symbol; a Taylor series about that sample stretches it.
+    # The shift of the middle sample moves the whole symbol; a Taylor series about that sample
+    # stretches it.
     instants = look.times_s + look.within_s[middle]
     term = offsets.turned(fft.fft(samples, axis=-1), np.outer(instants, shift_hz))
     result = fft.ifft(term, axis=-1)
@@ -76,7 +84,8 @@ def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Gene
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
     """Return how late all echoes appear at each symbol: ever later with a fast clock.
 
-    Lines move by at most e df / 2, a thousandth of a speed while the window stays in its prefix, which is left out.
+    Lines move by at most e df / 2, a thousandth of a speed while the window stays in its prefix,
+    which is left out.
     """
     rate = _rate(settings, rng)
     return Displacement(delay_s=rate / (1 + rate) * view.times_s)

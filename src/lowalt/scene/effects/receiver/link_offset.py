@@ -1,8 +1,8 @@
 """Offsets between the oscillators and clocks of two stations, on the links between them.
 
-During a look, the oscillator and the clock of each station have one error each. The offsets of the link from A to B are
-the errors of A minus those of B, so the link from B to A has the opposite offsets. A station that receives its own
-signal has none.
+During a look, the oscillator and the clock of each station have one error each. The offsets of the
+link from A to B are the errors of A minus those of B, so the link from B to A has the opposite
+offsets. A station that receives its own signal has none.
 """
 
 import numpy as np
@@ -15,8 +15,10 @@ from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look, oscillator_hz
 
 SOURCE = (
-    "P. H. Moose, IEEE Trans. Commun. 42(10), 1994 (carrier); M. Speth et al., IEEE Trans. Commun. 47(11), 1999 "
-    "(time); defaults: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1, and clocks disciplined to 20 ns by "
+    "P. H. Moose, IEEE Trans. Commun. 42(10), 1994 (carrier); M. Speth et al., IEEE Trans. Commun. "
+    "47(11), 1999 "
+    "(time); defaults: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1, and clocks disciplined to "
+    "20 ns by "
     "satellites: estimate"
 )
 DEFAULTS = {"sigma_ppm": 0.017, "sigma_s": 2e-8}
@@ -28,17 +30,25 @@ UNMODELLED = ("fmcw", "cw")
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a network without links."""
     if all(station.transmitter is None for station in scene.network.stations):
-        raise InputError("effects.link_offset: no station of the network is a link, expected {transmit, receive}")
+        raise InputError(
+            "effects.link_offset: no station of the network is a link, expected {transmit, receive}"
+        )
 
 
-def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+def receive(
+    settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
+) -> np.ndarray:
     """Return the samples (N, M) of a link, shifted by both offsets in frequency and in delay.
 
-    A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late makes all echoes late.
-    The samples of a station that receives its own signal stay as they are.
+    A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late
+    makes all echoes late. The samples of a station that receives its own signal stay as they are.
     """
     late_s, rise_hz = _of(settings, look.network, look.station, rng)
-    return samples if look.station.transmitter is None else risen(delayed(samples, late_s, look), rise_hz, look)
+    return (
+        samples
+        if look.station.transmitter is None
+        else risen(delayed(samples, late_s, look), rise_hz, look)
+    )
 
 
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:
@@ -46,11 +56,18 @@ def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacem
     return _of(settings, view.network, view.station, rng)
 
 
-def _of(settings: dict, network: Network, station: Station, rng: np.random.Generator) -> Displacement:
-    """The errors of the sender minus those of the receiver; zero for a station that receives its own signal."""
-    sends, hears = station.transmitter, station.receiver
+def _of(
+    settings: dict, network: Network, station: Station, rng: np.random.Generator
+) -> Displacement:
+    """The errors of the sender minus those of the receiver; zero for a station that receives its
+    own signal.
+    """
+    sends = station.transmitter
+    hears = station.receiver
     if sends is None or hears is None:
         return Displacement()
     errors = of_stations(settings, network, rng)
-    ppm, late_s = (theirs - ours for theirs, ours in zip(errors[sends.name], errors[hears.name], strict=True))
+    ppm, late_s = (
+        theirs - ours for theirs, ours in zip(errors[sends.name], errors[hears.name], strict=True)
+    )
     return Displacement(late_s, 1e-6 * ppm * oscillator_hz(network, station))

@@ -1,7 +1,8 @@
 """Timing offset: the receive window starts late or early, and every echo seems nearer or farther.
 
-A window that starts within the cyclic prefix holds one whole period, so its offset is exactly a phase that is linear
-over the subcarriers. A scene in which the window can leave the prefix is refused.
+A window that starts within the cyclic prefix holds one whole period, so its offset is exactly a
+phase that is linear over the subcarriers. A scene in which the window can leave the prefix is
+refused.
 """
 
 import numpy as np
@@ -12,7 +13,8 @@ from lowalt.scene.view import Displacement, View
 from lowalt.scene.waveform import Look
 
 SOURCE = (
-    "M. Speth, S. A. Fechtel, G. Fock, H. Meyr, Optimum receiver design for wireless broad-band systems using OFDM I, "
+    "M. Speth, S. A. Fechtel, G. Fock, H. Meyr, Optimum receiver design for wireless broad-band "
+    "systems using OFDM I, "
     "IEEE Trans. Commun. 47(11), 1999 (window offset inside the guard interval is a linear phase)"
 )
 DEFAULTS = {"fixed_s": 0.0, "sigma_s": 2e-8, "prefix_slack_s": 2.9e-7}
@@ -26,10 +28,14 @@ def check(settings: dict, scene: CheckedScene) -> None:
     offsets.check_slip("timing_offset", slip_s, settings["prefix_slack_s"])
 
 
-def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) of a window that starts late by d: subcarrier m turns by exp(j 2 pi (m - M // 2) df d).
+def receive(
+    settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator
+) -> np.ndarray:
+    """Return samples (N, M) of a window that starts late by d: subcarrier m turns by exp(j 2 pi (m
+    - M // 2) df d).
 
-    A late window makes all echoes appear nearer by c d / 2. The phase of the oscillator does not change.
+    A late window makes all echoes appear nearer by c d / 2. The phase of the oscillator does not
+    change.
     Source: Speth et al. 1999. One draw per sample and station.
     """
     return offsets.delayed(samples, -_late_s(settings, rng), look)

@@ -1,9 +1,10 @@
-"""Slow time as real frames have it: symbols in downlink slots only, some missing, none exactly on time.
+"""Slow time as real frames have it: symbols in downlink slots only, some missing, none exactly on
+time.
 
-A station sends sensing symbols in the downlink part of each TDD period. Some of them are missing, and each may be sent
-up to `jitter_s` later than its nominal instant. `regrid` says how the received symbols become the evenly spaced signal
-that the spectra expect. Jitter spreads lines beyond half the symbol rate, which would otherwise fold. The land and
-phase noise keep the nominal instants.
+A station sends sensing symbols in the downlink part of each TDD period. Some of them are missing,
+and each may be sent up to `jitter_s` later than its nominal instant. `regrid` says how the received
+symbols become the evenly spaced signal that the spectra expect. Jitter spreads lines beyond half
+the symbol rate, which would otherwise fold. The land and phase noise keep the nominal instants.
 """
 
 import numpy as np
@@ -15,10 +16,18 @@ from lowalt.scene.checks import CheckedScene
 from lowalt.scene.view import Sampling
 
 SOURCE = (
-    "3GPP TS 38.331, TDD-UL-DL-Pattern (periods of 0.5 to 10 ms); non-uniform transform: F. Marvasti (ed.), Nonuniform "
-    "Sampling, 2001, ch. 1; spectra of missing samples: P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, 2.4"
+    "3GPP TS 38.331, TDD-UL-DL-Pattern (periods of 0.5 to 10 ms); non-uniform transform: F. "
+    "Marvasti (ed.), Nonuniform "
+    "Sampling, 2001, ch. 1; spectra of missing samples: P. Stoica, R. Moses, Spectral Analysis of "
+    "Signals, 2005, 2.4"
 )
-DEFAULTS = {"tdd_period_s": 0.01, "downlink": 0.75, "missing": 0.0, "jitter_s": 0.0, "regrid": "zero"}
+DEFAULTS = {
+    "tdd_period_s": 0.01,
+    "downlink": 0.75,
+    "missing": 0.0,
+    "jitter_s": 0.0,
+    "regrid": "zero",
+}
 IDLE = [{"downlink": 1, "missing": 0, "jitter_s": 0}]
 
 FEWEST = 2
@@ -26,7 +35,9 @@ FEWEST = 2
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a jitter beyond the next symbol, a look without symbols, or set SNRs with gaps."""
+    """Raise InputError for a jitter beyond the next symbol, a look without symbols, or set SNRs
+    with gaps.
+    """
     step = scene.network.symbol_interval_s
     if settings["jitter_s"] >= step:
         raise InputError(
@@ -51,7 +62,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def _in_downlink(settings: dict, network: Network) -> np.ndarray:
-    """Whether each symbol's nominal instant (N,) lies in the downlink part, which begins every period."""
+    """Whether each symbol's nominal instant (N,) lies in the downlink part, which begins every
+    period.
+    """
     phase = network.times_s / settings["tdd_period_s"]
     # Instants that are multiples of the period must not fall before it by rounding.
     return phase - np.floor(phase + 1e-9) < settings["downlink"] - 1e-9
@@ -60,7 +73,8 @@ def _in_downlink(settings: dict, network: Network) -> np.ndarray:
 def sampling(settings: dict, network: Network, rng: np.random.Generator) -> Sampling:
     """Return the instants of a look and which symbols are received; 2 N draws.
 
-    Two symbols at least are received: where fewer are left, the first of the downlink ones are kept.
+    Two symbols at least are received: where fewer are left, the first of the downlink ones are
+    kept.
     """
     late, lost = rng.random((2, network.symbols))
     sent = _in_downlink(settings, network)
@@ -71,14 +85,17 @@ def sampling(settings: dict, network: Network, rng: np.random.Generator) -> Samp
 
 
 def regridded(settings: dict, signal: np.ndarray, timing: Sampling, network: Network) -> np.ndarray:
-    """Return the evenly spaced signal (N,) made of received symbols `signal` (K,), K of them present.
+    """Return the evenly spaced signal (N,) made of received symbols `signal` (K,), K of them
+    present.
 
-    zero: each symbol at its nominal instant, zeros in the gaps. nudft: the evenly spaced signal whose N Fourier
-    coefficients are the sums over symbols at their true instants.
+    zero: each symbol at its nominal instant, zeros in the gaps. nudft: the evenly spaced signal
+    whose N Fourier coefficients are the sums over symbols at their true instants.
     """
     if settings["regrid"] == "nudft":
         frequency = np.fft.fftfreq(network.symbols, network.symbol_interval_s)
-        sine, cosine = portable.sine_cosine_turns(np.outer(frequency, timing.times_s[timing.present]))
+        sine, cosine = portable.sine_cosine_turns(
+            np.outer(frequency, timing.times_s[timing.present])
+        )
         real = portable.dot(cosine, signal.real) + portable.dot(sine, signal.imag)
         imag = portable.dot(cosine, signal.imag) - portable.dot(sine, signal.real)
         return np.fft.ifft(real + 1j * imag)
