@@ -7,7 +7,7 @@ import numpy as np
 
 from lowalt.config.network import Station
 from lowalt.machine.jit import LEAN, kernel
-from lowalt.numerics.portable import TANGENT
+from lowalt.numerics.portable import TANGENT, from_decibels, sine_cosine
 
 
 class Element(NamedTuple):
@@ -90,17 +90,17 @@ def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
     """
     places = np.asarray(places, np.float64)
     points = places if places.ndim == 3 else places.reshape(1, -1, 3)
-    tilt = np.radians(element.downtilt_deg)
+    sine, cosine = sine_cosine(np.radians(element.downtilt_deg))
     result = np.empty(points.shape[:2])
     _gains_db(
         Element(*map(float, element)),
         np.array(station.position_m, np.float64),
         station.horizontal,
-        (np.cos(tilt), np.sin(tilt)),
+        (float(cosine), float(sine)),
         np.ascontiguousarray(points.swapaxes(1, 2)),
         result,
     )
-    return np.exp(np.log(10.0) / 10.0 * result).reshape(places.shape[:-1])
+    return from_decibels(result).reshape(places.shape[:-1])
 
 
 def array_sum(count: int, x: np.ndarray) -> np.ndarray:
