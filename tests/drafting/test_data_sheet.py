@@ -10,7 +10,8 @@ import lowalt
 from lowalt.__main__ import main
 from lowalt.files.errors import InputError
 from lowalt.targets.cloud import read
-from lowalt.targets.records import estimates
+from lowalt.targets.make import make
+from lowalt.targets.records import estimates, merge, with_row
 
 DRONE = ["--rotors", "6", "--diagonal", "1.13", "--propeller", "0.53", "--blades", "2", "--rate", "50:120"]
 BIRD = ["--length", "0.46", "--span", "0.99", "--rate", "3:5"]
@@ -22,6 +23,14 @@ def refusal(arguments, capsys):
     """What a refused command says."""
     assert main(["target", *arguments]) == 2
     return capsys.readouterr().err
+
+
+def drafted_cloud(kind, **stated):
+    """The cloud of a drafted target."""
+    text, _ = lowalt.draft_target(kind, subtype="mine", **stated)
+    record = yaml.safe_load(text)["mine"]
+    row = with_row(None, "mine", record.pop("row"), "draft")
+    return make(merge(row, record, "draft"), None, 1)
 
 
 @pytest.fixture
@@ -61,6 +70,34 @@ def test_a_bird_and_a_vehicle_have_the_sheet_s_sizes(drafts, tmp_path):
     wheels = read(tmp_path / "vehicle.npz")
     axles = wheels.hinges[[kind == "wheel" for kind in wheels.kinds]][:, 1]
     assert np.ptp(axles) == pytest.approx(2.85)
+
+
+@pytest.mark.parametrize("frame", ["car", "bus"])
+def test_a_vehicle_rolls_on_the_wheel_of_its_sheet(frame):
+    stated = {"length": 4.6, "width": 1.85, "height": 1.44, "wheel": 0.69, "wheel_base": 2.85, "speed": 18.0}
+    cloud = drafted_cloud("vehicle", frame=frame, **stated)
+    wheel = cloud.part == cloud.kinds.index("wheel")
+    assert cloud.record["wheel_diameter_m"] == 0.69
+    assert np.ptp(cloud.points[wheel][:, 2]) == pytest.approx(0.69, rel=0.02)
+
+
+def test_a_coaxial_frame_carries_two_rotors_on_each_arm_that_turn_against_each_other():
+    # DJI Agras T40: eight rotors of 54 inch on four arms.
+    stated = {"rotors": 8, "diagonal": 2.184, "propeller": 1.375, "blades": 2, "rate": (10.0, 30.0), "speed": 10.0}
+    cloud = drafted_cloud("drone", frame="coaxial", **stated)
+    rotors = [part for part, kind in enumerate(cloud.kinds) if kind == "rotor"]
+    hubs, axes = cloud.hinges[rotors], cloud.axes[rotors]
+    assert len(rotors) == 8
+    assert np.linalg.norm(hubs[:, None, :2] - hubs[:, :2], axis=2).max() == pytest.approx(2.184)
+    for index in range(8):
+        pair = [other for other in range(8) if np.allclose(hubs[index, :2], hubs[other, :2]) and other != index]
+        assert len(pair) == 1
+        assert abs(hubs[index, 2] - hubs[pair[0], 2]) > 0.05
+        assert axes[index, 2] == -axes[pair[0], 2]
+        blades = cloud.points[cloud.part == rotors[index]][:, :2] - hubs[index, :2]
+        assert np.linalg.norm(blades, axis=1).max() == pytest.approx(1.375 / 2, rel=0.03)
+    with pytest.raises(InputError, match="rotors is 7, expected an even number"):
+        lowalt.draft_target("drone", frame="coaxial", **{**stated, "rotors": 7})
 
 
 def test_what_the_sheet_does_not_say_grows_with_the_size(drafts, tmp_path):

@@ -94,14 +94,21 @@ def raised(record: dict, f: dict) -> list[Part]:
 
 
 def radial(record: dict, f: dict) -> list[Part]:
-    """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids and a gimbal."""
+    """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids and a gimbal.
+
+    With a figure `layer_gap` each arm carries two rotors, one above the other, that turn against each other.
+    """
     places, arm = hubs(record, f), f["arm_diameter"] / 2
     shape = ((0.5, 0.25, 0.3), (0.42, 0.6, 0.42), (0.2, 0.95, 0.5), (-0.2, 0.95, 0.5), (-0.42, 0.6, 0.42),
              (-0.5, 0.25, 0.3))  # fmt: skip
     length, width, height = f["body_length"], f["body_width"], f["body_height"]
     centre = hull([(y * length, w * width / 2, -h * height, h * height) for y, w, h in shape])
-    top = arm + f["motor_height"]
+    coaxial = "layer_gap" in f
+    # The arms carry the motors of a coaxial pair half-way between its rotors.
+    top = f["layer_gap"] / 2 if coaxial else arm + f["motor_height"]
     shells = [centre, *motors(places, top, f)]
+    if coaxial:
+        shells += motors(places, f["motor_height"] - top, f)
     cell = f["battery_length"]
     for x, y in places:
         shells.append(tube([(0.2 * x, 0.2 * y, 0), (x, y, 0)], arm))
@@ -114,7 +121,7 @@ def radial(record: dict, f: dict) -> list[Part]:
     bottom = -0.5 * f["body_height"] - f["leg_height"]
     shells += skids(0.85 * f["body_width"], 1.2 * f["body_length"], -0.3 * f["body_height"], bottom, 0.6 * arm)
     shells += camera(f, 0.1 * f["body_length"], -0.5 * f["body_height"] - 0.9 * f["camera_diameter"])
-    return [Part("body", "body", tuple(shells)), *rotors(places, top, f)]
+    return [Part("body", "body", tuple(shells)), *rotors(places, top, f, coaxial)]
 
 
 def cabin(record: dict, f: dict) -> list[Part]:
@@ -155,8 +162,8 @@ def tanker(record: dict, f: dict) -> list[Part]:
 
 
 LAYOUTS = {
-    "folding": folding, "ducted": ducted, "raised": raised, "radial": radial, "cabin": cabin, "tanker": tanker,
-    **aircraft.LAYOUTS,
+    "folding": folding, "ducted": ducted, "raised": raised, "radial": radial, "coaxial": radial, "cabin": cabin,
+    "tanker": tanker, **aircraft.LAYOUTS,
 }  # fmt: skip
 
 
