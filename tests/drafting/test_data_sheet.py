@@ -152,3 +152,24 @@ def test_wrong_sheets_are_refused_in_words_of_the_command(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["target", *[word.replace("50:120", "120:50") for word in given]])
     assert "'120:50', expected LOW:HIGH in Hz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("diagonal", "lender"), [(1.13, "DJI Matrice 600 Pro"), (0.52, "Yuneec H520")])
+def test_the_published_craft_nearest_in_size_lends_its_figures(diagonal, lender):
+    stated = {"rotors": 6, "diagonal": diagonal, "propeller": 0.1, "blades": 2, "rate": (50.0, 120.0), "speed": 18.0}
+    assert lowalt.draft_target("drone", **stated)[1] == lender
+
+
+@pytest.mark.parametrize(
+    ("word", "grown"),
+    [("width", {"track", "tyre_width"}), ("height", {"ground_clearance"})],
+)
+def test_a_figure_of_a_vehicle_grows_with_its_own_side_alone(word, grown):
+    stated = {"length": 4.6, "width": 1.85, "height": 1.44, "wheel": 0.67, "wheel_base": 2.0, "speed": 18.0}
+    figures = []
+    for factor in (1.0, 1.1):
+        text, _ = lowalt.draft_target("vehicle", **(stated | {word: stated[word] * factor}))
+        figures.append(yaml.safe_load(text)["My vehicle"]["figures"])
+    small, large = figures
+    for name, (value, unit, _) in small.items():
+        assert large[name][0] == pytest.approx(value * (1.1 if name in grown and unit == "m" else 1.0), rel=0.006)

@@ -227,7 +227,8 @@ def test_a_target_of_its_own_takes_its_size_from_the_file_and_a_given_size_sets_
 @pytest.mark.parametrize(
     ("factor", "words"),
     [(1000.0, r"write `unit: mm` \(--unit mm\), with which it measures 0.46"),
-     (0.1, "no unit fits: write `unit: [0-9.]+` .*--size [0-9.]+`, .*`row: {size_m: 0.034"), (1 / 0.0254, "write `unit: in`")],
+     (0.1, "no unit fits: write `unit: [0-9.]+` .*--size [0-9.]+`, .*`row: {size_m: 0.034"),
+     (1 / 0.0254, "write `unit: in`")],
 )  # fmt: skip
 def test_a_size_that_does_not_fit_is_refused_with_the_line_to_write(factor, words, tmp_path, capsys):
     shapes = {"hull": box((0.2, 0.12, 0.06))} | four("prop")
