@@ -10,12 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import overlaid
 from lowalt.config.plan import Plan
-from lowalt.config.splits import fold
+from lowalt.config.sample_list import SampleList
 from lowalt.recognition.samples import Facts
-from lowalt.shards.sample_record import sample_key
 from lowalt.targets.records import records_of
 
 VERSION = "lowalt-40 v1"
@@ -67,16 +65,12 @@ def truth(part: str) -> Truth:
     """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
     config = config_of(part)
     published = {name: record["published"] for name, record in records_of(config["targets"]).items()}
-    plan, classes = Plan.of(config, published), classes_of(published)
-    rows = [
-        (sample_key(name, model, snr), name, model, snr, group, of_model, number)
-        for group, names in plan.groups.items()
-        for name in names
-        for number in [label(classes, {"subtype": name, **published[name]})]
-        for model in range(plan.models)
-        for of_model in [fold(plan.split, plan.seed, name, model)]
-        for snr in plan.snrs
-    ]  # fmt: skip
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    nowhere = np.full((len(rows), len(config["network"]["stations"])), np.nan)
-    return Truth(Facts(*columns, range_m=nowhere, aspect_rad=nowhere), classes)
+    listed = SampleList(Plan.of(config, published), published)
+    columns = listed.columns()
+    nowhere = np.full((len(listed), len(config["network"]["stations"])), np.nan)
+    facts = Facts(**columns, range_m=nowhere, aspect_rad=nowhere)
+    # The list goes model by model, and this part's order subtype by subtype.
+    subtypes = [name for members in listed.plan.groups.values() for name in members]
+    numbers = {name: number for number, name in enumerate(subtypes)}
+    order = np.argsort([numbers[name] for name in facts.subtype.tolist()], kind="stable")
+    return Truth(facts.take(order), listed.classes)
