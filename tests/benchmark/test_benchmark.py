@@ -104,6 +104,20 @@ def test_a_trained_network_may_have_the_classes_of_a_track(track, tmp_path):
     assert runs.load(tmp_path / "model.pt").classes == classes
 
 
+@pytest.mark.parametrize("use", ["validation", "test"])
+@pytest.mark.parametrize("track", TRACKS.values(), ids=list(TRACKS))
+def test_neighbours_that_validate_or_test_have_no_class_in_common(track, use):
+    """Even whoever is told the most frequent class of each twentieth of the rows answers little better than chance."""
+    labels = track.samples(use).facts.label
+    right = [np.bincount(rows).max() for rows in np.array_split(labels, 20)]
+    assert sum(right) / len(labels) < np.bincount(labels).max() / len(labels) + 0.06
+
+
+def test_samples_that_train_stay_in_the_order_of_the_definition():
+    numbers = TRACKS["unseen"].numbers("train")
+    assert (np.diff(numbers) > 0).all()
+
+
 def test_each_part_has_a_seed_of_its_own_and_tests_alone():
     assert len({config_of(part)["seed"] for part in PARTS}) == len(PARTS)
     assert {track.part for track in TRACKS.values()} == set(PARTS)

@@ -1,9 +1,11 @@
 """The tracks of the benchmark: which samples train, validate and test, what is predicted, and which number counts.
 
 The samples that train and validate are always those of the main part. Validation uses fold val of the subtypes that
-train. docs/benchmark.md lists the tracks.
+train. Samples that validate or test come in the order of a digest of their keys, so that neither the number of a row
+nor its neighbours tell its class. docs/benchmark.md lists the tracks.
 """
 
+import hashlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,12 +63,14 @@ class Track:
     def numbers(self, use: str) -> np.ndarray:
         """Return which samples of `truth(MAIN)` train or validate, or which of `truth()` test, as numbers.
 
+        Those that train come in the order of `truth`, the others in that of `shuffled`.
         Raises: InputError for another use than USES.
         """
         if use not in USES:
             raise InputError(f"part {use!r}: expected one of {list(USES)}")
         if use == "test" and self.part != MAIN:
-            return np.arange(len(self.truth().facts))
+            facts = self.truth().facts
+            return shuffled(facts, np.arange(len(facts)))
         facts, pairs = self.truth(MAIN).facts, FOLDS[self.protocol][use]
         if use == "test" and self.whole:
             pairs = _TESTED
@@ -75,7 +79,15 @@ class Track:
             chosen |= _first(facts, self.shots)
         if use != "test" and self.headline == "AUROC":
             chosen &= facts.label != self.truth(MAIN).classes.index(UNKNOWN)
-        return np.flatnonzero(chosen)
+        numbers = np.flatnonzero(chosen)
+        return numbers if use == "train" else shuffled(facts, numbers)
+
+
+def shuffled(facts: Facts, numbers: np.ndarray) -> np.ndarray:
+    """Return the numbers (n,) of samples in the order of the SHA-256 of their keys."""
+    digests = [hashlib.sha256(key.encode()).digest() for key in facts.key[numbers].tolist()]
+    order = sorted(range(len(numbers)), key=digests.__getitem__)
+    return numbers[order]
 
 
 def _first(facts: Facts, count: int) -> np.ndarray:
