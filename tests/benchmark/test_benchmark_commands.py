@@ -5,6 +5,7 @@ import json
 import runpy
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,9 @@ from lowalt.benchmark import baseline_table, confirm, definition, frozen_bytes
 from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
 from lowalt.files.errors import InputError, InputWarning
+from lowalt.recognition import model_file, runs
+from lowalt.recognition.samples import statement
+from lowalt.recognition.schemes import Scheme
 
 ROOT = Path(__file__).parents[2]
 ZOO = ROOT / "results/zoo/default-unseen.safetensors"
@@ -150,15 +154,25 @@ def test_make_tells_the_last_bits_of_a_part_with_effects_from_another_signal(sma
     np.save(path, whole)
 
 
+def stating(path, track, **changed):
+    """A model of the zoo in a file that states the training of a track; changed: other entries of its identity."""
+    content = model_file.read(ZOO)
+    stated = {"protocol": track.protocol, "trained_on": statement(track.samples("train").facts), **changed}
+    identity, model = {**content.identity, **stated}, {**content.model, "protocol": stated["protocol"]}
+    model_file.write(path, replace(content, identity=identity, model=model))
+    return path
+
+
 def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeypatch, recwarn):
     monkeypatch.setattr(confirm, "USUAL", 2)
     track = TRACKS["unseen"]
+    model = stating(tmp_path / "own.safetensors", track)
     recwarn.clear()
-    first = confirm.confirm(ZOO, track)
+    first = confirm.confirm(model, track)
     assert not [one for one in recwarn if issubclass(one.category, InputWarning)]
-    assert first == confirm.confirm(ZOO, track)
+    assert first == confirm.confirm(model, track)
     assert first.samples == 4 * 4 * 2 and first.percent.value > 60
-    assert first.seed == definition.root_seed(ZOO.read_bytes() + b"lowalt-40 v1")
+    assert first.seed == definition.root_seed(model.read_bytes() + b"lowalt-40 v1")
     # Another seed gives other motion of the same subtypes.
     rows = [confirm.dataset(track, seed).record(0)["motion"] for seed in (first.seed, first.seed + 1)]
     assert rows[0] != rows[1]
@@ -169,9 +183,51 @@ def test_a_confirmed_result_follows_from_the_model_file(small, tmp_path, monkeyp
         "Walking Pedestrian 5",
     }
     with pytest.raises(InputError, match="stations"):
-        confirm.confirm(ZOO, TRACKS["one-station"])
+        confirm.confirm(model, TRACKS["one-station"])
     with pytest.raises(InputError, match="cannot be confirmed"):
-        confirm.confirm(ZOO, TRACKS["forty"])
+        confirm.confirm(model, TRACKS["forty"])
+
+
+def test_a_model_that_states_another_training_than_the_track_s_is_not_confirmed(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(confirm, "USUAL", 1)
+    unseen, few = TRACKS["unseen"], TRACKS["few-shot-1"]
+    trains = statement(unseen.samples("train").facts)
+    seen = statement(TRACKS["seen"].samples("train").facts)
+    wrong = {
+        "the protocol 'seen', and the track unseen trains in": {"protocol": "seen"},
+        "trained on DJI Mini 4 Pro, fold train, which the track unseen does not": {"trained_on": seen},
+        "trained on Crow, fold test, which": {"trained_on": [*trains, ["Crow", "test", 1]]},
+        "does not state trained_on": {"trained_on": []},
+        "trained_on.0": {"trained_on": [["Crow", "train"]]},
+    }
+    for sentence, changed in wrong.items():
+        model = stating(tmp_path / "own.safetensors", unseen, **changed)
+        with pytest.raises(InputError, match=sentence):
+            confirm.confirm(model, unseen)
+    with pytest.raises(InputError, match="does not state trained_on, so nobody can tell"):
+        confirm.confirm(ZOO, unseen)
+    model = stating(tmp_path / "own.safetensors", few)
+    assert confirm.confirm(model, few).samples == 4 * 2 * 2
+    more = [[name, fold, 2 if name == "Owl" else count] for name, fold, count in statement(few.samples("train").facts)]
+    with pytest.raises(InputError, match="states 2 motion models of Owl, of which the track few-shot-1 trains on 1"):
+        confirm.confirm(stating(tmp_path / "own.safetensors", few, trained_on=more), few)
+    with pytest.raises(InputError, match="fold train, which the track unseen does not train on"):
+        confirm.confirm(model, unseen)
+
+
+def test_a_training_states_what_it_trained_on(small, tmp_path):
+    train, validation = benchmark.load("unseen", "train"), benchmark.load("unseen", "validation")
+    config = definition.config_of("main")
+    block, scheme = config["recognition"], Scheme("A:VRP", (0, 1, 2), (0, 1, 2))
+    kept = {key: block[key] for key in ("network", "augmentation", "size")}
+    settings = scheme.settled({
+        **kept, "seed": 0, "classes": list(train.classes), "colour_map": "gray",
+        "training": {**block["training"], "steps": 1, "validate_every": 1},
+    })  # fmt: skip
+    runs.train({"train": train, "validation": validation}, scheme, "unseen", settings, tmp_path)
+    confirm.refuse_other_training(confirm.stated_by(tmp_path / "model.pt"), TRACKS["unseen"], tmp_path)
+    with pytest.raises(InputError, match="the track seen trains in the protocol 'seen'"):
+        confirm.refuse_other_training(confirm.stated_by(tmp_path / "model.pt"), TRACKS["seen"], tmp_path)
 
 
 @pytest.mark.slow

@@ -15,9 +15,11 @@ from lowalt.benchmark.benchmark_tracks import TRACKS, Track
 from lowalt.benchmark.definition import VERSION, config_of, root_seed
 from lowalt.benchmark.scoring import headline, tested, values_of
 from lowalt.config.layers import merge
+from lowalt.config.schema import check_brought
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.recognition.dataset_samples import DatasetSamples
 from lowalt.recognition.intervals import Interval
+from lowalt.recognition.samples import statement
 from lowalt.recognition.zoo_files import path_of
 from lowalt.shards.dataset import Dataset
 
@@ -50,13 +52,56 @@ def dataset(track: Track, seed: int) -> Dataset:
         return Dataset(merge(config_of(track.part), more), groups=("unseen",) if track.whole else ("seen", "unseen"))
 
 
+def refuse_other_training(stated: dict, track: Track, path: Path) -> None:
+    """Refuse a model whose file states another training than the track's, or states none.
+
+    stated: the identity in the model's file, with `protocol` and `trained_on`, the [subtype, fold, number of motion
+    models] that trained.
+    Raises: InputError naming what is missing or what the track holds out.
+    """
+    missing = [name for name in ("protocol", "trained_on") if not stated.get(name)]
+    if missing:
+        raise InputError(
+            f"{path}: its file does not state {' and '.join(missing)}, so nobody can tell whether it trained on what "
+            f"the track {track.name} holds out; expected a model that this version of lowalt trained"
+        )
+    if stated["protocol"] != track.protocol:
+        raise InputError(
+            f"{path}: its file states the protocol {stated['protocol']!r}, and the track {track.name} trains in the "
+            f"protocol {track.protocol!r}"
+        )
+    check_brought("trained_on", stated["trained_on"], path)
+    allowed = {(subtype, fold): models for subtype, fold, models in statement(track.samples("train").facts)}
+    held_out = set(track.samples("test").facts.subtype.tolist()) if track.whole else set()
+    for subtype, fold, models in stated["trained_on"]:
+        if (subtype, fold) not in allowed:
+            raise InputError(
+                f"{path}: its file states that it trained on {subtype}, fold {fold}, which the track {track.name} "
+                "does not train on"
+            )
+        if subtype in held_out and models > allowed[subtype, fold]:
+            raise InputError(
+                f"{path}: its file states {models} motion models of {subtype}, of which the track {track.name} "
+                f"trains on {allowed[subtype, fold]}"
+            )
+
+
+def stated_by(path: Path) -> dict:
+    """Return the identity in a model's file: what determined its weights. Raises: InputError for no such file."""
+    from lowalt.recognition import checkpoint, model_file
+
+    if path.suffix == ".safetensors":
+        return model_file.read(path).identity
+    return checkpoint.model(path)[0]
+
+
 def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
     """Make the test set that follows from a model file, evaluate the model on it, and return the result.
 
     model: model.pt of a training, a .safetensors file, or the name of one in results/zoo; trusted: FILE.py:FUNCTION of
     a model whose backbone is the user's own code.
     Raises: InputError for a file that is no model, one that does not answer with the track's classes or sees stations
-    that the track forbids, and a track that cannot be confirmed.
+    that the track forbids, one that states another training or none, and a track that cannot be confirmed.
     """
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
@@ -66,7 +111,8 @@ def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
         raise InputError(f"track {track.name}: cannot be confirmed, expected one of {list(CONFIRMED)}")
     path = path_of(model)
     trained, _ = opened(model, trusted=trusted)
-    content = Path(path).read_bytes()
+    refuse_other_training(stated_by(path), track, path)
+    content = path.read_bytes()
     seed, classes = root_seed(content + VERSION.encode()), track.truth().classes
     if trained.classes != classes or set(trained.scheme.stations) - set(track.stations):
         raise InputError(

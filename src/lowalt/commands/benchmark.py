@@ -6,7 +6,7 @@ from pathlib import Path
 from lowalt.benchmark import baseline_table, frozen_bytes
 from lowalt.benchmark.baselines import kept
 from lowalt.benchmark.benchmark_tracks import TRACKS, Track, named
-from lowalt.benchmark.definition import MAIN, VERSION, overlays, run_name
+from lowalt.benchmark.definition import MAIN, RUN, VERSION, overlays, run_name
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
@@ -30,7 +30,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     line.add_argument("predictions", type=Path, nargs="+", help="columns key and p_CLASS (.csv); one per training seed")
     line.add_argument("--track", required=True, help="the track, such as unseen")
     line = add_command(own, "confirm", confirmed, "test a model on a set whose root seed follows from its file",
-                       "lowalt benchmark confirm default-unseen --track unseen")  # fmt: skip
+                       f"lowalt benchmark confirm {RUN}-unseen --track unseen")  # fmt: skip
     line.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
     line.add_argument("--track", required=True, help="the track, such as unseen")
     name_backbone(line)
