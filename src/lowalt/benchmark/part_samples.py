@@ -19,10 +19,15 @@ VIEWS = (0, 1, 2)
 """Indices of VRP, TRP and VT among the known spectra."""
 
 
-def _of_unit_power(signals: np.ndarray) -> np.ndarray:
-    """Signals (..., symbols) complex64 divided by the root of their mean power; signals of zeros stay zeros."""
+def of_unit_power(signals: np.ndarray) -> np.ndarray:
+    """Return signals (..., symbols) complex64 divided by the root of their mean power; zeros stay zeros."""
     power = np.mean(np.abs(signals).astype(float) ** 2, axis=-1, keepdims=True)
     return (signals / np.sqrt(np.where(power > 0, power, 1))).astype(np.complex64)
+
+
+def columns_of(track: Track) -> list[int]:
+    """Return the numbers of the images that a track shows: VRP, TRP and VT of each of its stations."""
+    return Scheme("all spectra", track.stations, VIEWS).columns
 
 
 class TrackSamples(Samples):
@@ -64,7 +69,7 @@ class TrackSamples(Samples):
     def images(self) -> np.ndarray:
         """Index images (n, stations * 3, size, size) uint8. Raises: InputError where a sample has none."""
         pairs = set(zip(self.facts.group.tolist(), self.facts.fold.tolist(), strict=True))
-        columns = Scheme("all spectra", self.track.stations, VIEWS).columns
+        columns = columns_of(self.track)
         stored = [path for path in (self.run / f"views/{self.size}").glob("*.npz")
                   if tuple(path.stem.split("-")[:2]) in pairs]  # fmt: skip
         found = ViewSamples(stored, columns, pairs)
@@ -80,7 +85,7 @@ class TrackSamples(Samples):
         The level is taken out because it counts the points of the target's cloud; see docs/benchmark-rules.md.
         """
         network = Network.from_settings(self.config["network"])
-        return self.of_chunks(lambda path: _of_unit_power(load_signals(path, network)))
+        return self.of_chunks(lambda path: of_unit_power(load_signals(path, network)))
 
     def of_chunks(self, values: Callable[[Path], np.ndarray]) -> np.ndarray:
         """Return what `values` computes, for the samples and the track's stations alone, (n, stations, ...).

@@ -1,6 +1,7 @@
 """The command `lowalt benchmark`: data, tracks, scores of submissions, confirmed results, the table of baselines."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from lowalt.benchmark import baseline_table, frozen_bytes
@@ -31,7 +32,10 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     line.add_argument("--track", required=True, help="the track, such as unseen")
     line = add_command(own, "confirm", confirmed, "test a model on a set whose root seed follows from its file",
                        f"lowalt benchmark confirm {RUN}-unseen --track unseen")  # fmt: skip
-    line.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
+    about = "model.pt of a training, a .safetensors file, or the name of one in results/zoo"
+    line.add_argument("model", nargs="?", help=about)
+    about = "instead of a model: a Python file that answers; it runs with your rights"
+    line.add_argument("--predict", type=Path, metavar="FILE.py", help=about)
     line.add_argument("--track", required=True, help="the track, such as unseen")
     name_backbone(line)
     line = add_command(own, "table", shown, "the table of baselines", "lowalt benchmark table --track unseen")
@@ -108,12 +112,19 @@ def _report(track: Track, facts: dict) -> str:
 
 
 def confirmed(options: argparse.Namespace) -> Answer:
-    """Confirm a model. Raises: as `lowalt.benchmark.confirm.confirm`."""
-    from lowalt.benchmark.confirm import confirm
+    """Confirm a model, or a file that answers. Raises: as the functions of `lowalt.benchmark.confirm`."""
+    from lowalt.benchmark.confirm import confirm, confirm_predictions
 
-    found = confirm(options.model, named(options.track), options.backbone)
+    track = named(options.track)
+    if (options.model is None) == (options.predict is None):
+        raise InputError("benchmark confirm: expected either a model or --predict FILE.py")
+    if options.predict:
+        print(f"{options.predict} runs in this process, with your rights and at your own risk", file=sys.stderr)
+        found = confirm_predictions(options.predict, track)
+    else:
+        found = confirm(options.model, track, options.backbone)
     text = (f"{VERSION} {found.track}, confirmed: {baseline_table.words(found.percent)} % of {found.samples} samples, "
-            f"root seed {found.seed}, model {found.sha256}")  # fmt: skip
+            f"root seed {found.seed}, SHA-256 {found.sha256}")  # fmt: skip
     return Answer(found._asdict(), text)
 
 
