@@ -9,7 +9,9 @@ rest); Hoerl and Kennard, Technometrics 12, 1970 (ridge); Friedman, Ann. Stat. 2
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import islice
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve
@@ -33,6 +35,61 @@ MANY = 10
 Scores = Callable[[np.ndarray], np.ndarray]
 
 
+def constant(shares: np.ndarray, count: int) -> np.ndarray:
+    """Return the same probabilities (classes,) for a number of samples."""
+    return np.tile(shares, (count, 1))
+
+
+def centroids(features: np.ndarray, labels: np.ndarray, classes: int) -> Scores:
+    """Return the function to class probabilities that fall off with the squared distance to each class's mean."""
+    mean, scale = features.mean(0), np.maximum(features.std(0), 1e-9)
+    scaled = (features - mean) / scale
+    centres = np.array([scaled[labels == label].mean(0) for label in range(classes)])
+    return partial(_near, mean, scale, centres)
+
+
+def _near(mean: np.ndarray, scale: np.ndarray, centres: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Probabilities (B, classes) by the squared distance to each centre, in units of the deviations."""
+    away = ((asked - mean) / scale)[:, None] - centres
+    logits = -0.5 * (away**2).sum(-1)
+    shares = np.exp(logits - logits.max(1, keepdims=True))
+    return shares / shares.sum(1, keepdims=True)
+
+
+def _standardised(decide: Scores, mean: np.ndarray, scale: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Scores of features that are standardised first."""
+    return decide((asked - mean) / scale)
+
+
+def _staged(model: Any, rounds: int, asked: np.ndarray) -> np.ndarray:
+    """Scores of scikit-learn's boosted trees after some rounds."""
+    return next(islice(model.staged_decision_function(asked), rounds - 1, None))
+
+
+def _margins(model: Any, rounds: int, asked: np.ndarray) -> np.ndarray:
+    """Scores of XGBoost's trees after some rounds."""
+    import xgboost
+
+    return model.predict(xgboost.DMatrix(asked), output_margin=True, iteration_range=(0, rounds))
+
+
+def _votes(model: Any, asked: np.ndarray) -> np.ndarray:
+    """Scores of a random forest of 300 trees: logarithms of its smoothed votes."""
+    return np.log(model.predict_proba(asked) + 1 / 300)
+
+
+def _linear(
+    mean: np.ndarray, scale: np.ndarray, weights: np.ndarray, share: np.ndarray, asked: np.ndarray
+) -> np.ndarray:
+    """Scores of least squares on standardised features."""
+    return (asked - mean) / scale @ weights + share
+
+
+def _probabilities(scores: Scores, temperature: float, asked: np.ndarray) -> np.ndarray:
+    """Class probabilities (B, classes) of scores."""
+    return softmax(temperature * scores(asked), 1)
+
+
 def _svm(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
     """Yield the decision functions of one candidate's machines: one class against the rest, or of MANY classes each
     against each, which needs smaller machines."""
@@ -43,7 +100,7 @@ def _svm(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -
     machine = SVC(C=candidate["c"], gamma=candidate["gamma"] / features.shape[1])
     many = len(np.unique(labels)) >= MANY
     model = (machine if many else OneVsRestClassifier(machine)).fit((features - mean) / scale, labels)
-    yield lambda asked: model.decision_function((asked - mean) / scale)
+    yield partial(_standardised, model.decision_function, mean, scale)
 
 
 def _boosting(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
@@ -55,7 +112,7 @@ def _boosting(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: i
         random_state=seed,
     ).fit(features, labels)  # fmt: skip
     for count in range(EVERY, ROUNDS + 1, EVERY):
-        yield lambda asked, last=count: next(islice(model.staged_decision_function(asked), last - 1, None))
+        yield partial(_staged, model, count)
 
 
 def _xgboost(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
@@ -68,9 +125,7 @@ def _xgboost(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: in
     }  # fmt: skip
     model = xgboost.train(given, xgboost.DMatrix(features, labels), ROUNDS)
     for count in range(EVERY, ROUNDS + 1, EVERY):
-        yield lambda asked, last=count: model.predict(
-            xgboost.DMatrix(asked), output_margin=True, iteration_range=(0, last)
-        )
+        yield partial(_margins, model, count)
 
 
 def _forest(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
@@ -78,7 +133,7 @@ def _forest(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int
     from sklearn.ensemble import RandomForestClassifier
 
     model = RandomForestClassifier(300, min_samples_leaf=candidate["leaf"], random_state=seed).fit(features, labels)
-    yield lambda asked: np.log(model.predict_proba(asked) + 1 / 300)
+    yield partial(_votes, model)
 
 
 def _logistic(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
@@ -87,7 +142,7 @@ def _logistic(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: i
 
     mean, scale = features.mean(0), np.maximum(features.std(0), 1e-9)
     model = LogisticRegression(C=candidate["c"], max_iter=300).fit((features - mean) / scale, labels)
-    yield lambda asked: model.decision_function((asked - mean) / scale)
+    yield partial(_standardised, model.decision_function, mean, scale)
 
 
 def _ridge(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
@@ -99,7 +154,7 @@ def _ridge(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int)
     products, answers = features.T @ features, features.T @ (wanted - share)
     for penalty in candidate["penalties"]:
         weights = solve(products + penalty * np.eye(len(products), dtype=products.dtype), answers, assume_a="pos")
-        yield lambda asked, weights=weights: (asked - mean) / scale @ weights + share
+        yield partial(_linear, mean, scale, weights, share)
 
 
 MAKERS = {
@@ -115,7 +170,8 @@ MAKERS = {
 def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
     """Return the function from features (B, D) to class probabilities (B, classes) with the least cross entropy.
 
-    train, validation: features (B, D) and labels (B,) of both parts; every class has training samples.
+    train, validation: features (B, D) and labels (B,) of both parts; every class has training samples. The function
+    can be pickled.
     """
     asked, labels = validation
     least, best = np.inf, None
@@ -128,4 +184,4 @@ def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
             if chosen.fun < least:
                 least, best = chosen.fun, (scores, float(np.exp(chosen.x)))
     scores, temperature = best
-    return lambda features: softmax(temperature * scores(features), 1)
+    return partial(_probabilities, scores, temperature)

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import kendalltau
 
-from lowalt.benchmark.baseline_table import COLUMNS, TABLE
+from lowalt.benchmark.baseline_table import COLUMNS, TABLE, read
 from lowalt.benchmark.benchmark_tracks import TRACKS, Track
 from lowalt.benchmark.scoring import Values, difference, values_of
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
 from lowalt.recognition.predictions import Predictions
 
 
@@ -41,7 +42,7 @@ def alike(rows: list[dict], count: int = 5) -> list[str]:
     """
     percent: dict[str, dict[str, float]] = {}
     for row in rows:
-        percent.setdefault(row["track"], {})[row["method"]] = row["percent"]
+        percent.setdefault(row["track"], {})[row["method"]] = float(row["percent"])
     pairs = [
         (float(kendalltau(*([percent[track][method] for method in percent[first]] for track in (first, second)))[0]),
          f"{first} and {second}") for first, second in combinations(percent, 2)
@@ -50,8 +51,15 @@ def alike(rows: list[dict], count: int = 5) -> list[str]:
 
 
 def write_table(rows: list[dict], folder: str | Path) -> None:
-    """Write the table, rows as dicts of COLUMNS, sorted by track and then by percent."""
+    """Write the table, rows as dicts of COLUMNS, sorted by track and then by percent.
+
+    Raises: InputError where a row of the table that is already there is not among them.
+    """
     order = list(TRACKS)
+    path = Path(folder) / TABLE
+    there = {(row["track"], row["method"]) for row in read(folder)} if path.is_file() else set()
+    if lost := sorted(there - {(row["track"], row["method"]) for row in rows}):
+        raise InputError(f"{path}: would lose the rows of {lost[:3]}, {len(lost)} in all; expected a table with them")
     rows = sorted(rows, key=lambda row: (order.index(row["track"]), -row["percent"], row["method"]))
     plain = [
         {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()} for row in rows
@@ -65,6 +73,20 @@ def packed(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> 
     if track.headline != "accuracy":
         return found.values.astype(np.float16)
     return np.rint(found.values * found.weight).astype(np.uint8)
+
+
+def unpacked(array: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the values (seeds, models) of what is kept of a method, as `packed` returns it."""
+    return array / weight if array.dtype == np.uint8 else array.astype(float)
+
+
+def read_values(track: Track, folder: str | Path) -> dict[str, np.ndarray]:
+    """Return what is kept of a track's baselines by their names, as `write_values` wrote it; {} without a file."""
+    path = Path(folder) / f"{track.name}.npz"
+    if not path.is_file():
+        return {}
+    with np.load(path, allow_pickle=False) as data:
+        return {name: data[name] for name in data.files}
 
 
 def write_values(track: Track, arrays: dict[str, np.ndarray], folder: str | Path) -> None:

@@ -7,6 +7,9 @@ images' views do. A scheme names one as its backbone:
     transformer  an encoder over short pieces of the signal
 """
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import torch
 from torch import nn
 
@@ -148,3 +151,13 @@ class SignalRecogniser(Fused):
     def mirrored(signals: torch.Tensor) -> torch.Tensor:
         """Return the signals with the opposite Doppler frequencies: the target turned by 180 degrees."""
         return signals.conj().resolve_conj()
+
+
+def builder(backbone: str) -> Callable[[Scheme, dict, int, str, int], SignalRecogniser]:
+    """Return the function that builds a network on signals with fresh weights; backbone: a name of BACKBONES."""
+
+    def built(scheme: Scheme, block: dict, size: int, colours: str, classes: int) -> SignalRecogniser:
+        """Return a network on signals of `size` symbols."""
+        return SignalRecogniser(replace(scheme, backbone=backbone), block, size, classes)
+
+    return built

@@ -13,9 +13,11 @@ TABLE = "table.csv"
 SHOWN = (("seen", "unseen", "one-station", "few-shot-1", "few-shot-5", "few-shot-20"),
          ("forty", "open-set", "low-snr", "town", "fr2"))  # fmt: skip
 """Tracks of the tables of a document, side by side."""
+CONFIRMED = ("confirmed_percent", "confirmed_low", "confirmed_high", "confirmed_sha256")
+"""Columns of a confirmed result: accuracy with its interval, and the checksum of what was confirmed."""
 COLUMNS = (
     "track", "method", "seeds", "percent", "low", "high", "macro_f1_percent", "macro_f1_low", "macro_f1_high", "group",
-    "confirmed_percent", "confirmed_low", "confirmed_high", "train_core_s", "test_core_s_per_1000", "hardware",
+    *CONFIRMED, "train_core_s", "test_core_s_per_1000", "hardware",
 )  # fmt: skip
 
 
