@@ -24,7 +24,8 @@ _TESTED = {("unseen", "val"), ("unseen", "test")}
 @dataclass(frozen=True)
 class Track:
     """One track. serves: whom it serves, one sentence; part: the part it tests on; stations: numbers of those that may
-    be used; shots: motion models of each unseen subtype that train too; headline: "accuracy" or "AUROC"."""
+    be used; shots: motion models of each unseen subtype that train too; headline: "accuracy" or "AUROC"; limit: what a
+    score on this track cannot show, one sentence or ""."""
 
     name: str
     serves: str
@@ -34,6 +35,7 @@ class Track:
     shots: int = 0
     headline: str = "accuracy"
     subtypes: bool = False
+    limit: str = ""
 
     @property
     def whole(self) -> bool:
@@ -105,7 +107,8 @@ TRACKS = {
         Track("seen", "Serves operators who know every type that will fly."),
         Track("unseen", "Serves surveillance: no training has seen these types.", "unseen"),
         Track("one-station", "Serves operators of a single radar: unseen types, station A alone.", "unseen",
-              stations=(0,)),
+              stations=(0,), limit="A file of answers cannot show whether other stations were used; `confirm` can, "
+                                   "because it shows station A alone."),
         Track("few-shot-1", "Serves whoever has one recorded flight of each new type.", "unseen", shots=1),
         Track("few-shot-5", "Serves whoever has five recorded flights of each new type.", "unseen", shots=5),
         Track("few-shot-20", "Serves whoever has twenty recorded flights of each new type.", "unseen", shots=20),

@@ -45,11 +45,13 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 def tracks(options: argparse.Namespace) -> Answer:
     """List the tracks."""
     facts = [
-        {"track": track.name, "serves": track.serves, "headline": track.headline, "part": track.part,
+        {"track": track.name, "serves": track.serves, "limit": track.limit, "headline": track.headline,
+         "part": track.part,
          **{use: len(track.numbers(use)) for use in ("train", "validation", "test")}}
         for track in TRACKS.values()
     ]  # fmt: skip
-    lines = ["{track:12} {train:6} train {validation:6} validate {test:6} test {serves}".format(**one) for one in facts]
+    line = "{track:12} {train:6} train {validation:6} validate {test:6} test {serves} {limit}"
+    lines = [line.format(**one).rstrip() for one in facts]
     return Answer(facts, "\n".join(lines))
 
 
@@ -103,6 +105,7 @@ def _report(track: Track, facts: dict) -> str:
     if "rejected_percent" in facts:
         lines.append(f"rejected of the held-out class at 95 % acceptance: {facts['rejected_percent']:.1f}")
     lines.append("by SNR: " + ", ".join(f"{snr} dB {share:.1f}" for snr, share in facts["by_snr_percent"].items()))
+    lines += [track.limit] if track.limit else []
     worst = sorted(facts["by_subtype_percent"].items(), key=lambda pair: pair[1])
     lines.append("lowest subtypes: " + ", ".join(f"{name} {share:.1f}" for name, share in worst[:5]))
     leads = sorted(facts["differences"].items(), key=lambda pair: -pair[1].value)
