@@ -21,7 +21,7 @@ import lowalt.benchmark
 import small_benchmark
 from dataset import build, publish
 from lowalt.__main__ import main
-from lowalt.benchmark import definition, frozen_bytes
+from lowalt.benchmark import frozen_bytes
 from lowalt.benchmark.submission import read as read_submission
 from lowalt.commands import workflow
 from lowalt.config.layers import load
@@ -115,7 +115,7 @@ def test_a_submission_to_the_benchmark(checkout, monkeypatch):
     test = lowalt.benchmark.load("unseen", "test")
     right = read_submission("mine.csv", test.track).argmax(1) == test.labels
     assert f"accuracy {100 * right.mean():.1f} (" in printed
-    definition.truth.cache_clear()
+    small_benchmark.clear()
 
 
 def test_a_trajectory(checkout, monkeypatch):

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 import runpy
 import shutil
 import sys
@@ -14,7 +15,7 @@ import pytest
 import small_benchmark
 from lowalt import benchmark
 from lowalt.__main__ import main
-from lowalt.benchmark import baseline_table, confirm, definition, frozen_bytes
+from lowalt.benchmark import baseline_table, confirm, costs, definition, frozen_bytes
 from lowalt.benchmark.benchmark_tracks import TRACKS
 from lowalt.commands import workflow
 from lowalt.files.errors import InputError, InputWarning
@@ -34,7 +35,7 @@ def made(tmp_path_factory):
         small_benchmark.shrink(patch)
         for part in ("main", "low-snr"):
             small_benchmark.write(folder / "results", part)
-    definition.truth.cache_clear()
+    small_benchmark.clear()
     return folder
 
 
@@ -44,7 +45,7 @@ def small(made, monkeypatch):
     small_benchmark.shrink(monkeypatch)
     monkeypatch.chdir(made)
     yield made
-    definition.truth.cache_clear()
+    small_benchmark.clear()
 
 
 def test_samples_of_a_track_are_those_of_its_keys(small):
@@ -123,6 +124,34 @@ def test_make_compares_with_the_kept_checksums(small, monkeypatch, capsys, tmp_p
     assert main(["benchmark", "make"]) == 1
     assert f"main/motion/{table.name} is missing" in capsys.readouterr().out
     table.write_text(whole)
+
+
+def test_make_says_what_it_costs_and_makes_the_images_that_the_tracks_use(small, monkeypatch, capsys, tmp_path):
+    asked = []
+    monkeypatch.setattr(workflow, "ended", lambda options: asked.append(options.target) or {"status": 0})
+    monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: frozen_bytes.Compared([], []))
+    for part in ("main", "low-snr"):
+        times = Path("results", definition.run_name(part), "benchmarks")
+        for name, cpu_s in (("noise/seen-00000", 7), ("views/24/unseen-train-00000", 2.5), ("echo/a", "NA")):
+            (times / name).parent.mkdir(parents=True, exist_ok=True)
+            (times / f"{name}.jsonl").write_text(json.dumps({"cpu_time": cpu_s}) + "\n")
+        for pair in ("seen-train", "seen-val", "seen-test", "unseen-val", "unseen-test"):
+            (times / f"views/24/{pair}-00000.jsonl").write_text('{"cpu_time": 1}\n')
+    monkeypatch.setattr(costs, "REFERENCE", str(tmp_path))
+    costs.write("results", tmp_path)
+    assert main(["benchmark", "make", "--track", "unseen", "--json"]) == 0
+    assert re.search("unseen: from empty 11 core-s, 0.1 min on two cores, [0-9]+ MB", capsys.readouterr().err)
+    images = {Path(name).stem.rpartition("-")[0] for name in asked[0] if "/views/24/" in name}
+    assert images == {"seen-train", "seen-val", "unseen-val", "unseen-test"} and "signals" in asked[0]
+    assert main(["benchmark", "make", "--track", "low-snr"]) == 0
+    assert "low-snr: from empty 27 core-s" in capsys.readouterr().err
+    assert main(["benchmark", "make", "--track", "town"]) == 0
+    assert "town: from empty cost not measured" in capsys.readouterr().err
+    missing = Path("results/lowalt-40-v1/views/24")
+    kept = missing.rename(tmp_path / "views")
+    with pytest.raises(InputError, match=r"no image of .*; `lowalt benchmark make --track seen` makes them"):
+        _ = benchmark.load("seen", "test").images
+    kept.rename(missing)
 
 
 def test_make_tells_the_last_bits_of_a_part_with_effects_from_another_signal(small, monkeypatch, capsys, tmp_path):

@@ -43,7 +43,7 @@ def own(tmp_path, monkeypatch):
     (tmp_path / "levels.py").write_text("def level(images):\n    return images.mean((2, 3)) / 255\n")
     np.savez(tmp_path / "mine.npz", weights=np.random.default_rng(0).normal(size=(9, 4)))
     yield tmp_path / "own.py"
-    definition.truth.cache_clear()
+    small_benchmark.clear()
 
 
 def test_the_test_set_follows_from_the_file_and_all_that_it_reads(own, capsys, monkeypatch):

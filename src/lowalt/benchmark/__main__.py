@@ -2,7 +2,7 @@
 
 import argparse
 
-from lowalt.benchmark import frozen_bytes
+from lowalt.benchmark import costs, frozen_bytes
 from lowalt.benchmark.definition import REFERENCE
 from lowalt.config.command import run, warn_in_one_line
 
@@ -13,8 +13,12 @@ def main(arguments: list[str]) -> None:
     line.add_argument("results", help="folder of the finished runs, such as results")
     line.add_argument("--samples", action="store_true", help="only the samples, which need no run")
     line.add_argument("--out", default=REFERENCE, help=f"folder to write into (default: {REFERENCE})")
+    line.add_argument("--costs", action="store_true", help="only the costs of the runs that are there")
     options = line.parse_args(arguments)
     warn_in_one_line()
+    if options.costs:
+        costs.write(options.results, options.out)
+        return
     frozen_bytes.write_samples(options.out)
     if not options.samples:
         frozen_bytes.write(options.results, options.out)

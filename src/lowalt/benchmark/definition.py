@@ -61,16 +61,21 @@ class Truth(NamedTuple):
 
 
 @cache
-def truth(part: str) -> Truth:
-    """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
+def listed(part: str) -> SampleList:
+    """Return the list of a part's samples, which is read without any data."""
     config = config_of(part)
     published = {name: record["published"] for name, record in records_of(config["targets"]).items()}
-    listed = SampleList(Plan.of(config, published), published)
-    columns = listed.columns()
-    nowhere = np.full((len(listed), len(config["network"]["stations"])), np.nan)
-    facts = Facts(**columns, range_m=nowhere, aspect_rad=nowhere)
+    return SampleList(Plan.of(config, published), published)
+
+
+@cache
+def truth(part: str) -> Truth:
+    """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
+    samples = listed(part)
+    nowhere = np.full((len(samples), len(config_of(part)["network"]["stations"])), np.nan)
+    facts = Facts(**samples.columns(), range_m=nowhere, aspect_rad=nowhere)
     # The list goes model by model, and this part's order subtype by subtype.
-    subtypes = [name for members in listed.plan.groups.values() for name in members]
+    subtypes = [name for members in samples.plan.groups.values() for name in members]
     numbers = {name: number for number, name in enumerate(subtypes)}
     order = np.argsort([numbers[name] for name in facts.subtype.tolist()], kind="stable")
-    return Truth(facts.take(order), listed.classes)
+    return Truth(facts.take(order), samples.classes)

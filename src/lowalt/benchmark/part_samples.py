@@ -75,7 +75,10 @@ class TrackSamples(Samples):
         found = ViewSamples(stored, columns, pairs)
         places = {key: number for number, key in enumerate(found.facts.key.tolist())}
         if missing := [key for key in self.key.tolist() if key not in places]:
-            raise InputError(f"{self.run}/views: no image of {missing[0]}, expected one of every sample")
+            raise InputError(
+                f"{self.run}/views: no image of {missing[0]}, expected one of every sample; "
+                f"`lowalt benchmark make --track {self.track.name}` makes them"
+            )
         return found.images[[places[key] for key in self.key.tolist()]]
 
     @cached_property

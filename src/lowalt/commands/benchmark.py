@@ -7,7 +7,8 @@ from pathlib import Path
 from lowalt.benchmark import baseline_table, frozen_bytes
 from lowalt.benchmark.baselines import kept
 from lowalt.benchmark.benchmark_tracks import TRACKS, Track, named
-from lowalt.benchmark.definition import MAIN, RUN, VERSION, overlays, run_name
+from lowalt.benchmark.costs import cost_of, parts_of
+from lowalt.benchmark.definition import RUN, VERSION, config_of, listed, overlays, run_name
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
@@ -47,24 +48,48 @@ def tracks(options: argparse.Namespace) -> Answer:
     facts = [
         {"track": track.name, "serves": track.serves, "limit": track.limit, "headline": track.headline,
          "part": track.part,
-         **{use: len(track.numbers(use)) for use in ("train", "validation", "test")}}
+         **{use: len(track.numbers(use)) for use in ("train", "validation", "test")}, **_cost(track)}
         for track in TRACKS.values()
     ]  # fmt: skip
-    line = "{track:12} {train:6} train {validation:6} validate {test:6} test {serves} {limit}"
-    lines = [line.format(**one).rstrip() for one in facts]
+    line = "{track:12} {train:6} train {validation:6} validate {test:6} test {cost:42} {serves} {limit}"
+    lines = [line.format(**one, cost=_words(TRACKS[one["track"]])).rstrip() for one in facts]
     return Answer(facts, "\n".join(lines))
+
+
+def _cost(track: Track) -> dict:
+    """The cost of a track's data as facts; none where it has not been measured."""
+    cost = cost_of([track])
+    return cost._asdict() if cost else {}
+
+
+def _words(*tracks: Track) -> str:
+    """The cost of the data of tracks as text."""
+    cost = cost_of(list(tracks))
+    return cost.words if cost else "cost not measured"
+
+
+def _targets(part: str, pairs: set[tuple[str, str]]) -> list[str]:
+    """What the workflow makes of a part: signals, and the images of the (group, fold) pairs that tracks need."""
+    run = run_name(part)
+    views = f"results/{run}/views/{config_of(part)['recognition']['size']}"
+    shards = [shard for shard in listed(part).plan.shards if tuple(shard.split("-")[:2]) in pairs]
+    images = [f"{views}/{shard}.npz" for shard in shards]
+    return ["signals", f"results/{run}/SHA256SUMS", f"results/{run}/config.yaml", *images]
 
 
 def make(options: argparse.Namespace) -> Answer:
     """Make the data of tracks with the workflow, and compare them with the kept checksums; status 1 where they differ.
 
+    Images are made of those groups and folds only that the tracks train, validate or test on.
+
     Raises: InputError for an unknown track.
     """
-    parts = list(dict.fromkeys([MAIN, *(named(name).part for name in options.track)]))
+    asked = [named(name) for name in options.track]
+    print(f"{' '.join(options.track)}: from empty {_words(*asked)}; what is there is kept", file=sys.stderr)
     facts, lines = {}, []
-    for part in parts:
+    for part, pairs in parts_of(asked).items():
         words = argparse.Namespace(overlay=[Path(one) for one in map(str, map(workflow.shipped, overlays(part)))],
-                                   configfile=[], target=["training_samples", "signals"], cores=options.cores,
+                                   configfile=[], target=_targets(part, pairs), cores=options.cores,
                                    dry_run=False, printshellcmds=False, profile=None, json=options.json)  # fmt: skip
         ended = workflow.ended(words)
         if ended["status"]:
