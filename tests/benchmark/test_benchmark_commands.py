@@ -78,6 +78,8 @@ def test_an_example_writes_a_submission_that_is_scored(small, name, track, monke
     monkeypatch.setattr(sys, "argv", [f"{name}.py", track])
     assert len((ROOT / f"examples/{name}.py").read_text().splitlines()) <= 30
     runpy.run_path(str(ROOT / f"examples/{name}.py"))
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"{track}: reading the data\n") and "predictions.csv: written" in printed
     assert main(["benchmark", "score", "predictions.csv", "--track", track, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["samples"] == len(benchmark.load(track, "test")) and found["percent"][0] > 35

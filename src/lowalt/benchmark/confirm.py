@@ -21,7 +21,7 @@ from lowalt.benchmark.submission import checked
 from lowalt.config.layers import merge
 from lowalt.config.schema import check_brought
 from lowalt.files.errors import InputError, InputWarning
-from lowalt.machine.progress import Reporter
+from lowalt.machine.progress import Reporter, announced
 from lowalt.recognition.dataset_samples import DatasetSamples, images_of
 from lowalt.recognition.intervals import Interval
 from lowalt.recognition.samples import statement
@@ -106,7 +106,8 @@ class FreshSamples(DatasetSamples):
     def __init__(self, track: Track, seed: int, columns: list[int], size: int) -> None:
         """columns: the images to make; size: of their pixels."""
         data = dataset(track, seed)
-        super().__init__(data, columns, {(group, "train") for group in data.groups}, size, placed=False)
+        with announced(f"benchmark confirm: making the targets and motions of root seed {seed}"):
+            super().__init__(data, columns, {(group, "train") for group in data.groups}, size, placed=False)
         self.track = track
         self._made = 0
         self._report = Reporter(len(self.facts), "samples")
@@ -136,7 +137,8 @@ class FreshSamples(DatasetSamples):
 def _scored(track: Track, samples: FreshSamples, answers: np.ndarray, seed: int, digest: str) -> Confirmed:
     """The result of answers (n, classes) to a test set."""
     part = tested(track, samples.facts, np.asarray(answers))
-    percent = headline(track, values_of(track, [part], track.truth().classes))
+    with announced("benchmark confirm: computing the interval"):
+        percent = headline(track, values_of(track, [part], track.truth().classes))
     return Confirmed(track.name, percent, len(samples.facts), seed, digest)
 
 
@@ -163,7 +165,9 @@ def confirm_predictions(path: str | Path, track: Track) -> Confirmed:
     seed = root_seed(file.checksums + VERSION.encode())
     samples = FreshSamples(track, seed, columns_of(track), config_of(track.part)["recognition"]["size"])
     samples.keep(shuffled(samples.facts, np.arange(len(samples.facts))))
-    answers = file.answers(*samples.signals_and_images())
+    signals, images = samples.signals_and_images()
+    with announced(f"benchmark confirm: {path} answers"):
+        answers = file.answers(signals, images)
     checked(answers, samples.facts.key, track.truth().classes)
     return _scored(track, samples, answers, seed, file.sha256)
 

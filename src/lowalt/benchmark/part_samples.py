@@ -10,6 +10,7 @@ from lowalt.benchmark.benchmark_tracks import Track, named
 from lowalt.benchmark.definition import MAIN, config_of, overlays, run_name
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import announced, reported
 from lowalt.motion import read_table
 from lowalt.recognition.samples import Samples, ViewSamples, fingerprint
 from lowalt.recognition.schemes import Scheme
@@ -72,8 +73,9 @@ class TrackSamples(Samples):
         columns = columns_of(self.track)
         stored = [path for path in (self.run / f"views/{self.size}").glob("*.npz")
                   if tuple(path.stem.split("-")[:2]) in pairs]  # fmt: skip
-        found = ViewSamples(stored, columns, pairs)
-        places = {key: number for number, key in enumerate(found.facts.key.tolist())}
+        with announced(f"{self.run}: reading images"):
+            found = ViewSamples(stored, columns, pairs) if stored else None
+        places = {key: number for number, key in enumerate(found.facts.key.tolist())} if found else {}
         if missing := [key for key in self.key.tolist() if key not in places]:
             raise InputError(
                 f"{self.run}/views: no image of {missing[0]}, expected one of every sample; "
@@ -102,7 +104,8 @@ class TrackSamples(Samples):
         levels = {float(snr): place for place, snr in enumerate(self.config["noise"]["snr_db"])}
         level = [levels[snr] for snr in self.facts.snr_db.tolist()]
         result: np.ndarray | None = None
-        for path in sorted((self.run / "noisy").glob("*.npy")):
+        paths = sorted((self.run / "noisy").glob("*.npy"))
+        for path in reported(paths, len(paths), "files"):
             chunk = values(path)
             if result is None:
                 result = np.empty((len(self), len(self.track.stations), *chunk.shape[3:]), chunk.dtype)

@@ -14,6 +14,7 @@ from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
 from lowalt.config.command import name_backbone
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import announced
 from lowalt.recognition.intervals import Interval
 
 EXAMPLE = "lowalt benchmark score predictions.csv --track unseen"
@@ -114,7 +115,8 @@ def score(options: argparse.Namespace) -> Answer:
     from lowalt.benchmark.submission import read
 
     track = named(options.track)
-    facts = scores(track, [read(path, track) for path in options.predictions], kept(track))
+    with announced("benchmark score: reading answers and computing intervals"):
+        facts = scores(track, [read(path, track) for path in options.predictions], kept(track))
     return Answer(facts, _report(track, facts))
 
 

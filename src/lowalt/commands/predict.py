@@ -12,6 +12,7 @@ from lowalt.config.command import name_backbone
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import announced
 from lowalt.recognition.zoo_files import path_of
 
 if TYPE_CHECKING:
@@ -50,7 +51,8 @@ def run(options: argparse.Namespace) -> Answer:
     from lowalt.recognition.zoo import opened
 
     own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")
-    model, settings = opened(options.model, trusted=own)
+    with announced("lowalt predict: loading the network"):
+        model, settings = opened(options.model, trusted=own)
     if record is not None:
         return _recording(model, settings, record, options)
     if "radar" in settings and options.input.suffix == ".npy":
@@ -74,7 +76,8 @@ def _recording(model: "Trained", settings: dict, record: "Record", options: argp
     """The class of every window of a recording, one line each, and how many windows of each class there are."""
     from lowalt.recordings.answers import answers
 
-    heard = answers(model, settings, record, str(options.input))
+    with announced("lowalt predict: reading the recording and answering"):
+        heard = answers(model, settings, record, str(options.input))
     names = np.array(model.classes)[heard.probabilities.argmax(1)]
     facts = zip(heard.starts_s.tolist(), heard.present.tolist(), heard.clipped.tolist(), heard.beyond_mps.tolist(),
                 names, heard.probabilities.tolist(), strict=True)  # fmt: skip
