@@ -5,6 +5,7 @@ import json
 import re
 import runpy
 import shutil
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -290,10 +291,10 @@ def test_frozen_features_are_those_of_each_sample_s_images_station_by_station(sm
 def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "studies")
     monkeypatch.syspath_prepend(ROOT / "studies/benchmark")
+    import kept_results
     import study
 
     monkeypatch.setattr(study, "OUT", tmp_path / "out")
-    monkeypatch.setattr(study, "REFERENCE", str(tmp_path))
     for method in ("majority class", "nearest centroid on moments", "logistic regression on features"):
         for track in ("unseen", "open-set", "one-station"):
             study.one((method, track, 0), "results")
@@ -308,4 +309,28 @@ def test_the_study_trains_tests_and_writes_its_table(small, tmp_path, monkeypatc
     assert by["unseen", "majority class"]["seeds"] == "none"
     with np.load(tmp_path / "unseen.npz") as kept:
         assert kept["majority class"].shape == (1, 8)
+    kept_results.write_table(rows, tmp_path)
+    # Where only some trainings are there, the rows of the others stay, and so does a row of more seeds.
+    table = {(row["track"], row["method"]): row for row in baseline_table.read(tmp_path)}
+    table["unseen", "logistic regression on features"] |= {"seeds": "3", "percent": "12"}
+    kept_results.write_table([{**row, "percent": float(row["percent"])} for row in table.values()], tmp_path)
+    shutil.rmtree(tmp_path / "out/majority-class")
+    shutil.rmtree(study.place("nearest centroid on moments", "open-set", 0))
+    again = {(row["track"], row["method"]): row for row in study.tables(tmp_path)}
+    assert set(again) == set(table)
+    assert again["unseen", "majority class"]["percent"] == 25
+    assert again["unseen", "logistic regression on features"]["percent"] == 12
+    assert again["open-set", "logistic regression on features"]["macro_f1_percent"] == pytest.approx(
+        by["open-set", "logistic regression on features"]["macro_f1_percent"]
+    )
+    with np.load(tmp_path / "unseen.npz") as kept:
+        assert len(kept.files) == 3
+    with pytest.raises(InputError, match=r"would lose the rows of .*, 1 in all"):
+        kept_results.write_table(list(again.values())[1:], tmp_path)
     shutil.rmtree(tmp_path / "out")
+
+
+def test_the_study_says_what_it_takes():
+    words = [sys.executable, str(ROOT / "studies/benchmark/study.py"), "--help"]
+    found = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+    assert found.returncode == 0 and "--confirm" in found.stdout
