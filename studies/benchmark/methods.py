@@ -164,5 +164,7 @@ KEPT = {
     "linear": Kept(embedded, "views/*/*.npz", embedded_chunk),
 }
 """By the last word of a method's name; its time is added to the method's."""
+CHOSEN_ON = {"majority class": "nothing", "nearest centroid on moments": "nothing"}
+"""Part on which a method's settings, candidates or training step were chosen: `validation` where it stands not here."""
 SEEDLESS = ("majority class", "nearest centroid on moments", "frozen EfficientNet-Lite0, linear")
 """Methods that draw nothing, so that one seed is enough."""

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import confirmations
 import kept_results
 import numpy as np
-from methods import KEPT, METHODS, SEEDLESS, Given
+from methods import CHOSEN_ON, KEPT, METHODS, SEEDLESS, Given
 from signals import cost_s
 
 import trainings
@@ -140,8 +140,8 @@ def finished(method: str, track: Track) -> Iterator[tuple[dict, Predictions]]:
             yield about, scoring.tested(track, facts, shares)
 
 
-def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], group: int) -> dict:
-    """Return a method's row of the table."""
+def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]]) -> dict:
+    """Return a method's row of the table, without its group and what follows from the kept values."""
     about, parts = zip(*runs, strict=True)
     found = scoring.scores(track, [part.probabilities for part in parts], {})
     names = ("percent", "low", "high"), ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
@@ -152,7 +152,7 @@ def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], grou
     test_s = np.mean([one["test_core_s"][track.name] for one in about])
     return {
         "track": track.name, "method": method, "seeds": "none" if method in SEEDLESS else len(parts),
-        **cells, "group": group, "train_core_s": float(np.mean([one["train_core_s"] for one in about])),
+        **cells, "train_core_s": float(np.mean([one["train_core_s"] for one in about])),
         "test_core_s_per_1000": float(1000 * test_s / len(parts[0])), "hardware": about[0]["hardware"],
     }  # fmt: skip
 
@@ -201,10 +201,11 @@ def tables(out: Path) -> list[dict]:
         values = {name: kept_results.unpacked(array, weight) for name, array in arrays.items()}
         numbers = kept_results.groups(track, weight, subtypes, values)
         for method in arrays:
-            if method in runs:
-                rows.append(row_of(track, method, runs[method], numbers[method]))
-            else:
-                rows.append(kept[track.name, method] | {"group": numbers[method]})
+            row = row_of(track, method, runs[method]) if method in runs else kept[track.name, method]
+            row |= {"group": numbers[method], "chosen_on": CHOSEN_ON.get(method, "validation")}
+            if track.whole:
+                row |= baseline_table.by_subtype(values[method], weight, subtypes)
+            rows.append(row)
         kept_results.write_values(track, arrays, out)
     return rows
 

@@ -8,10 +8,11 @@ import pytest
 import yaml
 
 from lowalt.benchmark import definition, frozen_bytes
-from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN
+from lowalt.benchmark.benchmark_tracks import INNER, TRACKS, UNKNOWN, held_out
 from lowalt.benchmark.definition import MAIN, PARTS, VERSION, config_of, truth
 from lowalt.commands.compare import leaves
 from lowalt.config.layers import SCHEMA
+from lowalt.files.errors import InputError
 from lowalt.files.shipped import as_named
 from lowalt.recognition import checkpoint, recogniser, runs, schemes
 from lowalt.workflow.run import Run
@@ -102,6 +103,27 @@ def test_a_trained_network_may_have_the_classes_of_a_track(track, tmp_path):
         tmp_path / "model.pt", "{}", {"weights": weights, "colour_map": "gray", "classes": list(classes), **about}
     )
     assert runs.load(tmp_path / "model.pt").classes == classes
+
+
+def test_the_inner_splits_hold_out_each_subtype_that_trains_once():
+    track = TRACKS["unseen"]
+    classes = track.truth().classes
+    validated, names = [], []
+    for split in INNER:
+        train, validation = track.samples("train", split).facts, track.samples("validation", split).facts
+        held = set(held_out(split))
+        assert set(validation.subtype.tolist()) == held and not held & set(train.subtype.tolist())
+        assert sorted(set(validation.label.tolist())) == list(range(len(classes)))
+        assert len(train) == 24000 * 16 / 20 and set(train.group.tolist()) == {"seen"}
+        validated += validation.key.tolist()
+        names += sorted(held)
+    assert sorted(validated) == sorted(track.samples("validation").facts.key.tolist())
+    # Frozen with this version.
+    digest = hashlib.sha256("\n".join(names).encode()).hexdigest()
+    assert digest.startswith("27a0a248ec4821e0")
+    for wrong in (("seen", "train", "inner-1"), ("unseen", "test", "inner-1"), ("unseen", "train", "inner-6")):
+        with pytest.raises(InputError, match=r"expected one of .'inner-1'"):
+            TRACKS[wrong[0]].numbers(*wrong[1:])
 
 
 @pytest.mark.parametrize("use", ["validation", "test"])

@@ -86,6 +86,17 @@ def test_an_example_writes_a_submission_that_is_scored(small, name, track, monke
     assert found["samples"] == len(benchmark.load(track, "test")) and found["percent"][0] > 35
 
 
+def test_the_example_of_a_choice_holds_out_subtypes_of_every_split(small, monkeypatch, capsys):
+    """The small benchmark has one subtype of each class that trains, so its splits are replaced by parts."""
+    asked, load = [], benchmark.load
+    monkeypatch.setattr(benchmark, "load", lambda track, part, split: asked.append((part, split)) or load(track, part))
+    assert len((ROOT / "examples/benchmark_choose.py").read_text().splitlines()) <= 30
+    runpy.run_path(str(ROOT / "examples/benchmark_choose.py"))
+    assert asked == [(part, split) for split in benchmark.INNER for part in ("train", "validation")]
+    text = capsys.readouterr().out
+    assert text.count("held out") == 5 and re.search(r"C = 1.0: \d+\.\d % of the subtypes that did not train", text)
+
+
 def test_the_example_of_a_network_is_a_backbone_and_its_overlay_names_it():
     spec = importlib.util.spec_from_file_location("own", ROOT / "examples/benchmark_network.py")
     own = importlib.util.module_from_spec(spec)

@@ -114,6 +114,10 @@ def test_headline_and_f1_are_those_of_the_definitions():
     assert found["macro_f1_percent"].value == pytest.approx(100 * np.mean(by_snr))
     owls = facts.subtype == "Owl"
     assert found["by_subtype_percent"]["Owl"] == pytest.approx(100 * np.mean(guesses[owls] == facts.label[owls]))
+    by_name = found["by_subtype_percent"]
+    assert found["median_percent"] == pytest.approx(np.median(list(by_name.values())))
+    others = [share for name, share in by_name.items() if name not in ("EH 216 S", "Sparrow")]
+    assert len(others) == 18 and found["others_percent"] == pytest.approx(np.mean(others))
     assert list(found["by_snr_percent"]) == ["3", "8", "13", "18", "23", "inf"]
 
 

@@ -3,8 +3,8 @@
 `load(track, part)` gives the samples of a track's part, `write(path, samples, probabilities)` a submission.
 """
 
-from lowalt.benchmark.benchmark_tracks import TRACKS
+from lowalt.benchmark.benchmark_tracks import INNER, TRACKS
 from lowalt.benchmark.part_samples import load
 from lowalt.benchmark.submission import write
 
-__all__ = ["TRACKS", "load", "write"]
+__all__ = ["INNER", "TRACKS", "load", "write"]

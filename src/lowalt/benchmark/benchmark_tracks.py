@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.benchmark.definition import MAIN, Truth, truth
+from lowalt.benchmark.definition import MAIN, Truth, listed, truth
 from lowalt.files.errors import InputError, instead
 from lowalt.recognition.protocols import FOLDS
 from lowalt.recognition.samples import Facts
 
 USES = ("train", "validation", "test")
+INNER = ("inner-1", "inner-2", "inner-3", "inner-4", "inner-5")
+"""Splits of the subtypes that train in tracks of unseen subtypes, for choices that should hold for other subtypes."""
 UNKNOWN = "Bird"
 """The class that the track open-set holds out."""
 _TESTED = {("unseen", "val"), ("unseen", "test")}
@@ -57,17 +59,20 @@ class Track:
         order = np.argsort(first)
         return Truth(replace(facts, label=np.argsort(order)[labels]), tuple(names[order].tolist()))
 
-    def samples(self, use: str = "test") -> Truth:
-        """Return the samples of a use, and their classes. Raises: as `numbers`."""
+    def samples(self, use: str = "test", split: str = "") -> Truth:
+        """Return the samples of a use, and their classes; split: as in `numbers`. Raises: as `numbers`."""
         every, classes = self.truth(self.part if use == "test" else MAIN)
-        return Truth(every.take(self.numbers(use)), classes)
+        return Truth(every.take(self.numbers(use, split)), classes)
 
-    def numbers(self, use: str) -> np.ndarray:
+    def numbers(self, use: str, split: str = "") -> np.ndarray:
         """Return which samples of `truth(MAIN)` train or validate, or which of `truth()` test, as numbers.
 
-        Those that train come in the order of `truth`, the others in that of `shuffled`.
-        Raises: InputError for another use than USES.
+        Those that train come in the order of `truth`, the others in that of `shuffled`. split: a name of INNER, of
+        which one subtype of each class does not train, and only these validate.
+        Raises: InputError for another use than USES, and for a split where there is none.
         """
+        if split:
+            return self._inner(use, split)
         if use not in USES:
             raise InputError(f"part {use!r}: expected one of {list(USES)}")
         if use == "test" and self.part != MAIN:
@@ -83,6 +88,35 @@ class Track:
             chosen &= facts.label != self.truth(MAIN).classes.index(UNKNOWN)
         numbers = np.flatnonzero(chosen)
         return numbers if use == "train" else shuffled(facts, numbers)
+
+    def _inner(self, use: str, split: str) -> np.ndarray:
+        """Which samples of `truth(MAIN)` train or validate in an inner split. Raises: InputError; see `numbers`."""
+        if not self.whole or split not in INNER or use == "test":
+            whole = [track.name for track in TRACKS.values() if track.whole]
+            raise InputError(
+                f"split {split!r} of track {self.name}, part {use!r}: expected one of {list(INNER)}, a track of "
+                f"{whole}, and the part train or validation"
+            )
+        numbers = self.numbers(use)
+        held = np.isin(self.truth(MAIN).facts.subtype[numbers], held_out(split))
+        return numbers[held if use == "validation" else ~held]
+
+
+def held_out(split: str) -> tuple[str, ...]:
+    """Return the subtypes that an inner split holds out: one of each class of the subtypes that train.
+
+    The subtypes of each class are ordered by the SHA-256 of their names; split k holds out the k-th of each class.
+    """
+    samples = listed(MAIN)
+    by_class: dict[int, list[str]] = {}
+    for name in samples.plan.groups["seen"]:
+        by_class.setdefault(samples.label_of[name], []).append(name)
+    number = INNER.index(split)
+    found = []
+    for names in by_class.values():
+        ordered = sorted(names, key=lambda name: hashlib.sha256(name.encode()).digest())
+        found.append(ordered[number % len(ordered)])
+    return tuple(found)
 
 
 def shuffled(facts: Facts, numbers: np.ndarray) -> np.ndarray:

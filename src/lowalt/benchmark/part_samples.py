@@ -38,14 +38,14 @@ class TrackSamples(Samples):
     each VRP, TRP, VT; `signals` (n, stations, 400) complex64, of mean power one at each station.
     """
 
-    def __init__(self, track: Track, part: str, folder: str | Path) -> None:
-        """track: which samples; part: "train", "validation" or "test"; folder: where the runs' folders are.
+    def __init__(self, track: Track, part: str, folder: str | Path, split: str = "") -> None:
+        """track: which samples; part, split: as in `load`; folder: where the runs' folders are.
 
         Raises: InputError for another part, or where the data have not been made.
         """
         self.track = track
         source = track.part if part == "test" else MAIN
-        (self.facts, self.classes), self.config = track.samples(part), config_of(source)
+        (self.facts, self.classes), self.config = track.samples(part, split), config_of(source)
         self.run, self.size = Path(folder) / run_name(source), self.config["recognition"]["size"]
         if not self.run.is_dir():
             raise InputError(
@@ -125,9 +125,11 @@ class TrackSamples(Samples):
         return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
 
 
-def load(track: str, part: str = "train", folder: str | Path = "results") -> TrackSamples:
+def load(track: str, part: str = "train", folder: str | Path = "results", split: str = "") -> TrackSamples:
     """Return the samples of a track's part, "train", "validation" or "test"; folder: where the runs' folders are.
 
-    Raises: InputError for an unknown track or part, or where the data have not been made.
+    split: in tracks of unseen subtypes the name of an inner split, "inner-1" to "inner-5". One subtype of each class is
+    then absent from "train", and "validation" has these subtypes only.
+    Raises: InputError for an unknown track, part or split, or where the data have not been made.
     """
-    return TrackSamples(named(track), part, folder)
+    return TrackSamples(named(track), part, folder, split)

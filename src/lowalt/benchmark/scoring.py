@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.benchmark.baseline_table import by_subtype
 from lowalt.benchmark.benchmark_tracks import UNKNOWN, Track
 from lowalt.benchmark.definition import MAIN, named_seed
 from lowalt.numerics.streams import stream
@@ -119,6 +120,8 @@ def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndar
         for name, groups in (("by_snr_percent", facts.snr_db), ("by_subtype_percent", facts.subtype))
     }  # fmt: skip
     more = {}
+    if track.whole:
+        more |= by_subtype(found.values, found.weight, found.subtypes)
     if track.headline == "AUROC":
         label = classes.index(UNKNOWN)
         more["rejected_percent"] = 100 * float(np.mean([kept_share(part, label) for part in parts]))

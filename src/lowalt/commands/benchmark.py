@@ -129,6 +129,11 @@ def _report(track: Track, facts: dict) -> str:
             facts["headline"], *map(baseline_table.words, (facts["percent"], facts["macro_f1_percent"]))
         ),
     ]
+    if "others_percent" in facts:
+        lines.append(
+            f"median over subtypes {facts['median_percent']:.1f}, without {' and '.join(baseline_table.HARDEST)} "
+            f"{facts['others_percent']:.1f}"
+        )
     if "rejected_percent" in facts:
         lines.append(f"rejected of the held-out class at 95 % acceptance: {facts['rejected_percent']:.1f}")
     lines.append("by SNR: " + ", ".join(f"{snr} dB {share:.1f}" for snr, share in facts["by_snr_percent"].items()))
