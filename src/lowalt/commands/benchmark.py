@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from lowalt.benchmark import baseline_table, frozen_bytes
+from lowalt.benchmark import baseline_table, frozen_bytes, submitted_rows
 from lowalt.benchmark.baselines import kept
 from lowalt.benchmark.benchmark_tracks import TRACKS, Track, named
 from lowalt.benchmark.costs import cost_of, parts_of
@@ -40,6 +40,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     line.add_argument("--predict", type=Path, metavar="FILE.py", help=about)
     line.add_argument("--track", required=True, help="the track, such as unseen")
     name_backbone(line)
+    line = add_command(own, "submissions", rescored, "score every submission of a folder and write their table",
+                       "lowalt benchmark submissions")  # fmt: skip
+    line.add_argument("folder", nargs="?", type=Path, default=Path(submitted_rows.FOLDER), help="folder of submissions")
     line = add_command(own, "table", shown, "the table of baselines", "lowalt benchmark table --track unseen")
     line.add_argument("--track", nargs="+", default=list(TRACKS), help="tracks to show (default: all)")
 
@@ -161,6 +164,17 @@ def confirmed(options: argparse.Namespace) -> Answer:
     text = (f"{VERSION} {found.track}, confirmed: {baseline_table.words(found.percent)} % of {found.samples} samples, "
             f"root seed {found.seed}, SHA-256 {found.sha256}")  # fmt: skip
     return Answer(found._asdict(), text)
+
+
+def rescored(options: argparse.Namespace) -> Answer:
+    """Score all submissions of a folder and write its table. Raises: InputError naming what is wrong with one."""
+    if not options.folder.is_dir():
+        raise InputError(f"{options.folder}: no such folder of submissions")
+    with announced("benchmark submissions: scoring"):
+        rows = list(submitted_rows.rows(options.folder))
+    path = submitted_rows.write(options.folder, rows)
+    line = "{submission:24} {track:12} {percent} ({low} to {high})"
+    return Answer(rows, "\n".join([*(line.format(**row) for row in rows), f"{path}: {len(rows)} rows"]))
 
 
 def shown(options: argparse.Namespace) -> Answer:
