@@ -24,7 +24,7 @@ MADE_OF = ("seed", "network", "targets", "motion", "echo", "effects", "noise", "
 
 def test_root_seeds_are_those_of_the_names_of_the_parts():
     for part in PARTS:
-        text = VERSION if part == MAIN else f"{VERSION} {part}"
+        text = VERSION if part == MAIN else f"{VERSION} {'town' if part == 'clutter' else part}"
         assert config_of(part)["seed"] == int(hashlib.sha256(text.encode()).hexdigest()[:8], 16)
 
 
@@ -39,7 +39,7 @@ def test_the_definition_takes_nothing_that_decides_bytes_from_the_default():
 
 @pytest.mark.parametrize("part", PARTS)
 def test_samples_made_again_are_those_that_are_kept(part):
-    """Every subtype, in the town a few: a change of targets, motion, echo, noise, spectra or effects is seen here."""
+    """Every subtype, of smaller parts a few: a change of targets, motion, echo, noise, spectra or effects is seen here."""
     kept = [(name, digest) for name, digest in frozen_bytes.kept(frozen_bytes.SAMPLES).items() if name.startswith(part)]
     assert len(kept) == frozen_bytes.FEW.get(part, 40)
     assert [(f"{part}/{key}", digest) for key, digest in frozen_bytes.samples(part)] == kept

@@ -67,8 +67,8 @@ def test_samples_of_a_track_are_those_of_its_keys(small):
 
 
 def test_data_that_nobody_made_are_asked_for_by_name(small):
-    with pytest.raises(InputError, match="lowalt benchmark make --track town"):
-        benchmark.load("town", "test")
+    with pytest.raises(InputError, match="lowalt benchmark make --track clutter"):
+        benchmark.load("clutter", "test")
     with pytest.raises(InputError, match="expected perhaps \\['unseen'\\]"):
         benchmark.load("unsen")
 
@@ -159,8 +159,8 @@ def test_make_says_what_it_costs_and_makes_the_images_that_the_tracks_use(small,
     assert images == {"seen-train", "seen-val", "unseen-val", "unseen-test"} and "signals" in asked[0]
     assert main(["benchmark", "make", "--track", "low-snr"]) == 0
     assert "low-snr: from empty 27 core-s" in capsys.readouterr().err
-    assert main(["benchmark", "make", "--track", "town"]) == 0
-    assert "town: from empty cost not measured" in capsys.readouterr().err
+    assert main(["benchmark", "make", "--track", "clutter"]) == 0
+    assert "clutter: from empty cost not measured" in capsys.readouterr().err
     missing = Path("results/lowalt-40-v1/views/24")
     kept = missing.rename(tmp_path / "views")
     with pytest.raises(InputError, match=r"no image of .*; `lowalt benchmark make --track seen` makes them"):

@@ -70,7 +70,7 @@ def test_a_wrong_submission_is_named(tmp_path):
             list(submitted_rows.rows(own.parent))
     own = submitted(tmp_path / "four", "four")
     (own / "unseen-0.csv").rename(own / "unsen-0.csv")
-    with pytest.raises(InputError, match="unsen-0.csv: expected a name TRACK-SEED.csv"):
+    with pytest.raises(InputError, match=r"unsen-0\.csv: expected a name TRACK-SEED.csv"):
         list(submitted_rows.rows(own.parent))
 
 

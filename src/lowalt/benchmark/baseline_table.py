@@ -11,7 +11,7 @@ from lowalt.recognition.intervals import Interval
 
 TABLE = "table.csv"
 SHOWN = (("seen", "unseen", "one-station", "few-shot-1", "few-shot-5", "few-shot-20"),
-         ("forty", "open-set", "low-snr", "town", "fr2"))  # fmt: skip
+         ("forty", "open-set", "low-snr", "clutter", "fr2"))  # fmt: skip
 """Tracks of the tables of a document, side by side."""
 CONFIRMED = ("confirmed_percent", "confirmed_low", "confirmed_high", "confirmed_sha256")
 """Columns of a confirmed result: accuracy with its interval, and the checksum of what was confirmed."""

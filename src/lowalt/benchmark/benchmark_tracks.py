@@ -150,8 +150,8 @@ TRACKS = {
               headline="AUROC"),
         Track("forty", "Serves forensics: which of the forty types was it?", subtypes=True),
         Track("low-snr", "Serves the detection of small and distant targets: 3 dB down to -10 dB.", part="low-snr"),
-        Track("town", "Serves deployment between buildings: trained in the paper's scene, tested in a town.",
-              part="town"),
+        Track("clutter", "Serves deployment near the ground: trained without clutter, tested in clutter and wind.",
+              part="clutter", limit="The scene has ground, clutter and wind, and no building."),
         Track("fr2", "Serves operators of another band: trained at 4.9 GHz, tested at 28 GHz.", part="fr2"),
     )
 }  # fmt: skip

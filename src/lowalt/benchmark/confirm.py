@@ -28,7 +28,7 @@ from lowalt.recognition.samples import statement
 from lowalt.recognition.zoo_files import path_of
 from lowalt.shards.dataset import Dataset
 
-MODELS = {"town": 5}
+MODELS = {"clutter": 5}
 """Motion models of each subtype by part; of other parts `USUAL`."""
 USUAL = 10
 CONFIRMED = tuple(name for name, track in TRACKS.items() if track.headline == "accuracy" and not track.subtypes)

@@ -21,7 +21,9 @@ RUN = VERSION.replace(" ", "-")
 REFERENCE = f"results/reference/{RUN}"
 """Folder of what is kept of this version: checksums, the table, and what the baselines got right."""
 MAIN = "main"
-PARTS = (MAIN, "low-snr", "town", "fr2")
+PARTS = (MAIN, "low-snr", "clutter", "fr2")
+SEEDED_AS = {"clutter": "town"}
+"""Word from which a part's root seed is drawn, where it is not the part's name."""
 
 
 def root_seed(text: str | bytes) -> int:
@@ -34,8 +36,8 @@ def root_seed(text: str | bytes) -> int:
 
 
 def named_seed(part: str) -> int:
-    """Return the root seed of a part: that of the version's name, followed by the part's unless it is the main one."""
-    return root_seed(VERSION if part == MAIN else f"{VERSION} {part}")
+    """Return the root seed of a part: that of the version's name, followed by a word unless it is the main one."""
+    return root_seed(VERSION if part == MAIN else f"{VERSION} {SEEDED_AS.get(part, part)}")
 
 
 def overlays(part: str) -> list[str]:

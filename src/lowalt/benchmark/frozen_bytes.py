@@ -23,7 +23,7 @@ from lowalt.shards.dataset import Dataset
 FILES = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy")
 """Files of a part's run, in the order in which each makes the next. Images follow from the signals."""
 WHOLE, SAMPLES = "checksums.txt", "samples.txt"
-FEW = {"low-snr": 8, "town": 8, "fr2": 8}
+FEW = {"low-snr": 8, "clutter": 8, "fr2": 8}
 """Number of subtypes of which a sample is kept, where it is not one of each: two of each class."""
 
 CLOSE = 1e-6

@@ -26,7 +26,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     own = about.add_subparsers(metavar="COMMAND", required=True)
     add_command(own, "tracks", tracks, "the tracks: whom each serves, numbers of samples", "lowalt benchmark tracks")
     line = add_command(own, "make", make, "make the data of tracks and compare them with the kept checksums",
-                       "lowalt benchmark make --track unseen town")  # fmt: skip
+                       "lowalt benchmark make --track unseen clutter")  # fmt: skip
     line.add_argument("--track", nargs="+", default=["unseen"], help="tracks whose data to make (default: unseen)")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
     line = add_command(own, "score", score, "score a submission and compare it with each baseline", EXAMPLE)
