@@ -39,7 +39,7 @@ def test_the_definition_takes_nothing_that_decides_bytes_from_the_default():
 
 @pytest.mark.parametrize("part", PARTS)
 def test_samples_made_again_are_those_that_are_kept(part):
-    """Every subtype, of smaller parts a few: a change of targets, motion, echo, noise, spectra or effects is seen here."""
+    """Every subtype, of smaller parts a few: a change of targets, motion, echo, noise or effects is seen here."""
     kept = [(name, digest) for name, digest in frozen_bytes.kept(frozen_bytes.SAMPLES).items() if name.startswith(part)]
     assert len(kept) == frozen_bytes.FEW.get(part, 40)
     assert [(f"{part}/{key}", digest) for key, digest in frozen_bytes.samples(part)] == kept
