@@ -2,12 +2,12 @@
 
 import json
 import os
+import pickle
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-import joblib
 import numpy as np
 import pytest
 import yaml
@@ -97,7 +97,7 @@ def test_the_file_on_the_page_is_confirmed(tmp_path, monkeypatch):
     (tmp_path / "predict.py").write_text(text)
     generator = np.random.default_rng(0)
     model = LogisticRegression().fit(generator.normal(size=(40, 12)), np.arange(40) % 4)
-    joblib.dump(model, tmp_path / "mine.joblib")
+    (tmp_path / "mine.pkl").write_bytes(pickle.dumps(model))
     found = confirm.confirm_predictions(tmp_path / "predict.py", TRACKS["unseen"])
     small_benchmark.clear()
     assert found.samples == 16 and 0 <= found.percent.value <= 100

@@ -3,7 +3,7 @@
 The file names the track and part that it trained on, and every file that it reads:
 
     TRAINED_ON = "unseen", "train"
-    FILES = ["mine.joblib"]
+    FILES = ["mine.pkl"]
 
     def predict(signals, images): ...
 
