@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.benchmark.benchmark_tracks import TRACKS
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, load, merge
 from lowalt.config.splits import fold
@@ -177,7 +177,7 @@ def by_number(config: dict, models: int = 250) -> tuple:
 
 
 def by_row() -> tuple:
-    """The row of a program that knows only the number of a test sample's row in `lowalt.benchmark.load`.
+    """The row of a program that knows only the number of a test sample's row in `lowalt.extensions.benchmark.load`.
 
     The track is `unseen`; no data is needed.
     """
@@ -185,7 +185,7 @@ def by_row() -> tuple:
     number = np.arange(len(facts))
     features = np.stack([number, number % 2, number % 3, number % 5, number % 6], axis=1).astype(float)
     answers = learned(features, facts.label, facts.motion)
-    return row("row of `lowalt.benchmark.load`", answers, facts.label, facts.motion, "chance")
+    return row("row of `lowalt.extensions.benchmark.load`", answers, facts.label, facts.motion, "chance")
 
 
 def learned(features: np.ndarray, labels: np.ndarray, groups: np.ndarray) -> np.ndarray:

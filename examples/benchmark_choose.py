@@ -3,7 +3,7 @@
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from lowalt import benchmark
+from lowalt.extensions import benchmark
 
 
 def features(signals: np.ndarray) -> np.ndarray:

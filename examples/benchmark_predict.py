@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 
-from lowalt import benchmark
+from lowalt.extensions import benchmark
 
 track = sys.argv[1] if len(sys.argv) > 1 else "unseen"
 print(f"{track}: reading the data")

@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 side_channels = import_module("side_channels")
 KEPT = list(csv.DictReader((ROOT / "results/benchmarks/side_channels.csv").open(newline="")))
 RULES = (ROOT / "docs/benchmark-rules.md").read_text()
-WITHOUT_DATA = ("motion models absent from training", "row of `lowalt.benchmark.load`")
+WITHOUT_DATA = ("motion models absent from training", "row of `lowalt.extensions.benchmark.load`")
 """Channels that are measured on the list of the benchmark's samples."""
 SURE = 0.001
 """The least p-value, that of a classifier which beats all random assignments."""

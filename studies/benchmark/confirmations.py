@@ -10,10 +10,10 @@ from pathlib import Path
 
 from methods import Trained
 
-from lowalt.benchmark.benchmark_tracks import Track
-from lowalt.benchmark.confirm import Confirmed, confirm_predictions
-from lowalt.benchmark.definition import MAIN, config_of
 from lowalt.config.network import Network
+from lowalt.extensions.benchmark.benchmark_tracks import Track
+from lowalt.extensions.benchmark.confirm import Confirmed, confirm_predictions
+from lowalt.extensions.benchmark.definition import MAIN, config_of
 from lowalt.files.atomic import replacing
 from lowalt.recognition.intervals import Interval
 
@@ -38,7 +38,7 @@ seen = {seen}
 def predict(signals, images):
     \"\"\"Probabilities (n, classes).\"\"\"
     return answer(seen(signals, images))"""
-OF_NETWORK = """answer = network(Path(__file__).with_name("model.pt"), {backbone!r})
+OF_NETWORK = """answer = network(Path(__file__).with_name("model.safetensors"), {backbone!r})
 
 
 def predict(signals, images):
@@ -63,7 +63,7 @@ def frozen(method: str, track: Track, trained: Trained, training: Path, kept: Pa
     body = PICKLED
     if trained.sees == "signals":
         backbone = "complex" if method.startswith("complex") else method.split()[0].lower()
-        sources = {HERE / "seen.py", HERE / "signal_networks.py", training / "model.pt"}
+        sources = {HERE / "seen.py", HERE / "signal_networks.py", training / "model.safetensors"}
         imports, body = "from seen import network", OF_NETWORK.format(backbone=backbone)
     elif trained.sees == "nothing":
         imports, body = "", PICKLED.format(seen="lambda signals, images: len(signals)")

@@ -21,7 +21,7 @@ from features import features, spectral_moments
 from frozen import embedded, embedded_chunk, embedded_of
 from signals import Signals, features_of, told
 
-from lowalt.benchmark.part_samples import TrackSamples
+from lowalt.extensions.benchmark.part_samples import TrackSamples
 from lowalt.recognition.batches import epoch_order
 from lowalt.recognition.schemes import Scheme
 
@@ -29,7 +29,7 @@ from lowalt.recognition.schemes import Scheme
 class Trained(NamedTuple):
     """A trained method: `answer` returns class probabilities (samples, classes) of what it `sees`, a name of SEEN.
 
-    It can be pickled, unless `answer` is that of a network, which its model.pt keeps.
+    It can be pickled, unless `answer` is that of a network, which its model.safetensors keeps.
     """
 
     sees: str
@@ -110,7 +110,7 @@ def network(given: Given, scheme: Scheme, build: Callable, sees: str) -> Trained
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
 
-    block, model = given.config["recognition"], given.folder / "model.pt"
+    block, model = given.config["recognition"], given.folder / "model.safetensors"
     if not model.is_file():
         samples = {"train": SEEN[sees](given.train, given.features),
                    "validation": SEEN[sees](given.validation, given.features)}  # fmt: skip

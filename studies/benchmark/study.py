@@ -33,12 +33,12 @@ from methods import CHOSEN_ON, KEPT, METHODS, SEEDLESS, Given
 from signals import cost_s
 
 import trainings
-from lowalt.benchmark import baseline_table, scoring
-from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
-from lowalt.benchmark.confirm import Confirmed, confirm
-from lowalt.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
-from lowalt.benchmark.part_samples import TrackSamples
 from lowalt.config.command import run
+from lowalt.extensions.benchmark import baseline_table, scoring
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
+from lowalt.extensions.benchmark.confirm import Confirmed, confirm
+from lowalt.extensions.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
+from lowalt.extensions.benchmark.part_samples import TrackSamples
 from lowalt.files.atomic import replacing, slug
 from lowalt.machine.hardware import describe
 from lowalt.recognition import model_file
@@ -229,7 +229,7 @@ def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
 def confirmed_by_zoo(name: str, method: str, data: str, zoo: Path) -> Confirmed:
     """Keep the first training of a method as a model of the zoo, and return its confirmed result."""
     entry, track = ZOO_ENTRIES[name, method], named(name)
-    model, config = place(method, name, 0) / "model.pt", config_of(MAIN)
+    model, config = place(method, name, 0) / "model.safetensors", config_of(MAIN)
     content = replace(model_file.of_run(model), input={block: config[block] for block in model_file.INPUT})
     keep(content, model, TrackSamples(track, "validation", data), entry, zoo)
     return confirm(zoo / f"{entry}.safetensors", track)

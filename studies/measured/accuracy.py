@@ -16,14 +16,14 @@ from recorded_sets import HALVES, Measured
 from torch import nn
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.twin_training import simulated, train
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import checkpoint, runs
+from lowalt.recognition import model_file, runs
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recordings.twin_scenes import Library
-from lowalt.recordings.twin_training import simulated, train
-from lowalt.recordings.window_samples import Windows, facts, rendered
 from lowalt.tiles import join
 from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import encode
@@ -69,7 +69,7 @@ def loaded(path: Path, name: str) -> nn.Module:
 
     Raises: InputError where the file is missing, damaged, or was trained on another twin than `name`.
     """
-    twin = checkpoint.model(path)[1].get("twin")
+    twin = model_file.read(path).model.get("twin")
     if twin != name:
         raise InputError(f"{path}: trained on the twin {twin!r}, expected {name!r}")
     return runs.load(path).model
@@ -109,7 +109,7 @@ def radar_rows(
     for recording, windows in measured:
         write_picture(recording, windows, block, out)
     if reuse:
-        networks = {seed: loaded(models / f"{name}-{seed}/model.pt", name) for seed in block["seeds"]}
+        networks = {seed: loaded(models / f"{name}-{seed}/model.safetensors", name) for seed in block["seeds"]}
     else:
         samples = {fold: simulated(library, name, block, fold) for fold in ("train", "validation")}
         networks = {seed: train(block, samples, name, seed, models / f"{name}-{seed}") for seed in block["seeds"]}

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.config.command import run
+from lowalt.extensions.recordings.answers import answers
+from lowalt.extensions.recordings.own_radar import trained_radar
+from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.twin_training import RECOGNITION, settings
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.zoo import opened
-from lowalt.recordings.answers import answers
-from lowalt.recordings.own_radar import trained_radar
-from lowalt.recordings.record import record
-from lowalt.recordings.twin_training import RECOGNITION, settings
 
 RECORDS = Path(__file__).with_name("fourth_radar.yaml")
 KNOWN = "bird_drone_10ghz"

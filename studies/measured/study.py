@@ -18,12 +18,12 @@ import numpy as np
 from recorded_sets import Measured, recordings, usable
 
 from lowalt.config.command import dispatch, run
+from lowalt.extensions.recordings.twin import RADARS
+from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
-from lowalt.recordings.twin import RADARS
-from lowalt.recordings.twin_scenes import Library
 
 HERE = Path(__file__).parent
 PAIRS = HERE / "pictures.yaml"
@@ -74,7 +74,7 @@ def pairs(arguments: list[str]) -> None:
     from comparison import unmended
     from pairs import measured_stretch, picture, simulated_stretch
 
-    from lowalt.recordings.twin import Twin
+    from lowalt.extensions.recordings.twin import Twin
 
     inputs, block = _inputs("pairs", pairs.__doc__, arguments), load_yaml(PAIRS)
     records = inputs.library.records
@@ -144,7 +144,7 @@ def recognise(arguments: list[str]) -> None:
     from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
     from fetch import addresses
 
-    from lowalt.recordings.twin_training import settings
+    from lowalt.extensions.recordings.twin_training import settings
 
     options, block = inputs.options, settings(inputs.options.recognition)
     named = addresses(load_yaml(options.only, "list of recordings")) if options.only else None

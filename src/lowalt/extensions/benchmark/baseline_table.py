@@ -1,0 +1,108 @@
+"""The table of the benchmark: a row for each track and method, kept as CSV, and its form in documents and reports."""
+
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.extensions.benchmark.definition import REFERENCE
+from lowalt.files.csv_tables import number, read_csv
+from lowalt.files.shipped import shipped
+from lowalt.recognition.intervals import Interval
+
+TABLE = "table.csv"
+SHOWN = (("seen", "unseen", "one-station", "few-shot-1", "few-shot-5", "few-shot-20"),
+         ("forty", "open-set", "low-snr", "clutter", "fr2"))  # fmt: skip
+"""Tracks of the tables of a document, side by side."""
+CONFIRMED = ("confirmed_percent", "confirmed_low", "confirmed_high", "confirmed_sha256")
+"""Columns of a confirmed result: accuracy with its interval, and the checksum of what was confirmed."""
+HARDEST = ("EH 216 S", "Sparrow")
+"""The unseen subtypes on which most errors of every method fall."""
+BY_SUBTYPE = ("median_percent", "others_percent")
+"""Columns of tracks of unseen subtypes: the median accuracy over subtypes, and the accuracy without HARDEST."""
+DECIDES = ("unseen, median subtype", f"unseen without {' and '.join(HARDEST)}")
+"""Heads of the columns BY_SUBTYPE of the track `unseen`."""
+COLUMNS = (
+    "track", "method", "seeds", "chosen_on", "percent", "low", "high", *BY_SUBTYPE,
+    "macro_f1_percent", "macro_f1_low", "macro_f1_high", "group",
+    *CONFIRMED, "train_core_s", "test_core_s_per_1000", "hardware",
+)  # fmt: skip
+
+
+def read(folder: str | Path = REFERENCE) -> list[dict]:
+    """Return the kept table's rows; numbers as text. Raises: InputError where it is missing or lacks a column."""
+    return read_csv(shipped(Path(folder) / TABLE), *COLUMNS, what="table of the benchmark")
+
+
+def interval(row: dict) -> Interval:
+    """Return a row's headline number with its interval. Raises: InputError where a cell is no number."""
+    return Interval(*(number(row, name, TABLE) for name in ("percent", "low", "high")))
+
+
+def words(found: Interval) -> str:
+    """Return a value with its interval as text, one digit each."""
+    return f"{found.value:.1f} ({found.low:.1f} to {found.high:.1f})"
+
+
+def result(row: dict) -> str:
+    """Return a row's result as text: percent with its interval, the group as a letter, a tick where it is confirmed."""
+    return f"{words(interval(row))} {chr(ord('a') + int(row['group']) - 1)}{' ✓' if row['confirmed_percent'] else ''}"
+
+
+def by_subtype(values: np.ndarray, weight: np.ndarray, subtypes: np.ndarray) -> dict[str, float]:
+    """Return the columns BY_SUBTYPE in percent.
+
+    values (seeds, models): shares of correct samples; weight, subtypes (models,): of the motion models.
+    """
+    shares = values.mean(0)
+    accuracy = []
+    for name in np.unique(subtypes):
+        accuracy.append(np.average(shares[subtypes == name], weights=weight[subtypes == name]))
+    others = ~np.isin(subtypes, HARDEST)
+    found = {"median_percent": 100 * float(np.median(accuracy))}
+    if others.any():
+        found["others_percent"] = 100 * float(np.average(shares[others], weights=weight[others]))
+    return found
+
+
+def _mean(rows: list[dict], column: str) -> str:
+    """The mean of a column of core-seconds with two digits, over the rows that have it; a dash where none has."""
+    found = [number(row, column, TABLE) for row in rows if row[column]]
+    return "-" if not found else f"{np.mean(found):.2g}" if np.mean(found) < 10 else f"{np.mean(found):.0f}"
+
+
+def _digit(cell: str | None) -> str:
+    """A number of the table with one digit; a dash where there is none."""
+    return f"{float(cell):.1f}" if cell else "-"
+
+
+def tables(rows: list[dict]) -> list[list[tuple[str, ...]]]:
+    """Return the rows as tables of texts, one for each of SHOWN: names of columns, then a line for each method.
+
+    Methods are sorted by the mean over a table's tracks, best first; costs are means over all tracks. After `unseen`
+    stand its columns BY_SUBTYPE.
+    """
+    by_method: dict[str, dict[str, dict]] = {}
+    for row in rows:
+        by_method.setdefault(row["method"], {})[row["track"]] = row
+    found = []
+    for tracks in ([track for track in shown if any(track in one for one in by_method.values())] for shown in SHOWN):
+        percents = {name: [number(one[track], "percent", TABLE) for track in tracks if track in one]
+                    for name, one in by_method.items()}  # fmt: skip
+        heads = []
+        for track in tracks:
+            heads += [track, *DECIDES] if track == "unseen" else [track]
+        lines = [("method", *heads, "chosen on", "seeds", "training, core-s", "1000 samples, core-s")]
+        for name in sorted(by_method, key=lambda name: -np.mean(percents[name] or [0])):
+            own = by_method[name]
+            results = []
+            for track in tracks:
+                results.append(result(own[track]) if track in own else "-")
+                if track == "unseen":
+                    results += [_digit(own.get(track, {}).get(column)) for column in BY_SUBTYPE]
+            chosen = next(iter(own.values()))["chosen_on"]
+            seeds = sorted({row["seeds"] for row in own.values()})
+            counts = " to ".join(dict.fromkeys((seeds[0], seeds[-1])))
+            costs = (_mean(list(own.values()), column) for column in ("train_core_s", "test_core_s_per_1000"))
+            lines.append((name, *results, chosen, counts, *costs))
+        found += [lines] if tracks else []
+    return found
