@@ -229,7 +229,7 @@ def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
     for candidate in candidates[:1] if train[1].max() >= MANY else candidates:
         for scores in MAKERS[method](*train, candidate, seed):
             found = scores(asked)
-            cost = lambda logarithm, found=found: cross_entropy(
+            cost = lambda logarithm, found=found: cross_entropy(  # noqa: E731
                 softmax(np.exp(logarithm) * found, 1), labels
             )
             chosen = minimize_scalar(cost, bounds=(-3, 4), method="bounded")
