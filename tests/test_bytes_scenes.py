@@ -1,4 +1,4 @@
-"""Scenes and the benchmark's town have the same signals whichever kernels a BLAS chooses, and with
+"""Scenes and the benchmark's part clutter have the same signals whichever kernels a BLAS chooses, and with
 the vector registers of AVX2 as with those of this processor.
 
 The comparison is of double precision, before rounding to the kept precision hides all but a few
@@ -39,7 +39,7 @@ def noted(sample):
 SceneSample.received = noted
 path, symbols, subtypes, *scenes = sys.argv[1:]
 for name in scenes:
-    config = config_of("town") if name == "town" else overlaid([f"config/scenes/{name}.yaml"])
+    config = config_of("clutter") if name == "clutter" else overlaid([f"config/scenes/{name}.yaml"])
     config["targets"]["select"] = subtypes.split(",")
     if int(symbols):
         config["network"]["symbols"] = int(symbols)
@@ -98,13 +98,13 @@ SHIPPED = sorted(
 
 
 @pytest.mark.slow
-def test_signals_of_every_shipped_scene_and_of_the_town_do_not_follow_the_processor(
+def test_signals_of_every_shipped_scene_and_of_the_part_clutter_do_not_follow_the_processor(
     tmp_path,
 ):
     made = signals(
-        tmp_path, CORES, 0, "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1", "town", *SHIPPED
+        tmp_path, CORES, 0, "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1", "clutter", *SHIPPED
     )
-    assert set(made[0]) == {"town", *SHIPPED}
+    assert set(made[0]) == {"clutter", *SHIPPED}
     assert differing(made) == []
 
 
