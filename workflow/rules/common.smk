@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lowalt.config.command import Refusing, refusing
 from lowalt.machine.environment import prepare
-from lowalt.config.plan import PART, PIECE
+from lowalt.shards.plan import PART, PIECE
 from lowalt.scene.effects import dotted
 from lowalt.workflow import mends, space
 from lowalt.files.shipped import located

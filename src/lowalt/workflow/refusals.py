@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
-from lowalt.config.named_code import buildings_of, own_effects
+from lowalt.config.named_code import own_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -20,6 +20,7 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, columns_in, names
 from lowalt.recognition.schemes import named as scheme_named
 from lowalt.scene.set_noise import in_all_cells
+from lowalt.scene.trust import buildings_of
 from lowalt.shards.clean import refuse
 from lowalt.spectra.catalogue import named, of_cells
 from lowalt.targets.records import missing_inputs, records_of

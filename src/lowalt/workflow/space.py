@@ -11,10 +11,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.config.plan import Plan, cell_type, sample_bytes
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import free_bytes
 from lowalt.files.errors import InputError, SpaceError
+from lowalt.shards.plan import Plan
+from lowalt.shards.sizes import cell_type, sample_bytes
 from lowalt.spectra.catalogue import named
 
 VARIABLE = "LOWALT_SPACE"

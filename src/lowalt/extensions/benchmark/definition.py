@@ -12,9 +12,9 @@ import numpy as np
 
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import overlaid
-from lowalt.config.plan import Plan
 from lowalt.config.splits import fold
 from lowalt.recognition.samples import Facts
+from lowalt.shards.plan import Plan
 from lowalt.shards.sample_record import sample_key
 from lowalt.targets.records import records_of
 

@@ -14,10 +14,10 @@ from collections.abc import Callable
 from typing import Any
 
 from lowalt.config.layers import canonical
-from lowalt.config.named_code import buildings_of
-from lowalt.config.plan import Chunk
 from lowalt.files.atomic import slug
 from lowalt.scene.effects import module_of
+from lowalt.scene.trust import buildings_of
+from lowalt.shards.plan import Chunk
 from lowalt.workflow.run import Run
 
 
