@@ -1,5 +1,6 @@
 # Common to all rules: the run derived from the configuration, and the functions used in rules.
-# RUN: names, plan and schemes; given: options for inputs that only some jobs have; code: the source files of a command.
+# RUN: names, plan and schemes; given: options for inputs that only some jobs have; code: the
+# source files of a command.
 # Each rule file begins with the module of its stage, which holds what its rules take besides paths.
 from functools import partial
 from pathlib import Path
