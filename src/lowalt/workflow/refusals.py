@@ -232,8 +232,7 @@ def refuse_region(config: dict) -> None:
     """Refuse a region with zero area, given explicitly or spanned by the stations."""
     polygon = config["motion"]["region"]["polygon_m"]
     corners = masts_m(config["network"]) if polygon is None else polygon
-    first_x, first_y = corners[0]
-    sides = [(x - first_x, y - first_y) for x, y in corners[1:]]
+    sides = [(x - corners[0][0], y - corners[0][1]) for x, y in corners[1:]]
     parallel = all(a * d == b * c for (a, b), (c, d) in itertools.product(sides, repeat=2))
     if not parallel:
         return
