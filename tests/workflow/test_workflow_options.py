@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import pytest
+
 from configured import Stages, run_of, stages_of
 from lowalt.config.layers import merge
 from lowalt.files.atomic import slug
@@ -26,6 +28,18 @@ def test_every_value_in_a_command_of_a_rule_is_quoted_and_rules_run_nothing_but_
         "threads"
     }
     assert not re.findall(r"^    (?:script|run|notebook|wrapper|cwl):", text, re.MULTILINE)
+
+
+BESIDE = {"echo_in_scene": {"echo"}, "occluders": set(), "common": {"stage"}}
+"""Rule files whose stage is not named after them: the modules of stages that they import."""
+
+
+@pytest.mark.parametrize(
+    "path", sorted(Path("workflow/rules").glob("*.smk")), ids=lambda one: one.stem
+)
+def test_a_rule_file_begins_with_the_module_of_its_stage_alone(path):
+    imported = re.findall(r"^from lowalt\.workflow\.stages\.(\w+) import", path.read_text(), re.M)
+    assert {*imported} == BESIDE.get(path.stem, {path.stem})
 
 
 def modules(stage, **config):
