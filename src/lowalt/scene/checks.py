@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping
 from types import ModuleType
 from typing import NamedTuple
 
+from lowalt.config.blocks import snrs_of
 from lowalt.config.network import Network
-from lowalt.config.plan import snrs_of
 from lowalt.files.errors import InputError
 from lowalt.scene.effects import PLACES, called, every, module_of
 

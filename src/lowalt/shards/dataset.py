@@ -12,11 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lowalt.config.blocks import motion_block
 from lowalt.config.layers import SCHEMA, check
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
-from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
-from lowalt.config.sample_list import Place, SampleList
 from lowalt.config.splits import FOLDS
 from lowalt.files.errors import InputError, warn
 from lowalt.files.shipped import located, shipped
@@ -24,9 +22,13 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
+from lowalt.shards.plan import GROUPS, Plan
 from lowalt.shards.remake import CloudFolder
+from lowalt.shards.sample_list import Place, SampleList
 from lowalt.shards.sample_record import accompanied, record
+from lowalt.shards.sizes import cell_type
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import missing_inputs, records_of

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import Network
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, slug
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
 from lowalt.shards.sample_record import accompanied, record, row_of

@@ -12,11 +12,11 @@ import numpy as np
 
 from lowalt.config.classes import CATEGORIES, label
 from lowalt.config.network import Network, Station
-from lowalt.config.sample_list import sample_key
 from lowalt.files.errors import InputError
 from lowalt.motion.table import TRACK
 from lowalt.numerics.portable import dot, norm
 from lowalt.numerics.streams import digest
+from lowalt.shards.sample_list import sample_key
 from lowalt.tiles.tile_files import npy_header
 
 NAMES = ("subtype", "category", "group", "model")

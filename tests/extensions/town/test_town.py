@@ -12,7 +12,6 @@ from scipy.ndimage import maximum_filter1d
 from scipy.special import fresnel
 
 from lowalt.__main__ import main
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.extensions.town import image_paths, knife_edge, town
@@ -23,6 +22,7 @@ from lowalt.files.errors import InputError
 from lowalt.scene.chain import received_signal
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.channel import ground_reflection, walls
+from lowalt.scene.trust import refuse_effects
 from scenes import A, network, scene, target, view_of
 from shown_meshes import ply as ply_bytes
 from towns import BOXES, ORIGIN, block, geojson, mitsuba, ply
