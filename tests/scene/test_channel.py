@@ -350,15 +350,11 @@ def test_routes_show_the_sides_that_their_images_see(station):
         ImagePath(view.places, 0.5),
     ]
 
-    def weight(view: View, names=("occlusion", "walls"), but=()) -> np.ndarray:
+    def weight(view: View, one_sided: bool) -> np.ndarray:
         """A follower's factor that tells a place from another, and one of all others that does not."""
         ends = [np.sum(np.square(end.station.position_m)) for end in view.ends()]
         followed = (2.0 + np.sin(ends[0])) * (2.0 + np.sin(ends[-1]))
-        names = set(names) - set(but)
-        return np.full(
-            view.places.shape[:2],
-            (followed if "occlusion" in names else 1.0) * (3.0 if "walls" in names else 1.0),
-        )
+        return np.full(view.places.shape[:2], followed if one_sided else 3.0)
 
     found = reflected_aspect.routes(reflected_aspect.DEFAULTS, view, paths, weight)
     assert found.shape == (3, 3, *view.places.shape[:2])

@@ -6,10 +6,9 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.files.errors import InputError
-from lowalt.numerics.streams import stream
 from lowalt.scene.checks import refuse_unmodelled
 from lowalt.scene.contract import numbers
-from lowalt.scene.effects import NamedEffect, every, only
+from lowalt.scene.effects import NamedEffect, every, look_stream, only
 from lowalt.scene.view import Perturbations, View, located
 from lowalt.targets.cloud import Cloud
 
@@ -36,16 +35,7 @@ class Scene:
             for effect in self.effects
             if effect.name == name and effect.snr_db is not None
         ]
-        # The stream of a user's own effect has the name of its file, wherever that lies.
-        return stream(
-            self.seed,
-            "effect",
-            name.rpartition("/")[2],
-            row["subtype"],
-            row["model"],
-            *ends,
-            *levels,
-        )
+        return look_stream(self.seed, name, row, *ends, *levels)
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
         """Return the random stream of an effect, or of another name, at a station, from its start.

@@ -32,6 +32,7 @@ DEFAULTS = {
     "conductivity_s_m": 0.16,
 }
 IDLE = [{"facades": []}, {"permittivity": 1, "conductivity_s_m": 0}]
+WAVES = ("reflected by walls",)
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
