@@ -55,13 +55,19 @@ rule signals:
 
 rule data:
     input:
-        products.data,
+        expand("results/{run}/shards/{file}", run=RUN.name, file=["index.json", "README.md"]),
+        expand(
+            "results/{run}/shards/{shard}.{ending}",
+            run=RUN.name,
+            shard=RUN.plan.shards,
+            ending=["tar", "npz"],
+        ),
     localrule: True
 
 
 rule training_samples:
     input:
-        products.own_views,
+        OWN_VIEWS,
         f"results/{RUN.name}/SHA256SUMS",
         f"results/{RUN.name}/config.yaml",
     localrule: True
@@ -70,7 +76,16 @@ rule training_samples:
 # Everything before the first training that needs no torch: `make` makes it while torch is being downloaded.
 rule prepared:
     input:
-        products.prepared,
+        branch(
+            RUN.data == RUN.name,
+            then=[
+                f"{DATA}/SHA256SUMS",
+                f"{DATA}/distances.csv",
+                f"{DATA}/clouds.png",
+                f"{DATA}/shards/README.md",
+            ],
+        ),
+        branch(RUN.data == RUN.name and config["recognition"]["cache"], then=OWN_VIEWS),
     localrule: True
 
 

@@ -6,7 +6,7 @@
 rule occluders:
     input:
         code=code("lowalt.targets.occluders"),
-        files=products.record_files,
+        files=targets.record_files,
     output:
         "results/{run}/occluders/{subtype}.npz",
     log:
@@ -16,6 +16,6 @@ rule occluders:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.cloud,
+        settings=targets.settings,
     shell:
         "python -m lowalt.targets.occluders --settings {params.settings:q} --out {output:q} 2> {log:q}"
