@@ -1,7 +1,7 @@
 # Echo in a scene with effects: the signals at one base station, or at all in one job, and the powers of the targets'
 # own echoes.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz; results/{run}/occluders/*.npz
-#                  where the scene hides points behind surfaces; the file of buildings that effects.town names
+#                  where the scene hides points behind surfaces; the files that effects read
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
 from lowalt.workflow.stages.echo import Echo
 

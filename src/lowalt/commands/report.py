@@ -12,12 +12,13 @@ from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
 from lowalt.config.layers import SCHEMA, check, of_run
-from lowalt.config.named_code import allowed, refuse_effects
+from lowalt.config.named_code import allowed
 from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import as_named, located, shipped
 from lowalt.files.yaml_files import load_yaml
+from lowalt.scene.effects import refuse_brought
 
 BASE = "config/default.yaml"
 
@@ -87,7 +88,7 @@ def _refuse_code(config: dict, folder: Path) -> None:
     """Refuse a run whose configuration, or whose table of schemes, names code that the workflow
     would run.
     """
-    refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
+    refuse_brought(check(config, shipped(SCHEMA))["effects"], folder)
     block = located(config)["recognition"]
     how = (
         f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"

@@ -21,8 +21,6 @@ PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
 """Regular expression of a chunk's part."""
 PIECE = r"(?:p\d+)?"
 """Regular expression of a shard's piece, if a fold of a chunk is packed into several shards."""
-JUMPING = ("rotor_spread", "gusts", "companions")
-"""Effects that draw a motion for each look."""
 RECORD_BYTES = 2048
 """Bytes of a sample's JSON record in the tar, including padding."""
 PIXEL_BYTES = 0.5
@@ -63,18 +61,10 @@ def motion_block(config: dict) -> dict:
 
 
 def _refuse_tracks(config: dict) -> None:
-    """Refuse tracks that a split would divide, or whose targets would jump between looks in this
-    scene.
-    """
-    if "looks" not in config["motion"]:
-        return
-    if config["split"]["by"] != "motion":
+    """Refuse tracks that a split would divide."""
+    if "looks" in config["motion"] and config["split"]["by"] != "motion":
         raise InputError(
             f"split.by: {config['split']['by']!r} together with motion.looks, expected 'motion'"
-        )
-    if jumping := sorted(set(JUMPING) & set(config["effects"])):
-        raise InputError(
-            f"effects: {jumping} together with motion.looks, expected none of {list(JUMPING)}"
         )
 
 

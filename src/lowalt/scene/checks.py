@@ -82,7 +82,7 @@ def refuse_jumps(config: dict) -> None:
     """Raise InputError where the looks of a track do not join because an effect draws a motion for
     each.
     """
-    if "looks" not in config["motion"]:
+    if "looks" not in config.get("motion", {}):
         return
     if jumping := breaks_tracks(config["effects"]):
         raise InputError(

@@ -20,6 +20,7 @@ DEFAULTS, and then the arguments that `takes` lists. It may also define
 - PARTS, settings that leave out one component of the effect, by the component's name: `lowalt
   explain` measures each;
 - KINDS, settings of the kinds of the effect that `lowalt explain` compares, by the kind's name;
+- TRIED, of an effect of the detection: `lowalt explain` tries it where the scene does not name it;
 - DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of
   a link's stations;
 - FILES, the settings that hold the path of a file which the effect reads: jobs run again when the

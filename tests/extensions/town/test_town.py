@@ -12,7 +12,6 @@ from scipy.ndimage import maximum_filter1d
 from scipy.special import fresnel
 
 from lowalt.__main__ import main
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.extensions.town import image_paths, knife_edge, town
@@ -22,6 +21,7 @@ from lowalt.extensions.town.materials import MATERIALS, named, properties
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import received_signal
 from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects import refuse_brought
 from lowalt.scene.effects.channel import ground_reflection, walls
 from scenes import A, network, scene, target, view_of
 from shown_meshes import ply as ply_bytes
@@ -517,7 +517,7 @@ def test_a_strangers_folder_may_not_name_a_file_of_buildings():
     with pytest.raises(
         InputError, match=r"index.json: its effect 'town' reads the file '/etc/passwd'"
     ):
-        refuse_effects({"town": {"buildings": "/etc/passwd"}}, "index.json")
+        refuse_brought({"town": {"buildings": "/etc/passwd"}}, "index.json")
 
 
 def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):
