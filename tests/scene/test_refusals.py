@@ -319,7 +319,8 @@ def test_the_schema_knows_every_setting_and_each_effect_names_its_source(name):
     assert set(schema["properties"]["effects"]["properties"][name].get("properties", {})) == set(
         module.DEFAULTS
     )
-    assert module.SOURCE and f".{PLACES[name]}." in module.__name__
+    assert module.SOURCE
+    assert name in ADDED or f".{PLACES[name]}." in module.__name__
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "IDLE", ()))
     assert all(
         set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "PARTS", {}).values()

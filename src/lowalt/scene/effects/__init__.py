@@ -115,7 +115,7 @@ class NamedEffect(NamedTuple):
         found = getattr(self.module, function)(self.settings)
         if not isinstance(found, list) or not all(isinstance(text, str) for text in found):
             raise InputError(
-                f"effects.{self.name}: {function} gives {shown(found)}, expected a list of texts"
+                f"effects: {self.name}: {function} gives {shown(found)}, expected a list of texts"
             )
         return found
 
