@@ -14,7 +14,7 @@ import yaml
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import check
-from lowalt.scene.effects import PLACES, called, dotted
+from lowalt.scene.effects import ADDED, PLACES, called, dotted
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.view import Still
 from scenes import target
