@@ -1,4 +1,5 @@
-# lowalt: from records of targets to a benchmark and its report. One rule file per stage, in pipeline order.
+# lowalt: from records of targets to a benchmark and its report. One rule file per stage, in
+# pipeline order.
 import sys
 
 from snakemake.utils import min_version
@@ -73,7 +74,8 @@ rule training_samples:
     localrule: True
 
 
-# Everything before the first training that needs no torch: `make` makes it while torch is being downloaded.
+# Everything before the first training that needs no torch: `make` makes it while torch is being
+# downloaded.
 rule prepared:
     input:
         branch(

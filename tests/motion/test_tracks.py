@@ -13,9 +13,9 @@ import pytest
 
 from builtin_records import TABLE
 from configured import run_of
+from lowalt.config.blocks import motion_block
 from lowalt.config.layers import check, merge
 from lowalt.config.network import masts_m
-from lowalt.config.plan import motion_block
 from lowalt.config.splits import FOLDS
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml

@@ -15,7 +15,9 @@ from lowalt.config.layers import merge, overlaid
 from lowalt.files.errors import InputError
 from lowalt.scene import effects
 from lowalt.scene.checks import check, refuse_unknown_subtypes
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards import clean
+from lowalt.shards.plan import Plan
 from lowalt.workflow import refusals
 from lowalt.workflow.stages.recognition import Recognition
 from lowalt.workflow.stages.shards import Shards
@@ -106,7 +108,7 @@ def test_a_missing_file_and_one_with_braces_are_refused_by_key(usual, rain, path
 def test_what_it_needs_and_the_scene_does_not_have_is_refused(usual, rain):
     tracks = merge(usual.config, {"effects": rain, "motion": {"looks": 3}})
     with pytest.raises(InputError, match=r"effects: \['rain\.py'\] together with motion\.looks"):
-        check(tracks)
+        Plan.of(tracks, {})
     with pytest.raises(InputError, match=r"rain\.py\.subtypes: \['Owl'\], expected subtypes"):
         refuse_unknown_subtypes(rain, ["Crow"])
     walls = merge(usual.config, {"effects": {**rain, "walls": {}}})
@@ -119,7 +121,7 @@ def test_what_it_needs_and_the_scene_does_not_have_is_refused(usual, rain):
 def test_a_stranger_s_file_may_choose_neither_its_code_nor_a_file(rain):
     Path("rain.py").write_text(RAIN + "Path('ran').touch()\n")
     with pytest.raises(InputError, match=r"index\.json: its effect 'rain\.py' is code"):
-        effects.refuse_brought(rain, "index.json")
+        refuse_effects(rain, "index.json")
     assert not Path("ran").exists()
 
 

@@ -1,7 +1,9 @@
-# Accuracy: recognition accuracy against computing time, for trained schemes and for networks that are only timed.
-# REQUIRED INPUTS: predictions of the run in the unseen protocol; those of the presets that a study trains
-#                  (`make accuracy-cost` does all); a quiet machine
-# OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv, results/{run}/accuracy_cost.svg
+# Accuracy: recognition accuracy against computing time, for trained schemes and for networks that
+# are only timed.
+# REQUIRED INPUTS: predictions of the run in the unseen protocol; those of the presets that a study
+#                  trains (`make accuracy-cost` does all); a quiet machine
+# OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv,
+#          results/{run}/accuracy_cost.svg
 from lowalt.workflow.stages.accuracy_cost import AccuracyCost
 
 accuracy_cost = Refusing(AccuracyCost(RUN))
@@ -23,7 +25,8 @@ rule speed:
     params:
         settings=recognition.training,
     shell:
-        "python -m lowalt.measure.network_speed --settings {params.settings:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.measure.network_speed --settings {params.settings:q} --out {output:q}"
+        " 2> {log:q}"
 
 
 rule accuracy_cost_table:
@@ -52,9 +55,10 @@ rule accuracy_cost_table:
     params:
         settings=recognition.seed,
     shell:
-        "python -m lowalt.measure.accuracy_cost --settings {params.settings:q} --predictions {input.predictions:q}"
-        " {input.studied:q} --speeds {input.speeds:q} --data-jobs {input.data_jobs:q} --index {input.index:q}"
-        " --presets {input.presets:q} --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.measure.accuracy_cost --settings {params.settings:q}"
+        " --predictions {input.predictions:q} {input.studied:q} --speeds {input.speeds:q}"
+        " --data-jobs {input.data_jobs:q} --index {input.index:q} --presets {input.presets:q}"
+        " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_figure:
@@ -74,4 +78,5 @@ rule accuracy_cost_figure:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.report.figures.cost_plots recognition --table {input.table:q} --figure {output:q} 2> {log:q}"
+        "python -m lowalt.report.figures.cost_plots recognition --table {input.table:q}"
+        " --figure {output:q} 2> {log:q}"

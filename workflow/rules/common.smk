@@ -1,12 +1,13 @@
 # Common to all rules: the run derived from the configuration, and the functions used in rules.
-# RUN: names, plan and schemes; given: options for inputs that only some jobs have; code: the source files of a command.
+# RUN: names, plan and schemes; given: options for inputs that only some jobs have; code: the
+# source files of a command.
 # Each rule file begins with the module of its stage, which holds what its rules take besides paths.
 from functools import partial
 from pathlib import Path
 
 from lowalt.config.command import Refusing, refusing
 from lowalt.machine.environment import prepare
-from lowalt.config.plan import PART, PIECE
+from lowalt.shards.plan import PART, PIECE
 from lowalt.scene.effects import dotted
 from lowalt.workflow import mends, space
 from lowalt.files.shipped import located

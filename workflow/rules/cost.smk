@@ -1,5 +1,6 @@
 # Cost: error of the echo against computing time, with one cloud per category.
-# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of this workflow runs meanwhile)
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of
+#                  this workflow runs meanwhile)
 # OUTPUTS: results/{run}/cost.csv, results/{run}/cost.svg
 from lowalt.workflow.stages.cost import Cost
 
@@ -22,9 +23,8 @@ rule cost_table:
     params:
         settings=cost.settings,
     shell:
-        "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1"
-        " python -m lowalt.measure.echo_cost --settings {params.settings:q} --clouds {input.clouds:q}"
-        " --out {output:q} 2> {log:q}"
+        "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python -m lowalt.measure.echo_cost"
+        " --settings {params.settings:q} --clouds {input.clouds:q} --out {output:q} 2> {log:q}"
 
 
 rule cost_figure:
@@ -40,4 +40,5 @@ rule cost_figure:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.report.figures.cost_plots echo --table {input.table:q} --figure {output:q} 2> {log:q}"
+        "python -m lowalt.report.figures.cost_plots echo --table {input.table:q}"
+        " --figure {output:q} 2> {log:q}"

@@ -1,4 +1,5 @@
-# Echo: the clean symbol-domain signals of a chunk's motion models at one base station, or at all in one job.
+# Echo: the clean symbol-domain signals of a chunk's motion models at one base station, or at all
+# in one job.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols)
 from lowalt.workflow.stages.echo import Echo
@@ -23,5 +24,5 @@ rule echo:
         settings=echo.settings,
         stations=echo.stations,
     shell:
-        "python -m lowalt.echo --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
-        " --station {params.stations:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.echo --settings {params.settings:q} --motion {input.motion:q}"
+        " --clouds {input.clouds:q} --station {params.stations:q} --out {output:q} 2> {log:q}"

@@ -1,8 +1,10 @@
-# Echo in a scene with effects: the signals at one base station, or at all in one job, and the powers of the targets'
-# own echoes.
-# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz; results/{run}/occluders/*.npz
-#                  where the scene hides points behind surfaces; the files that effects read
-# OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
+# Echo in a scene with effects: the signals at one base station, or at all in one job, and the
+# powers of the targets' own echoes.
+# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz;
+#                  results/{run}/occluders/*.npz where the scene hides points behind surfaces; the
+#                  files that effects read
+# OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and
+#          {station}.power.npy
 from lowalt.workflow.stages.echo import Echo
 
 echo = Refusing(Echo(RUN))
@@ -31,5 +33,6 @@ rule echo_in_scene:
         occluders=given("occluders"),
         stations=echo.stations,
     shell:
-        "python -m lowalt.scene --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
-        " {params.occluders:q} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"
+        "python -m lowalt.scene --settings {params.settings:q} --motion {input.motion:q}"
+        " --clouds {input.clouds:q} {params.occluders:q} --station {params.stations:q}"
+        " --out {output.signals:q} --power {output.power:q} 2> {log:q}"

@@ -1,5 +1,7 @@
-# Motion: the table of motion models of one chunk, one row per model (per look where motion.looks asks for tracks), every parameter drawn from its own stream.
-# REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's subtypes; the flight log that motion.track names
+# Motion: the table of motion models of one chunk, one row per model (per look where motion.looks
+# asks for tracks), every parameter drawn from its own stream.
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's subtypes; the flight log that
+#                  motion.track names
 # OUTPUTS: results/{run}/motion/{group}-{part}.csv
 from lowalt.workflow.stages.motion import Motion
 

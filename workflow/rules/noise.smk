@@ -1,4 +1,5 @@
-# Noise: complex white Gaussian noise at every SNR of the set, independent from station to station and SNR to SNR.
+# Noise: complex white Gaussian noise at every SNR of the set, independent from station to station
+# and SNR to SNR.
 # REQUIRED INPUTS: motion table and echoes of the chunk
 # OUTPUTS: results/{run}/noisy/{group}-{part}.npy, complex64 (models, snrs, stations, symbols)
 from lowalt.workflow.stages.noise import Noise

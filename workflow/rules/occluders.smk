@@ -18,4 +18,5 @@ rule occluders:
     params:
         settings=targets.settings,
     shell:
-        "python -m lowalt.targets.occluders --settings {params.settings:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.targets.occluders --settings {params.settings:q} --out {output:q}"
+        " 2> {log:q}"

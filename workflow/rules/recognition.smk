@@ -1,7 +1,9 @@
-# Recognition: freeze the simulated data, train every scheme in its protocols, predict, and make the tables.
+# Recognition: freeze the simulated data, train every scheme in its protocols, predict, and make
+# the tables.
 # REQUIRED INPUTS: results/{run}/shards/index.json and its shards, all clouds and motion tables
-# OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its companions; where the
-#          configuration names other runs, results/{run}/transfer.csv: their models on this run's test samples
+# OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its
+#          companions; where the configuration names other runs, results/{run}/transfer.csv: their
+#          models on this run's test samples
 from lowalt.workflow.stages.recognition import Recognition
 
 recognition = Refusing(Recognition(RUN))
@@ -10,7 +12,8 @@ recognition = Refusing(Recognition(RUN))
 rule views:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.views"),
-        # All that is read of the index follows from the shard and from `render`; it grows where chunks are added.
+        # All that is read of the index follows from the shard and from `render`; it grows where
+        # chunks are added.
         index=ancient("results/{run}/shards/index.json"),
         shard="results/{run}/shards/{group}-{fold}-{part}{piece}.tar",
         reduced=branch(
@@ -34,7 +37,8 @@ rule views:
         reduced=given("reduced", "motion"),
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}{wildcards.piece:q}.tar {params.reduced:q} --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}{wildcards.piece:q}.tar"
+        " {params.reduced:q} --out {output:q} 2> {log:q}"
 
 
 rule freeze:
@@ -49,8 +53,8 @@ rule freeze:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.recognition freeze --settings '{{}}' --files {input.clouds:q} {input.motion:q}"
-        " --out {output:q} 2> {log:q}"
+        "python -m lowalt.recognition freeze --settings '{{}}'"
+        " --files {input.clouds:q} {input.motion:q} --out {output:q} 2> {log:q}"
 
 
 rule distances:
@@ -67,8 +71,8 @@ rule distances:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.recognition distances --settings '{{}}' --clouds {input.clouds:q} --motion {input.motion:q}"
-        " --out {output:q} 2> {log:q}"
+        "python -m lowalt.recognition distances --settings '{{}}' --clouds {input.clouds:q}"
+        " --motion {input.motion:q} --out {output:q} 2> {log:q}"
 
 
 rule train:
@@ -89,7 +93,8 @@ rule train:
         "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
     benchmark:
         "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
-    # Trainings with more images take longer. Start the longest first, so that no core waits for it at the end.
+    # Trainings with more images take longer. Start the longest first, so that no core waits for it
+    # at the end.
     priority: RUN.images_of_job
     conda:
         "../../envs/environment.yaml"
@@ -135,7 +140,8 @@ rule evaluate:
         backbone=recognition.backbone,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
-        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q} --out {output.table:q} 2> {log:q}"
+        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q}"
+        " --out {output.table:q} 2> {log:q}"
 
 
 rule tables:
@@ -174,8 +180,9 @@ rule tables:
     params:
         settings=recognition.seed,
     shell:
-        "python -m lowalt.recognition tables --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --published {input.published:q} --schemes {input.schemes:q} --out results/{wildcards.run:q} 2> {log:q}"
+        "python -m lowalt.recognition tables --settings {params.settings:q}"
+        " --predictions {input.predictions:q} --published {input.published:q}"
+        " --schemes {input.schemes:q} --out results/{wildcards.run:q} 2> {log:q}"
 
 
 rule transfer_evaluate:
@@ -207,7 +214,8 @@ rule transfer_evaluate:
         backbone=recognition.backbone,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
-        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q} --trained-on {wildcards.other:q} --out {output.table:q} 2> {log:q}"
+        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q}"
+        " --trained-on {wildcards.other:q} --out {output.table:q} 2> {log:q}"
 
 
 rule transfer:
@@ -240,5 +248,6 @@ rule transfer:
     params:
         settings=recognition.seed,
     shell:
-        "python -m lowalt.recognition transfer --settings {params.settings:q} --own {input.own:q} --other {input.other:q}"
-        " --configs {input.configs:q} --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.recognition transfer --settings {params.settings:q} --own {input.own:q}"
+        " --other {input.other:q} --configs {input.configs:q} --schemes {input.schemes:q}"
+        " --out {output:q} 2> {log:q}"

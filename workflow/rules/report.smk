@@ -1,8 +1,8 @@
 # Report: one self-contained page of the run, and the table of the time that each stage took.
-# REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every job's benchmark;
-#                  where report.cost says so the echo's cost
-# OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html, results/{run}/stages.csv,
-#          results/{run}/figures (each plot as SVG and CSV)
+# REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every
+#                  job's benchmark; where report.cost says so the echo's cost
+# OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html,
+#          results/{run}/stages.csv, results/{run}/figures (each plot as SVG and CSV)
 from lowalt.workflow.stages.report import Report
 
 page = Refusing(Report(RUN))
@@ -41,5 +41,6 @@ rule report:
     params:
         settings=page.settings,
     shell:
-        "python -m lowalt.report --settings {params.settings:q} --manifest {input.manifest:q} --jobs {threads}"
-        " --stages {output.stages:q} --figures {output.figures:q} --out {output.page:q} 2> {log:q}"
+        "python -m lowalt.report --settings {params.settings:q} --manifest {input.manifest:q}"
+        " --jobs {threads} --stages {output.stages:q} --figures {output.figures:q}"
+        " --out {output.page:q} 2> {log:q}"

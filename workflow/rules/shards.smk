@@ -1,7 +1,10 @@
-# Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples next to it, and one index.
-# REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals (for cubes with clouds and surfaces), or its clean echoes
-# OUTPUTS: results/{run}/shards/{group}-{fold}-{part}{piece}.tar and .npz, results/{run}/shards/index.json,
-#          and next to them the data card: README.md, samples.csv, croissant.json, SHA256SUMS
+# Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples next to
+# it, and one index.
+# REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals
+#                  (for cubes with clouds and surfaces), or its clean echoes
+# OUTPUTS: results/{run}/shards/{group}-{fold}-{part}{piece}.tar and .npz,
+#          results/{run}/shards/index.json, and next to them the data card: README.md, samples.csv,
+#          croissant.json, SHA256SUMS
 from lowalt.workflow.stages.shards import Shards
 
 shards = Refusing(Shards(RUN))
@@ -53,7 +56,8 @@ rule shard:
         piece=shards.piece,
     shell:
         "python -m lowalt.shards write --settings {params.settings:q} --motion {input.motion:q}"
-        " {params.content:q} --fold {wildcards.fold:q} {params.piece:q} --out {output.tar:q} 2> {log:q}"
+        " {params.content:q} --fold {wildcards.fold:q} {params.piece:q} --out {output.tar:q}"
+        " 2> {log:q}"
 
 
 rule index:
@@ -72,7 +76,8 @@ rule index:
     params:
         settings=shards.index_settings,
     shell:
-        "python -m lowalt.shards index --settings {params.settings:q} --shards {input.tars:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.shards index --settings {params.settings:q} --shards {input.tars:q}"
+        " --out {output:q} 2> {log:q}"
 
 
 rule card:
@@ -90,7 +95,8 @@ rule card:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.shards.card --index {input.index:q} --config {input.configuration:q} 2> {log:q}"
+        "python -m lowalt.shards.card --index {input.index:q} --config {input.configuration:q}"
+        " 2> {log:q}"
 
 
 rule configuration:

@@ -1,5 +1,6 @@
 # Targets: one calibration point cloud per subtype, from a built-in model, a mesh or a recording.
-# REQUIRED INPUTS: config/targets.csv and the record files; the user's files where a record names one.
+# REQUIRED INPUTS: config/targets.csv and the record files; the user's files where a record names
+#                  one.
 # OUTPUTS: results/{run}/clouds/{subtype}.npz, results/{run}/clouds.png
 from lowalt.workflow.stages.targets import Targets
 

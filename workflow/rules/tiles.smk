@@ -1,8 +1,9 @@
 # Tiles: three spectra per station, nine images per sample, tiled 3 x 3 and encoded without loss.
-# REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy; the motion table where spectra know late symbols' instants,
-#                  and with it clouds and surfaces where spectra show range cells
-# OUTPUTS: results/{run}/tiles/{group}-{part}.npz, deleted once its shards are written, and for every size of tiles.reduced
-#          results/{run}/reduced/{size}/{group}-{part}.npy
+# REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy; the motion table where spectra know late
+#                  symbols' instants, and with it clouds and surfaces where spectra show range
+#                  cells
+# OUTPUTS: results/{run}/tiles/{group}-{part}.npz, deleted once its shards are written, and for
+#          every size of tiles.reduced results/{run}/reduced/{size}/{group}-{part}.npy
 from lowalt.workflow.stages.tiles import Tiles
 
 tiles = Refusing(Tiles(RUN))
@@ -42,5 +43,5 @@ rule tiles:
         reduced=tiles.reduced,
         scene=given("motion", "clouds", "occluders"),
     shell:
-        "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced:q}"
-        " {params.scene:q} --out {output.tiles:q} 2> {log:q}"
+        "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q}"
+        " {params.reduced:q} {params.scene:q} --out {output.tiles:q} 2> {log:q}"

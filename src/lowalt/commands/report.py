@@ -18,7 +18,7 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import as_named, located, shipped
 from lowalt.files.yaml_files import load_yaml
-from lowalt.scene.effects import refuse_brought
+from lowalt.scene.trust import refuse_effects
 
 BASE = "config/default.yaml"
 
@@ -88,7 +88,7 @@ def _refuse_code(config: dict, folder: Path) -> None:
     """Refuse a run whose configuration, or whose table of schemes, names code that the workflow
     would run.
     """
-    refuse_brought(check(config, shipped(SCHEMA))["effects"], folder)
+    refuse_effects(check(config, shipped(SCHEMA))["effects"], folder)
     block = located(config)["recognition"]
     how = (
         f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"

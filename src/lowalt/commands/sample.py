@@ -14,7 +14,7 @@ from lowalt.files.atomic import replacing, write_file
 from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.receive import AT, alone, receive, write
-from lowalt.shards.sample_record import sample_key
+from lowalt.shards.sample_list import sample_key
 from lowalt.tiles.png import encode
 
 

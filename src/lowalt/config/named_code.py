@@ -33,8 +33,8 @@ def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME)
     if file_of(name) is None:
         return name
     if file_of(trusted) is None:
-        place = f"{where}: " if where else ""
+        source = f"{where}: " if where else ""
         raise InputError(
-            f"{place}its backbone {name!r} is code, which a file may not choose; expected {how}"
+            f"{source}its backbone {name!r} is code, which a file may not choose; expected {how}"
         )
     return trusted

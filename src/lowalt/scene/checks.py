@@ -6,10 +6,10 @@ from collections.abc import Collection, Mapping
 from types import ModuleType
 from typing import NamedTuple
 
+from lowalt.config.blocks import snrs_of
 from lowalt.config.network import Network
-from lowalt.config.plan import snrs_of
 from lowalt.files.errors import InputError
-from lowalt.scene.effects import breaks_tracks, called, complete, every, module_of, with_offer
+from lowalt.scene.effects import called, complete, every, module_of, with_offer
 
 
 class CheckedScene(NamedTuple):
@@ -60,7 +60,6 @@ def check(config: dict, all_cells: bool = False) -> CheckedScene:
         config.get("spectra", {}).get("times") == "known",
         all_cells,
     )
-    refuse_jumps(config)
     refuse_same_waves(scene)
     refuse_unmodelled(scene.network, scene.modules)
     refuse_missing(scene.network, [module_of(name) for name in config["effects"]])
@@ -76,19 +75,6 @@ def check(config: dict, all_cells: bool = False) -> CheckedScene:
         if hasattr(effect.module, "check"):
             effect.module.check(effect.settings, scene)
     return scene
-
-
-def refuse_jumps(config: dict) -> None:
-    """Raise InputError where the looks of a track do not join because an effect draws a motion for
-    each.
-    """
-    if "looks" not in config.get("motion", {}):
-        return
-    if jumping := breaks_tracks(config["effects"]):
-        raise InputError(
-            f"effects: {jumping} together with motion.looks, expected none of them: each draws a "
-            "motion for every look, and the looks of a track would not join"
-        )
 
 
 def refuse_same_waves(scene: CheckedScene) -> None:

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import yaml
 
+from lowalt.config.blocks import motion_block
 from lowalt.config.network import Network, Station, masts_m
-from lowalt.config.plan import motion_block
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import reported
 from lowalt.motion.drawing import region_polygon

@@ -7,7 +7,6 @@ set.
 from lowalt.config.classes import stated
 from lowalt.config.command import dispatch, parser, pick, run
 from lowalt.config.network import Network
-from lowalt.config.plan import CELL_BYTES, cell_type
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.scene.effects import complete
@@ -15,6 +14,7 @@ from lowalt.shards.content import clean_content, cube_content, noisy_content
 from lowalt.shards.index import build
 from lowalt.shards.sample_record import accompanied
 from lowalt.shards.sample_table import KINDS
+from lowalt.shards.sizes import CELL_BYTES, cell_type
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import read as read_cloud
 from lowalt.targets.occluders import read_all

@@ -13,7 +13,6 @@ import numpy as np
 
 from lowalt.config.command import run
 from lowalt.config.layers import SCHEMA, load
-from lowalt.config.plan import cell_type
 from lowalt.files.atomic import slug
 from lowalt.motion.table import write_table
 from lowalt.scene.set_noise import filters
@@ -21,6 +20,7 @@ from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
 from lowalt.shards.sample_record import npy
+from lowalt.shards.sizes import cell_type
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import write as write_cloud
 

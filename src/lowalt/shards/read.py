@@ -16,7 +16,6 @@ import numpy as np
 
 from lowalt.config.classes import stated
 from lowalt.config.network import station_names
-from lowalt.config.plan import GROUPS
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
@@ -24,7 +23,9 @@ from lowalt.files.json_objects import json_object
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import WHAT, checked, load
+from lowalt.shards.plan import GROUPS
 from lowalt.shards.remote import MOST_INDEX_BYTES, beside, fetched, is_address, span
+from lowalt.shards.sample_list import refuse_unknown
 from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import MOST_OVERHEAD_BYTES, SAMPLE, map_samples, table_path
 from lowalt.shards.stored_cubes import cubes_of
@@ -34,13 +35,6 @@ from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
-
-
-def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
-    """Refuse groups and folds that no data set has. Raises: InputError naming them."""
-    for option, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
-        if set(names) - set(known):
-            raise InputError(f"{option} {names}, expected some of {known}")
 
 
 class ShardSet:

@@ -13,7 +13,8 @@ from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, slug
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.scene.effects import complete, needs_surfaces, of_record, refuse_brought
+from lowalt.scene.effects import complete, needs_surfaces, of_record
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
 from lowalt.shards.sample_record import accompanied, record, row_of
@@ -63,7 +64,7 @@ class Remaker:
                 f"{shards.index_path}: does not say how echoes were computed, expected an index that lowalt 0.2 or "
                 f"later wrote, found format {shards.index['format']}"
             )
-        refuse_brought(shards.index["echo"]["effects"], shards.index_path)
+        refuse_effects(shards.index["echo"]["effects"], shards.index_path)
         self.shards = shards
         self.clouds = clouds
         self.occluders = occluders
@@ -156,7 +157,7 @@ def opened(
     surfaces = None
     clouds = Path(clouds or Path(index).resolve().parent.parent / "clouds")
     effects = (shards.index.get("echo") or {}).get("effects", {})
-    refuse_brought(effects, shards.index_path)
+    refuse_effects(effects, shards.index_path)
     if needs_surfaces(effects):
         surfaces = read_all(sorted(Path(occluders or clouds.parent / "occluders").glob("*.npz")))
     return Remaker(shards, CloudFolder(clouds), surfaces)

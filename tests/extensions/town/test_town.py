@@ -21,8 +21,8 @@ from lowalt.extensions.town.materials import MATERIALS, named, properties
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import received_signal
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.effects import refuse_brought
 from lowalt.scene.effects.channel import ground_reflection, walls
+from lowalt.scene.trust import refuse_effects
 from scenes import A, network, scene, target, view_of
 from shown_meshes import ply as ply_bytes
 from towns import BOXES, ORIGIN, block, geojson, mitsuba, ply
@@ -517,7 +517,7 @@ def test_a_strangers_folder_may_not_name_a_file_of_buildings():
     with pytest.raises(
         InputError, match=r"index.json: its effect 'town' reads the file '/etc/passwd'"
     ):
-        refuse_brought({"town": {"buildings": "/etc/passwd"}}, "index.json")
+        refuse_effects({"town": {"buildings": "/etc/passwd"}}, "index.json")
 
 
 def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):

@@ -279,25 +279,6 @@ def record_fields(
     return dict(sorted(result.items()))
 
 
-def refuse_brought(block: Mapping[str, dict | None], where: str | Path) -> None:
-    """Refuse effects of the user's own, and files that effects read, in what may be a stranger's
-    file or folder.
-
-    No code that the block names is run and no file is read. Raises: InputError naming the effect.
-    """
-    for name in own_effects(block):
-        raise InputError(
-            f"{where}: its effect {name!r} is code, which a file may not choose; expected an overlay "
-            "of your own that names it"
-        )
-    for effect in complete(block):
-        for path in effect.named_files.values():
-            raise InputError(
-                f"{where}: its effect {effect.name!r} reads the file {path!r}, which a file may not "
-                "choose; expected an overlay of your own that names it"
-            )
-
-
 def with_offer(name: str) -> str:
     """Return the shipped effects that offer a name of the contract, as sentences name a choice of
     them.

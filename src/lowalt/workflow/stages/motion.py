@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from lowalt.config.blocks import motion_block
 from lowalt.config.network import masts_m
-from lowalt.config.plan import motion_block
 from lowalt.motion.drawing import masts_in_reach
 from lowalt.workflow.stages.stage import Stage, text
 

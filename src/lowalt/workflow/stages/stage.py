@@ -14,9 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 from lowalt.config.layers import canonical
-from lowalt.config.plan import Chunk
 from lowalt.files.atomic import slug
 from lowalt.scene.effects import effect_files, needed_subtypes, needs_surfaces
+from lowalt.shards.plan import Chunk
 from lowalt.workflow.run import Run
 
 
