@@ -33,7 +33,7 @@ from lowalt.scene.observe import observe
 from lowalt.scene.response import ImagePath
 from lowalt.scene.target_classes import LARGE_UAV, VEHICLE
 from lowalt.scene.view import View
-from scenes import A, B, link, linked, scene, seen_by, target
+from scenes import A, B, link, linked, network, scene, seen_by, target
 
 LINK = link()
 
@@ -386,7 +386,12 @@ def test_companions_stand_clear_of_each_other_and_fly_alike():
     cloud = replace(cloud, record=record)
     settings = companions.DEFAULTS | {"count": [3, 3], "spread_m": 2.0}
     found = companions.companions(settings, cloud, row, {}, np.random.default_rng(2))
-    assert [name for name in companions.listed(settings, 1, row)] == ["Thing"] * 3
+    recorded = companions.record(settings, network(), row, np.random.default_rng(2))
+    assert (
+        recorded
+        == {"companions": [other.subtype for other, _ in found]}
+        == {"companions": ["Thing"] * 3}
+    )
     places = np.array(
         [[r[f"{axis}_m"] for axis in "xyz"] for r in (row, *(mine for _, mine in found))]
     )
