@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import lowalt
 from configured import run_of
 from lowalt.config.layers import merge, overlaid
 from lowalt.files.errors import InputError
-from lowalt.scene import effects
+from lowalt.scene import effects, set_noise
 from lowalt.scene.checks import check, refuse_unknown_subtypes
 from lowalt.scene.trust import refuse_effects
 from lowalt.shards import clean
@@ -165,3 +166,10 @@ def test_its_filter_is_refused_for_shards_whose_readers_would_need_its_code(rain
     with pytest.raises(InputError, match=r"'recipe' with the effect 'half\.py', whose code"):
         clean.refuse({"half.py": {}})
     clean.refuse({"canceller": {}, **rain})
+
+
+def test_noise_passes_its_filter(rain):
+    Path("half.py").write_text(HALF)
+    passed = set_noise.filters({"half.py": None, "adc": {}, **rain})
+    assert passed == {"half.py": {}}
+    np.testing.assert_array_equal(set_noise.behind(np.ones(4), passed), np.full(4, 0.5))

@@ -34,8 +34,8 @@ class Received(NamedTuple):
     """The signal of one target at one station.
 
     signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells, -1 where no symbol was received;
-    power: the mean |Y_bin|^2 (W) of the target's own echo on the direct path, with occlusion,
-    aspect and fluctuation. The SNRs of the configuration refer to this power.
+    power: the mean |Y_bin|^2 (W) of the target's own echo on the direct path, with the amplitude
+    factors of effects. The SNRs of the configuration refer to this power.
     """
 
     signal: np.ndarray
@@ -67,9 +67,9 @@ class SceneSample:
         self.only = partial(only, scene.effects)
         self.all = partial(every, scene.effects)
         self.detection = [effect for effect in scene.effects if effect.place == "detection"]
-        self._waves = {
-            key: value for waves in self.all("waves").values() for key, value in waves().items()
-        }
+        self._waves: dict[str, bool] = {}
+        for waves in self.all("waves").values():
+            self._waves |= waves()
         self._factors: dict[tuple[View, str], np.ndarray] = {}
 
     def weight(self, view: View, one_sided: bool | None = None) -> np.ndarray:
@@ -123,12 +123,16 @@ class SceneSample:
         """Return all paths but the direct one; on a link, those of the receiver, each with the
         sender's of its kind.
         """
-        adding = self.all("paths").values()
-        ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
+        ends = []
+        for end in view.ends():
+            seen: list[ImagePath] = []
+            for paths in self.all("paths").values():
+                seen += paths(end)
+            ends.append(seen)
         if len(ends) == 1:
             return ends[0]
-        # In a town the ends of a link may see different numbers of paths: pad the shorter list with
-        # paths of factor 0.
+        # Both ends of a link may see different numbers of paths: pad the shorter list with paths of
+        # factor 0.
         none = ImagePath(view.places, 0.0)
         return [there._replace(sender=here) for here, there in zip_longest(*ends, fillvalue=none)]
 
@@ -168,9 +172,8 @@ class SceneSample:
         if self._power is not None:
             return self._power
         cells = waveform.range_cells(self.direct)
-        return arriving_power(
-            np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0]
-        )
+        strongest = abs(cells).argmax(axis=1)
+        return arriving_power(cells[np.arange(len(cells)), strongest])
 
     def direct_echo(self, view: View) -> np.ndarray:
         """Return the target's frequency response (N, M) on the direct path, with the scene's
@@ -346,10 +349,8 @@ class SceneSample:
         geometric truth.
         """
         ways_m = view.ways_m(view.places.mean(axis=1))
-        cells = (
-            np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
-        )
-        return self._present(cells)
+        cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64)
+        return self._present(cells % self.cells.shape[1])
 
     def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
         """Return where the echo of the middle of a view's target appears on the direct path: the

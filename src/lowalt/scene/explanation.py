@@ -251,25 +251,38 @@ def changes(
     result = []
     parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
     others = [name for name in PLACES if name not in config["effects"]]
-    tried = [*((name, "") for name in named), *parts, *((name, "") for name in others)]
+    tried = [(name, "") for name in named] + parts + [(name, "") for name in others]
     for name, part in reported(tried, len(tried), "effects"):
         place = places.get(name) or PLACES[name]
         inside = name in named
         try:
-            changed, also = (
-                (_without_part(config, name, part), "") if part else _changed(config, name)
-            )
+            if part:
+                changed = _without_part(config, name, part)
+                also = ""
+            else:
+                changed, also = _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
         except InputError as error:
             result.append(Change(name, place, inside, refused=str(error)))
             continue
         moved = np.linalg.norm(new_signals - signals, axis=2) / np.linalg.norm(signals, axis=2)
-        cost_ms = (times_ms - new_times_ms) if inside else (new_times_ms - times_ms)
-        shares = float(np.mean(moved)), float(np.mean(cells != new_cells))
+        added_ms = new_times_ms - times_ms
+        cost_ms = -added_ms if inside else added_ms
         after = shown(new_signals)
-        more = {kind: _differing(before[kind], after[kind]) for kind in before}
-        cost = float(np.median(cost_ms)), float(np.std(cost_ms))
-        result.append(Change(name, place, inside, *shares, more, *cost, also, part=part))
+        result.append(
+            Change(
+                name,
+                place,
+                inside,
+                signal=float(np.mean(moved)),
+                cells=float(np.mean(cells != new_cells)),
+                more={kind: _differing(before[kind], after[kind]) for kind in before},
+                ms=float(np.median(cost_ms)),
+                spread_ms=float(np.std(cost_ms)),
+                also=also,
+                part=part,
+            )
+        )
     return result
 
 
@@ -330,10 +343,9 @@ def _received(
                     received_signal(scene, scene.network.station(name), *explained, clouds)
                 )
                 times_s.append(time.process_time())
-    shape = len(chosen), len(station_names)
-    signals, cells = (
-        np.array([result[k] for result in received]).reshape(*shape, -1) for k in range(2)
-    )
+    shape = (len(chosen), len(station_names))
+    signals = np.array([result.signal for result in received]).reshape(*shape, -1)
+    cells = np.array([result.cell for result in received]).reshape(*shape, -1)
     return signals, cells, 1e3 * np.diff(times_s).reshape(shape)
 
 

@@ -99,14 +99,10 @@ def observe(
     network = scene.network
     cloud = with_cross_sections(scene, cloud)
     grid_s = np.append(network.times_s, len(network.times_s) * network.symbol_interval_s)
-    perturbing = every(scene.effects, "perturb")
-    moved = Perturbations(
-        grid_s,
-        tuple(
-            perturb(cloud, row, grid_s, scene.stream(name, row))
-            for name, perturb in perturbing.items()
-        ),
-    )
+    changes = []
+    for name, perturb in every(scene.effects, "perturb").items():
+        changes.append(perturb(cloud, row, grid_s, scene.stream(name, row)))
+    moved = Perturbations(grid_s, tuple(changes))
     if beside is not None:
         motion, places = located(cloud, row, beside.times_s, moved)
         return replace(
@@ -142,8 +138,8 @@ def observe(
     )
     stations = [end for end in network.stations if end.transmitter is None]
     for name, beams in every(scene.effects, "beams").items():
-        drawn = {
-            end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations
-        }
+        drawn = {}
+        for end in stations:
+            drawn[end.name] = beams(view.of(end), scene.stream(name, row, end.name))
         view = replace(view, beams=drawn)
     return view

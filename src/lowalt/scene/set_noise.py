@@ -23,8 +23,8 @@ def in_all_cells(effects: Mapping[str, dict | None]) -> list[str]:
 
 
 def filters(effects: Mapping[str, dict | None]) -> dict[str, dict]:
-    """Return the part of a configuration's `effects` that filters range cells, and so the noise
-    that is added later.
+    """Return those of a configuration's `effects` that filter range cells, and so the noise that is
+    added later.
     """
     return offering(effects, "detection", "filtered")
 

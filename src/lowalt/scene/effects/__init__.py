@@ -298,14 +298,18 @@ def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[.
 
 
 def offering(block: Mapping[str, dict | None], place: str, name: str) -> dict[str, dict]:
-    """Return the part of an `effects` block that acts at a place and has a function, or another
-    name, of the contract.
+    """Return those of an `effects` block that act at a place and have a function, or another name,
+    of the contract.
 
-    Only shipped effects of that place are imported; idle ones are left out.
+    Of shipped effects only those of that place are imported, while a file of the user's own tells
+    its place when it is loaded; idle ones are left out.
     """
-    asked = called({key: value for key, value in block.items() if PLACES.get(key) == place})
+    own = own_effects(block)
+    asked = {key: value for key, value in block.items() if key in own or PLACES.get(key) == place}
     return {
-        effect.name: block[effect.name] or {} for effect in asked if hasattr(effect.module, name)
+        effect.name: block[effect.name] or {}
+        for effect in called(asked)
+        if effect.place == place and effect.offers(name)
     }
 
 
