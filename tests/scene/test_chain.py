@@ -10,10 +10,11 @@ import pytest
 import reference_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import echo_signal
+from lowalt.extensions.town import town
 from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal
-from lowalt.scene.effects.channel import interference, reflected_aspect, town, walls
+from lowalt.scene.effects.channel import interference, reflected_aspect, walls
 from lowalt.scene.laws.offsets import of_stations
 from lowalt.scene.observe import observe
 from lowalt.scene.response import ImagePath, response
@@ -255,9 +256,9 @@ def test_on_a_link_the_change_of_the_direct_path_shows_the_direct_paths_side(tmp
     )
     both = ImagePath(view.places, 0.5, mirror, ImagePath(view.places, 0.5))
 
-    def weight(seen, names=None, but=()):
+    def weight(seen, one_sided):
         """A bistatic side that is not the geometric mean of both ends' sides."""
-        if but:
+        if not one_sided:
             return np.ones(view.places.shape[:2])
         sender, receiver = seen.masts_m
         return np.full(view.places.shape[:2], 1.0 + abs(sender[2] - 3.0 * receiver[2]))

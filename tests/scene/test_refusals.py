@@ -14,7 +14,7 @@ import yaml
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import check
-from lowalt.scene.effects import PLACES, called, dotted
+from lowalt.scene.effects import ADDED, PLACES, called, dotted
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.view import Still
 from scenes import target
@@ -319,7 +319,8 @@ def test_the_schema_knows_every_setting_and_each_effect_names_its_source(name):
     assert set(schema["properties"]["effects"]["properties"][name].get("properties", {})) == set(
         module.DEFAULTS
     )
-    assert module.SOURCE and f".{PLACES[name]}." in module.__name__
+    assert module.SOURCE
+    assert name in ADDED or f".{PLACES[name]}." in module.__name__
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "IDLE", ()))
     assert all(
         set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "PARTS", {}).values()

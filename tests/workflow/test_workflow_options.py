@@ -80,16 +80,16 @@ def test_settings_name_an_effect_for_the_stages_that_read_it_alone():
     assert not cancelled.tiles.reads_motion
     written = json.loads(cancelled.noise.settings(CHUNK))
     assert written["filters"] == {"canceller": {"kind": "mean"}}
-    assert "canceller" not in json.loads(cancelled.shards.settings(CHUNK))
+    assert "filters" not in json.loads(cancelled.shards.settings(CHUNK))
     usual = scene({"canceller": None})
     assert json.loads(usual.noise.settings(CHUNK))["filters"] == {"canceller": {}}
     beside = scene({"companions": None})
-    assert json.loads(beside.shards.settings(CHUNK))["companions"] == {}
-    assert "companions" not in json.loads(plain.shards.settings(CHUNK))
+    assert json.loads(beside.shards.settings(CHUNK))["record"] == {"companions": {}}
+    assert "record" not in json.loads(plain.shards.settings(CHUNK))
     recipe = scene({"canceller": {"kind": "mean"}}, shards={"kind": "recipe"})
-    assert json.loads(recipe.shards.settings(CHUNK))["canceller"]["kind"] == "mean"
+    assert json.loads(recipe.shards.settings(CHUNK))["filters"]["canceller"]["kind"] == "mean"
     no_canceller = scene({}, shards={"kind": "recipe"})
-    assert "canceller" not in json.loads(no_canceller.shards.settings(CHUNK))
+    assert "filters" not in json.loads(no_canceller.shards.settings(CHUNK))
 
 
 def test_late_symbols_tell_the_tiles_their_draws_and_other_scenes_do_not():

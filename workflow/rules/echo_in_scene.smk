@@ -2,7 +2,7 @@
 # powers of the targets' own echoes.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz;
 #                  results/{run}/occluders/*.npz where the scene hides points behind surfaces; the
-#                  file of buildings that effects.town names
+#                  files that effects read
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and
 #          {station}.power.npy
 from lowalt.workflow.stages.echo import Echo

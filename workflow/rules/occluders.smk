@@ -1,4 +1,4 @@
-# Occluders: the opaque surfaces of a subtype, made only for scenes with the effect `occlusion`.
+# Occluders: the opaque surfaces of a subtype, made only for scenes whose effects need them.
 # REQUIRED INPUTS: as the cloud of the subtype
 # OUTPUTS: results/{run}/occluders/{subtype}.npz
 

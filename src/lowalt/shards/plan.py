@@ -15,6 +15,7 @@ from functools import cached_property
 from lowalt.config.blocks import snrs_of
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError, instead
+from lowalt.scene.effects import breaks_tracks
 from lowalt.shards.sizes import sample_bytes
 
 GROUPS = ("seen", "unseen")
@@ -22,8 +23,6 @@ PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
 """Regular expression of a chunk's part."""
 PIECE = r"(?:p\d+)?"
 """Regular expression of a shard's piece, if a fold of a chunk is packed into several shards."""
-JUMPING = ("rotor_spread", "gusts", "companions")
-"""Effects that draw a motion for each look."""
 EVERY = 2**53
 """Limit of samples per shard where there is no limit of size."""
 
@@ -38,9 +37,10 @@ def _refuse_tracks(config: dict) -> None:
         raise InputError(
             f"split.by: {config['split']['by']!r} together with motion.looks, expected 'motion'"
         )
-    if jumping := sorted(set(JUMPING) & set(config["effects"])):
+    if jumping := breaks_tracks(config["effects"]):
         raise InputError(
-            f"effects: {jumping} together with motion.looks, expected none of {list(JUMPING)}"
+            f"effects: {jumping} together with motion.looks, expected none of them: each draws a "
+            "motion for every look, and the looks of a track would not join"
         )
 
 

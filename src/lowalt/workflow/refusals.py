@@ -20,8 +20,9 @@ from lowalt.files.shipped import SHIPPED, as_named
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, columns_in, names
 from lowalt.recognition.schemes import named as scheme_named
+from lowalt.scene.checks import check, refuse_unknown_subtypes
+from lowalt.scene.effects import named_files
 from lowalt.scene.set_noise import in_all_cells
-from lowalt.scene.trust import buildings_of
 from lowalt.shards.clean import refuse
 from lowalt.spectra.catalogue import named, of_cells
 from lowalt.targets.records import missing_inputs, records_of
@@ -44,7 +45,7 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
         "inputs": inputs,
         "the folder of lowalt": str(SHIPPED),
         "effects": " ".join(own_effects(config["effects"])),
-        "effects.town.buildings": buildings_of(config["effects"]),
+        **named_files(config["effects"]),
     }
     for block, key in keys:
         paths[f"{block}.{key}"] = config.get(block, {}).get(key)
@@ -54,21 +55,18 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
 
 
 def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> None:
-    """Refuse incompatible effects, companions that are not subtypes of the run, and added SNRs with
-    `cell_noise`.
+    """Refuse incompatible effects, effects that need subtypes which the run lacks, and added SNRs
+    whose noise the echoes would have to hold.
     """
     links = any(station.transmitter is not None for station in network.stations)
     if config["effects"] or links or network.guard_subcarriers < 0:
-        from lowalt.scene.checks import check
-
-        check(config)
-    companions = (config["effects"].get("companions") or {}).get("subtypes", [])
-    if unknown := sorted(set(companions) - set(subtypes)):
-        raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
+        check(config, shows_all_cells(config))
+    refuse_unknown_subtypes(config["effects"], subtypes)
     adds_snrs = any("snr_db" in step for step in config.get("added", []))
-    if adds_snrs and in_all_cells(config["effects"]):
+    noisy = in_all_cells(config["effects"])
+    if adds_snrs and noisy:
         raise InputError(
-            "added: snr_db together with effects.cell_noise, whose echoes contain the noise of all "
+            f"added: snr_db together with effects.{noisy[0]}, whose echoes contain the noise of all "
             "SNRs"
         )
 
@@ -129,9 +127,15 @@ def refuse_input(config: dict) -> None:
         )
 
 
+def shows_all_cells(config: dict) -> bool:
+    """Return whether the data set stores or shows range cells of all symbols."""
+    return config["shards"]["kind"] == "cube" or bool(of_cells(config["spectra"]))
+
+
 def refuse_cells(config: dict) -> None:
-    """Refuse three combinations: spectra of range cells with shards of signals, cubes with
-    interpolated gaps, and `shards.cells` for shards other than cubes."""
+    """Refuse spectra of range cells with shards of signals, and `shards.cells` for shards other than
+    cubes.
+    """
     kind = config["shards"]["kind"]
     shown = of_cells(config["spectra"])
     cells = config["shards"].get("cells")
@@ -141,12 +145,6 @@ def refuse_cells(config: dict) -> None:
         raise InputError(
             f"spectra: {shown} and shards.kind {kind!r}, expected 'image' or 'cube': signals hold "
             "one cell"
-        )
-    regrid = (config["effects"].get("slow_time") or {}).get("regrid", "zero")
-    if (shown or kind == "cube") and regrid != "zero":
-        raise InputError(
-            f"effects.slow_time.regrid: {regrid!r} and range cells of all symbols, expected "
-            "'zero': cells of symbols that were not received are zeros"
         )
 
 
@@ -212,7 +210,7 @@ def refuse_missing(config: dict) -> None:
     files = {
         "inputs": config["inputs"],
         "motion.track": config["motion"].get("track"),
-        "effects.town.buildings": buildings_of(config["effects"]),
+        **named_files(config["effects"]),
         "recognition.table": config["recognition"]["table"],
     }
     if file_of(network["backbone"]) is not None:

@@ -5,6 +5,7 @@ from typing import Any
 
 from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import Scheme
+from lowalt.scene.effects import needs_surfaces
 from lowalt.workflow.stages.stage import Stage, text
 
 
@@ -56,7 +57,7 @@ class Recognition(Stage):
             "dataset": f"{data}/config.yaml",
             "clouds": [f"{data}/clouds/{subtype}.npz" for subtype in subtypes],
         }
-        if "occlusion" in self._config["effects"]:
+        if needs_surfaces(self._config["effects"]):
             files["surfaces"] = [f"{data}/occluders/{subtype}.npz" for subtype in subtypes]
         return files
 

@@ -4,7 +4,8 @@ from typing import Any
 
 from lowalt.files.package_plan import PACKAGE
 from lowalt.files.shipped import as_named
-from lowalt.scene.effects import dotted
+from lowalt.scene.effects import dotted, of_record
+from lowalt.scene.set_noise import filters
 from lowalt.workflow.run import Run
 from lowalt.workflow.sources import near
 from lowalt.workflow.stages.stage import Stage, text
@@ -19,13 +20,12 @@ class Shards(Stage):
 
     @property
     def modules(self) -> list[str]:
-        """The modules of effects that the stage loads: all where it makes cubes, else the town's
-        for what records say.
+        """The modules of effects that the stage loads: all where it makes cubes, else those that
+        add to records.
         """
         effects = self._config["effects"]
-        if self.kind == "cube":
-            return [dotted(name) for name in effects]
-        return [dotted("town")] if "town" in effects else []
+        loaded = effects if self.kind == "cube" else of_record(effects)
+        return [dotted(name) for name in loaded]
 
     def settings(self, wildcards: Any) -> str:
         """Return the fold of each sample, its name and its form, and what its record says of the
@@ -33,11 +33,10 @@ class Shards(Stage):
         """
         effects = self._config["effects"]
         added: dict[str, Any] = {}
-        for name in ("companions", "town"):
-            if name in effects:
-                added[name] = effects[name] or {}
-        if self.kind == "recipe" and "canceller" in effects:
-            added["canceller"] = effects["canceller"] or {}
+        if recorded := of_record(effects):
+            added["record"] = recorded
+        if self.kind == "recipe" and (passed := filters(effects)):
+            added["filters"] = passed
         if self.kind == "cube":
             added["echo"] = {"tolerance": self._config["echo"]["tolerance"], "effects": effects}
         blocks = self._blocks("seed", "network", "split", "shards")

@@ -15,8 +15,7 @@ from typing import Any
 
 from lowalt.config.layers import canonical
 from lowalt.files.atomic import slug
-from lowalt.scene.effects import module_of
-from lowalt.scene.trust import buildings_of
+from lowalt.scene.effects import effect_files, needed_subtypes, needs_surfaces
 from lowalt.shards.plan import Chunk
 from lowalt.workflow.run import Run
 
@@ -85,22 +84,18 @@ class Stage:
         return [slug(name) for name in self._chunk(wildcards).members]
 
     def scene_subtypes(self, wildcards: Any) -> list[str]:
-        """Return the file names of a chunk's subtypes and of the scene's companions."""
-        companions = (self._config["effects"].get("companions") or {}).get("subtypes", [])
-        names = [*self.subtypes(wildcards), *(slug(name) for name in companions)]
-        return list(dict.fromkeys(names))
+        """Return the file names of a chunk's subtypes and of those that the scene's effects need."""
+        beside = [slug(name) for name in needed_subtypes(self._config["effects"])]
+        return list(dict.fromkeys([*self.subtypes(wildcards), *beside]))
 
     def opaque_subtypes(self, wildcards: Any) -> list[str]:
         """Return the file names of a chunk's subtypes where the effects need their surfaces."""
-        return self.subtypes(wildcards) if "occlusion" in self._config["effects"] else []
+        return self.subtypes(wildcards) if needs_surfaces(self._config["effects"]) else []
 
     @property
     def effect_files(self) -> list[str]:
         """The files that the scene's effects read."""
-        buildings = buildings_of(self._config["effects"])
-        if buildings is None:
-            return []
-        return module_of("town").files_of(buildings)
+        return effect_files(self._config["effects"])
 
     @property
     def power_stations(self) -> list[str]:
