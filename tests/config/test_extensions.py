@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import lowalt
 from lowalt.config import extensions
 from lowalt.config.core_commands import Command
 from lowalt.config.extensions import AddedEffect, Extension, found
@@ -19,6 +20,7 @@ from lowalt.files.package_plan import PACKAGE, ROOMS, modules, rooms_imported
 ROOT = Path(__file__).parents[2]
 GOOD = Extension(commands={"hum": Command("hum.command", "hums", "lowalt hum")})
 TAKEN = Extension(commands={"run": Command("hum.command", "runs", "lowalt run")})
+FACE = Extension(functions={"receive": "hum.command"})
 NO_COMMAND = Extension(commands={"hum": "hum.command"})
 AGAIN = Extension(effects={"mist": AddedEffect("other", "channel")}, commands=GOOD.commands)
 NUMBER = 3
@@ -51,6 +53,7 @@ def installed(monkeypatch):
         ("NUMBER", "expected an Extension"),
         ("NO_COMMAND", "expected a Command"),
         ("TAKEN", "lowalt's own"),
+        ("FACE", "functions 'receive' is lowalt's own"),
     ],
 )
 def test_a_faulty_extension_is_one_sentence_and_the_others_stay(installed, name, says):
@@ -66,6 +69,16 @@ def test_of_two_extensions_with_one_name_the_second_is_left_out(installed):
     seen = installed("GOOD", "AGAIN")
     assert len(seen.extensions) == 1
     assert "commands 'hum'" in seen.faults[0]
+
+
+def test_functions_of_extensions_stand_in_the_face_of_the_package():
+    functions = extensions.offered("functions")
+    assert set(functions) == {"draft_target", "inspect_recording"}
+    for name, module in functions.items():
+        assert getattr(lowalt, name).__module__ == module
+    assert set(functions) <= set(dir(lowalt))
+    with pytest.raises(AttributeError, match="no attribute 'hum'"):
+        _ = lowalt.hum
 
 
 @pytest.mark.parametrize("room", ROOMS)

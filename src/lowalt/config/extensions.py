@@ -14,6 +14,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any, NamedTuple
 
+import lowalt
 from lowalt.config.core_commands import CORE_COMMANDS, Command
 from lowalt.files.errors import InputError, shown
 from lowalt.files.package_plan import PACKAGE
@@ -45,7 +46,8 @@ class Extension:
     name)`; comparisons: what `lowalt compare` takes besides runs, modules that offer
     `compared_named(first, second)`; sections: of the report by the name of the file in its manifest
     without which the page has no such section, modules that offer `values(run)` beside a template
-    of the same name.
+    of the same name; functions: that programs call as `lowalt.NAME`, modules that offer a function
+    of this name.
     """
 
     commands: Mapping[str, Command] = field(default_factory=dict)
@@ -54,6 +56,7 @@ class Extension:
     readers: Mapping[str, str] = field(default_factory=dict)
     comparisons: Mapping[str, str] = field(default_factory=dict)
     sections: Mapping[str, str] = field(default_factory=dict)
+    functions: Mapping[str, str] = field(default_factory=dict)
 
 
 KINDS = {
@@ -111,7 +114,13 @@ def _core_names() -> dict[str, set[str]]:
     """
     effects = {path.stem for path in PACKAGE.glob("scene/effects/*/*.py")}
     spectra = {path.stem for path in PACKAGE.glob("spectra/kinds/*.py")}
-    return {"commands": {*CORE_COMMANDS}, "effects": effects, "spectra": spectra}
+    rooms = {path.stem for path in PACKAGE.iterdir()}
+    return {
+        "commands": {*CORE_COMMANDS},
+        "effects": effects,
+        "spectra": spectra,
+        "functions": {*lowalt.__all__, *rooms},
+    }
 
 
 def _taken(extension: Extension, others: dict[str, Extension]) -> str:

@@ -28,7 +28,8 @@ DRAFTING = Extension(
             "your own mesh or robot: look, draft a record, make its cloud",
             "lowalt target inspect inputs/mydrone.stl",
         )
-    }
+    },
+    functions={"draft_target": f"{_HERE}.drafting.scaled"},
 )
 """Drafts of records from meshes, robots' descriptions and data sheets."""
 
@@ -41,6 +42,7 @@ RECORDINGS = Extension(
         )
     },
     readers={".yaml": f"{_HERE}.recordings.predicted"},
+    functions={"inspect_recording": f"{_HERE}.recordings.file_inspection"},
 )
 """Recordings of radars, and their twins."""
 
