@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-from lowalt import benchmark
+from lowalt.extensions import benchmark
 
 
 def features(signals: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from lowalt import benchmark
+from lowalt.extensions import benchmark
 
 track = sys.argv[1] if len(sys.argv) > 1 else "unseen"
 train = benchmark.load(track, "train")

@@ -387,3 +387,28 @@ def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():
         "README.md"
     }
     assert every <= named
+
+
+FOLLOWED = {
+    "tests/test_tutorials.py": (
+        "first_data_set",
+        "trajectory",
+        "effect",
+        "backbone",
+        "pytorch",
+        "hugging_face",
+    ),
+    "tests/config/test_strangers_package.py": ("extension",),
+    "tests/extensions/benchmark/test_benchmark_tutorial.py": ("benchmark",),
+    "tests/extensions/drafting/test_drafting_tutorial.py": ("target",),
+    "tests/extensions/recordings/test_recordings_tutorial.py": ("recording",),
+}
+"""The tutorials that each file of tests follows, block by block."""
+
+
+def test_every_tutorial_is_followed_by_a_test():
+    tutorials = sorted(path.stem for path in (ROOT / "docs/tutorials").glob("*.md"))
+    assert sorted(page for pages in FOLLOWED.values() for page in pages) == tutorials
+    for test, pages in FOLLOWED.items():
+        text = (ROOT / test).read_text()
+        assert not [page for page in pages if f'"{page}"' not in text and f"{page}.md" not in text]

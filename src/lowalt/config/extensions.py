@@ -47,7 +47,10 @@ class Extension:
     `compared_named(first, second)`; sections: of the report by the name of the file in its manifest
     without which the page has no such section, modules that offer `values(run)` beside a template
     of the same name; functions: that programs call as `lowalt.NAME`, modules that offer a function
-    of this name.
+    of this name; stores: of data sets by the scheme of their addresses, modules that offer `span`,
+    `beside` and `fetched`; models: collections of trained models, modules that offer `names()` and
+    `path_of(name)`; exports: of trained models by the suffix of the file, modules that offer
+    `export(trained, out)`.
     """
 
     commands: Mapping[str, Command] = field(default_factory=dict)
@@ -57,6 +60,9 @@ class Extension:
     comparisons: Mapping[str, str] = field(default_factory=dict)
     sections: Mapping[str, str] = field(default_factory=dict)
     functions: Mapping[str, str] = field(default_factory=dict)
+    stores: Mapping[str, str] = field(default_factory=dict)
+    models: Mapping[str, str] = field(default_factory=dict)
+    exports: Mapping[str, str] = field(default_factory=dict)
 
 
 KINDS = {

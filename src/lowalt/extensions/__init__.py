@@ -59,5 +59,11 @@ BENCHMARK = Extension(
 )
 """The benchmark lowalt-40."""
 
-FORMATS = Extension(readers={})
-"""Files for other tools."""
+FORMATS = Extension(
+    stores=dict.fromkeys(("http", "https"), f"{_HERE}.formats.web_files"),
+    models={"zoo": f"{_HERE}.formats.zoo_files"},
+    exports={".onnx": f"{_HERE}.formats.onnx_export"},
+)
+"""Files for other tools: data sets on web servers, the zoo of small models, ONNX, and SigMF by
+`python -m lowalt.extensions.formats.sigmf`.
+"""

@@ -57,7 +57,7 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
 
     A signal of three stations, by a model of the zoo:
 
-        >>> from lowalt.recognition.zoo import opened
+        >>> from lowalt.recognition.runs import opened
         >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) **
         1.4).astype(np.complex64))
         >>> model, settings = opened("default-seen")

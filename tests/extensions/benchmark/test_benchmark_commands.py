@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import small_benchmark
-from lowalt import benchmark
+
 from lowalt.__main__ import main
 from lowalt.commands import workflow
+from lowalt.extensions import benchmark
 from lowalt.extensions.benchmark import baseline_table, confirm, definition, frozen_bytes
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS
 from lowalt.files.errors import InputError, InputWarning

@@ -18,7 +18,7 @@ from lowalt.extensions.benchmark.scoring import headline, tested, values_of
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.recognition.dataset_samples import DatasetSamples
 from lowalt.recognition.intervals import Interval
-from lowalt.recognition.zoo_files import path_of
+from lowalt.recognition.named_models import path_of
 from lowalt.shards.dataset import Dataset
 
 MODELS = {"town": 5}
@@ -72,7 +72,7 @@ def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
     """
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
-    from lowalt.recognition.zoo import opened
+    from lowalt.recognition.runs import opened
 
     if track.name not in CONFIRMED:
         raise InputError(
