@@ -22,7 +22,7 @@ rule report_manifest:
 rule report:
     input:
         unpack(products.report),
-        code=code("lowalt.report"),
+        code=products.page_code,
         templates=products.page_templates,
         configuration="results/{run}/config.yaml",
         manifest="results/{run}/report.json",

@@ -9,13 +9,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+from lowalt.config.extensions import offered
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.package_plan import PACKAGE
 from lowalt.files.shipped import shipped
 from lowalt.report.inputs import KEPT
 from lowalt.workflow.data_products import DataProducts
-from lowalt.workflow.sources import near
+from lowalt.workflow.sources import code, file_of, near
 
 PRESETS = "config/cost/presets.csv"
 """The presets for the cost of recognition, some of which a study trains."""
@@ -172,11 +173,21 @@ class Products(DataProducts):
         """The text of the data card."""
         return near(PACKAGE / "shards/card.md.jinja")
 
+    def _added_sections(self, wildcards: Any) -> list[str]:
+        """Modules of the sections that extensions add to this run's page."""
+        files = self.report(wildcards)
+        return [module for name, module in offered("sections").items() if name in files]
+
+    def page_code(self, wildcards: Any) -> tuple[str, ...]:
+        """Source files of the report and of the sections that extensions add to it."""
+        return code("lowalt.report", *self._added_sections(wildcards))
+
     def page_templates(self, wildcards: Any) -> list[str]:
-        """Templates, style and scripts of the report."""
-        return [
-            near(path) for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE
-        ]
+        """Templates, style and scripts of the report and of its added sections."""
+        own = [path for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE]
+        modules = self._added_sections(wildcards)
+        added = [file_of(module).with_suffix(".html") for module in modules]
+        return [near(path) for path in [*own, *added]]
 
     def data_benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of the jobs of the data set, in pipeline order."""

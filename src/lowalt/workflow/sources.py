@@ -100,6 +100,14 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
 
 
+def file_of(module: str) -> Path:
+    """Return the file of a module. Raises: ModuleNotFoundError where there is no such module."""
+    path = _file(module)
+    if path is None:
+        raise ModuleNotFoundError(module)
+    return path
+
+
 def near(path: Path) -> str:
     """Return a path relative to the working directory if it is below it, so that a checkout can be
     moved.
