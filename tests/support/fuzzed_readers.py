@@ -12,7 +12,7 @@ from craft import craft, row
 from fuzzed_folders import folders
 from fuzzed_seals import ARCHIVE, INDEX, JSON, MODEL, PNG, YAML
 from fuzzing import Reader
-from shown_meshes import dae, ply, prism, skinned
+from shown_meshes import dae, prism
 
 
 def bytes_of(write: Callable[[Path], object], name: str) -> bytes:
@@ -29,7 +29,7 @@ def _meshes() -> list[Reader]:
     from lowalt.targets.mesh_files import read_mesh
 
     box = trimesh.creation.box((0.3, 0.4, 0.1)).subdivide()
-    kinds = ("stl", "obj", "ply", "glb", "dae")
+    kinds = ("stl", "obj", "dae")
     readers = []
     for kind in kinds:
         data = box.export(file_type=kind)
@@ -38,8 +38,6 @@ def _meshes() -> list[Reader]:
             Reader(f"mesh .{kind}", f"a.{kind}", data, lambda path: read_mesh(path, "m"))
         )
     more = {
-        "skinned .glb": bytes_of(skinned, "a.glb"),
-        "mixed .ply": ply(*prism(), "little", [[0, 1, 2, 3]]),
         "polygons .dae": dae(*prism()).encode(),
     }
     readers += [

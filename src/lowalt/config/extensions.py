@@ -50,7 +50,8 @@ class Extension:
     of this name; stores: of data sets by the scheme of their addresses, modules that offer `span`,
     `beside` and `fetched`; models: collections of trained models, modules that offer `names()` and
     `path_of(name)`; exports: of trained models by the suffix of the file, modules that offer
-    `export(trained, out)`.
+    `export(trained, out)`; meshes: of targets by the suffix of the file, modules that offer
+    `pieces(path)` and, where the format states them, METRES of its unit and its axis UP.
     """
 
     commands: Mapping[str, Command] = field(default_factory=dict)
@@ -63,6 +64,7 @@ class Extension:
     stores: Mapping[str, str] = field(default_factory=dict)
     models: Mapping[str, str] = field(default_factory=dict)
     exports: Mapping[str, str] = field(default_factory=dict)
+    meshes: Mapping[str, str] = field(default_factory=dict)
 
 
 KINDS = {

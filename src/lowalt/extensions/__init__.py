@@ -30,8 +30,14 @@ DRAFTING = Extension(
         )
     },
     functions={"draft_target": f"{_HERE}.drafting.scaled"},
+    meshes={
+        ".glb": f"{_HERE}.drafting.mesh_glb",
+        ".ply": f"{_HERE}.drafting.mesh_ply",
+    },
 )
-"""Drafts of records from meshes, robots' descriptions and data sheets."""
+"""Drafts of records from meshes, robots' descriptions and data sheets, and further formats of
+meshes.
+"""
 
 RECORDINGS = Extension(
     commands={

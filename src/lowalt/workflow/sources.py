@@ -11,12 +11,15 @@ import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 
+from lowalt.config.extensions import offered
 from lowalt.spectra.catalogue import module_name
 
 PACKAGE = Path(__file__).parents[1]
 ROOT = PACKAGE.parent
 CATALOGUE = "lowalt.spectra.catalogue"
 """The module that imports spectra by name, so that a new file in their folder changes no other."""
+MESHES = "lowalt.targets.mesh_files"
+"""The module that imports the readers of extensions by name."""
 
 
 @functools.cache
@@ -97,6 +100,8 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
             ]
             if name == CATALOGUE:
                 todo += [module_name(spectrum) for spectrum in spectra]
+            if name == MESHES:
+                todo += offered("meshes").values()
     return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
 
 

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import trimesh
 import yaml
 from scipy.io import savemat, wavfile
 
@@ -21,7 +22,9 @@ from lowalt.extensions.recordings.record import record as recording
 from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.extensions.town.buildings import read as read_town
 from lowalt.extensions.town.town import DEFAULTS
+from lowalt.targets.mesh_files import read_mesh
 from made_robots import MJCF, SDF, urdf
+from shown_meshes import ply, prism, skinned
 
 
 def _recording(kind: str) -> Callable[[Path], object]:
@@ -170,6 +173,21 @@ def _records() -> list[Reader]:
     ]
 
 
+def _meshes() -> list[Reader]:
+    """Readers of the formats of meshes that extensions add, each with a good file."""
+    box = trimesh.creation.box((0.3, 0.4, 0.1)).subdivide()
+    files = {
+        ".ply": box.export(file_type="ply"),
+        ".glb": box.export(file_type="glb"),
+        "skinned .glb": bytes_of(skinned, "a.glb"),
+        "mixed .ply": ply(*prism(), "little", [[0, 1, 2, 3]]),
+    }
+    return [
+        Reader(f"mesh {kind}", f"a{kind[-4:]}", bytes(data), lambda path: read_mesh(path, "m"))
+        for kind, data in files.items()
+    ]
+
+
 def readers() -> list[Reader]:
     """Return every reader of the extensions with a good file of its kind."""
-    return [*_records(), *_recordings(), *_towns(), *_robots()]
+    return [*_records(), *_recordings(), *_meshes(), *_towns(), *_robots()]
