@@ -25,7 +25,8 @@ for effects in ({"mist": {"db_per_km": 2.0}}, {}):
     config["targets"]["select"] = ["DJI Mini 2"]
     made = lowalt.Dataset(config)
     row = made.row(made.place(0))
-    powers.append(made.maker.received(row, stations=[0])[1][0, 0])
+    signal = made.maker.received(row, stations=[0])[0][0]
+    powers.append(np.mean(abs(signal) ** 2))
 mast = made.maker.network.stations[0].position_m
 way_m = np.linalg.norm(np.subtract([row["x_m"], row["y_m"], row["z_m"]], mast))
 print(10 * np.log10(powers[1] / powers[0]), 2 * way_m)

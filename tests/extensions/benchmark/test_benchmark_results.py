@@ -10,7 +10,7 @@ from lowalt.__main__ import main
 from lowalt.extensions.benchmark import baseline_table, benchmark_results
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.inputs import FILES, Inputs
-from lowalt.report.page import assembled, rendered
+from lowalt.report.page import added_sections, assembled
 from pages import sound
 
 
@@ -49,7 +49,7 @@ def test_a_run_on_a_benchmark_s_data_shows_the_table_of_baselines():
     assert benchmark_results.values(SimpleNamespace(inputs=Inputs(files))) is None
     path = "results/reference/lowalt-40-v1/table.csv"
     own = SimpleNamespace(inputs=Inputs(files | {"benchmark": path}))
-    html = rendered("benchmark_results", benchmark_results.values(own))
+    html = added_sections(own)
     assert "Baselines of lowalt-40-v1" in html
     tables = sound(assembled("page", [{"id": "results", "title": "Results", "html": html}])).tables
     rows = read_csv(path, "method", "track", "percent", "low", "high", "group")
