@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets import cloud as clouds
-from lowalt.targets.mesh_files import SUFFIXES, read_mesh
+from lowalt.targets.mesh_files import read_mesh, suffixes
 from lowalt.targets.record_schema import record_files
 from lowalt.targets.records import read_records
 from lowalt.targets.surfaces import volume
@@ -81,7 +81,7 @@ def test_axes_of_the_file_do_not_matter_if_the_record_names_them(up, front, tmp_
 
 @pytest.mark.parametrize(
     ("suffix", "unit", "metres"),
-    [(suffix, "m", 1.0) for suffix in SUFFIXES]
+    [(suffix, "m", 1.0) for suffix in suffixes()]
     + [(suffix, "in", 0.0254) for suffix in (".stl", ".obj")],
 )
 def test_every_format_and_unit_gives_the_same_size(suffix, unit, metres, tmp_path):
@@ -221,7 +221,7 @@ def test_regions_take_whole_components_only_where_asked(tmp_path):
 
 
 # An extension reads GLB; where it is missing, OBJ stands for scenes.
-@pytest.mark.parametrize("suffix", ["o", "g", *(name for name in SUFFIXES if name == ".glb")])
+@pytest.mark.parametrize("suffix", ["o", "g", *(name for name in suffixes() if name == ".glb")])
 def test_parts_are_chosen_by_the_names_of_instances_objects_and_groups(suffix, tmp_path):
     hubs = {
         name: part["meshes"][0]["move"]

@@ -18,7 +18,6 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from lowalt.config.extensions import module_offered, offered
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading, warn
 from lowalt.numerics import portable
@@ -26,9 +25,7 @@ from lowalt.targets.mesh_collada import for_trimesh, stated_metres, stated_up
 from lowalt.targets.mesh_polygons import Piece, read_obj, stated_unit
 from lowalt.targets.surfaces import Surface, merged
 
-ADDED: dict[str, str] = offered("meshes")
-"""Modules of the readers that extensions add, by the suffix of their files."""
-SUFFIXES = (".stl", ".obj", ".dae", *ADDED)
+OWN_SUFFIXES = (".stl", ".obj", ".dae")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 LARGEST_TRIANGLES = 20_000_000
 """A file with more triangles is refused, since its arrays alone would take over two gigabytes."""
@@ -91,9 +88,22 @@ def stated_up_axis(path: Path) -> str | None:
     return getattr(_added(kind), "UP", None)
 
 
+def suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all files that are read, those of extensions last."""
+    from lowalt.config.extensions import offered
+
+    return (*OWN_SUFFIXES, *offered("meshes"))
+
+
 def _added(suffix: str) -> ModuleType | None:
     """The module of the extension that reads files of this suffix, None where none does."""
-    return module_offered("meshes", suffix, ADDED[suffix]) if suffix in ADDED else None
+    if suffix in OWN_SUFFIXES:
+        return None
+    # Looking for extensions takes longer than making a built-in cloud.
+    from lowalt.config.extensions import module_offered, offered
+
+    readers = offered("meshes")
+    return module_offered("meshes", suffix, readers[suffix]) if suffix in readers else None
 
 
 def _scene(path: Path) -> list[Piece]:
@@ -161,9 +171,9 @@ def pieces(path: Path) -> list[Piece]:
     """
     path = existing(path, "mesh")
     kind = path.suffix.lower()
-    if kind not in SUFFIXES:
-        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
     added = _added(kind)
+    if added is None and kind not in OWN_SUFFIXES:
+        raise InputError(f"{path}: format {path.suffix!r}, expected one of {suffixes()}")
     read = read_obj if kind == ".obj" else _scene
     if added is not None:
         read = added.pieces
@@ -264,7 +274,7 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
 
 
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
-    """Return the repaired mesh of a file of a format in SUFFIXES, in metres along the file's own
+    """Return the repaired mesh of a file of a format in `suffixes`, in metres along the file's own
     axes.
 
     `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry`
