@@ -31,7 +31,7 @@ def installed(monkeypatch):
     found.
     """
 
-    def only(*names: str) -> extensions.Found:
+    def only(*names: str) -> extensions.Installed:
         """What is found."""
         points = [
             EntryPoint(name.lower(), f"{__name__}:{name}", extensions.GROUP) for name in names

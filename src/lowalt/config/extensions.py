@@ -74,7 +74,7 @@ KINDS = {
 """Type of what an extension offers under a name, by the fields of `Extension`."""
 
 
-class Found(NamedTuple):
+class Installed(NamedTuple):
     """The extensions of this installation by their names, their packages, and a sentence for each
     left out.
     """
@@ -147,7 +147,7 @@ def _taken(extension: Extension, others: dict[str, Extension]) -> str:
 
 
 @functools.cache
-def found() -> Found:
+def found() -> Installed:
     """Return the extensions that are installed, read once per process; a faulty one is left out
     whole.
 
@@ -176,7 +176,7 @@ def found() -> Found:
             continue
         extensions[point.name] = extension
         packages[point.name] = point.dist.name if point.dist else "an unknown package"
-    return Found(extensions, packages, faults)
+    return Installed(extensions, packages, faults)
 
 
 def offered(kind: str) -> dict[str, Any]:
