@@ -40,31 +40,36 @@ class AddedEffect(NamedTuple):
 class Extension:
     """What an extension adds: mappings from names to modules, all of them empty by default.
 
-    commands: of `lowalt NAME`; effects: of the block `effects`; spectra: of the block `spectra`,
-    modules that keep `lowalt.spectra.interface`; readers: of inputs of `lowalt predict` by the
-    suffix of the file, modules that offer `read(path)` and `answer(model, settings, content,
-    name)`; comparisons: what `lowalt compare` takes besides runs, modules that offer
-    `compared_named(first, second)`; sections: of the report by the name of the file in its manifest
-    without which the page has no such section, modules that offer `values(run)` beside a template
-    of the same name; functions: that programs call as `lowalt.NAME`, modules that offer a function
-    of this name; stores: of data sets by the scheme of their addresses, modules that offer `span`,
-    `beside` and `fetched`; models: collections of trained models, modules that offer `names()` and
-    `path_of(name)`; exports: of trained models by the suffix of the file, modules that offer
-    `export(trained, out)`; meshes: of targets by the suffix of the file, modules that offer
-    `pieces(path)` and, where the format states them, METRES of its unit and its axis UP.
+    A suffix that the core reads or writes itself remains the core's.
     """
 
     commands: Mapping[str, Command] = field(default_factory=dict)
+    """Of `lowalt NAME`."""
     effects: Mapping[str, AddedEffect] = field(default_factory=dict)
+    """Of the block `effects`."""
     spectra: Mapping[str, str] = field(default_factory=dict)
-    readers: Mapping[str, str] = field(default_factory=dict)
-    comparisons: Mapping[str, str] = field(default_factory=dict)
-    sections: Mapping[str, str] = field(default_factory=dict)
+    """Of the block `spectra`: modules that keep `lowalt.spectra.interface`."""
     functions: Mapping[str, str] = field(default_factory=dict)
-    stores: Mapping[str, str] = field(default_factory=dict)
-    models: Mapping[str, str] = field(default_factory=dict)
-    exports: Mapping[str, str] = field(default_factory=dict)
+    """That programs call as `lowalt.NAME`: modules that offer a function of this name."""
     meshes: Mapping[str, str] = field(default_factory=dict)
+    """Formats of targets' meshes by suffix: modules that offer `pieces(path)` and, where the format
+    states them, METRES of its unit and its axis UP."""
+    readers: Mapping[str, str] = field(default_factory=dict)
+    """Of inputs of `lowalt predict` by suffix: modules that offer `read(path)` and `answer(model,
+    settings, content, name)`."""
+    stores: Mapping[str, str] = field(default_factory=dict)
+    """Of data sets by the scheme of their addresses, such as https: modules that offer `span`,
+    `beside` and `fetched` as `lowalt.extensions.formats.web_files` does."""
+    models: Mapping[str, str] = field(default_factory=dict)
+    """Collections of trained models: modules that offer `names()` and `path_of(name)`."""
+    exports: Mapping[str, str] = field(default_factory=dict)
+    """Formats of trained models by suffix: modules that offer `export(trained, out)`."""
+    comparisons: Mapping[str, str] = field(default_factory=dict)
+    """What `lowalt compare` takes besides runs: modules that offer `compared_named(first,
+    second)`."""
+    sections: Mapping[str, str] = field(default_factory=dict)
+    """Of the report, by the name of the file in its manifest without which the page has no such
+    section: modules that offer `values(run)` beside a template of the same name."""
 
 
 KINDS = {
