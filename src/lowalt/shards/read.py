@@ -19,6 +19,7 @@ from lowalt.config.classes import stated
 from lowalt.config.extensions import module_offered, offered
 from lowalt.config.network import station_names
 from lowalt.config.plan import GROUPS
+from lowalt.config.sample_list import refuse_unknown
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
@@ -51,13 +52,6 @@ def store_of(scheme: str) -> ModuleType:
             f"{scheme}://: no extension reads such addresses, expected a file or one of {sorted(stores)}"
         )
     return module_offered("stores", scheme, stores[scheme])
-
-
-def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
-    """Refuse groups and folds that no data set has. Raises: InputError naming them."""
-    for option, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
-        if set(names) - set(known):
-            raise InputError(f"{option} {names}, expected some of {known}")
 
 
 class ShardSet:

@@ -28,18 +28,18 @@ def test_samples_of_the_benchmark_have_their_kept_checksums_on_another_processor
         for folder in (tmp_path, ROOT / frozen_bytes.REFERENCE)
     )
     assert len(made) == len(kept) == 64
-    # The town has effects, whose last bits follow the processor: `test_bytes_effects.py` says how
+    # The part clutter has effects, whose last bits follow the processor: `test_bytes_effects.py` says how
     # far apart they are.
-    exact = [line for line in kept if "  town/" not in line]
+    exact = [line for line in kept if "  clutter/" not in line]
     assert len(exact) == 56 and set(exact) <= set(made)
 
 
-TOWN = """
+CLUTTER = """
 import sys
 import numpy as np
 from lowalt.extensions.benchmark.definition import config_of
 from lowalt.shards.dataset import Dataset
-dataset = Dataset(config_of("town"))
+dataset = Dataset(config_of("clutter"))
 images, signals, _ = zip(*(dataset.made(dataset.place(number)) for number in (0, len(dataset) // 2)))
 np.savez(sys.argv[1], images=np.stack(images), signals=np.stack(signals))
 """
@@ -47,11 +47,11 @@ np.savez(sys.argv[1], images=np.stack(images), signals=np.stack(signals))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("other", NAMES)
-def test_samples_of_the_benchmark_s_town_differ_in_the_last_bit_of_few_values_and_in_no_pixel(
+def test_samples_of_the_benchmark_s_clutter_differ_in_the_last_bit_of_few_values_and_in_no_pixel(
     other, tmp_path
 ):
     for name in ("native", other):
-        run(name, "-c", TOWN, str(tmp_path / f"{name}.npz"))
+        run(name, "-c", CLUTTER, str(tmp_path / f"{name}.npz"))
     here, there = (np.load(tmp_path / f"{name}.npz") for name in ("native", other))
     apart = abs(here["signals"] - there["signals"])
     assert (apart <= 2 * np.finfo(np.float32).eps * abs(here["signals"])).all() and (
@@ -61,7 +61,7 @@ def test_samples_of_the_benchmark_s_town_differ_in_the_last_bit_of_few_values_an
 
 
 @pytest.mark.slow
-def test_signals_of_the_town_do_not_follow_the_kernels_of_a_blas(tmp_path):
+def test_signals_of_the_clutter_do_not_follow_the_kernels_of_a_blas(tmp_path):
     subtypes = "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1"
-    made = signals(tmp_path, CORES, 0, subtypes, ",".join(definition.overlays("town")))
+    made = signals(tmp_path, CORES, 0, subtypes, ",".join(definition.overlays("clutter")))
     assert differing(made) == []

@@ -9,7 +9,7 @@ import lowalt
 import lowalt.extensions.benchmark
 from followed_pages import followed, linked_checkout
 from lowalt.commands import workflow
-from lowalt.extensions.benchmark import definition, frozen_bytes
+from lowalt.extensions.benchmark import frozen_bytes
 from lowalt.extensions.benchmark.submission import read as read_submission
 
 
@@ -37,4 +37,4 @@ def test_a_submission_to_the_benchmark(checkout, monkeypatch):
     test = lowalt.extensions.benchmark.load("unseen", "test")
     right = read_submission("mine.csv", test.track).argmax(1) == test.labels
     assert f"accuracy {100 * right.mean():.1f} (" in printed
-    definition.truth.cache_clear()
+    small_benchmark.clear()
