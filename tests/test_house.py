@@ -210,28 +210,28 @@ def tokens(text: str) -> int:
 
 
 TOKENS = {
-    "files": 4328,
-    "machine": 2882,
+    "files": 4466,
+    "machine": 2997,
     "numerics": 9596,
-    "config": 8659,
-    "targets": 45340,
+    "config": 9816,
+    "targets": 45372,
     "motion": 8938,
     "echo": 19673,
     "scene": 50205,
     "noise": 1221,
     "spectra": 5357,
     "tiles": 10751,
-    "shards": 21111,
-    "recognition": 32603,
+    "shards": 20456,
+    "recognition": 32790,
     "measure": 5423,
     "report": 15869,
     "workflow": 11962,
-    "commands": 6370,
-    "extensions/benchmark": 7570,
-    "extensions/drafting": 27369,
+    "commands": 6417,
+    "extensions/benchmark": 12325,
+    "extensions/drafting": 27371,
     "extensions/formats": 2178,
     "extensions/recordings": 26941,
-    "extensions/town": 21686,
+    "extensions/town": 21690,
 }
 """Tokens of each room and extension. A commit that needs more than SLACK above it raises its figure
 and says why.

@@ -35,7 +35,6 @@ OF_THE_WHOLE = (
     "laws",
     "physics",
     "portable_rooms",
-    "side_channels",
     "waveforms",
 )
 """Tests of the core that belong to no single room. The others beside them are of documents,
