@@ -66,6 +66,8 @@ def test_an_element_has_its_3db_widths_and_its_front_to_back():
     for off in ((32.5, 0), (-32.5, 0), (0, 32.5), (0, -32.5)):
         assert toward(*off) == pytest.approx(5.0)
     assert toward(180, 0) == pytest.approx(-22.0)
+    element = Element(downtilt_deg=0.0, back_db=20.0)
+    assert toward(180, 0) == pytest.approx(-12.0) and toward(32.5, 0) == pytest.approx(5.0)
     tilted = gain(
         Element(downtilt_deg=10.0),
         A,

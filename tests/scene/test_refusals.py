@@ -252,6 +252,17 @@ def test_settings_that_contradict_each_other_are_refused_by_name(network, effect
 
 
 @pytest.mark.parametrize(
+    "effects",
+    [
+        {"timing_offset": {"sigma_s": 1e-6, "prefix_slack_s": 3.1e-6}},
+        {"clock_offset": {"fixed_ppm": 1.0, "sigma_ppm": 0.0, "prefix_slack_s": 1.1e-6}},
+    ],
+)
+def test_a_longer_prefix_allows_a_larger_slip(effects):
+    assert check({"network": ALONE, "effects": effects, "noise": {"snr_db": QUIET}})
+
+
+@pytest.mark.parametrize(
     ("blocks", "said"),
     [
         (

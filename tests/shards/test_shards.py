@@ -221,3 +221,8 @@ def test_a_fold_in_several_shards_holds_each_sample_once_and_every_class_in_each
     # All SNRs of a motion model lie in one shard.
     models = [{key.rpartition(b"-")[0] for key in table["key"].tolist()} for table in tables]
     assert sum(map(len, models)) == len(set().union(*models))
+
+
+def test_an_address_that_no_extension_reads_is_refused():
+    with pytest.raises(InputError, match="carrier-pigeon://: no extension reads such addresses"):
+        ShardSet("carrier-pigeon://loft/index.json")

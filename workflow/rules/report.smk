@@ -25,7 +25,7 @@ rule report_manifest:
 rule report:
     input:
         unpack(page.files),
-        code=code("lowalt.report"),
+        code=page.code,
         templates=page.templates,
         configuration="results/{run}/config.yaml",
         manifest="results/{run}/report.json",

@@ -150,7 +150,7 @@ def _shown(
     renderer = Renderer(seen, whole.spectra, whole.images)
     if model is not None:
         from lowalt.recognition.predict_sample import answer
-        from lowalt.recognition.zoo import opened
+        from lowalt.recognition.runs import opened
         from lowalt.tiles import split
 
         trained, _ = opened(model)

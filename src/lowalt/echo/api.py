@@ -64,8 +64,8 @@ def echo_signal(
         >>> from lowalt.config.layers import overlaid
         >>> network = Network.from_settings(overlaid([])["network"])
         >>> point = np.array([200.0, 100.0, 60.0])
-        >>> result = echo_signal(network, network.stations[0], np.tile(point, (network.symbols, 1,
-        1)), 0.01, point)
+        >>> still = np.tile(point, (network.symbols, 1, 1))
+        >>> result = echo_signal(network, network.stations[0], still, 0.01, point)
         >>> result.signal.shape, int(result.cell[0]), result.bound < 1e-12
         ((400,), 46, True)
     """

@@ -11,6 +11,7 @@ import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 
+from lowalt.config.extensions import offered
 from lowalt.spectra.catalogue import module_name
 
 PACKAGE = Path(__file__).parents[1]
@@ -21,6 +22,8 @@ EXTENSIONS = "lowalt.config.extensions"
 """The module that finds extensions by their entry points."""
 DECLARATION = "lowalt.extensions"
 """The entry point of the package's own extensions, which that module imports."""
+MESHES = "lowalt.targets.mesh_files"
+"""The module that imports the readers of extensions by name."""
 
 
 @functools.cache
@@ -107,7 +110,17 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
             todo += [module_name(spectrum) for spectrum in spectra]
         if name == EXTENSIONS:
             todo.append(DECLARATION)
+        if name == MESHES:
+            todo += offered("meshes").values()
     return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
+
+
+def file_of(module: str) -> Path:
+    """Return the file of a module. Raises: ModuleNotFoundError where there is no such module."""
+    path = _file(module)
+    if path is None:
+        raise ModuleNotFoundError(module)
+    return path
 
 
 def near(path: Path) -> str:

@@ -4,6 +4,7 @@ captures of SigMF.
 
 import json
 import re
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.io import savemat, wavfile
 
 from lowalt.extensions.recordings import read, read_record
 from lowalt.extensions.recordings.faults import clipped
-from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.record import Record, record
 from lowalt.files.errors import InputError
 
 RATE = 12000.0
@@ -258,3 +259,15 @@ def test_every_file_of_the_folder_of_faults_is_read_rightly_or_refused():
         else:
             with pytest.raises(InputError, match=words):
                 read(read_record(found[name]))
+
+
+@pytest.mark.parametrize(
+    "chunk", [b"", b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 800, 1600, 2, 16)]
+)
+def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
+    path = tmp_path / "a.wav"
+    path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
+    with pytest.raises(
+        InputError, match=r"a\.wav: a \.wav file without a format or without samples"
+    ):
+        read(Record(file=path, carrier_hz=24e9, channel="real"))

@@ -11,6 +11,7 @@ import pytest
 from scipy.ndimage import maximum_filter1d
 from scipy.special import fresnel
 
+from linked_routes import link_of, seen_paths
 from lowalt.__main__ import main
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
@@ -545,3 +546,10 @@ def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):
         scene({"town": {"buildings": str(alone), "order": 1}}), A, cloud, row
     ).signal
     np.testing.assert_allclose(both, ground, rtol=1e-6, atol=1e-6 * abs(ground).max())
+
+
+def test_on_a_link_every_path_out_meets_every_path_back(tmp_path):
+    """A sees a house, B does not."""
+    settings = {"buildings": str(ply(tmp_path / "town.ply", [(-40.0, 6.0, 20.0, 8.0, 40.0)]))}
+    sent, received = seen_paths(link_of({"town": settings}), town, settings)
+    assert sent > received > 0

@@ -3,10 +3,11 @@
 import json
 from typing import Any
 
+from lowalt.config.extensions import offered
 from lowalt.files.package_plan import PACKAGE
 from lowalt.files.shipped import as_named, shipped
 from lowalt.report.inputs import KEPT
-from lowalt.workflow.sources import near
+from lowalt.workflow.sources import code, file_of, near
 from lowalt.workflow.stages.accuracy_cost import data_jobs
 from lowalt.workflow.stages.stage import Stage, text
 
@@ -69,11 +70,23 @@ class Report(Stage):
         """Return the files of the report as the JSON text of its manifest."""
         return json.dumps(self.files(wildcards), indent=1)
 
-    @property
-    def templates(self) -> list[str]:
-        """Templates, style and scripts of the page."""
+    def _added_sections(self, wildcards: Any) -> list[str]:
+        """Return the modules of the sections that extensions add to this run's page."""
+        files = self.files(wildcards)
+        return [module for name, module in offered("sections").items() if name in files]
+
+    def code(self, wildcards: Any) -> tuple[str, ...]:
+        """Return the source files of the report and of the sections that extensions add to it."""
+        return code("lowalt.report", *self._added_sections(wildcards))
+
+    def templates(self, wildcards: Any) -> list[str]:
+        """Return templates, style and scripts of the page and of its added sections."""
         paths = sorted((PACKAGE / "report").rglob("*"))
-        return [near(path) for path in paths if path.suffix in PAGE]
+        own = [path for path in paths if path.suffix in PAGE]
+        added = []
+        for module in self._added_sections(wildcards):
+            added.append(file_of(module).with_suffix(".html"))
+        return [near(path) for path in [*own, *added]]
 
     def settings(self, wildcards: Any) -> str:
         """Return the whole configuration, and the published values of each subtype."""

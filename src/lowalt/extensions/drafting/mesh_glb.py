@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.extensions.drafting.mesh_ply import stripped
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.numerics import portable
-from lowalt.targets.mesh_polygons import Piece, stripped
+from lowalt.targets.mesh_polygons import Piece
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -26,6 +27,10 @@ COMPRESSED = {
     "KHR_meshopt_compression": "meshopt",
 }
 MOST_VALUES = 200_000_000
+METRES = 1.0
+"""Metres of the unit of the format. Source: glTF 2.0, section 3.4."""
+UP = "y"
+"""The axis of the format that points up (the front is z). Source: glTF 2.0, section 3.4."""
 
 
 class _Glb:
@@ -226,7 +231,7 @@ def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
     ]
 
 
-def read_glb(path: Path) -> list[Piece]:
+def pieces(path: Path) -> list[Piece]:
     """Return each surface of the scene shown, by the names of its node and its mesh.
 
     Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions
