@@ -13,8 +13,9 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo.radar import radar
-from lowalt.extensions.town import image_paths, shadow_loops
+from lowalt.extensions.town import image_paths
 from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.bundle_loops import blocked
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.response import ImagePath
@@ -88,10 +89,7 @@ def refuse_place(settings: dict, network: Network) -> None:
         )
     for name, mast in masts:
         top = np.array([mast[0], mast[1], high[2] + 1.0])
-        if (
-            mast[2] < top[2]
-            and shadow_loops.blocked(found.town.occluders, mast[None], top[None])[0]
-        ):
+        if mast[2] < top[2] and blocked(found.town.occluders, mast[None], top[None])[0]:
             raise InputError(
                 f"{path}: station {name} at {mast.tolist()} m stands under a roof, expected it above the buildings: "
                 "move it, or set effects.town.origin"
@@ -153,5 +151,5 @@ def listed(settings: dict, network: Network, row: dict) -> dict:
             "field_db": float(np.round(20 * np.log10(max(abs(field[0, 0]), 1e-20)), 2)),
             "reflected": [[kinds[k] for k in route.facets] for route in found],
         }
-    roof = shadow_loops.blocked(town.occluders, place[0], place[0] + [0.0, 0.0, 1e4])[0]
+    roof = blocked(town.occluders, place[0], place[0] + [0.0, 0.0, 1e4])[0]
     return {"under_roof": bool(roof), "stations": result}
