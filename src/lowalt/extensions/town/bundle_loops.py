@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.town.image_loops import crosses
+from lowalt.extensions.town.image_loops import ALLOCATING, crosses
 from lowalt.machine.jit import INNER, PLAIN
 from lowalt.scene.rays_loops import can_meet
 
@@ -29,12 +29,6 @@ class Bundle(NamedTuple):
     way_half: np.ndarray
     box: np.ndarray
 
-    @classmethod
-    def empty(cls) -> "Bundle":
-        """Return room for one bundle."""
-        boxes = np.empty(12)
-        return cls(boxes, boxes[:3], boxes[3:6], boxes[6:9], boxes[9:], np.empty(6))
-
 
 class Span(NamedTuple):
     """The least and largest starts and ways of rays, (3, 3) m each: a row for each leg of a path,
@@ -46,10 +40,18 @@ class Span(NamedTuple):
     low_way: np.ndarray
     high_way: np.ndarray
 
-    @classmethod
-    def empty(cls) -> "Span":
-        """Return room for the rays of three legs."""
-        return cls(np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)))
+
+@ALLOCATING
+def empty_bundle():
+    """Return room for one bundle."""
+    boxes = np.empty(12)
+    return Bundle(boxes, boxes[:3], boxes[3:6], boxes[6:9], boxes[9:], np.empty(6))
+
+
+@ALLOCATING
+def empty_span():
+    """Return room for the rays of three legs."""
+    return Span(np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)))
 
 
 @INNER
@@ -159,35 +161,30 @@ def between(occluders, bundle, found):
 
 
 @PLAIN
-def near(occluders, starts, ends, room, bundle, span, found):
+def near(occluders, starts, ends, room, found):
     """Fill found (F,) with the triangles within about `room` (m) of rays between points (P, 3) m;
     return how many.
-
-    bundle, span: work space.
     """
-    bundled(starts, ends, span, bundle)
+    bundle = empty_bundle()
+    bundled(starts, ends, empty_span(), bundle)
     for i in range(3):
         bundle.start_half[i] += room
     return between(occluders, bundle, found)
 
 
 @PLAIN
-def _blocked(occluders, starts, ends, bundle, span, found, result):
-    """Set result (P,) to whether a triangle stands between starts and ends, (P, 3) m each."""
+def blocked(occluders, starts, ends):
+    """Return whether a triangle stands between starts and ends, (P, 3) m each, as (P,) bool."""
+    result = np.zeros(len(starts), np.bool_)
+    found = np.empty(len(occluders.triangles), np.int64)
+    bundle = empty_bundle()
+    span = empty_span()
     for p in range(len(starts)):
-        result[p] = False
         bundled(starts[p : p + 1], ends[p : p + 1], span, bundle)
         for f in range(between(occluders, bundle, found)):
             if crosses(occluders.triangles[found[f]], starts[p], ends[p]):
                 result[p] = True
                 break
-
-
-def blocked(occluders, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return whether a triangle stands between starts and ends, (P, 3) m each, as (P,) bool."""
-    found = np.empty(len(occluders.triangles), np.int64)
-    result = np.empty(len(starts), bool)
-    _blocked(occluders, starts, ends, Bundle.empty(), Span.empty(), found, result)
     return result
 
 

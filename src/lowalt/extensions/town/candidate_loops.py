@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.town.bundle_loops import Bundle, Span, between, bundled, dark
-from lowalt.extensions.town.image_loops import height_over, mirror
+from lowalt.extensions.town.bundle_loops import between, bundled, dark, empty_bundle, empty_span
+from lowalt.extensions.town.image_loops import ALLOCATING, height_over, mirror
 from lowalt.machine.jit import INNER, PLAIN
 
 
@@ -19,10 +19,11 @@ class BoxCorners(NamedTuple):
     height: np.ndarray
     foot: np.ndarray
 
-    @classmethod
-    def empty(cls) -> "BoxCorners":
-        """Return room for one box."""
-        return cls(np.empty((8, 3)), np.empty(8), np.empty((8, 2)))
+
+@ALLOCATING
+def empty_corners():
+    """Return room for the corners of one box."""
+    return BoxCorners(np.empty((8, 3)), np.empty(8), np.empty((8, 2)))
 
 
 @INNER
@@ -192,12 +193,12 @@ def misses(facets, route, station, low, high, source, box):
 
 
 @PLAIN
-def fitting(facets, routes, station, low, high, box):
+def fitting(facets, routes, station, low, high):
     """Return those of the routes (P, 1 or 2) by which rays from a station may end in the box
     between two corners (3,) m.
 
     Spheres around the box sort out most of them, before `misses` holds the box itself to the
-    facets. box: work space.
+    facets.
     """
     target = 0.5 * (low + high)
     radius = 0.0
@@ -210,6 +211,7 @@ def fitting(facets, routes, station, low, high, box):
     found = np.empty_like(routes)
     behind = np.empty(3)
     source = station.copy()
+    box = empty_corners()
     count = 0
     latest = -1
     for p in range(len(routes)):
@@ -230,13 +232,13 @@ def fitting(facets, routes, station, low, high, box):
 
 
 @PLAIN
-def hidden(facets, occluders, which, corners, bundle, span):
+def hidden(facets, occluders, which, corners):
     """Return for facets `which` (B,) whether one convex surface hides all of it from a whole box,
     corners (8, 3) m.
-
-    bundle, span: work space.
     """
     result = np.zeros(len(which), np.bool_)
+    bundle = empty_bundle()
+    span = empty_span()
     held = np.empty(len(occluders.triangles), np.int64)
     # From each corner of the box to each corner of the rectangle around the facet.
     starts = np.empty((32, 3))

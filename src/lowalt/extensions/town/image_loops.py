@@ -8,10 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.machine.jit import INNER, PLAIN
+from lowalt.machine.jit import INNER, PLAIN, kernel
 
 ROOM = 1e-9
 """Share of a ray next to its ends in which no triangle blocks it."""
+ALLOCATING = kernel(inner=True)
+"""For functions that only kernels call and that make arrays."""
 MOST_POINTS = 4
 """Corners of a ray with two reflections: the station, both reflections and the target."""
 
@@ -34,11 +36,6 @@ class RayPoints(NamedTuple):
     points: np.ndarray
     behind: np.ndarray
     ahead: np.ndarray
-
-    @classmethod
-    def empty(cls) -> "RayPoints":
-        """Return room for one ray."""
-        return cls(np.empty((MOST_POINTS, 3)), np.empty(3), np.empty(3))
 
 
 @INNER

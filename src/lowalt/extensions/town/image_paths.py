@@ -18,7 +18,6 @@ from lowalt.extensions.town import (
     knife_edge,
     shadow_loops,
 )
-from lowalt.extensions.town.bundle_loops import Bundle, Span
 from lowalt.extensions.town.facets import Town
 from lowalt.extensions.town.materials import properties
 from lowalt.scene.fresnel import VACUUM_F_M
@@ -102,13 +101,6 @@ def epsilons(town: Town, frequency_hz: float, where: str) -> np.ndarray:
     return np.array(of_material)[town.material]
 
 
-def _hidden(town: Town, facets: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Which facets one convex surface hides from a whole box, corners (8, 3) m."""
-    bundle = Bundle.empty()
-    span = Span.empty()
-    return candidate_loops.hidden(town.facets, town.occluders, facets, corners, bundle, span)
-
-
 def _pairs(town: Town, station_m: np.ndarray) -> np.ndarray:
     """The pairs (P, 2) of facets by which a ray from a station may go on; they hold for all
     targets.
@@ -118,7 +110,7 @@ def _pairs(town: Town, station_m: np.ndarray) -> np.ndarray:
     if key not in town.pairs:
         every_facet = np.arange(len(facets.offset))
         at_station = np.repeat(station_m[None], 8, axis=0)
-        seen_first = ~_hidden(town, every_facet, at_station)
+        seen_first = ~candidate_loops.hidden(facets, town.occluders, every_facet, at_station)
         radii = np.hypot(*facets.half.T)
         town.pairs[key] = candidate_loops.ordered_pairs(facets, seen_first, station_m, radii)
     return town.pairs[key]
@@ -129,7 +121,8 @@ def _unhidden(town: Town, routes: np.ndarray, low: np.ndarray, high: np.ndarray)
     axes = np.meshgrid(*zip(low, high, strict=True), indexing="ij")
     corners = np.stack(axes, axis=-1).reshape(8, 3)
     last, which = np.unique(routes[:, -1], return_inverse=True)
-    return routes[~_hidden(town, last, corners)[which]]
+    hidden = candidate_loops.hidden(town.facets, town.occluders, last, corners)
+    return routes[~hidden[which]]
 
 
 def candidates(
@@ -145,10 +138,9 @@ def candidates(
         routes.append(np.arange(len(town.facets.offset))[:, None])
     if order >= 2:
         routes.append(_pairs(town, station_m))
-    corners = candidate_loops.BoxCorners.empty()
     result = []
     for one in routes:
-        fitting = candidate_loops.fitting(town.facets, one, station_m, low, high, corners)
+        fitting = candidate_loops.fitting(town.facets, one, station_m, low, high)
         result.append(_unhidden(town, fitting, low, high))
     return result
 
@@ -158,9 +150,8 @@ def seen(town: Town, station_m: np.ndarray, rays: TracedRays, facets: np.ndarray
     L) bool.
     """
     path = shadow_loops.RayPath(town.facets, town.occluders, facets, station_m)
-    work = shadow_loops.Workspace.empty(len(town.occluders.triangles), len(rays.boxes))
     present = np.zeros((len(rays.places), 1), bool)
-    shadow_loops.trace(path, rays.places, rays.boxes, BLOCK, work, present)
+    shadow_loops.trace(path, rays.places, rays.boxes, BLOCK, present)
     return present[:, 0][rays.of_point]
 
 
@@ -168,9 +159,8 @@ def traced(
     town: Town, station_m: np.ndarray, rays: TracedRays, routes: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield the routes (P, 1 or 2) that reach any point, each with which points, (N, L) bool."""
-    work = shadow_loops.Workspace.empty(len(town.occluders.triangles), len(rays.boxes))
     reaching = shadow_loops.reaching(
-        town.facets, town.occluders, routes, station_m, rays.places, rays.boxes, BLOCK, work
+        town.facets, town.occluders, routes, station_m, rays.places, rays.boxes, BLOCK
     )
     for route in routes[reaching]:
         yield route, seen(town, station_m, rays, route)

@@ -388,14 +388,12 @@ def direct(
     """
     result = lit.astype(np.complex128)
     held = np.empty(len(town.occluders.triangles), np.int64)
-    bundle = bundle_loops.Bundle.empty()
-    span = bundle_loops.Span.empty()
     building_of = town.building[town.facets.first[:-2]]
     starts = np.repeat(station_m[None], places.shape[1], axis=0)
     for symbol, ends in enumerate(places):
         length = float(np.linalg.norm(ends - station_m, axis=1).max())
         room = -FREE * np.sqrt(wavelength_m * length / 8.0)
-        count = bundle_loops.near(town.occluders, starts, ends, room, bundle, span, held)
+        count = bundle_loops.near(town.occluders, starts, ends, room, held)
         if count:
             buildings = np.unique(building_of[town.occluders.facet[held[:count]]])
             screens = [town.edges[town.of_building == building] for building in buildings]

@@ -16,12 +16,15 @@ from lowalt.extensions.town.bundle_loops import (
     can_cross,
     clear_span,
     dark,
+    empty_bundle,
+    empty_span,
     span_of,
     widen,
 )
-from lowalt.extensions.town.candidate_loops import BoxCorners, misses
+from lowalt.extensions.town.candidate_loops import BoxCorners, empty_corners, misses
 from lowalt.extensions.town.facets import Facets, Occluders
 from lowalt.extensions.town.image_loops import (
+    ALLOCATING,
     MOST_POINTS,
     OUTSIDE,
     REACHED,
@@ -30,7 +33,7 @@ from lowalt.extensions.town.image_loops import (
     crosses,
     trace_ray,
 )
-from lowalt.machine.jit import INNER, PLAIN
+from lowalt.machine.jit import INLINED, INNER, PLAIN
 
 MOST_LEGS = 3
 """Legs of a ray with two reflections."""
@@ -100,22 +103,30 @@ class Workspace(NamedTuple):
     bundle: Bundle
     span: Span
 
-    @classmethod
-    def empty(cls, triangles: int, blocks: int) -> "Workspace":
-        """Return room for a number of triangles and of blocks."""
-        depths = 3 + blocks.bit_length()
-        rows = np.empty((depths, MOST_LEGS, triangles), np.int64)
-        stacks = [np.empty(MOST_WAITING, np.int64) for _ in Waiting._fields]
-        return cls(
-            lists=ShadowLists(rows, np.zeros((depths, MOST_LEGS), np.int64)),
-            waiting=Waiting(*stacks),
-            ray=RayPoints.empty(),
-            points=np.empty((8, MOST_POINTS, 3)),
-            box=Box(np.empty(3), np.empty(3), np.empty(3)),
-            corners=BoxCorners.empty(),
-            bundle=Bundle.empty(),
-            span=Span.empty(),
-        )
+
+@ALLOCATING
+def _workspace(triangles, blocks):
+    """Return the work space for a number of triangles and of blocks."""
+    depths = 3
+    while blocks > 0:
+        depths += 1
+        blocks //= 2
+    lists = ShadowLists(
+        np.empty((depths, MOST_LEGS, triangles), np.int64),
+        np.zeros((depths, MOST_LEGS), np.int64),
+    )
+    waiting = Waiting(
+        np.empty(MOST_WAITING, np.int64),
+        np.empty(MOST_WAITING, np.int64),
+        np.empty(MOST_WAITING, np.int64),
+        np.empty(MOST_WAITING, np.int64),
+    )
+    ray = RayPoints(np.empty((MOST_POINTS, 3)), np.empty(3), np.empty(3))
+    points = np.empty((8, MOST_POINTS, 3))
+    box = Box(np.empty(3), np.empty(3), np.empty(3))
+    return Workspace(
+        lists, waiting, ray, points, box, empty_corners(), empty_bundle(), empty_span()
+    )
 
 
 @INNER
@@ -159,7 +170,7 @@ def _gather_leg(occluders, route, leg, bundle, older, found):
     return kept
 
 
-@INNER
+@INLINED
 def _trace_rays(path, targets, work, depth, known, present, first_only):
     """Do the work of `_trace_blocks` for one block of targets (n, 1, 3), ray by ray.
 
@@ -225,7 +236,7 @@ def _bounded_facet(facets, route, k):
     return facets.first[route[k]] != facets.first[route[k] + 1]
 
 
-@INNER
+@INLINED
 def _leg_bundled(facets, route, leg, work):
     """Fill the bundle with the rays of one leg of a block, as far as they meet the facets.
 
@@ -257,7 +268,7 @@ def _leg_bundled(facets, route, leg, work):
     return True
 
 
-@INNER
+@INLINED
 def _shadow_lists(path, work, depth, parent):
     """Fill the lists at a depth with the triangles that can be in the way of a block; return their
     number, DARK where one convex surface is in the way of all rays, or no ray meets all facets.
@@ -287,7 +298,7 @@ def _shadow_lists(path, work, depth, parent):
     return total
 
 
-@INNER
+@INLINED
 def _bounds(path, boxes, begin, end, work):
     """Trace the rays to the corners of the box around blocks `begin` to `end`, and keep their
     points.
@@ -367,20 +378,22 @@ def _trace_blocks(path, targets, boxes, block, work, present, first_only):
 
 
 @PLAIN
-def trace(path, targets, boxes, block, work, present):
+def trace(path, targets, boxes, block, present):
     """Set present (R, 1) to True where a ray from the station by the facets of a path reaches a
     target.
 
     targets: (R, 1, 3) m; boxes (C, 2, 3): low and high corners around `block` targets each.
     """
+    work = _workspace(len(path.occluders.triangles), len(boxes))
     _trace_blocks(path, targets, boxes, block, work, present, False)
 
 
 @PLAIN
-def reaching(facets, occluders, routes, station, targets, boxes, block, work):
+def reaching(facets, occluders, routes, station, targets, boxes, block):
     """Return which routes (P, 1 or 2), facets from the station on, reach any target, (P,) bool;
     others as in `trace`.
     """
+    work = _workspace(len(occluders.triangles), len(boxes))
     present = np.empty(targets.shape[:2], np.bool_)
     result = np.zeros(len(routes), np.bool_)
     for p in range(len(routes)):
