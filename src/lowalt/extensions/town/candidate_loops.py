@@ -7,7 +7,7 @@ import numpy as np
 
 from lowalt.extensions.town.bundle_loops import between, bundled, dark, empty_bundle, empty_span
 from lowalt.extensions.town.image_loops import ALLOCATING, height_over, mirror
-from lowalt.machine.jit import INNER, PLAIN
+from lowalt.machine.jit import INLINED, INNER, PLAIN
 
 
 class BoxCorners(NamedTuple):
@@ -99,7 +99,7 @@ def ordered_pairs(facets, firsts, source, radii):
     return found[:count].copy()
 
 
-@INNER
+@INLINED
 def _passes(facets, k, source, box):
     """Whether the points of reflection at facet k of all rays from a source to a box, by its
     corners' `point`, lie on one side of the facet.
@@ -170,7 +170,7 @@ def _passes(facets, k, source, box):
     )
 
 
-@INNER
+@INLINED
 def misses(facets, route, station, low, high, source, box):
     """Return whether surely no ray from a station by the facets of a route ends in the box between
     two corners (3,) m.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.machine.jit import INNER, PLAIN, kernel
+from lowalt.machine.jit import INLINED, INNER, PLAIN, kernel
 
 ROOM = 1e-9
 """Share of a ray next to its ends in which no triangle blocks it."""
@@ -131,7 +131,7 @@ def crosses(t, start, end):
     return met and way > ROOM * whole and way < (1.0 - ROOM) * whole
 
 
-@INNER
+@INLINED
 def trace_ray(facets, route, station, target, ray, clip):
     """Fill `ray` with the points of the ray from a station to a target (3,) by the facets of a
     route (0 to 2,).

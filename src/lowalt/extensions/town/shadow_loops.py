@@ -115,12 +115,8 @@ def _workspace(triangles, blocks):
         np.empty((depths, MOST_LEGS, triangles), np.int64),
         np.zeros((depths, MOST_LEGS), np.int64),
     )
-    waiting = Waiting(
-        np.empty(MOST_WAITING, np.int64),
-        np.empty(MOST_WAITING, np.int64),
-        np.empty(MOST_WAITING, np.int64),
-        np.empty(MOST_WAITING, np.int64),
-    )
+    columns = np.empty((4, MOST_WAITING), np.int64)
+    waiting = Waiting(columns[0], columns[1], columns[2], columns[3])
     ray = RayPoints(np.empty((MOST_POINTS, 3)), np.empty(3), np.empty(3))
     points = np.empty((8, MOST_POINTS, 3))
     box = Box(np.empty(3), np.empty(3), np.empty(3))
