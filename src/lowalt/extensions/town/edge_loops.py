@@ -244,10 +244,11 @@ def _beside(edge, k, start, way, other, corner):
 @INNER
 def _level_top(outline, corner, way):
     """Let the top edge of an outline begin at a corner (3,) and run level, across a way (3,)."""
-    outline.top[0] = corner
-    outline.top[1] = corner
+    for i in range(3):
+        outline.top[0, i] = corner[i]
     outline.top[1, 0] = corner[0] - way[1]
     outline.top[1, 1] = corner[1] + way[0]
+    outline.top[1, 2] = corner[2]
 
 
 @PLAIN
