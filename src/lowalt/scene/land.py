@@ -88,7 +88,7 @@ def ellipses(
     q = 1.0 - (c / t) ** 2
     centre = g * c / (t * q)
     centre_rate = -2.0 * t * centre / (t**2 - c**2)
-    q_rate = 2.0 * c**2 / t**3
+    q_rate = 2.0 * c**2 / (t * t * t)
     short = np.maximum((t + g) ** 2 - c**2 - sends**2 + q * centre**2, 0.0)
     short_rate = 2.0 * (t + g) * (1.0 - g / t) + q_rate * centre**2 + 2.0 * q * centre * centre_rate
     return (
@@ -152,8 +152,7 @@ def land(
     place = np.concatenate([np.arange(0), *map(np.arange, counts)])
     centre, long, short, centre_rate, long_rate, short_rate = (values[ring] for values in rings)
     nu = 2.0 * np.pi * (place + 0.5) / counts[ring]
-    c = np.cos(nu)
-    s = np.sin(nu)
+    s, c = portable.sine_cosine(nu)
     along = centre + long * c
     aside = short * s
     points = np.zeros((len(nu), 3))

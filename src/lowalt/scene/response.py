@@ -9,6 +9,7 @@ subcarriers, so that no array of symbols x points x subcarriers is needed:
     exp(-j B x u) = sum over p of eps_p (-j)^p J_p(B x) T_p(u),   |u| <= 1.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -89,7 +90,7 @@ def response(
         nearest = min(float(end.centre.min()) for end in ends) - reach
         reach += 2.0 * aperture * min(reach / nearest if nearest > 0 else 1.0, 1.0)
     # Rounded up to a power of sqrt(2), so that a few tables serve all samples.
-    reach = 2.0 ** (np.ceil(2 * np.log2(max(reach, 1e-3))) / 2)
+    reach = 2.0 ** (math.ceil(2 * math.log2(max(reach, 1e-3))) / 2)
     band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
     tables = band_tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers, ERROR)
     shape = len(view.times_s), len(out.kappas), 2, len(tables[0]) // (2 * len(out.kappas))

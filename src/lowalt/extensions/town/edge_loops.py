@@ -6,9 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.chebyshev import cheb2poly
 from scipy.special import erfcx
 
 from lowalt.machine.jit import INNER, PLAIN
+from lowalt.numerics import portable
+from lowalt.numerics.chebyshev_series import chebyshev_points, to_terms
 from lowalt.scene.response_loops import phasor
 
 CLEAR = -0.78
@@ -37,12 +40,16 @@ def _pieces() -> np.ndarray:
     Each interpolates at Chebyshev points of one piece of nu / (nu + 1), in which the function is
     smooth.
     """
-    nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    nodes = chebyshev_points(DEGREE + 1)
     shares = (np.arange(PIECES)[:, None] + 0.5 * (nodes + 1.0)) / PIECES
     nu = shares / (1.0 - shares)
     values = 0.5 * (1.0 + nu) * erfcx(nu * (0.5 + 0.5j) * np.sqrt(np.pi))
-    terms = np.linalg.solve(np.vander(nodes, increasing=True), values.T).T
-    return np.ascontiguousarray(np.stack([terms.real, terms.imag], axis=1))
+    both = np.stack([values.real, values.imag], axis=1)
+    series = portable.product(both, to_terms(DEGREE + 1, DEGREE + 1))
+    powers = np.zeros((DEGREE + 1, DEGREE + 1))
+    for order in range(DEGREE + 1):
+        powers[order, : order + 1] = cheb2poly([*[0.0] * order, 1.0])
+    return portable.product(series, powers)
 
 
 _PIECES = _pieces()

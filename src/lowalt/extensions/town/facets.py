@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
+from lowalt.numerics import portable
 from lowalt.scene import rays
 
 GRID_M = 1e-3
@@ -172,7 +173,7 @@ def _outward(
         triangles = order[starts[number] : starts[number + 1]]
         facets = np.unique(label[triangles])
         points = corners[triangles].reshape(-1, 3)
-        over = planes[facets, :3] @ points.T - planes[facets, 3:]
+        over = portable.product(planes[facets, :3], points.T) - planes[facets, 3:]
         all_below = over.max(axis=1) <= FLAT_M
         all_above = over.min(axis=1) >= -FLAT_M
         result[facets] = all_below.astype(float) - all_above

@@ -28,6 +28,7 @@ from lowalt.extensions.town.edge_loops import (
     pass_point,
 )
 from lowalt.extensions.town.facets import Town
+from lowalt.numerics import portable
 
 ALIKE = 0.8
 """Buildings whose nu is more than this share of the way from FREE to the largest nu count with it.
@@ -135,8 +136,9 @@ def _past(
         before = _next(others, station_m, point, wavelength_m)
         beside = before * _next(others, point, places, wavelength_m)
         # Behind a building that takes J dB, those on its sides have this share of their effect.
-        loss_db = -20.0 * np.log10(np.clip(abs(field), 1e-20, 1.0))
-        result += share * field * (1.0 + (1.0 - np.exp(-loss_db / 6.0)) * (beside - 1.0))
+        size = np.sqrt(field.real * field.real + field.imag * field.imag)
+        loss_db = -20.0 / portable.LN_10 * portable.log(np.clip(size, 1e-20, 1.0))
+        result += share * field * (1.0 + (1.0 - portable.exp(-loss_db / 6.0)) * (beside - 1.0))
     # A blocked point behind no outline receives nothing.
     return np.where(~lit & (blocking.max(axis=0) < -SURE), 0.0, result)
 
@@ -156,7 +158,7 @@ def direct(
     building_of = town.building[town.facets.first[:-2]]
     starts = np.repeat(station_m[None], places.shape[1], axis=0)
     for symbol, ends in enumerate(places):
-        length = float(np.linalg.norm(ends - station_m, axis=1).max())
+        length = float(portable.norm(ends - station_m).max())
         room = -FREE * np.sqrt(wavelength_m * length / 8.0)
         count = bundle_loops.near(town.occluders, starts, ends, room, held)
         if count:

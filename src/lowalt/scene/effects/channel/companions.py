@@ -17,6 +17,7 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.motion.drawing import AIRBORNE, draw_rates
 from lowalt.motion.table import NUMBERS
+from lowalt.numerics.portable import norm
 from lowalt.numerics.streams import stream
 from lowalt.scene.checks import CheckedScene
 from lowalt.targets.cloud import Cloud
@@ -91,7 +92,7 @@ def companions(
             place = _place(mine)
             reach = _reach(other)
             if place[2] > reach * (other.like in AIRBORNE) and all(
-                np.linalg.norm(place - away) > reach + size for away, size in taken
+                norm(place - away) > reach + size for away, size in taken
             ):
                 break
         else:
@@ -114,7 +115,7 @@ def _place(row: dict) -> np.ndarray:
 def _reach(cloud: Cloud) -> float:
     """Distance of the farthest point from a target's origin (m)."""
     points = cloud.track if "node" in cloud.kinds else cloud.points
-    return float(np.linalg.norm(points, axis=-1).max())
+    return float(norm(points).max())
 
 
 def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -> dict:

@@ -9,6 +9,7 @@ has `transmit_leakage` instead.
 import numpy as np
 
 from lowalt.files.errors import InputError
+from lowalt.numerics.portable import norm
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
 from lowalt.scene.view import Still, View
@@ -52,5 +53,5 @@ def from_sender(settings: dict, view: View) -> Still:
     if sends is None:
         return Still(np.zeros(shape, np.complex128))
     turned = crossing(view, sends, hears)[0] * 10 ** (-settings["loss_db"] / 20)
-    cells = float(np.linalg.norm(np.subtract(*view.masts_m))) / (2 * network.cell_m)
+    cells = float(norm(np.subtract(*view.masts_m))) / (2 * network.cell_m)
     return Still(np.broadcast_to(turned, shape).copy(), cells - round(cells))

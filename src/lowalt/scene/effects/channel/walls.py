@@ -12,6 +12,7 @@ import numpy as np
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
 from lowalt.numerics import chebyshev_series
+from lowalt.numerics.portable import sine_cosine
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.fresnel import fresnel
 from lowalt.scene.response import ImagePath
@@ -54,8 +55,7 @@ def mirrored(
     the rectangle.
     """
     foot_x, foot_y, azimuth, width, height = facade
-    cosine = np.cos(np.radians(azimuth))
-    sine = np.sin(np.radians(azimuth))
+    sine, cosine = sine_cosine(np.radians(azimuth))
     x, y, z = np.moveaxis(places, -1, 0)
     # Distances from the facade's plane, and along it from the middle of its foot.
     before = (station_m[0] - foot_x) * cosine + (station_m[1] - foot_y) * sine
