@@ -15,7 +15,7 @@ _HOMES = {
     "Endless": "shards.dataset",
     "RawEcho": "shards.receive",
     "confusion": "recognition.train_evaluate",
-    "draft_target": "drafting.scaled",
+    "draft_target": "extensions.drafting.scaled",
     "evaluate": "recognition.train_evaluate",
     "inspect_recording": "recordings.file_inspection",
     "receive": "shards.receive",
