@@ -5,6 +5,9 @@ The comparison is of double precision, before rounding to the kept precision hid
 differences.
 """
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest

@@ -11,7 +11,6 @@ import reference_effects
 from linked_routes import link_of, seen_paths
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import echo_signal
-from lowalt.extensions.town import town
 from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.chain import SceneSample, received_signal

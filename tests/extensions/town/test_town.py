@@ -15,7 +15,7 @@ from linked_routes import link_of, seen_paths
 from lowalt.__main__ import main
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
-from lowalt.extensions.town import image_paths, knife_edge, town
+from lowalt.extensions.town import edge_loops, image_paths, town
 from lowalt.extensions.town.buildings import read
 from lowalt.extensions.town.facets import town as made
 from lowalt.extensions.town.materials import MATERIALS, named, properties
@@ -72,7 +72,7 @@ def edge_field(nu, edge=0):
     rows = np.full((3, len(nu)), 1e15)
     result = np.empty(len(nu), np.complex128)
     rows[edge] = nu
-    knife_edge.fields(rows, result)
+    edge_loops.fields(rows, result)
     return result
 
 

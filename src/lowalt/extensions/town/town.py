@@ -13,8 +13,9 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo.radar import radar
-from lowalt.extensions.town import image_paths, shadow_loops
+from lowalt.extensions.town import image_paths
 from lowalt.extensions.town.buildings import files_of, read
+from lowalt.extensions.town.bundle_loops import blocked
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.response import ImagePath
@@ -70,25 +71,27 @@ def refuse_place(settings: dict, network: Network) -> None:
     path = settings["buildings"]
     low = np.array(found.facts["low_m"])
     high = np.array(found.facts["high_m"])
-    masts = [(station.name, np.asarray(station.position_m, float)) for station in network.stations]
-    away = {
-        name: float(np.linalg.norm((mast - np.clip(mast, low, high))[:2])) for name, mast in masts
-    }
+    masts = {}
+    away = {}
+    for station in network.stations:
+        mast = np.asarray(station.position_m, float)
+        masts[station.name] = mast
+        away[station.name] = float(np.linalg.norm((mast - np.clip(mast, low, high))[:2]))
     nearest = min(away, key=away.__getitem__)
     if away[nearest] > NEAR_M:
         raise InputError(
-            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station {nearest}, expected at most "
-            f"{NEAR_M / 1000:g} km: set effects.town.origin, the place in the file of x = y = 0"
+            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station {nearest}, "
+            f"expected at most {NEAR_M / 1000:g} km: set effects.town.origin, the place in the "
+            "file of x = y = 0"
         )
-    for name, mast in masts:
+    for name, mast in masts.items():
         top = np.array([mast[0], mast[1], high[2] + 1.0])
-        if (
-            mast[2] < top[2]
-            and shadow_loops.blocked(found.town.occluders, mast[None], top[None])[0]
-        ):
+        if mast[2] >= top[2]:
+            continue
+        if blocked(found.town.occluders, mast[None], top[None])[0]:
             raise InputError(
-                f"{path}: station {name} at {mast.tolist()} m stands under a roof, expected it above the buildings: "
-                "move it, or set effects.town.origin"
+                f"{path}: station {name} at {mast.tolist()} m stands under a roof, expected it "
+                "above the buildings: move it, or set effects.town.origin"
             )
 
 
@@ -105,10 +108,12 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     places = np.ascontiguousarray(view.places)
     rays = image_paths.rays_to(places, settings["cell_m"])
     wavelength_m = SPEED_OF_LIGHT / radio.centre_hz
-    field = image_paths.direct(
+    _, field = image_paths.direct(
         town, station_m, places, rays, wavelength_m, settings["diffraction"]
-    )[1]
-    result = [ImagePath(view.places, field - 1.0)] if (field != 1.0).any() else []
+    )
+    result = []
+    if (field != 1.0).any():
+        result.append(ImagePath(view.places, field - 1.0))
     epsilon = image_paths.epsilons(town, radio.centre_hz, "effects.town")
     for route in image_paths.reflected(town, epsilon, station_m, places, rays, settings["order"]):
         coefficient = route.coefficient * view.relative_gain(route.images)
@@ -135,9 +140,11 @@ def record(
     each reflected path, as ["wall", "ground"].
     """
     town = read(settings).town
-    place = np.array([[[row["x_m"], row["y_m"], row["z_m"]]]], float)
-    rays = image_paths.rays_to(place, 0.0)
-    normal = town.facets.normal
+    target = np.array([[[row["x_m"], row["y_m"], row["z_m"]]]], float)
+    rays = image_paths.rays_to(target, 0.0)
+    # The last facet is the ground.
+    kinds = ["wall" if abs(up) < 0.5 else "roof" for up in town.facets.normal[:-1, 2]]
+    kinds.append("ground")
     result = {}
     for station in network.stations:
         if station.transmitter is not None:
@@ -146,15 +153,16 @@ def record(
         station_m = np.array(station.position_m, float)
         wavelength_m = SPEED_OF_LIGHT / frequency
         lit, field = image_paths.direct(
-            town, station_m, place, rays, wavelength_m, settings["diffraction"]
+            town, station_m, target, rays, wavelength_m, settings["diffraction"]
         )
         epsilon = image_paths.epsilons(town, frequency, "effects.town")
-        found = image_paths.reflected(town, epsilon, station_m, place, rays, settings["order"])
-        kinds = ["wall" if abs(up) < 0.5 else "roof" for up in normal[:-1, 2]] + ["ground"]
+        found = image_paths.reflected(town, epsilon, station_m, target, rays, settings["order"])
+        size = max(abs(field[0, 0]), 1e-20)
         result[station.name] = {
             "direct": bool(lit[0, 0]),
-            "field_db": float(np.round(20 * np.log10(max(abs(field[0, 0]), 1e-20)), 2)),
+            "field_db": float(np.round(20 * np.log10(size), 2)),
             "reflected": [[kinds[k] for k in route.facets] for route in found],
         }
-    roof = shadow_loops.blocked(town.occluders, place[0], place[0] + [0.0, 0.0, 1e4])[0]
+    far_above = target[0] + [0.0, 0.0, 1e4]
+    roof = blocked(town.occluders, target[0], far_above)[0]
     return {"paths": {"under_roof": bool(roof), "stations": result}}
