@@ -199,12 +199,12 @@ def finding(
             otherwise[label] = _right(
                 sample, detection + called({added: {}} if added else {}), target_cell
             )
-    view, range_m = (
-        sample.view,
-        float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m))),
-    )
-    ways_m = view.ways_m(view.places.mean(axis=1))
-    radial_mps = float((ways_m[-1] - ways_m[0]) / (2 * (view.times_s[-1] - view.times_s[0])))
+    view = sample.view
+    range_m = float(np.linalg.norm(view.aim_m - np.asarray(station.position_m)))
+    look_s = scene.network.symbols * scene.network.symbol_interval_s
+    ends = view.at(np.array([0.0, look_s]))
+    ways_m = ends.ways_m(ends.places.mean(axis=1))
+    radial_mps = float((ways_m[1] - ways_m[0]) / (2 * look_s))
     return Finding(
         row["category"],
         row["subtype"],
