@@ -4,7 +4,7 @@ is checked.
 
 import pytest
 import yaml
-from test_dataset import configuration
+from test_dataset import configuration, dataset  # noqa: F401
 
 from dataset import build as small
 from dataset import publish
@@ -16,7 +16,7 @@ from lowalt.shards.build import main, write_run
 from lowalt.shards.dataset import Dataset
 
 
-def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monkeypatch, capsys):
+def test_a_configuration_and_clouds_are_a_whole_data_set(dataset, tmp_path, monkeypatch, capsys):  # noqa: F811
     run = tmp_path / "run"
     write_run(dataset, run, "image")
     manifest.main(["write", "--run", str(run), "--manifest", str(tmp_path / "run.sha256")])

@@ -15,6 +15,7 @@ from typing import Any
 @cache
 def _controller() -> Any:
     """Controller of the loaded BLAS libraries; cached, because finding them takes milliseconds."""
+    import numpy  # noqa: F401, so that its BLAS is loaded
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

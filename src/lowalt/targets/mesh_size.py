@@ -99,10 +99,16 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
     return ""
 
 
-def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) -> Iterator[str]:
+def _doubts(
+    of_kind: dict[str, list[Pool]], category: str, count: int | None, body: np.ndarray
+) -> Iterator[str]:
     """Yield what is unusual but possible about the parts of each kind. Wings are those that hang on
     the body.
+
+    body (2, 3): the lowest and highest corner of the body, m; its middle parts left from right,
+    wherever the file's origin lies.
     """
+    middle = body[:, 0].mean()
     wheels = len(of_kind["wheel"])
     rotors = len(of_kind["rotor"])
     if category == "Vehicle" and wheels < FEWEST_WHEELS:
@@ -110,7 +116,7 @@ def _doubts(of_kind: dict[str, list[Pool]], category: str, count: int | None) ->
     if category == "UAV" and count and rotors != count:
         yield f"{rotors} rotors, expected the {count} of its row"
     for kind in ("wheel", "wing"):
-        offsets = np.array([pool.points[:, 0].mean() for pool in of_kind[kind]])
+        offsets = np.array([pool.points[:, 0].mean() - middle for pool in of_kind[kind]])
         width = max(
             (float(np.ptp(pool.points, axis=0).max()) for pool in of_kind[kind]), default=0.0
         )
@@ -168,18 +174,25 @@ def refuse_implausible(
         raise InputError(f"{where}: {listed}: its {fault}")
     if category == "Bird":
         refuse_span(parts, where)
-    for doubt in _doubts(of_kind, category, count):
+    for doubt in _doubts(of_kind, category, count, body):
         warn(f"{where}: {doubt}")
 
 
 def _refuse_size(
-    record: dict, measure: str, size_m: float, wanted_m: float, row_m: float | None = None
+    record: dict,
+    measure: str,
+    size_m: float,
+    wanted_m: float,
+    whole_m: float,
+    row_m: float | None = None,
 ) -> None:
     """Raise InputError if a size is more than the record's limit away from `wanted_m`; all in
     metres.
 
-    measure: what has the size, such as "the whole mesh". The error has the line to write: the unit
-    with which the size fits best, or the size of a row of its own, `row_m` or by default the size.
+    measure: what has the size, such as "the whole mesh"; whole_m: the mesh's largest extent. The
+    error has the line to
+    write: the unit with which the size fits best, or else the scale that fits and the size of a row
+    of its own, `row_m` or by default the size.
     """
     limit = record["scale_limit"]
     unit = record["unit"]
@@ -196,7 +209,10 @@ def _refuse_size(
         way = f"write `unit: {best}` (--unit {best}), with which it measures {numbers * UNITS_M[best]:.4g} m"
     else:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
-        way = f"no unit fits: give it a row with its own size, `row: {{{key}: {row_m or size_m:.4g}}}`, or another file"
+        own = f"`row: {{{key}: {row_m or size_m:.4g}}}`"
+        fitting = f"`unit: {metres(unit) * wanted_m / max(size_m, 1e-12):.4g}` (metres for 1.0 in the file)"
+        size = f"`lowalt target new --size {whole_m * wanted_m / max(size_m, 1e-12):.4g}`"
+        way = f"no unit fits: write {fitting} or draft it with {size}, or give it a row with its own size, {own}"
     raise InputError(
         f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
         f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit {unit!r} right? {way}"
@@ -242,11 +258,11 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
             # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not
             # show a wrong unit. Other sizes are the mesh's own: a gull's span may be more than
             # `limit` times its length.
-            _refuse_size(record, "the whole mesh", whole, row["size_m"], measured)
+            _refuse_size(record, "the whole mesh", whole, row["size_m"], whole, measured)
         size = np.full(3, measured)
         wanted = np.full(3, row["size_m"])
     for axis in range(3):
-        _refuse_size(record, f"the mesh ({size_is})", size[axis], wanted[axis])
+        _refuse_size(record, f"the mesh ({size_is})", size[axis], wanted[axis], whole)
     for name, pool in parts.items():
         largest = float(np.ptp(pool.points, axis=0).max())
         if kinds[name] != "body" and largest < whole / SMALLEST_PART:

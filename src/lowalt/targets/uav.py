@@ -129,6 +129,9 @@ def raised(record: dict, f: dict) -> list[Part]:
 def radial(record: dict, f: dict) -> list[Part]:
     """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids
     and a gimbal.
+
+    With a figure `layer_gap` each arm carries two rotors, one above the other, that turn against
+    each other.
     """
     places = hubs(record, f)
     arm = f["arm_diameter"] / 2
@@ -138,8 +141,12 @@ def radial(record: dict, f: dict) -> list[Part]:
     width = f["body_width"]
     height = f["body_height"]
     centre = hull([(y * length, w * width / 2, -h * height, h * height) for y, w, h in shape])
-    top = arm + f["motor_height"]
+    coaxial = "layer_gap" in f
+    # The arms carry the motors of a coaxial pair half-way between its rotors.
+    top = f["layer_gap"] / 2 if coaxial else arm + f["motor_height"]
     shells = [centre, *motors(places, top, f)]
+    if coaxial:
+        shells += motors(places, f["motor_height"] - top, f)
     cell = f["battery_length"]
     for x, y in places:
         shells.append(tube([(0.2 * x, 0.2 * y, 0), (x, y, 0)], arm))
@@ -159,7 +166,7 @@ def radial(record: dict, f: dict) -> list[Part]:
     shells += camera(
         f, 0.1 * f["body_length"], -0.5 * f["body_height"] - 0.9 * f["camera_diameter"]
     )
-    return [Part("body", "body", tuple(shells)), *rotors(places, top, f)]
+    return [Part("body", "body", tuple(shells)), *rotors(places, top, f, coaxial)]
 
 
 def cabin(record: dict, f: dict) -> list[Part]:
@@ -241,6 +248,7 @@ LAYOUTS = {
     "ducted": ducted,
     "raised": raised,
     "radial": radial,
+    "coaxial": radial,
     "cabin": cabin,
     "tanker": tanker,
     **aircraft.LAYOUTS,

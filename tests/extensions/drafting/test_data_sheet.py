@@ -12,7 +12,8 @@ import lowalt
 from lowalt.__main__ import main
 from lowalt.files.errors import InputError
 from lowalt.targets.cloud import read
-from lowalt.targets.records import estimates
+from lowalt.targets.make import make
+from lowalt.targets.records import estimates, merge, with_row
 
 DRONE = [
     "--rotors",
@@ -46,6 +47,14 @@ def refusal(arguments, capsys):
     """What a refused command says."""
     assert main(["target", *arguments]) == 2
     return capsys.readouterr().err
+
+
+def drafted_cloud(kind, **stated):
+    """The cloud of a drafted target."""
+    text, _ = lowalt.draft_target(kind, subtype="mine", **stated)
+    record = yaml.safe_load(text)["mine"]
+    row = with_row(None, "mine", record.pop("row"), "draft")
+    return make(merge(row, record, "draft"), None, 1)
 
 
 @pytest.fixture
@@ -91,6 +100,53 @@ def test_a_bird_and_a_vehicle_have_the_sheet_s_sizes(drafts, tmp_path):
     wheels = read(tmp_path / "vehicle.npz")
     axles = wheels.hinges[[kind == "wheel" for kind in wheels.kinds]][:, 1]
     assert np.ptp(axles) == pytest.approx(2.85)
+
+
+@pytest.mark.parametrize("frame", ["car", "bus"])
+def test_a_vehicle_rolls_on_the_wheel_of_its_sheet(frame):
+    stated = {
+        "length": 4.6,
+        "width": 1.85,
+        "height": 1.44,
+        "wheel": 0.69,
+        "wheel_base": 2.85,
+        "speed": 18.0,
+    }
+    cloud = drafted_cloud("vehicle", frame=frame, **stated)
+    wheel = cloud.part == cloud.kinds.index("wheel")
+    assert cloud.record["wheel_diameter_m"] == 0.69
+    assert np.ptp(cloud.points[wheel][:, 2]) == pytest.approx(0.69, rel=0.02)
+
+
+def test_a_coaxial_frame_carries_two_rotors_on_each_arm_that_turn_against_each_other():
+    # DJI Agras T40: eight rotors of 54 inch on four arms.
+    stated = {
+        "rotors": 8,
+        "diagonal": 2.184,
+        "propeller": 1.375,
+        "blades": 2,
+        "rate": (10.0, 30.0),
+        "speed": 10.0,
+    }
+    cloud = drafted_cloud("drone", frame="coaxial", **stated)
+    rotors = [part for part, kind in enumerate(cloud.kinds) if kind == "rotor"]
+    hubs = cloud.hinges[rotors]
+    axes = cloud.axes[rotors]
+    assert len(rotors) == 8
+    assert np.linalg.norm(hubs[:, None, :2] - hubs[:, :2], axis=2).max() == pytest.approx(2.184)
+    for index in range(8):
+        pair = [
+            other
+            for other in range(8)
+            if np.allclose(hubs[index, :2], hubs[other, :2]) and other != index
+        ]
+        assert len(pair) == 1
+        assert abs(hubs[index, 2] - hubs[pair[0], 2]) > 0.05
+        assert axes[index, 2] == -axes[pair[0], 2]
+        blades = cloud.points[cloud.part == rotors[index]][:, :2] - hubs[index, :2]
+        assert np.linalg.norm(blades, axis=1).max() == pytest.approx(1.375 / 2, rel=0.03)
+    with pytest.raises(InputError, match="rotors is 7, expected an even number"):
+        lowalt.draft_target("drone", frame="coaxial", **{**stated, "rotors": 7})
 
 
 def test_what_the_sheet_does_not_say_grows_with_the_size(drafts, tmp_path):
@@ -175,3 +231,42 @@ def test_wrong_sheets_are_refused_in_words_of_the_command(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["target", *[word.replace("50:120", "120:50") for word in given]])
     assert "'120:50', expected LOW:HIGH in Hz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("diagonal", "lender"), [(1.13, "DJI Matrice 600 Pro"), (0.52, "Yuneec H520")]
+)
+def test_the_published_craft_nearest_in_size_lends_its_figures(diagonal, lender):
+    stated = {
+        "rotors": 6,
+        "diagonal": diagonal,
+        "propeller": 0.1,
+        "blades": 2,
+        "rate": (50.0, 120.0),
+        "speed": 18.0,
+    }
+    assert lowalt.draft_target("drone", **stated)[1] == lender
+
+
+@pytest.mark.parametrize(
+    ("word", "grown"),
+    [("width", {"track", "tyre_width"}), ("height", {"ground_clearance"})],
+)
+def test_a_figure_of_a_vehicle_grows_with_its_own_side_alone(word, grown):
+    stated = {
+        "length": 4.6,
+        "width": 1.85,
+        "height": 1.44,
+        "wheel": 0.67,
+        "wheel_base": 2.0,
+        "speed": 18.0,
+    }
+    figures = []
+    for factor in (1.0, 1.1):
+        text, _ = lowalt.draft_target("vehicle", **(stated | {word: stated[word] * factor}))
+        figures.append(yaml.safe_load(text)["My vehicle"]["figures"])
+    small, large = figures
+    for name, (value, unit, _) in small.items():
+        assert large[name][0] == pytest.approx(
+            value * (1.1 if name in grown and unit == "m" else 1.0), rel=0.006
+        )

@@ -3,6 +3,7 @@ that do not fit.
 """
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,13 @@ from PIL import Image
 
 from lowalt.__main__ import main
 from lowalt.extensions.drafting.inspection import inspect_mesh
+from lowalt.extensions.drafting.new import Asked
 from lowalt.files.errors import InputWarning
+from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.mesh_parts import Pool
+from lowalt.targets.mesh_size import refuse_implausible
+from lowalt.targets.records import load_table
 from meshes import box, saved
 
 HUBS = np.array([(0.13, 0.11), (0.13, -0.11), (-0.13, 0.11), (-0.13, -0.11)])
@@ -286,7 +292,7 @@ def test_a_target_of_its_own_takes_its_size_from_the_file_and_a_given_size_sets_
     ("factor", "words"),
     [
         (1000.0, r"write `unit: mm` \(--unit mm\), with which it measures 0.46"),
-        (0.1, "no unit fits: .* `row: {size_m: 0.034"),
+        (0.1, "no unit fits: write `unit: [0-9.]+` .*--size [0-9.]+`, .*`row: {size_m: 0.034"),
         (1 / 0.0254, "write `unit: in`"),
     ],
 )
@@ -302,6 +308,57 @@ def test_a_size_that_does_not_fit_is_refused_with_the_line_to_write(
     error = capsys.readouterr().err
     assert "is the unit 'm' right?" in error
     assert re.search(words, error)
+
+
+def test_a_scale_that_a_refusal_proposes_is_accepted(tmp_path, refused):
+    shapes = hull() | four("prop")
+    for shape in shapes.values():
+        shape.apply_scale(0.1)
+    path = saved(tmp_path / "a.obj", shapes)
+    error = refused(path, "--subtype", "DJI Mavic 3 Pro", "--unit", "m")
+    proposed = re.search(r"--size ([0-9.]+)`", error)[1]
+    status, out = draft(path, "--subtype", "DJI Mavic 3 Pro", "--size", proposed)
+    assert status == 0
+    assert cloud(out).record["published"]["size_m"] == pytest.approx(0.38, abs=0.1)
+
+
+@pytest.mark.parametrize("subtype", ["DJI Mavic 3 Pro", "EH 216 S"])
+def test_inspect_and_new_find_the_same_unit_of_a_published_target(
+    subtype, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    shapes = hull() | four("prop")
+    for shape in shapes.values():
+        shape.apply_scale(35.0)
+    path = saved(tmp_path / "a.obj", shapes)
+    assert main(["target", "inspect", str(path), "--subtype", subtype]) == 0
+    inspected = re.search(r"^unit +(\S+)", capsys.readouterr().out, re.M)[1]
+    asked = Asked(path, tmp_path, load_table(SHIPPED / "config/targets.csv"), subtype)
+    drafted = inspect_mesh(path, "UAV", asked.unit, asked.row).unit
+    assert inspected == str(drafted)
+    assert main(["target", "inspect", str(path), "--subtype", "Dog"]) == 2
+    assert "--subtype is 'Dog', expected one of" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("aside", [-5.0, 0.0, 5.0])
+def test_both_wings_are_found_wherever_the_origin_of_a_file_lies(aside):
+    more = {"normals": np.ones((2, 3)), "component": np.zeros(2, int), "corners": 2, "area": 1.0}
+    body = Pool(np.array([[aside - 0.04, -0.2, 0.0], [aside + 0.04, 0.2, 0.1]]), **more)
+    pools = {"body": body}
+    kinds = {"body": "body"}
+    for name, side in (("left", -1), ("right", 1)):
+        points = np.array([[0.05 * side + aside, 0.0, 0.0], [0.5 * side + aside, 0.1, 0.01]])
+        hinge = np.array([0.05 * side + aside, 0.0, 0.0])
+        pools[name] = Pool(points, **more, hinge=hinge, axis=np.array([0.0, 1.0, 0.0]))
+        kinds[name] = "wing"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        refuse_implausible(pools, kinds, {}, "Bird", "gull")
+    del pools["left"]
+    pools["other"] = pools["right"]
+    kinds["other"] = "wing"
+    with pytest.warns(InputWarning, match="every wing is on one side"):
+        refuse_implausible(pools, kinds, {}, "Bird", "gull")
 
 
 def test_blades_by_name_of_which_some_stand_alone_are_asked_for_by_number(tmp_path, refused):

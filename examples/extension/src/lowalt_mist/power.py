@@ -5,6 +5,7 @@ strong.
 import numpy as np
 
 from lowalt.spectra import fourier
+from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, rows, speeds, tables  # noqa: F401
 from lowalt.spectra.settings import Fourier as Settings
 
 TITLE = "power"
@@ -24,7 +25,7 @@ def definition(
 
 
 def fill(
-    re: np.ndarray, im: np.ndarray, settings: Settings, tables: tuple, out: np.ndarray
+    re: np.ndarray, im: np.ndarray, settings: Settings, tables: tuple, out: np.ndarray  # noqa: F811
 ) -> None:
     """Fill out (rows, starts) float32 with the squares of the windows that start at 0 .. starts -
     1.

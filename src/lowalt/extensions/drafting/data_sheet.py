@@ -42,6 +42,7 @@ EXAMPLES = {
 }
 FRAMES = {"drone": "radial", "bird": "bird", "vehicle": "car"}
 """Usual frame of each kind."""
+COAXIAL_HELP = {"drone": "; coaxial has two rotors on each arm"}
 
 
 def add_sheets(actions: argparse._SubParsersAction) -> None:
@@ -71,9 +72,8 @@ def add_sheets(actions: argparse._SubParsersAction) -> None:
         line.add_argument(
             "--speed", type=metres, required=True, help="highest speed over ground (m/s)"
         )
-        line.add_argument(
-            "--frame", default=FRAMES[kind], help="built-in model (default: %(default)s)"
-        )
+        frames = "built-in model (default: %(default)s)" + COAXIAL_HELP.get(kind, "")
+        line.add_argument("--frame", default=FRAMES[kind], help=frames)
         line.add_argument("--subtype", default="", help="its name (default: that of the file)")
         line.add_argument(
             "--about", default="data sheet", help="which data sheet it is, for the record"

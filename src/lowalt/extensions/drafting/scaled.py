@@ -24,7 +24,7 @@ SIZE_IS = {
 }
 """What the size of a drafted target measures."""
 SHEET = "sheet"
-KEPT = ("coaxial", "flap", "wheel_size", "moving_share")
+KEPT = ("coaxial", "flap", "moving_share")
 """Keys of a record that a draft takes from the target that lends its figures."""
 BY_SIDE = {
     "track": "wid_m",
@@ -33,6 +33,12 @@ BY_SIDE = {
     "ground_clearance": "hgt_m",
 }
 """Figures of a vehicle that grow with its width or height; all others grow with its length."""
+
+
+COAXIAL = "coaxial"
+"""Frame of which each arm carries two rotors; no published target has it. The figures of a radial
+one are lent, and the distance between the two rotors is that of the published craft with two layers
+of blades nearest in size."""
 
 
 class Kind(NamedTuple):
@@ -90,17 +96,29 @@ def frames(category: str) -> list[str]:
     ]
 
 
-def _lender(sheet: Sheet) -> tuple[dict, dict]:
-    """The record and the row of the published target of the sheet's frame that is nearest in size."""
+def _nearest(sheet: Sheet, model: str) -> tuple[dict, dict]:
+    """The record and the row of the published target of a built-in model that is nearest in size."""
     table = load_table(SHIPPED / "config/targets.csv")
     key = "len_m" if sheet.category == "Vehicle" else "size_m"
     found = []
     for file in FILES:
         for name, record in read_records(SHIPPED / f"config/targets/{file}.yaml").items():
-            if record.get("model") == sheet.frame:
+            if record.get("model") == model:
                 row = table[name] if name in table else with_row(None, name, record["row"], file)
                 found.append((abs(np.log(row[key] / sheet.row[key])), len(found), record, row))
     return min(found)[2:]
+
+
+def _lender(sheet: Sheet) -> tuple[dict, dict]:
+    """The record and the row of the published target that lends what the sheet does not state."""
+    if sheet.frame != COAXIAL:
+        return _nearest(sheet, sheet.frame)
+    record, row = _nearest(sheet, "radial")
+    layered, layered_row = _nearest(sheet, "tanker")
+    gap, unit, source = layered["figures"]["layer_gap"]
+    # All figures grow with the size of the radial craft.
+    gap *= row["size_m"] / layered_row["size_m"]
+    return record | {"figures": record["figures"] | {"layer_gap": [gap, unit, source]}}, row
 
 
 def _figures(sheet: Sheet, record: dict, lent: dict) -> dict[str, list]:
@@ -131,6 +149,14 @@ def drafted_sheet(sheet: Sheet, subtype: str) -> tuple[str, str]:
     if sheet.frame not in known:
         raise InputError(f"--frame is {sheet.frame!r}, expected one of {known}")
     record, lent = _lender(sheet)
+    if sheet.frame == COAXIAL:
+        rotors = sheet.row["n_rotors_or_wings"]
+        if rotors % 2:
+            raise InputError(
+                f"rotors is {rotors}, expected an even number with the frame {COAXIAL}, two on each arm"
+            )
+        # The row counts motor axes, as it does for every craft with two layers of blades.
+        sheet = sheet._replace(row={**sheet.row, "n_rotors_or_wings": rotors // 2})
     stated = {name: value for name, value in sheet.row.items() if value is not None}
     cells = {
         name: value
@@ -145,6 +171,7 @@ def drafted_sheet(sheet: Sheet, subtype: str) -> tuple[str, str]:
         "model": sheet.frame,
         "size_is": SIZE_IS[sheet.category],
         **{key: record[key] for key in KEPT if key in record},
+        **({"wheel_size": "rolling"} if sheet.category == "Vehicle" else {}),
         "sources": {SHEET: sheet.about},
         "figures": _figures(sheet, record, lent),
     }

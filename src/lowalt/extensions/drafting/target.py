@@ -50,7 +50,10 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     inspect = add_command(
         actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl"
     )
-    inspect.add_argument("--category", default="UAV", choices=KINDS)
+    inspect.add_argument("--category", choices=KINDS, help="default: that of --subtype, or UAV")
+    inspect.add_argument(
+        "--subtype", help="the published target that it is: its size tells the unit, as for `new`"
+    )
     inspect.add_argument(
         "--out",
         type=Path,
@@ -103,10 +106,11 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     make.add_argument("--subtype", help="which record of the file (default: its only one)")
     make.add_argument("--seed", type=int, default=SEED)
     make.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
-    for line in (new, make):
+    for line in (inspect, new, make):
         line.add_argument(
             "--table", type=Path, default=TABLE, help="table of targets (default: the package's)"
         )
+    for line in (new, make):
         line.add_argument(
             "--inputs",
             type=Path,
@@ -131,7 +135,18 @@ def _inspect(options: argparse.Namespace) -> Answer:
     """Inspect a mesh and draw it."""
     from lowalt.extensions.drafting.mesh_picture import inspection_picture
 
-    seen = inspect_mesh(options.file, options.category, options.unit, size_m=options.size_m)
+    row = {}
+    if options.subtype is not None:
+        table = load_table(options.table)
+        if options.subtype not in table:
+            raise InputError(f"--subtype is {options.subtype!r}, expected one of {list(table)}")
+        row = table[options.subtype]
+    category = options.category or row.get("category", "UAV")
+    if category not in KINDS:
+        raise InputError(
+            f"--subtype is {options.subtype!r}, a {category}, expected one of {list(KINDS)}"
+        )
+    seen = inspect_mesh(options.file, category, options.unit, row, options.size_m)
     out = _write(options.out or Path(f"{options.file.stem}-inspect.png"), inspection_picture(seen))
     facts = {name: value for name, value in vars(seen).items() if name not in INNER} | {
         "components": [
