@@ -18,20 +18,25 @@ from lowalt.scene.view import Displacement, View
 FEWEST = 3
 """Symbols that a difference between symbols needs to be exact to the second order at both ends."""
 STEP_S = 1e-6
-"""Half the time over which rates are taken where differences between symbols are not."""
+"""Half the time over which rates are taken where they are not differences between symbols."""
 
 
 def rate(quantity: Callable[[View], np.ndarray], view: View) -> np.ndarray:
     """Return the change per second at each symbol, (N, ...), of a quantity (N, ...) of a view.
 
-    It is the difference between neighbouring symbols. One or two symbols have no such difference
-    at their own instants, so the target is then placed shortly before and after each of them.
+    It is the difference between neighbouring symbols. One or two symbols have no such difference of
+    second order, so the target is then placed twice more, STEP_S apart: after the first symbol, and
+    before the second, since a recording may end with the look.
     """
-    if len(view.times_s) >= FEWEST:
-        return np.gradient(quantity(view), view.times_s, axis=0, edge_order=2)
-    before = quantity(view.at(view.times_s - STEP_S))
-    after = quantity(view.at(view.times_s + STEP_S))
-    return (after - before) / (2 * STEP_S)
+    here = quantity(view)
+    count = len(view.times_s)
+    if count >= FEWEST:
+        return np.gradient(here, view.times_s, axis=0, edge_order=2)
+    steps_s = np.array([STEP_S, -STEP_S])[:count]
+    near = quantity(view.at(view.times_s + steps_s))
+    far = quantity(view.at(view.times_s + 2 * steps_s))
+    change = -3 * here + 4 * near - far
+    return (change.T / (2 * steps_s)).T
 
 
 def middle_of(view: View) -> np.ndarray:
