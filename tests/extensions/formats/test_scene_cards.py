@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from test_shards_tools import loaded, text
 
 import towns
 from lowalt.__main__ import main
@@ -27,6 +26,20 @@ FEW = {
     "motion": {"models": 4, "models_per_chunk": 4, "looks": None},
     "split": {"by": "motion", "train": 2, "val": 1, "test": 1},
 }
+
+
+def loaded(folder, name, tmp_path, monkeypatch):
+    """A protocol of the data set as the hub's library reads it from a folder, no internet asked."""
+    monkeypatch.setenv("HF_HOME", str(tmp_path))
+    monkeypatch.setenv("HF_DATASETS_OFFLINE", "1")
+    datasets = pytest.importorskip("datasets")
+    datasets.disable_progress_bars()
+    return datasets.load_dataset(str(folder), name, cache_dir=str(tmp_path / "cache"))
+
+
+def text(value):
+    """A cell of text, which Croissant's reference implementation gives as bytes."""
+    return value.decode() if isinstance(value, bytes) else value
 
 
 def drafted_town(folder):
@@ -70,7 +83,7 @@ def read_by_hub(shards, numbers, tmp_path, monkeypatch):
     folder = shards.index_path.parent
     card = (folder / "README.md").read_text()
     for protocol in yaml.safe_load(card.split("---")[1])["configs"]:
-        found = loaded(folder, tmp_path, monkeypatch, str(folder), protocol["config_name"])
+        found = loaded(folder, protocol["config_name"], tmp_path, monkeypatch)
         for rows in found.values():
             for row in rows:
                 key = row["__key__"]
@@ -103,7 +116,7 @@ def test_a_drafted_town_s_samples_are_read_by_other_tools(tmp_path, monkeypatch,
     shards = check_tools(drafted_town(tmp_path), tmp_path, monkeypatch, mlcroissant)
     stations = [shards.record(number)["paths"]["stations"] for number in range(len(shards))]
     routes = [seen["reflected"] for each in stations for seen in each.values()]
-    # The case at issue: lists of lists, of which some are empty.
+    # Lists of lists, of which some are empty.
     assert any(routes) and not all(routes)
 
 
