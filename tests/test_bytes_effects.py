@@ -85,12 +85,12 @@ def test_signals_of_scenes_agree_but_for_the_last_bit_of_few(tmp_path):
     assert (abs(here - there).max(axis=(1, 2)) < CLOSE * abs(here).max(axis=(1, 2))).all()
 
 
-TOWN = """
+CLUTTER = """
 import sys
 import numpy as np
 from lowalt.extensions.benchmark.definition import config_of
 from lowalt.shards.dataset import Dataset
-dataset = Dataset(config_of("town"))
+dataset = Dataset(config_of("clutter"))
 images, signals, _ = zip(*(dataset.made(dataset.place(number)) for number in (0, len(dataset) // 2)))
 np.savez(sys.argv[1], images=np.stack(images), signals=np.stack(signals))
 """
@@ -98,11 +98,11 @@ np.savez(sys.argv[1], images=np.stack(images), signals=np.stack(signals))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("other", NAMES)
-def test_samples_of_the_benchmark_s_town_differ_in_the_last_bit_of_few_values_and_in_no_pixel(
+def test_samples_of_the_benchmark_s_clutter_differ_in_the_last_bit_of_few_values_and_in_no_pixel(
     other, tmp_path
 ):
     for name in ("native", other):
-        run(name, "-c", TOWN, str(tmp_path / f"{name}.npz"))
+        run(name, "-c", CLUTTER, str(tmp_path / f"{name}.npz"))
     here, there = (np.load(tmp_path / f"{name}.npz") for name in ("native", other))
     apart = abs(here["signals"] - there["signals"])
     assert (apart <= 2 * np.finfo(np.float32).eps * abs(here["signals"])).all() and (

@@ -23,7 +23,7 @@ from dataset import build, publish
 from lowalt.__main__ import main
 from lowalt.commands import workflow
 from lowalt.config.layers import load
-from lowalt.extensions.benchmark import definition, frozen_bytes
+from lowalt.extensions.benchmark import frozen_bytes
 from lowalt.extensions.benchmark.submission import read as read_submission
 from lowalt.files.yaml_files import load_yaml
 from lowalt.shards.build import write_run
@@ -133,7 +133,7 @@ def test_a_submission_to_the_benchmark(checkout, monkeypatch):
     test = lowalt.extensions.benchmark.load("unseen", "test")
     right = read_submission("mine.csv", test.track).argmax(1) == test.labels
     assert f"accuracy {100 * right.mean():.1f} (" in printed
-    definition.truth.cache_clear()
+    small_benchmark.clear()
 
 
 def test_a_trajectory(checkout, monkeypatch):

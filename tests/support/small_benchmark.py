@@ -38,6 +38,12 @@ def shrink(monkeypatch) -> None:
         monkeypatch.setattr(f"lowalt.extensions.benchmark.{module}.config_of", small)
     # What is kept of the baselines belongs to all motion models.
     monkeypatch.setattr("lowalt.extensions.benchmark.baselines.path_of", lambda track: Path("none"))
+    clear()
+
+
+def clear() -> None:
+    """Forget the samples that have been listed."""
+    definition.listed.cache_clear()
     definition.truth.cache_clear()
 
 

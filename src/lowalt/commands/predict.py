@@ -11,6 +11,7 @@ from lowalt.config.extensions import module_offered, offered
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import announced
 from lowalt.recognition.zoo_files import path_of
 
 
@@ -56,7 +57,8 @@ def run(options: argparse.Namespace) -> Answer:
     from lowalt.recognition.zoo import opened
 
     own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")
-    model, settings = opened(options.model, trusted=own)
+    with announced("lowalt predict: loading the network"):
+        model, settings = opened(options.model, trusted=own)
     if reader:
         return Answer(*reader.answer(model, settings, content, str(options.input)))
     if "radar" in settings and options.input.suffix == ".npy":

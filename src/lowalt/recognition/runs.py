@@ -29,7 +29,7 @@ from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import ModelFile
 from lowalt.recognition.recogniser import built
-from lowalt.recognition.samples import Samples, first_models
+from lowalt.recognition.samples import Samples, first_models, statement
 from lowalt.recognition.schemes import Scheme, of_record
 from lowalt.recognition.training import Trainer, TrainingRun, tensorboard
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
@@ -143,6 +143,7 @@ def _identity(
         settings={**settings, "training": {**settings["training"], **replaced}},
         samples={part: source.sha256() for part, source in samples.items()},
         torch=torch.__version__,
+        trained_on=statement(samples["train"].facts),
         **({"own": sha256(code)} if code and code.is_file() else {}),
     )
 

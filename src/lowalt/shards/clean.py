@@ -15,10 +15,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from lowalt.config.sample_list import sample_key
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals
 from lowalt.scene.set_noise import behind, in_all_cells
-from lowalt.shards.sample_record import encoded, sample_key
+from lowalt.shards.sample_record import encoded
 
 POWER = "power_w"
 """Field of the record: the power (W) that SNRs refer to, one number per station. Without it, the

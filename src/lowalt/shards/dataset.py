@@ -5,8 +5,6 @@ expects, and `Endless` is an iterable. Both can be pickled, so the workers of an
 samples.
 """
 
-import functools
-import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -14,12 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
 from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
-from lowalt.config.splits import FOLDS, fold
+from lowalt.config.sample_list import Place, SampleList
+from lowalt.config.splits import FOLDS
 from lowalt.files.errors import InputError, warn
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
@@ -27,9 +25,8 @@ from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker
-from lowalt.shards.read import refuse_unknown
 from lowalt.shards.remake import CloudFolder
-from lowalt.shards.sample_record import accompanied, record, sample_key
+from lowalt.shards.sample_record import accompanied, record
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import missing_inputs, records_of
@@ -42,15 +39,6 @@ class Sample(NamedTuple):
     image: np.ndarray
     signal: np.ndarray
     record: dict
-
-
-class Place(NamedTuple):
-    """Identification of a sample: its group, subtype, motion model and SNR."""
-
-    group: str
-    subtype: str
-    model: int
-    snr_db: float
 
 
 class MadeOnDemand(Mapping):
@@ -148,18 +136,17 @@ class Dataset:
             config = check(load_yaml(config), shipped(SCHEMA))
             refuse_effects(config["effects"], path)
         self.config = config
-        self.folds = tuple(folds)
         if records is None and (published is None or clouds is None):
             # A run's configuration names tables and records as seen from the checkout it was made
             # in.
             records = records_of(located(config)["targets"], inputs)
         records = records or {}
         self.published = published or {name: item["published"] for name, item in records.items()}
-        self.classes = classes_of(self.published)
         self.plan = Plan.of(config, self.published)
-        groups = tuple(groups)
-        refuse_unknown(groups, self.folds)
-        self.groups = tuple(name for name in self.plan.groups if name in groups)
+        self.listed = SampleList(self.plan, self.published, groups, folds)
+        self.classes = self.listed.classes
+        self.groups = self.listed.groups
+        self.folds = self.listed.folds
         if clouds is None:
             wanted = {
                 name: records[name] for group in self.groups for name in self.plan.groups[group]
@@ -187,71 +174,22 @@ class Dataset:
         for text in self.folding:
             warn(text)
 
-    @functools.cached_property
-    def _numbers(self) -> np.ndarray | None:
-        """Numbers of the chosen folds' samples, counted over all folds; None if all folds are
-        chosen.
-        """
-        if set(self.folds) == set(FOLDS):
-            return None
-        return np.array(
-            [n for n in range(self._all) if self._fold(self._place(n)) in self.folds], np.int64
-        )
-
-    @property
-    def _all(self) -> int:
-        """Number of samples of the chosen groups in all folds."""
-        return (
-            sum(len(self.plan.groups[group]) for group in self.groups)
-            * self.plan.models
-            * len(self.plan.snrs)
-        )
-
     def __len__(self) -> int:
-        return self._all if self._numbers is None else len(self._numbers)
-
-    def _place(self, number: int) -> Place:
-        """Return the place of the sample with this number, counted over all folds."""
-        position, level = divmod(number, len(self.plan.snrs))
-        for group in self.groups:
-            names = self.plan.groups[group]
-            if position < len(names) * self.plan.models:
-                model, index = divmod(position, len(names))
-                return Place(group, names[index], model, self.plan.snrs[level])
-            position -= len(names) * self.plan.models
-        raise IndexError(number)
+        return len(self.listed)
 
     def place(self, number: int) -> Place:
         """Return group, subtype, motion model and SNR of a sample.
 
         Raises: IndexError where there is no sample of this number.
         """
-        number = int(number)
-        if not 0 <= number < len(self):
-            raise IndexError(f"sample {number}: expected 0 to {len(self) - 1}")
-        return self._place(number if self._numbers is None else int(self._numbers[number]))
+        return self.listed[number]
 
     def place_of(self, subtype: str, model: int, snr_db: float) -> Place:
         """Return the place of any motion model of a subtype at any SNR (dB).
 
         Raises: InputError for a subtype that is not selected.
         """
-        for group, members in self.plan.groups.items():
-            if subtype in members:
-                return Place(group, subtype, model, snr_db)
-        raise InputError(
-            f"subtype is {subtype!r}, expected one of {[*itertools.chain(*self.plan.groups.values())]}"
-        )
-
-    def _fold(self, place: Place) -> str:
-        """Fold of a sample."""
-        return fold(
-            self.plan.split,
-            self.plan.seed,
-            place.subtype,
-            place.model // self.plan.looks,
-            place.snr_db,
-        )
+        return self.listed.named(subtype, model, snr_db)
 
     def row(self, place: Place) -> dict:
         """Return the motion table's row of a sample; models beyond the configuration's count are
@@ -281,7 +219,13 @@ class Dataset:
 
     def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
         """Return the JSON record of a sample; cubes: its part about each station's cube."""
-        facts = place.snr_db, self._fold(place), self.plan.seed, self.maker.network, self.classes
+        facts = (
+            place.snr_db,
+            self.listed.fold(place),
+            self.plan.seed,
+            self.maker.network,
+            self.classes,
+        )
         return record(self.row(place), *facts, cubes)
 
     def made(self, place: Place) -> Sample:
@@ -298,19 +242,12 @@ class Dataset:
 
     def key(self, number: int) -> str:
         """Return the key of a sample, as in the shards."""
-        place = self.place(number)
-        return sample_key(place.subtype, place.model, place.snr_db)
+        return self.place(number).key
 
     @property
     def labels(self) -> np.ndarray:
         """Labels of all samples, (n,) int64 indices into `classes`; no sample is simulated."""
-        numbers = {
-            name: label(self.classes, item | {"subtype": name})
-            for name, item in self.published.items()
-        }
-        return np.array(
-            [numbers[self.place(number).subtype] for number in range(len(self))], np.int64
-        )
+        return self.listed.labels
 
     def signal(self, number: int) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""
@@ -365,14 +302,7 @@ class Endless:
 
     def places(self) -> Iterator[Place]:
         """Yield the place of each sample in turn; no sample is made."""
-        plan = self.dataset.plan
-        for model in itertools.count(self.first + self.part, self.parts):
-            for group in self.dataset.groups:
-                for subtype in plan.groups[group]:
-                    for snr_db in plan.snrs:
-                        place = Place(group, subtype, model, snr_db)
-                        if self.dataset._fold(place) in self.dataset.folds:
-                            yield place
+        return self.dataset.listed.models_from(self.first + self.part, self.parts)
 
     def __iter__(self) -> Iterator[Sample]:
         return map(self.dataset.made, self.places())

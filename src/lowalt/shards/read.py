@@ -17,6 +17,7 @@ import numpy as np
 from lowalt.config.classes import stated
 from lowalt.config.network import station_names
 from lowalt.config.plan import GROUPS
+from lowalt.config.sample_list import refuse_unknown
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
@@ -34,13 +35,6 @@ from lowalt.tiles.image_settings import Images
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
-
-
-def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
-    """Refuse groups and folds that no data set has. Raises: InputError naming them."""
-    for option, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
-        if set(names) - set(known):
-            raise InputError(f"{option} {names}, expected some of {known}")
 
 
 class ShardSet:

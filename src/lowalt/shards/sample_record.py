@@ -1,5 +1,5 @@
-"""The bytes of a sample: its key, its place in the shuffled order, its JSON record, its signals as
-an .npy file.
+"""The bytes of a sample: its place in the shuffled order, its JSON record, its signals as an .npy
+file.
 
 Every field has one type in all records, and no value is missing, so that tables with typed columns
 (Arrow) hold them.
@@ -12,7 +12,7 @@ import numpy as np
 
 from lowalt.config.classes import CATEGORIES, label
 from lowalt.config.network import Network, Station
-from lowalt.files.atomic import slug
+from lowalt.config.sample_list import sample_key
 from lowalt.files.errors import InputError
 from lowalt.motion.table import TRACK
 from lowalt.numerics.portable import dot, norm
@@ -27,30 +27,6 @@ changes the rules.
 It is not the version of the package: a release that changes no rule makes the same shards as the
 release before it.
 """
-
-
-def snr_label(snr_db: float) -> str:
-    """Return an SNR for a key: `snrinf`, `snr003`, `snr-60`, `snr003p5` (no dots, which end a key
-    in a tar).
-    """
-    if math.isinf(snr_db):
-        return "snrinf"
-    text = f"{int(snr_db):03d}" if float(snr_db).is_integer() else f"{snr_db:05.1f}"
-    if float(text) != snr_db:
-        text = repr(float(snr_db))
-    return "snr" + text.replace(".", "p")
-
-
-def model_key(subtype: str, model: int) -> str:
-    """Return the key of a motion model, {slug}-{model, six digits}."""
-    return f"{slug(subtype)}-{model:06d}"
-
-
-def sample_key(subtype: str, model: int, snr_db: float) -> str:
-    """Return the key of a sample, {slug}-{model, six digits}-{SNR}: unique, no dots, sorts by
-    subtype and model.
-    """
-    return f"{model_key(subtype, model)}-{snr_label(snr_db)}"
 
 
 def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:

@@ -10,11 +10,12 @@ import numpy as np
 
 from lowalt.config.classes import CATEGORIES, label
 from lowalt.config.network import Network
+from lowalt.config.sample_list import model_key, sample_key
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.shards.clean import packed
-from lowalt.shards.sample_record import model_key, rank, record, sample_key
+from lowalt.shards.sample_record import rank, record
 from lowalt.shards.sample_table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.sample_table import write as write_table
 from lowalt.shards.tar import Span, Writer
