@@ -82,7 +82,8 @@ def echo_signal(
     bound = worst / largest if largest > 0 else np.inf if worst > 0 else 0.0
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
-            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 promises {bound:.1e} "
+            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 "
+            f"promises {bound:.1e} "
             f"of its largest value, expected a larger tolerance or null"
         )
     return EchoResult(
@@ -134,7 +135,8 @@ def prepared(network, station, motion, rcs_m2, aim_m, sample):
     """
     if station.transmitter is not None:
         raise InputError(
-            f"{_named(sample)}station {station.name} is a link between two stations, expected a station that hears "
+            f"{_named(sample)}station {station.name} is a link between two stations, expected a "
+            "station that hears "
             "itself; scenes with effects.direct_path have links"
         )
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
@@ -150,6 +152,7 @@ def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> 
         points = len(scene.part) or scene.translation.shape[1]
         n, l = divmod(fault - 1, points)  # noqa: E741
         raise InputError(
-            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the place of station "
+            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the "
+            "place of station "
             f"{station.name} (r = 0), expected r > 0"
         )

@@ -65,5 +65,6 @@ def export(trained: Trained, out: str | Path) -> None:
             )
         except ImportError as error:
             raise InputError(
-                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `{install_command('export')}`"
+                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected "
+                f"`{install_command('export')}`"
             ) from error

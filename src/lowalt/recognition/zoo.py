@@ -117,7 +117,8 @@ def kept(
     measured = held_against(exact, answering, samples)
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
-            f"--model: 8 bits fall from {measured['exact_percent']:.2f} to {measured['percent']:.2f} % of the "
+            f"--model: 8 bits fall from {measured['exact_percent']:.2f} to "
+            f"{measured['percent']:.2f} % of the "
             f"validation fold, expected at most {FEWER_POINTS} points less"
         )
     reduced = replace(reduced, measured=measured)
@@ -154,7 +155,9 @@ def main(arguments: list[str]) -> None:
     samples = Source(views=options.views).samples(trained.scheme.columns, pairs, trained.size)
     measured = entry(options.model, samples, options.name, options.out, options.backbone)
     print(
-        f"{options.name}: {(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, validation "
+        f"{options.name}: "
+        f"{(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, "
+        "validation "
         f"{measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in 8 bits, "
         f"{measured['changed']} of {measured['samples']} answers differ"
     )

@@ -31,14 +31,20 @@ def fault(record: dict) -> str | None:
     """Return the reason why a merged record is no aircraft of its layout, or None."""
     f = {name: value["si"] for name, value in record["figures"].items()}
     if "tip_chord" in f and not f["tip_chord"] <= f["root_chord"] < f["body_length"]:
-        return f"figures.root_chord is {f['root_chord']:.4g} m, expected from the tip's chord to the body's length"
+        return (
+            f"figures.root_chord is {f['root_chord']:.4g} m, expected from the tip's chord to the "
+            "body's length"
+        )
     if "wing_station" in f and not 0 < f["wing_station"] < 1:
         return (
             f"figures.wing_station is {f['wing_station']}, expected between 0 (nose) and 1 (tail)"
         )
     if f.get("boom_spacing", 0) >= record["published"]["size_m"]:
         span = record["published"]["size_m"]
-        return f"figures.boom_spacing is {f['boom_spacing']:.4g} m, expected less than the span of {span} m"
+        return (
+            f"figures.boom_spacing is {f['boom_spacing']:.4g} m, expected less than the span of "
+            f"{span} m"
+        )
     return None
 
 

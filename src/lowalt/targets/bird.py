@@ -29,7 +29,10 @@ def fault(record: dict) -> str | None:
     f = {name: value["si"] for name, value in record["figures"].items()}
     long = f["bill"] + f["head"] + f["neck"] + f["tail"]
     if long > 0.9:
-        return f"figures bill, head, neck and tail add up to {long:.3g} of the length, expected at most 0.9"
+        return (
+            f"figures bill, head, neck and tail add up to {long:.3g} of the length, expected at "
+            "most 0.9"
+        )
     if f["span"] / f["length"] <= 2 * f["body_width"]:
         return f"figures.span is {f['span']:.3g} m, expected more than twice the body's width"
     if not 0.1 <= f["wrist"] <= 0.9:

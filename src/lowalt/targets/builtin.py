@@ -72,7 +72,8 @@ def check_record(merged: dict, where: str) -> dict:
     if rotors not in model.get("rotors", [rotors]):
         number = " or ".join(map(str, model["rotors"]))
         raise InputError(
-            f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not {rotors}"
+            f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not "
+            f"{rotors}"
         )
     kinds = record_schema.figures(name)
     figures = merged.get("figures", {})

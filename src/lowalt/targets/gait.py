@@ -197,14 +197,16 @@ def check_record(merged: dict, where: str) -> dict:
     """
     if like(merged) != "Pedestrian":
         raise InputError(
-            f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or mesh"
+            f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or "
+            "mesh"
         )
     result = {"stature_m": merged["published"]["hgt_m"], "rate_hz": 400, **merged}
     if result.get("gait") == "trot":
         result = {"mass_kg": 30, **result}
     elif "mass_kg" in result:
         raise InputError(
-            f"{where}: mass_kg is given with gait {result.get('gait')!r}, expected it with trot alone"
+            f"{where}: mass_kg is given with gait {result.get('gait')!r}, expected it with trot "
+            "alone"
         )
     try:
         names = _cycle(result, 8)[1]

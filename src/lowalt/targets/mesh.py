@@ -97,7 +97,8 @@ def _thinned(
     """
     if len(pool.points) < count:
         raise InputError(
-            f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a larger part"
+            f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a "
+            "larger part"
         )
     pick = np.arange(len(pool.points))
     if len(pick) > pool.corners + THINNED * count:

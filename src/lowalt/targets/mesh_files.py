@@ -136,7 +136,8 @@ def _refuse_truncated(path: Path) -> None:
     is_text = head.startswith(b"solid") and b"facet" in head
     if not is_text and len(head) >= 84 and there < stated:
         raise InputError(
-            f"{path}: the header states {stated} triangles and the file ends after {there}, expected the "
+            f"{path}: the header states {stated} triangles and the file ends after {there}, "
+            "expected the "
             "whole file: copy or export it again"
         )
 
@@ -201,7 +202,8 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
         import pymeshlab
     except ImportError as error:
         raise InputError(
-            f"mesh records need pymeshlab, which does not load here ({error}); on a machine without a display install "
+            f"mesh records need pymeshlab, which does not load here ({error}); on a machine "
+            "without a display install "
             "the system's OpenGL libraries (Debian: libgl1 libopengl0), or use built-in records"
         ) from None
     vertices, faces = _merged(vertices, faces)
@@ -267,7 +269,10 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     faces = np.asarray(whole.faces, np.int64)
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
-        text = f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record is followed"
+        text = (
+            f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record "
+            "is followed"
+        )
         warn(text)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")

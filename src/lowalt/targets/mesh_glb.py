@@ -236,7 +236,8 @@ def read_glb(path: Path) -> list[Piece]:
     for name, word in COMPRESSED.items():
         if name in glb.list("extensionsRequired"):
             raise InputError(
-                f"{path}: is compressed by {word}, expected a plain GLB: export it without compression"
+                f"{path}: is compressed by {word}, expected a plain GLB: export it without "
+                "compression"
             )
     places = glb.placed()
     pieces = []

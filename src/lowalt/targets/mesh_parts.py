@@ -130,7 +130,8 @@ def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) 
         smaller = min(int(left.sum()), int(right.sum()))
         if shared > SHARED_LIMIT * smaller:
             raise InputError(
-                f"{where}: the regions of parts {first!r} and {second!r} take the same surface ({shared} "
+                f"{where}: the regions of parts {first!r} and {second!r} take the same surface "
+                f"({shared} "
                 f"of {smaller} samples), expected disjoint regions"
             )
 
@@ -195,7 +196,8 @@ def cut_parts(
                 for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
             )
             raise InputError(
-                f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface, which "
+                f"{where}: parts.{name}.region holds nothing of the body, expected a part of its "
+                "surface, which "
                 f"reaches from {low} to {high} m; is the unit {record['unit']!r} right?"
             )
     for region in record["drop"]:

@@ -63,12 +63,14 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
             way = ("right", "front", "up")[int(np.abs(pool.axis).argmax())]
             along = np.round(np.abs(pool.axis), 3).tolist()
             return (
-                f"axle points {way}, {along} (right, front, up), expected right or left: is `front` (--front) or "
+                f"axle points {way}, {along} (right, front, up), expected right or left: is "
+                "`front` (--front) or "
                 "`up` (--up) another axis, or is it no wheel that rolls?"
             )
         if middle[2] > (below + above) / 2:
             return (
-                f"centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
+                f"centre lies {middle[2] - below:.3g} m above the lowest point of a body "
+                f"{above - below:.3g} m "
                 "high, expected the lower half: is `up` (--up) reversed?"
             )
         # Twin wheels on one axle are wider than high, but round about it.
@@ -76,7 +78,8 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
             length, height
         ):
             return (
-                f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m across, expected "
+                f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m "
+                "across, expected "
                 "a wheel that is thinnest along its axle"
             )
     elif kind == "rotor":
@@ -84,7 +87,8 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
         away = float(np.linalg.norm(middle - pool.hinge))
         if away > OFF_HUB * reach:
             return (
-                f"hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
+                f"hinge lies {away:.3g} m from the middle of its surface, which reaches "
+                f"{reach:.3g} m, expected "
                 "the hub"
             )
     else:
@@ -93,7 +97,8 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
         )
         if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
             return (
-                f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected "
+                f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's "
+                "middle, expected "
                 "the hinge between body and wing"
             )
     return ""
@@ -136,8 +141,10 @@ def refuse_span(parts: dict[str, Pool], where: str) -> None:
     span, length, _ = high - low
     if not SPANS[0] <= span / length <= SPANS[1]:
         raise InputError(
-            f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to tail, "
-            f"expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or `up` (--up) "
+            f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to "
+            "tail, "
+            f"expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or `up` "
+            "(--up) "
             "another axis?"
         )
 
@@ -206,16 +213,27 @@ def _refuse_size(
     )
     best = min(off, key=off.get, default="")
     if best and off[best] <= np.log(limit):
-        way = f"write `unit: {best}` (--unit {best}), with which it measures {numbers * UNITS_M[best]:.4g} m"
+        way = (
+            f"write `unit: {best}` (--unit {best}), with which it measures "
+            f"{numbers * UNITS_M[best]:.4g} m"
+        )
     else:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
         own = f"`row: {{{key}: {row_m or size_m:.4g}}}`"
-        fitting = f"`unit: {metres(unit) * wanted_m / max(size_m, 1e-12):.4g}` (metres for 1.0 in the file)"
+        fitting = (
+            f"`unit: {metres(unit) * wanted_m / max(size_m, 1e-12):.4g}` (metres for 1.0 in the "
+            "file)"
+        )
         size = f"`lowalt target new --size {whole_m * wanted_m / max(size_m, 1e-12):.4g}`"
-        way = f"no unit fits: write {fitting} or draft it with {size}, or give it a row with its own size, {own}"
+        way = (
+            f"no unit fits: write {fitting} or draft it with {size}, or give it a row with its own "
+            f"size, {own}"
+        )
     raise InputError(
-        f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
-        f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit {unit!r} right? {way}"
+        f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is "
+        "published: "
+        f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit "
+        f"{unit!r} right? {way}"
     )
 
 
@@ -267,7 +285,8 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
         largest = float(np.ptp(pool.points, axis=0).max())
         if kinds[name] != "body" and largest < whole / SMALLEST_PART:
             raise InputError(
-                f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, expected at "
+                f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, "
+                "expected at "
                 f"least 1/{SMALLEST_PART} of it; is the unit of its file right?"
             )
     ratio = wanted / size
@@ -318,7 +337,8 @@ def sized(
         diameter = 2 * _turned_radius(result[name]) if kinds[name] == "rotor" else np.inf
         if diameter < SMALLEST_ROTOR_M:
             raise InputError(
-                f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the final size, "
+                f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the "
+                "final size, "
                 f"expected at least {SMALLEST_ROTOR_M} m"
             )
     low, high = _bounds(result)

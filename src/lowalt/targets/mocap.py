@@ -43,7 +43,8 @@ def check_record(merged: dict, where: str) -> dict:
         raise InputError(f"{where}: skeleton is missing, expected the .asf of {merged['motion']}")
     if like(merged) != "Pedestrian":
         raise InputError(
-            f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or mesh"
+            f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or "
+            "mesh"
         )
     defaults = {
         "first_frame": 1,
@@ -108,8 +109,10 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
     start, end, fade, mismatch = mocap_motion.find_cycle(motion)
     if mismatch > record["max_mismatch_m"]:
         raise InputError(
-            f"{where}: the best cycle, frames {first + start} to {first + end - 1}, closes to {mismatch:.3f} m "
-            f"(root mean square over the nodes), expected at most max_mismatch_m = {record['max_mismatch_m']} m: "
+            f"{where}: the best cycle, frames {first + start} to {first + end - 1}, closes to "
+            f"{mismatch:.3f} m "
+            "(root mean square over the nodes), expected at most max_mismatch_m = "
+            f"{record['max_mismatch_m']} m: "
             "choose first_frame and last_frame around a steady gait"
         )
     cycle, drift = mocap_motion.closed(motion, start, end, fade)
@@ -131,7 +134,10 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
             track, motion.rate_hz, speed * scale, stature * scale, where
         )
     if len(motion.root_m) > LONG * (end - start):
-        text = f"{where}: of {len(motion.root_m)} frames {first + start} to {first + end - 1} are used, which close best"
+        text = (
+            f"{where}: of {len(motion.root_m)} frames {first + start} to {first + end - 1} are "
+            "used, which close best"
+        )
         warn(f"{text}; first_frame and last_frame choose others")
     sums = {name: sha256(path) for name, path in zip(record_files(record), paths, strict=True)}
     facts = {

@@ -121,7 +121,8 @@ def read_skeleton(path: str | Path) -> Skeleton:
     }
     if wrong or len(dofs["root"]) != 6 or any(fixed):
         raise InputError(
-            f"{path}: root order, offset or dof not as in CMU's files ({wrong or fixed or dofs['root']})"
+            f"{path}: root order, offset or dof not as in CMU's files "
+            f"({wrong or fixed or dofs['root']})"
         )
     if not (np.isfinite(bones).all() and np.isfinite(axes).all() and 0 < unit_m < math.inf):
         raise InputError(f"{path}: a length, direction or axis is not finite")
@@ -221,12 +222,14 @@ def read_motion(
     empty = first + np.flatnonzero(~motion["root"].any(axis=1))
     if len(empty):
         raise InputError(
-            f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by first_frame)"
+            f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by "
+            "first_frame)"
         )
     still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
         raise InputError(
-            f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not frozen"
+            f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not "
+            "frozen"
         )
     return motion, first

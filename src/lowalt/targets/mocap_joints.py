@@ -86,7 +86,8 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
                 return known[side, word]
         side = {"l": "left ", "r": "right "}.get(side, "")
         raise InputError(
-            f"{where}: no joint is called a {side}{part}, expected {NAMES[part].split()} among {sorted(joints)[:40]}"
+            f"{where}: no joint is called a {side}{part}, expected {NAMES[part].split()} among "
+            f"{sorted(joints)[:40]}"
         )
 
     places = {"root": joints[joint("root")]}
@@ -134,7 +135,8 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
     """
     if not np.isfinite(nodes).all() or len(nodes) < 2 or np.abs(nodes).max() > 1e6:
         raise InputError(
-            f"{where}: {len(nodes)} frames with places that are not finite, expected two good ones or more"
+            f"{where}: {len(nodes)} frames with places that are not finite, expected two good ones "
+            "or more"
         )
     reach = np.mean(nodes[:, NODES.index("head")] - nodes[:, NODES.index("ltibia")], axis=0)
     axis = int(np.abs(reach).argmax())
@@ -259,7 +261,8 @@ def read_joints(path: str | Path) -> tuple[dict[str, np.ndarray], float | None]:
             ]
             if "joints" not in data.files:
                 raise ValueError(
-                    f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body model makes "
+                    f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body "
+                    "model makes "
                     "them of poses"
                 )
             places = np.asarray(data["joints"], float)

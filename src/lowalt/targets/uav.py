@@ -32,7 +32,10 @@ def fault(record: dict) -> str | None:
     gap = portable.norm(places - np.roll(places, 1, 0)).min()
     diameter = figures["propeller_diameter"]
     if diameter >= gap:
-        return f"figures.propeller_diameter is {diameter:.4g} m, expected less than the {gap:.4g} m between motors"
+        return (
+            f"figures.propeller_diameter is {diameter:.4g} m, expected less than the {gap:.4g} m "
+            "between motors"
+        )
     return None
 
 

@@ -24,7 +24,10 @@ def fault(record: dict) -> str | None:
     table = record["published"]
     axle = f["front_overhang"] + f["wheel_base"]
     if axle >= table["len_m"]:
-        return f"figures front_overhang + wheel_base are {axle:.4g} m, expected less than the {table['len_m']} m length"
+        return (
+            f"figures front_overhang + wheel_base are {axle:.4g} m, expected less than the "
+            f"{table['len_m']} m length"
+        )
     if f["track"] >= table["wid_m"]:
         return (
             f"figures.track is {f['track']:.4g} m, expected less than the {table['wid_m']} m width"
@@ -38,10 +41,16 @@ def _profile_fault(f: dict, table: dict) -> str | None:
         f[name] for name in ("windshield_base", "roof_front", "roof_rear", "rear_glass_base")
     ]
     if not 0.18 < stations[0] < stations[1] < stations[2] < stations[3] < 1:
-        return f"figures windshield_base to rear_glass_base are {stations}, expected rising from 0.18 to 1"
+        return (
+            f"figures windshield_base to rear_glass_base are {stations}, expected rising from 0.18 "
+            "to 1"
+        )
     heights = [f["ground_clearance"] / table["hgt_m"], f["hood_height"], f["belt_height"]]
     if not heights[0] < heights[1] <= heights[2] < 1 or not heights[0] < f["deck_height"] < 1:
-        return f"figures ground_clearance, hood and belt are {heights} of the height, expected rising and below 1"
+        return (
+            f"figures ground_clearance, hood and belt are {heights} of the height, expected rising "
+            "and below 1"
+        )
     return None
 
 
