@@ -83,8 +83,7 @@ def echo_signal(
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
             f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 "
-            f"promises {bound:.1e} "
-            f"of its largest value, expected a larger tolerance or null"
+            f"promises {bound:.1e} of its largest value, expected a larger tolerance or null"
         )
     return EchoResult(
         found.values, found.cells, int(found.ties.sum()), bound, method, found.gaps, found.totals
@@ -136,8 +135,7 @@ def prepared(network, station, motion, rcs_m2, aim_m, sample):
     if station.transmitter is not None:
         raise InputError(
             f"{_named(sample)}station {station.name} is a link between two stations, expected a "
-            "station that hears "
-            "itself; scenes with effects.direct_path have links"
+            "station that hears itself; scenes with effects.direct_path have links"
         )
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
     radio = radar(network, station)
@@ -153,6 +151,5 @@ def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> 
         n, l = divmod(fault - 1, points)  # noqa: E741
         raise InputError(
             f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the "
-            "place of station "
-            f"{station.name} (r = 0), expected r > 0"
+            f"place of station {station.name} (r = 0), expected r > 0"
         )

@@ -29,8 +29,7 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
     if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
         raise InputError(
             f"motion: region polygon has shape {corners.shape}, expected three or more (x, y) "
-            "corners in metres; "
-            "with fewer than three stations give motion.region.polygon_m"
+            "corners in metres; with fewer than three stations give motion.region.polygon_m"
         )
     try:
         hull = ConvexHull(corners).vertices

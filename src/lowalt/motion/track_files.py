@@ -50,8 +50,8 @@ def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStart
         x, y, _ = place_m[outside[0]]
         raise InputError(
             f"{path}: {outside[0] * look_s:g} s after its start at ({x:.1f}, {y:.1f}) m, outside "
-            "the cell; expected a "
-            f"place in motion.region, at least {cell.clearance_m:g} m from all stations"
+            f"the cell; expected a place in motion.region, at least {cell.clearance_m:g} m from "
+            "all stations"
         )
     return LookStarts(place_m, velocity_mps, _headings(velocity_mps))
 
@@ -63,8 +63,7 @@ def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
     if len(rows) < 2 or not set(named) <= set(rows[0]):
         raise InputError(
             f"{path}: {len(rows)} rows of the columns {list(rows[0]) if rows else []}, expected "
-            "two or more of "
-            f"{list(METRES)} or {list(DEGREES)}"
+            f"two or more of {list(METRES)} or {list(DEGREES)}"
         )
     values = np.array(
         [
@@ -77,8 +76,7 @@ def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
         line = int(back[0])
         raise InputError(
             f"{path}, line {line + 3}, column time_s: {values[line + 1, 0]:g} after "
-            f"{values[line, 0]:g}, expected "
-            "times that increase"
+            f"{values[line, 0]:g}, expected times that increase"
         )
     return values[:, 0], values[:, 1:] if named == METRES else _flat(
         values[:, 1:], cell.corners.mean(axis=0)

@@ -113,8 +113,8 @@ class Machine:
         if layers and not self.gpu:
             raise InputError(
                 f"training: {self.ranks} processes on processors share no batch norm, and the "
-                "backbone has "
-                f"{layers[0]}; expected GPUs, one process, or a backbone without batch norm"
+                f"backbone has {layers[0]}; expected GPUs, one process, or a backbone without "
+                "batch norm"
             )
         return timm.layers.convert_sync_batchnorm(model)
 
@@ -136,10 +136,9 @@ class Machine:
         if int(bounds.sum()):
             raise InputError(
                 f"training: rank {self.rank} computes in {self.precision} and stands at step "
-                f"{steps}, another rank "
-                "differs in that or in its samples; expected identical nodes that see the same "
-                "files (with an "
-                "explicit training.precision instead of auto, different nodes compute alike)"
+                f"{steps}, another rank differs in that or in its samples; expected identical "
+                "nodes that see the same files (with an explicit training.precision instead of "
+                "auto, different nodes compute alike)"
             )
 
 

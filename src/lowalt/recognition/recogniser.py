@@ -176,8 +176,8 @@ def checkpoint_activations(model: Recogniser) -> None:
     ):
         raise InputError(
             f"training.activation_checkpointing: the backbone {name} has batch norms, whose "
-            "running means would move "
-            "twice a step; expected a backbone without, such as Swin, ConvNeXt or ViT"
+            "running means would move twice a step; expected a backbone without, such as Swin, "
+            "ConvNeXt or ViT"
         )
     try:
         model.backbone.set_grad_checkpointing(True)

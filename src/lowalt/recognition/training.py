@@ -345,12 +345,10 @@ class Trainer:
         if self.metrics:
             self.metrics(row["step"], {name: row[name] for name in HISTORY[3:]} | pace)
         print(
-            f"step {row['step']}/{self.block['steps']} loss {row['train_loss']:.4f} "
-            f"validation {100 * row['validation_accuracy']:.2f} % (loss "
-            f"{row['validation_loss']:.4f}) "
+            f"step {row['step']}/{self.block['steps']} loss {row['train_loss']:.4f} validation "
+            f"{100 * row['validation_accuracy']:.2f} % (loss {row['validation_loss']:.4f}) "
             f"{pace['samples_per_s']:.0f} samples/s, {100 * pace['waiting_share']:.1f} % of the "
-            "time waiting for data, "
-            f"{left:.0f} s left",
+            f"time waiting for data, {left:.0f} s left",
             file=sys.stderr,
             flush=True,
         )

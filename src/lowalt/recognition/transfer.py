@@ -56,9 +56,8 @@ def check_folds(own: dict, other: dict) -> None:
     if own["seed"] == other["seed"] and own["split"] != other["split"]:
         raise InputError(
             f"transfer: run {other['run']!r} has the same seed {own['seed']} and split "
-            f"{other['split']}, this run has "
-            f"{own['split']}; motion models tested here may have trained there. Expected equal "
-            "splits"
+            f"{other['split']}, this run has {own['split']}; motion models tested here may have "
+            "trained there. Expected equal splits"
         )
 
 

@@ -118,8 +118,8 @@ def kept(
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
             f"--model: 8 bits fall from {measured['exact_percent']:.2f} to "
-            f"{measured['percent']:.2f} % of the "
-            f"validation fold, expected at most {FEWER_POINTS} points less"
+            f"{measured['percent']:.2f} % of the validation fold, expected at most {FEWER_POINTS} "
+            "points less"
         )
     reduced = replace(reduced, measured=measured)
     out = zoo / f"{name}.safetensors"
@@ -157,9 +157,8 @@ def main(arguments: list[str]) -> None:
     print(
         f"{options.name}: "
         f"{(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, "
-        "validation "
-        f"{measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in 8 bits, "
-        f"{measured['changed']} of {measured['samples']} answers differ"
+        f"validation {measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in "
+        f"8 bits, {measured['changed']} of {measured['samples']} answers differ"
     )
 
 

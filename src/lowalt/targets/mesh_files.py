@@ -137,8 +137,7 @@ def _refuse_truncated(path: Path) -> None:
     if not is_text and len(head) >= 84 and there < stated:
         raise InputError(
             f"{path}: the header states {stated} triangles and the file ends after {there}, "
-            "expected the "
-            "whole file: copy or export it again"
+            "expected the whole file: copy or export it again"
         )
 
 
@@ -203,8 +202,8 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
     except ImportError as error:
         raise InputError(
             f"mesh records need pymeshlab, which does not load here ({error}); on a machine "
-            "without a display install "
-            "the system's OpenGL libraries (Debian: libgl1 libopengl0), or use built-in records"
+            "without a display install the system's OpenGL libraries (Debian: libgl1 libopengl0), "
+            "or use built-in records"
         ) from None
     vertices, faces = _merged(vertices, faces)
     meshes = pymeshlab.MeshSet(verbose=False)

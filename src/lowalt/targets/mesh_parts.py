@@ -131,8 +131,7 @@ def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) 
         if shared > SHARED_LIMIT * smaller:
             raise InputError(
                 f"{where}: the regions of parts {first!r} and {second!r} take the same surface "
-                f"({shared} "
-                f"of {smaller} samples), expected disjoint regions"
+                f"({shared} of {smaller} samples), expected disjoint regions"
             )
 
 
@@ -197,8 +196,8 @@ def cut_parts(
             )
             raise InputError(
                 f"{where}: parts.{name}.region holds nothing of the body, expected a part of its "
-                "surface, which "
-                f"reaches from {low} to {high} m; is the unit {record['unit']!r} right?"
+                f"surface, which reaches from {low} to {high} m; is the unit {record['unit']!r} "
+                "right?"
             )
     for region in record["drop"]:
         body = body.picked(~taken(body, mesh, region))

@@ -64,14 +64,12 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
             along = np.round(np.abs(pool.axis), 3).tolist()
             return (
                 f"axle points {way}, {along} (right, front, up), expected right or left: is "
-                "`front` (--front) or "
-                "`up` (--up) another axis, or is it no wheel that rolls?"
+                "`front` (--front) or `up` (--up) another axis, or is it no wheel that rolls?"
             )
         if middle[2] > (below + above) / 2:
             return (
                 f"centre lies {middle[2] - below:.3g} m above the lowest point of a body "
-                f"{above - below:.3g} m "
-                "high, expected the lower half: is `up` (--up) reversed?"
+                f"{above - below:.3g} m high, expected the lower half: is `up` (--up) reversed?"
             )
         # Twin wheels on one axle are wider than high, but round about it.
         if width > ROUND * min(length, height) and max(length, height) > ROUND * min(
@@ -79,8 +77,7 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
         ):
             return (
                 f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m "
-                "across, expected "
-                "a wheel that is thinnest along its axle"
+                "across, expected a wheel that is thinnest along its axle"
             )
     elif kind == "rotor":
         reach = float((high - low).max())
@@ -88,8 +85,7 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
         if away > OFF_HUB * reach:
             return (
                 f"hinge lies {away:.3g} m from the middle of its surface, which reaches "
-                f"{reach:.3g} m, expected "
-                "the hub"
+                f"{reach:.3g} m, expected the hub"
             )
     else:
         hinge, centre = (
@@ -98,8 +94,7 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
         if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
             return (
                 f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's "
-                "middle, expected "
-                "the hinge between body and wing"
+                "middle, expected the hinge between body and wing"
             )
     return ""
 
@@ -142,10 +137,8 @@ def refuse_span(parts: dict[str, Pool], where: str) -> None:
     if not SPANS[0] <= span / length <= SPANS[1]:
         raise InputError(
             f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to "
-            "tail, "
-            f"expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or `up` "
-            "(--up) "
-            "another axis?"
+            f"tail, expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or "
+            "`up` (--up) another axis?"
         )
 
 
@@ -231,9 +224,8 @@ def _refuse_size(
         )
     raise InputError(
         f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is "
-        "published: "
-        f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit "
-        f"{unit!r} right? {way}"
+        f"published: {max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the "
+        f"unit {unit!r} right? {way}"
     )
 
 
@@ -286,8 +278,7 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
         if kinds[name] != "body" and largest < whole / SMALLEST_PART:
             raise InputError(
                 f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, "
-                "expected at "
-                f"least 1/{SMALLEST_PART} of it; is the unit of its file right?"
+                f"expected at least 1/{SMALLEST_PART} of it; is the unit of its file right?"
             )
     ratio = wanted / size
     scale = {"published": ratio, "uniform": np.full(3, ratio[1]), "none": np.ones(3)}[
@@ -338,8 +329,7 @@ def sized(
         if diameter < SMALLEST_ROTOR_M:
             raise InputError(
                 f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the "
-                "final size, "
-                f"expected at least {SMALLEST_ROTOR_M} m"
+                f"final size, expected at least {SMALLEST_ROTOR_M} m"
             )
     low, high = _bounds(result)
     middle = (low + high) / 2

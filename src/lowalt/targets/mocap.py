@@ -110,10 +110,9 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
     if mismatch > record["max_mismatch_m"]:
         raise InputError(
             f"{where}: the best cycle, frames {first + start} to {first + end - 1}, closes to "
-            f"{mismatch:.3f} m "
-            "(root mean square over the nodes), expected at most max_mismatch_m = "
-            f"{record['max_mismatch_m']} m: "
-            "choose first_frame and last_frame around a steady gait"
+            f"{mismatch:.3f} m (root mean square over the nodes), expected at most max_mismatch_m "
+            f"= {record['max_mismatch_m']} m: choose first_frame and last_frame around a steady "
+            "gait"
         )
     cycle, drift = mocap_motion.closed(motion, start, end, fade)
     looped = mocap_motion.nodes_m(cycle)

@@ -262,8 +262,7 @@ def read_joints(path: str | Path) -> tuple[dict[str, np.ndarray], float | None]:
             if "joints" not in data.files:
                 raise ValueError(
                     f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body "
-                    "model makes "
-                    "them of poses"
+                    "model makes them of poses"
                 )
             places = np.asarray(data["joints"], float)
             names = [str(name) for name in data["names"]] if "names" in data.files else SMPL

@@ -155,8 +155,7 @@ def joint(
     if not ((flat < upper_m + lower_m).all() and (flat > abs(upper_m - lower_m)).all()):
         raise InputError(
             f"limb: ends are {flat.min():.3g} to {flat.max():.3g} m apart, expected what bones of "
-            f"{upper_m:.3g} and "
-            f"{lower_m:.3g} m reach"
+            f"{upper_m:.3g} and {lower_m:.3g} m reach"
         )
     along = (upper_m**2 - lower_m**2 + flat**2) / (2 * flat)
     across = np.sqrt(upper_m**2 - along**2)
