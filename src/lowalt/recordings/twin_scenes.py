@@ -1,10 +1,12 @@
 """Scenes of a twin: targets in front of the radar and their courses, drawn from the ranges of a configuration.
 
-A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene (`scene` in brought.schema.yaml):
+A value of a scene is a number, [low, high] for a uniform draw, or [a, b, c, ...] for one whose stretches a to b, b to
+c and so on are equally probable. Keys of a scene (`scene` in brought.schema.yaml):
     subtypes       names of targets, one drawn per sample
     course         hover | pass | to_and_fro, and the course's own keys:
                    hover: distance_m, height_m, sway_m, sway_hz, rock_deg
-                   pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol)
+                   pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol);
+                   acceleration_mps2 and curve_per_m (one over the radius of a bend), both or neither
                    to_and_fro: near_m, far_m, height_m, speed_mps, turn_s
     rate_hz        of rotors or wings (optional: the target's own); wheels roll with the speed
     spread, wander of the rotors' rates, as the effect `rotor_spread` has them (both optional)
@@ -14,7 +16,8 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     foils          patterns of foil, one drawn per sample (optional)
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
-    second         share of samples with a second target of the same scene, and its level_db (optional)
+    second         share of samples with a second target, its level_db, and its scene (optional; the same scene)
+    rate_error     of the receiver's clock (optional)
     receiver       settings of `twin_receiver.Receiver` that differ from those of the radar (optional)
 """
 
@@ -35,7 +38,7 @@ from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
 from lowalt.recordings.twin import RADARS, Twin, records, twin_of
-from lowalt.recordings.twin_courses import Course, hover, straight, to_and_fro
+from lowalt.recordings.twin_courses import Course, drive, hover, straight, to_and_fro
 from lowalt.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
 from lowalt.recordings.twin_receiver import Receiver, received
 from lowalt.targets.cloud import Cloud
@@ -47,12 +50,14 @@ MARGIN = 40
 
 
 def value(setting: float | list[float], rng: np.random.Generator) -> float:
-    """Return a setting's value: the number, or a uniform draw between the two of a list.
+    """Return a setting's value: the number, or a draw from the stretches between the numbers of a list, which are
+    equally probable; uniform within each.
 
     Raises: InputError for anything else.
     """
-    if isinstance(setting, list) and len(setting) == 2 and all(isinstance(end, (int, float)) for end in setting):
-        return float(rng.uniform(*setting))
+    if isinstance(setting, list) and len(setting) >= 2 and all(isinstance(end, (int, float)) for end in setting):
+        first = int(rng.integers(len(setting) - 1)) if len(setting) > 2 else 0
+        return float(rng.uniform(setting[first], setting[first + 1]))
     if isinstance(setting, bool) or not isinstance(setting, (int, float)):
         raise InputError(f"scene: value is {setting!r}, expected a number or [low, high]")
     return float(setting)
@@ -83,11 +88,31 @@ def _course(scene: dict, cloud: Cloud, times_s: np.ndarray, rng: np.random.Gener
         return hover(times_s, place, heading, drawn("sway_m"), drawn("sway_hz"), rock, rng), 0.0
     if kind == "pass":
         place, speed = np.array([drawn("lateral_m"), drawn("ahead_m"), drawn("height_m")]), drawn("speed_mps")
+        if "acceleration_mps2" in scene:
+            return _driven(place, speed, drawn("acceleration_mps2"), drawn("curve_per_m"), cloud, times_s)
         return straight(times_s, place, abs(speed), 0.0 if speed > 0 else math.pi), abs(speed)
     if kind == "to_and_fro":
         walk = [drawn(name) for name in ("near_m", "far_m", "speed_mps", "turn_s")]
         return to_and_fro(times_s, *walk, cloud.record["track_speed_mps"], 0.0, drawn("height_m")), walk[2]
     raise InputError(f"scene: course is {kind!r}, expected hover, pass or to_and_fro")
+
+
+def _driven(
+    place_m: np.ndarray, speed_mps: float, acceleration_mps2: float, curve_per_m: float, cloud: Cloud,
+    times_s: np.ndarray,
+) -> tuple[Course, float]:  # fmt: skip
+    """The course of `drive`, and the speed (m/s) at which its clock runs as fast as time.
+
+    Wheels and limbs follow the way; rotors and wings do not.
+    """
+    own_mps = 1.0
+    if "node" in cloud.kinds:
+        own_mps = cloud.record["track_speed_mps"]
+    yaw = 0.0 if speed_mps > 0 else math.pi
+    course = drive(times_s, place_m, abs(speed_mps), yaw, acceleration_mps2, curve_per_m, own_mps)
+    if cloud.like in AIRBORNE:
+        course = course._replace(clock_s=times_s)
+    return course, own_mps
 
 
 def _rate(scene: dict, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
@@ -112,7 +137,7 @@ def heard(
     """
     signal, name = _of_one_target(twin, scene, clouds, rng, seconds)
     if "second" in scene and rng.uniform() < scene["second"]["share"]:
-        second, _ = _of_one_target(twin, scene, clouds, rng, seconds)
+        second, _ = _of_one_target(twin, scene["second"].get("scene", scene), clouds, rng, seconds)
         level = 10 ** (value(scene["second"]["level_db"], rng) / 20)
         signal = signal + level * rms(signal) / max(rms(second), 1e-300) * second
     return signal, name
@@ -136,6 +161,8 @@ def _of_one_target(
         cloud = textured(cloud, *(value(scene.get(key, 0.0), rng) for key in ("texture_db", "tip")), rng)
         margin = 2 * MARGIN * twin.symbol_interval_s
         times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz
+        if "rate_error" in scene:
+            times *= 1 + value(scene["rate_error"], rng)
         times += value(scene.get("start_s", 0.0), rng)
         course, speed = _course(scene, cloud, times, rng)
         row = still_row(cloud, _rate(scene, cloud, speed, rng), rng)
@@ -168,12 +195,14 @@ def stretch(values: np.ndarray, twin: Twin, seconds: float) -> np.ndarray:
 
 
 REDRAWS = 8
-"""Largest number of receivers drawn for one echo until its target is above the noise. The last one is kept anyway."""
+"""Largest number of receivers drawn for one echo, and of echoes drawn for a window, until its target is above the
+noise. The last one is kept anyway."""
 
 
-def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np.ndarray:
-    """Return the coherent interval (symbols,) of an echo at a receiver. Where targets move, so that they are not heard
-    all the time, it is drawn again while no target is present."""
+def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> tuple[np.ndarray, bool]:
+    """Return the coherent interval (symbols,) of an echo at a receiver, and whether its target stands above the noise.
+
+    Where targets move, so that they are not heard all the time, it is drawn again while no target is present."""
     seconds = twin.symbols * twin.symbol_interval_s
     for redraw in range(REDRAWS):
         both = []
@@ -181,8 +210,8 @@ def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np
             values = samples(twin, receiver, signal, stream(*keys, redraw), target)
             both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow))
         if not twin.slowest_mps or present(both[0], twin, both[-1]).all():
-            break
-    return both[0][0]
+            return both[0][0], True
+    return both[0][0], False
 
 
 def intervals(
@@ -192,15 +221,23 @@ def intervals(
 
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from the scene's ranges.
     As with recordings, a window counts if its target stands above the noise (`presence.present`); a hovering target
-    counts at any SNR.
+    counts at any SNR. A scene whose target no receiver hears, such as a car that stands, is drawn again.
     """
     seconds = twin.symbols * twin.symbol_interval_s
     result, names = np.empty((count, receivers, twin.symbols), np.complex128), []
     for number in reported(range(count), count, "scenes"):
-        signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
-        for again in range(receivers):
-            receiver_keys = (seed, "twin-receiver", *keys, number, again)
-            result[number, again] = _interval(twin, scene["receiver"], signal, receiver_keys)
+        for again in range(REDRAWS):
+            which = (number, again) if again else (number,)
+            signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, *which), seconds)
+            heard_by_all = True
+            for receiver in range(receivers):
+                receiver_keys = (seed, "twin-receiver", *keys, *which, receiver)
+                result[number, receiver], found = _interval(twin, scene["receiver"], signal, receiver_keys)
+                heard_by_all = heard_by_all and found
+                if not found and again + 1 < REDRAWS and twin.slowest_mps:
+                    break
+            if heard_by_all:
+                break
         names.append(name)
     return result, names
 
@@ -215,6 +252,8 @@ def _placed(scene: dict, said: dict) -> dict:
     """A usual scene with the distances, heights and beam of a record's block `twin`."""
     near, far = said["distance_m"]
     scene = {**scene, "height_m": said["height_m"]}
+    if "scene" in scene.get("second", {}):
+        scene["second"] = {**scene["second"], "scene": _placed(scene["second"]["scene"], said)}
     scene["beam"] = {"width_deg": said["beam_deg"], "floor_db": -20.0}
     if scene["course"] == "hover":
         scene["distance_m"] = [near, far]
@@ -226,12 +265,17 @@ def _placed(scene: dict, said: dict) -> dict:
     return scene
 
 
-def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, list[dict]]:
+def scenes_of(record: Record, twin: Twin, snr_db: list[float], usual: dict) -> dict[str, list[dict]]:
     """Return the scenes of each category of a record, their receivers filled in.
 
-    snr_db: range of SNR (dB); usual: the content of `SCENES`, for whatever the record's block `twin` does not say.
+    snr_db: range of SNR (dB); usual: the content of `SCENES`, for whatever the record's block `twin` does not say; its
+    block `moving` is for radars in front of which targets move.
     """
     said = record.twin or {}
+    if twin.slowest_mps:
+        moving = usual["moving"]
+        scenes = {label: [moving["common"][label] | scene for scene in part] for label, part in moving["scenes"].items()}
+        usual = {"receiver": moving["receiver"], "scenes": scenes}
     receiver = usual["receiver"] | said.get("receiver", {}) | {"snr_db": snr_db}
     # Values are drawn in this order, whatever the order of the files is.
     receiver = {key: receiver[key] for key in Receiver.__dataclass_fields__ if key in receiver}
@@ -267,7 +311,7 @@ class Library:
         own = dict.fromkeys(name for about, *_ in radars.values() for name in (about.twin or {}).get("targets", []))
         table, records = usual["targets"]["table"], usual["targets"]["records"]
         known = load_records(shipped(table), [*map(shipped, records), *own])
-        scenes = {name: scenes_of(about, snr_db, usual) for name, (about, _, snr_db) in radars.items()}
+        scenes = {name: scenes_of(about, twin, snr_db, usual) for name, (about, twin, snr_db) in radars.items()}
         return cls(int(usual["seed"]), {name: twin for name, (_, twin, _) in radars.items()}, scenes, known)
 
     @classmethod
@@ -290,7 +334,8 @@ class Library:
         equal scenes.
         """
         scenes = self.scenes[twin][category]
-        subtypes_of_all = dict.fromkeys(name for scene in scenes for name in scene["subtypes"])
+        seconds = [scene["second"]["scene"] for scene in scenes if "scene" in scene.get("second", {})]
+        subtypes_of_all = dict.fromkeys(name for scene in [*scenes, *seconds] for name in scene["subtypes"])
         clouds = clouds_of(self.records, list(subtypes_of_all), self.seed)
         parts, names = [], []
         for number, scene in enumerate(scenes):
