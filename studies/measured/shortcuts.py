@@ -4,8 +4,9 @@
 
 Of windows that networks learn from, measured-shortcuts.csv says how well a linear classifier tells the classes by one
 number alone, in percent, the mean over the classes, cross-validated over scenes: `speed` of the strongest line (m/s),
-within the speeds that all classes share; `level` of the window (dB); `colour`, the slow noise between lines over the
-fast (dB); `hum`, the strongest line that is narrower than two cells over the floor (dB).
+within the speeds that all classes share; and of the same windows without their targets the `level` (dB), the `colour`,
+noise of the slowest third of the speeds over that of the fastest (dB), and the `hum`, the strongest narrow line over
+what is beside it (dB).
 """
 
 import argparse
@@ -27,18 +28,23 @@ SHARED = 0.025
 RECEIVERS, FOLDS = 2, 5
 
 
-def numbers_of(intervals: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:
-    """Return the numbers (n,) of intervals (n, symbols), by name."""
+def speed_mps(intervals: np.ndarray, twin: Twin) -> np.ndarray:
+    """Return the speed (n,) m/s of the strongest line of intervals (n, symbols)."""
     power, heard = heard_powers(intervals, twin)
-    kept = power[:, heard]
-    speeds = np.linspace(twin.slowest_mps, twin.fastest_mps, kept.shape[1])
+    speeds = np.linspace(twin.slowest_mps, twin.fastest_mps, int(heard.sum()))
+    return speeds[power[:, heard].argmax(axis=1)]
+
+
+def receiver_numbers(quiet: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:
+    """Return what receivers add to windows, (n,) dB by name, from intervals (n, symbols) without targets."""
+    power, heard = heard_powers(quiet, twin)
+    kept = np.maximum(power[:, heard], 1e-300)
     third = kept.shape[1] // 3
-    between = np.quantile(kept.reshape(len(kept), -1)[:, :third], 0.25, axis=1)
-    fast = np.quantile(kept[:, 2 * third :], 0.25, axis=1)
-    around = np.maximum(kept[:, :-4], kept[:, 4:])
-    narrow = (kept[:, 2:-2] / np.maximum(around, 1e-300)).max(axis=1)
-    decibels = {"level": kept.mean(axis=1), "colour": between / np.maximum(fast, 1e-300), "hum": narrow}
-    return {"speed": speeds[kept.argmax(axis=1)]} | {name: 10 * np.log10(one) for name, one in decibels.items()}
+    colour = np.median(kept[:, :third], axis=1) / np.median(kept[:, 2 * third :], axis=1)
+    beside = np.maximum(kept[:, :-8], kept[:, 8:])
+    hum = (kept[:, 4:-4] / beside).max(axis=1)
+    return {name: 10 * np.log10(ratio) for name, ratio in
+            {"level": kept.mean(axis=1), "colour": colour, "hum": hum}.items()}  # fmt: skip
 
 
 def told_percent(number: np.ndarray, labels: np.ndarray, scenes: np.ndarray) -> float:
@@ -57,8 +63,12 @@ def rows(name: str, library: Library, count: int) -> list[list]:
     parts = []
     labels = []
     for label, category in enumerate(library.scenes[name]):
-        intervals, _ = library.simulated(name, category, count, "shortcuts", RECEIVERS)
-        parts.append(numbers_of(intervals.reshape(-1, intervals.shape[-1]), library.twins[name]))
+        twin = library.twins[name]
+        windows, quiet = (
+            library.simulated(name, category, count, "shortcuts", RECEIVERS, without)[0].reshape(-1, twin.symbols)
+            for without in (False, True)
+        )
+        parts.append({"speed": speed_mps(windows, twin), **receiver_numbers(quiet, twin)})
         labels += [label] * count * RECEIVERS
     labels = np.array(labels)
     scenes = np.repeat(np.arange(len(labels) // RECEIVERS), RECEIVERS)

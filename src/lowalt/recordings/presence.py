@@ -8,7 +8,7 @@ its speeds, so its lines are compared with what lies between them.
 import math
 
 import numpy as np
-from scipy.ndimage import maximum_filter, median_filter
+from scipy.ndimage import maximum_filter, maximum_filter1d, median_filter
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.recordings.twin import Twin
@@ -28,6 +28,10 @@ PASSES = 10.0
 windows hold no line."""
 BEYOND_DB = 10.0
 """How far a line beyond the speeds that windows show must stand above all that they show: rotors' lines do by less."""
+STAYS_CELLS = 8
+"""Doppler cells by which interference beyond the speeds that windows show may drift to either side."""
+FEWEST_STAYS = 5
+"""Least number of windows with which such interference can be told from a fast target."""
 SLOW_CELLS = 4
 """Doppler cells about zero speed that hold slow noise and are no line beyond a window's speeds."""
 
@@ -124,7 +128,9 @@ def beyond_mps(values: np.ndarray, rate_hz: float, twin: Twin, count: int) -> np
     """Return the speed (count,) m/s of a line of each window that lies beyond the speeds that the twin's windows show,
     NaN where there is none.
 
-    values: samples (samples,) of a recording at `rate_hz`. The line stands `BEYOND_DB` above all that windows show.
+    values: samples (samples,) of a recording at `rate_hz`. The line stands `BEYOND_DB` above all that windows show. One
+    that stays in its place in nine tenths of `FEWEST_STAYS` windows or more is interference, such as a spur of the
+    receiver, and counts only where it stands as much above that, too.
     """
     long = twin.symbols * twin.symbol_interval_s * rate_hz
     length = min(math.floor(long), len(values))
@@ -133,7 +139,11 @@ def beyond_mps(values: np.ndarray, rate_hz: float, twin: Twin, count: int) -> np
     power = np.abs(np.fft.fft((cut - cut.mean(axis=1, keepdims=True)) * np.hanning(length), axis=1)) ** 2
     cells = np.abs(np.fft.fftfreq(length, 1 / length))
     speeds = cells * rate_hz / length * SPEED_OF_LIGHT / twin.carrier_hz / 2
+    level = 10 ** (BEYOND_DB / 10)
     outside = np.where(speeds > twin.fastest_mps, power, 0.0)
+    if count >= FEWEST_STAYS:
+        around = maximum_filter1d(outside, 2 * STAYS_CELLS + 1, axis=1, mode="constant")
+        outside[outside <= level * np.quantile(around, QUIET_SHARE, axis=0)] = 0.0
     shown = power[:, (speeds <= twin.fastest_mps) & (cells >= SLOW_CELLS)].max(axis=1)
-    far = outside.max(axis=1) > 10 ** (BEYOND_DB / 10) * shown
+    far = outside.max(axis=1) > level * shown
     return np.where(far, speeds[outside.argmax(axis=1)], np.nan)

@@ -24,6 +24,7 @@ c and so on are equally probable. Keys of a scene (`scene` in brought.schema.yam
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -199,25 +200,36 @@ REDRAWS = 8
 noise. The last one is kept anyway."""
 
 
-def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> tuple[np.ndarray, bool]:
-    """Return the coherent interval (symbols,) of an echo at a receiver, and whether its target stands above the noise.
+class Drawn(NamedTuple):
+    """A coherent interval (symbols,) of an echo at a receiver, the same without the echo where targets move, and
+    whether the target stands above the noise."""
 
-    Where targets move, so that they are not heard all the time, it is drawn again while no target is present."""
+    interval: np.ndarray
+    quiet: np.ndarray
+    found: bool
+
+
+def _drawn(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> Drawn:
+    """The interval of an echo at a receiver. Where targets move, so that they are not heard all the time, the receiver
+    is drawn again while no target is present."""
     seconds = twin.symbols * twin.symbol_interval_s
     for redraw in range(REDRAWS):
         both = []
         for target in (True, False) if twin.slowest_mps else (True,):
             values = samples(twin, receiver, signal, stream(*keys, redraw), target)
             both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow))
-        if not twin.slowest_mps or present(both[0], twin, both[-1]).all():
-            return both[0][0], True
-    return both[0][0], False
+        found = not twin.slowest_mps or bool(present(both[0], twin, both[-1]).all())
+        if found:
+            break
+    return Drawn(both[0][0], both[-1][0], found)
 
 
 def intervals(
-    twin: Twin, scene: dict, clouds: dict[str, Cloud], seed: int, keys: tuple, count: int, receivers: int = 1
-) -> tuple[np.ndarray, list[str]]:
-    """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
+    twin: Twin, scene: dict, clouds: dict[str, Cloud], seed: int, keys: tuple, count: int, receivers: int = 1,
+    quiet: bool = False,
+) -> tuple[np.ndarray, list[str]]:  # fmt: skip
+    """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count); quiet: the
+    same without the targets, where targets move.
 
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from the scene's ranges.
     As with recordings, a window counts if its target stands above the noise (`presence.present`); a hovering target
@@ -232,9 +244,10 @@ def intervals(
             heard_by_all = True
             for receiver in range(receivers):
                 receiver_keys = (seed, "twin-receiver", *keys, *which, receiver)
-                result[number, receiver], found = _interval(twin, scene["receiver"], signal, receiver_keys)
-                heard_by_all = heard_by_all and found
-                if not found and again + 1 < REDRAWS and twin.slowest_mps:
+                drawn = _drawn(twin, scene["receiver"], signal, receiver_keys)
+                result[number, receiver] = drawn.quiet if quiet else drawn.interval
+                heard_by_all = heard_by_all and drawn.found
+                if not drawn.found and again + 1 < REDRAWS and twin.slowest_mps:
                     break
             if heard_by_all:
                 break
@@ -327,11 +340,13 @@ class Library:
             radars[name] = about, twin_of(about, float(about.rate_hz or 0)), about.twin["snr_db"]
         return cls.of(radars)
 
-    def simulated(self, twin: str, category: str, count: int, purpose: str, receivers: int = 1):
+    def simulated(
+        self, twin: str, category: str, count: int, purpose: str, receivers: int = 1, quiet: bool = False
+    ) -> tuple[np.ndarray, list[str]]:
         """Return simulated intervals (count, receivers, symbols) of a category, and the names of their subtypes.
 
         The category's scenes share the `count` intervals evenly. `purpose` keys the random streams: equal purposes give
-        equal scenes.
+        equal scenes. quiet: the same intervals without their targets, as `intervals`.
         """
         scenes = self.scenes[twin][category]
         seconds = [scene["second"]["scene"] for scene in scenes if "scene" in scene.get("second", {})]
@@ -341,7 +356,7 @@ class Library:
         for number, scene in enumerate(scenes):
             share = len(range(number, count, len(scenes)))
             keys = (purpose, twin, category, number)
-            signals, subtypes = intervals(self.twins[twin], scene, clouds, self.seed, keys, share, receivers)
+            signals, subtypes = intervals(self.twins[twin], scene, clouds, self.seed, keys, share, receivers, quiet)
             parts.append(signals)
             names += subtypes
         return np.concatenate(parts), names
