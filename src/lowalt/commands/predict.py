@@ -75,16 +75,19 @@ def _recording(model: "Trained", settings: dict, record: "Record", options: argp
     from lowalt.recordings.answers import answers
 
     heard = answers(model, settings, record, str(options.input))
+    outcomes = heard.outcomes(list(model.classes))
     names = np.array(model.classes)[heard.probabilities.argmax(1)]
-    facts = zip(heard.starts_s.tolist(), heard.present.tolist(), heard.clipped.tolist(), heard.beyond_mps.tolist(),
-                names, heard.probabilities.tolist(), strict=True)  # fmt: skip
+    facts = zip(heard.starts_s.tolist(), heard.present.tolist(), heard.clipped.tolist(), heard.lost.tolist(),
+                heard.beyond_mps.tolist(), names, heard.probabilities.tolist(), strict=True)  # fmt: skip
     windows = [
-        {"start_s": start, "target": target, "clipped": clipped, "beyond_mps": None if beyond != beyond else beyond,
-         "class": str(name), **dict(zip(model.classes, shares, strict=True))}
-        for start, target, clipped, beyond, name, shares in facts
+        {"start_s": start, "target": target, "clipped": clipped, "lost": lost,
+         "beyond_mps": None if beyond != beyond else beyond, "class": str(name),
+         **dict(zip(model.classes, shares, strict=True))}
+        for start, target, clipped, lost, beyond, name, shares in facts
     ]  # fmt: skip
-    lines = [f"{start:8.2f} s  {heard.words(number, model.classes)}" for number, start in enumerate(heard.starts_s)]
-    counts = [f"{category} {int((names[heard.present] == category).sum())}" for category in model.classes]
+    lines = [f"{heard.starts_s[number]:8.2f} s  {heard.words(number, outcome)}"
+             for number, outcome in enumerate(outcomes)]  # fmt: skip
+    counts = [f"{category} {outcomes.count(category)}" for category in model.classes]
     last = f"{heard.present.sum()} of {len(names)} windows hold a target: {', '.join(counts)}"
     if not heard.present.any():
         last = f"nothing there: none of {len(names)} windows holds a target that this network could know"

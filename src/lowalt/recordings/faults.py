@@ -20,6 +20,10 @@ ROUND_STEPS = 2.5
 """Steps of the quantiser by which a smooth wave's top may fall to the next sample."""
 ROUND_RUN = 8
 """Times that a smooth wave may stay longer at its highest level than at the next."""
+LOST_RUN = 16
+"""Least number of exact zeros in a row that count as lost samples."""
+LOST_STEPS = 16
+"""Least ratio of a signal's median to its smallest value, both without zeros, at which zeros in a row are no rest."""
 MIRRORED = 0.9
 """Least correlation of a spectrum with its mirror about a quarter of the rate that shows I and Q in turn."""
 SAME_SHARE = 0.999
@@ -80,6 +84,24 @@ def _cut(values: np.ndarray) -> np.ndarray:
 def clipped(values: np.ndarray) -> np.ndarray:
     """Return which samples (samples,) of a recording, real or complex, the receiver has clipped, (samples,) bool."""
     return _cut(values.real) | _cut(values.imag) if np.iscomplexobj(values) else _cut(values)
+
+
+def lost(values: np.ndarray) -> np.ndarray:
+    """Return which samples (samples,) of a recording, real or complex, are lost packets, (samples,) bool: exact zeros
+    in a row, for longer than the signal itself stays at one value, between samples far from zero."""
+    zero = values == 0
+    if not zero.any() or zero.all():
+        return np.zeros(len(values), bool)
+    starts = np.flatnonzero(np.diff(zero, prepend=~zero[0]))
+    lengths = np.diff(starts, append=len(values))
+    runs = zero[starts]
+    size = np.abs(values)
+    step = size[~zero].min()
+    gaps = runs & (lengths >= LOST_RUN)
+    # A quiet channel of few steps rests at zero as well.
+    if np.median(size[~zero]) < LOST_STEPS * step:
+        return np.zeros(len(values), bool)
+    return np.repeat(gaps, lengths)
 
 
 def _mirrored(values: np.ndarray) -> float:

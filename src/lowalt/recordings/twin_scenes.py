@@ -41,6 +41,7 @@ from lowalt.recordings.record import Record
 from lowalt.recordings.twin import RADARS, Twin, records, twin_of
 from lowalt.recordings.twin_courses import Course, drive, hover, straight, to_and_fro
 from lowalt.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
+from lowalt.recordings.twin_others import KINDS, NO_CLASS, NOTHING, other_echo
 from lowalt.recordings.twin_receiver import Receiver, received
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
@@ -136,6 +137,10 @@ def heard(
     seconds: length without the margins. A second target, where the scene has one, drives at its own place and speed.
     Raises: InputError for a scene with a wrong key or value.
     """
+    if "others" in scene:
+        kind = scene["others"][int(rng.integers(len(scene["others"])))]
+        count = math.ceil((seconds + 2 * MARGIN * twin.symbol_interval_s) * twin.rate_hz)
+        return other_echo(kind, twin, count, rng), kind
     signal, name = _of_one_target(twin, scene, clouds, rng, seconds)
     if "second" in scene and rng.uniform() < scene["second"]["share"]:
         second, _ = _of_one_target(twin, scene["second"].get("scene", scene), clouds, rng, seconds)
@@ -245,7 +250,7 @@ def intervals(
             for receiver in range(receivers):
                 receiver_keys = (seed, "twin-receiver", *keys, *which, receiver)
                 drawn = _drawn(twin, scene["receiver"], signal, receiver_keys)
-                result[number, receiver] = drawn.quiet if quiet else drawn.interval
+                result[number, receiver] = drawn.quiet if quiet or name == NOTHING else drawn.interval
                 heard_by_all = heard_by_all and drawn.found
                 if not drawn.found and again + 1 < REDRAWS and twin.slowest_mps:
                     break
@@ -279,7 +284,8 @@ def _placed(scene: dict, said: dict) -> dict:
 
 
 def scenes_of(record: Record, twin: Twin, snr_db: list[float], usual: dict) -> dict[str, list[dict]]:
-    """Return the scenes of each category of a record, their receivers filled in.
+    """Return the scenes of each category of a record, their receivers filled in; where targets move, also those of
+    `NO_CLASS`.
 
     snr_db: range of SNR (dB); usual: the content of `SCENES`, for whatever the record's block `twin` does not say; its
     block `moving` is for radars in front of which targets move.
@@ -302,6 +308,8 @@ def scenes_of(record: Record, twin: Twin, snr_db: list[float], usual: dict) -> d
         if names := said.get("subtypes", {}).get(label):
             scenes = [{**scene, "subtypes": names} for scene in scenes]
         result[label] = [{**scene, "receiver": receiver | scene.get("receiver", {})} for scene in scenes]
+    if twin.slowest_mps:
+        result[NO_CLASS] = [{"others": list(KINDS), "receiver": receiver}]
     return result
 
 
@@ -350,7 +358,7 @@ class Library:
         """
         scenes = self.scenes[twin][category]
         seconds = [scene["second"]["scene"] for scene in scenes if "scene" in scene.get("second", {})]
-        subtypes_of_all = dict.fromkeys(name for scene in [*scenes, *seconds] for name in scene["subtypes"])
+        subtypes_of_all = dict.fromkeys(name for scene in [*scenes, *seconds] for name in scene.get("subtypes", ()))
         clouds = clouds_of(self.records, list(subtypes_of_all), self.seed)
         parts, names = [], []
         for number, scene in enumerate(scenes):

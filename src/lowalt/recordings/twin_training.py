@@ -4,6 +4,8 @@ The images are those of the data set: spectra, tiles and shrinking by the same f
 never trained or validated on.
 """
 
+import hashlib
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from torch import nn
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.layers import load_yaml, merge
+from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.recognition.checkpoint import identity
@@ -26,12 +29,15 @@ from lowalt.tiles.image_settings import Images
 RECOGNITION = "config/measured/recognition.yaml"
 
 
-def settings(path: str | Path = RECOGNITION) -> dict:
+def settings(path: str | Path = RECOGNITION, moving: bool = False) -> dict:
     """Return the recognition settings: the default run's block with the file's network, training and augmentation.
 
+    moving: whether targets move in front of the radar, for which the file's block `moving` lies over the rest.
     Raises: InputError naming a missing key.
     """
     block = load_yaml(shipped(path), "recognition of recordings")
+    if moving:
+        block = merge(block, block.get("moving", {}))
     try:
         default = load_yaml(shipped(block["default"]))
         result = merge(default["recognition"], {key: block[key] for key in ("size", "training", "augmentation")})
@@ -42,15 +48,36 @@ def settings(path: str | Path = RECOGNITION) -> dict:
         raise InputError(f"{path}: key {error} is missing") from None
 
 
+def _intervals(library: Library, name: str, category: str, block: dict, fold: str, kept: Path | None) -> tuple:
+    """The intervals of a category for a fold, and their subtypes; out of the folder `kept` where it has them."""
+    count, receivers = block["echoes"][fold], block["receivers"]
+    made_of = identity(twin=asdict(library.twins[name]), scenes=library.scenes[name][category], seed=library.seed,
+                       count=count, receivers=receivers, fold=fold, name=name, category=category)  # fmt: skip
+    path = None if kept is None else kept / f"{hashlib.sha256(made_of.encode()).hexdigest()[:16]}.npz"
+    if path is not None and path.is_file():
+        with np.load(path, allow_pickle=False) as data:
+            return data["intervals"], data["subtypes"].tolist()
+    intervals, subtypes = library.simulated(name, category, count, fold, receivers)
+    intervals = intervals.astype(np.complex64)
+    if path is not None:
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, intervals=intervals, subtypes=np.array(subtypes))
+    return intervals, subtypes
+
+
 def simulated(
-    library: Library, name: str, block: dict, fold: str, classes: tuple[str, ...] = tuple(CATEGORIES)
+    library: Library, name: str, block: dict, fold: str, classes: tuple[str, ...] = tuple(CATEGORIES),
+    kept: Path | None = None,
 ) -> Windows:  # fmt: skip
-    """Return the windows of a twin's classes for a fold of the block's `echoes`: disjoint random streams per fold."""
+    """Return the windows of a twin's classes for a fold of the block's `echoes`: disjoint random streams per fold.
+
+    kept: folder that keeps the signals of each class, so that making them can be interrupted.
+    """
     images, parts = Images.from_settings(block["images"]), []
     labels, names, models, snrs = [], [], [], []
     count, receivers = block["echoes"][fold], block["receivers"]
     for label, category in enumerate(classes):
-        intervals, subtypes = library.simulated(name, category, count, fold, receivers)
+        intervals, subtypes = _intervals(library, name, category, block, fold, kept)
         every_interval = intervals.reshape(-1, intervals.shape[-1])
         parts.append(rendered(every_interval, library.twins[name], images, block["size"]))
         labels += [label] * count * receivers
