@@ -1,6 +1,5 @@
 """What is in a recording by the second (`labels.yaml`), and pictures that show it over the spectrogram."""
 
-from collections.abc import Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -67,11 +66,11 @@ def label_of(start_s: float, window_s: float, intervals: list[Interval]) -> str 
 
 def picture(
     baseband: Baseband, carrier_hz: float, intervals: list[Interval], title: str, window_s: float = 0.0,
-    outcomes: dict[str, Sequence[str]] | None = None,
+    outcomes: dict[str, list[tuple[float, str]]] | None = None,
 ) -> bytes:  # fmt: skip
     """Return a PNG of a recording's spectrogram with its labels above, and below what networks say of each window.
 
-    window_s: length of their windows; outcomes: name of a network -> what it says of each window, one after the other.
+    window_s: length of their windows; outcomes: name of a network -> start (s) of each window and what is said of it.
     """
     values, rate_hz = baseband
     length = min(round(SECONDS * rate_hz), len(values) // 4)
@@ -86,7 +85,7 @@ def picture(
     level_db -= np.median(level_db)
     strips = {"label": intervals}
     for name, said in (outcomes or {}).items():
-        strips[name] = [(window_s * place, window_s * (place + 1), what) for place, what in enumerate(said)]
+        strips[name] = [(start_s, start_s + window_s, what) for start_s, what in said]
     heights = [*[0.25] * len(strips), 3.0]
     figure, panels = plt.subplots(
         len(heights), 1, figsize=(10, sum(heights) + 0.8), sharex=True, gridspec_kw={"height_ratios": heights}

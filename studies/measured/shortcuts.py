@@ -18,7 +18,7 @@ from sklearn.model_selection import GroupKFold, cross_val_predict
 
 from lowalt.config.command import run
 from lowalt.files.csv_tables import write_csv
-from lowalt.recordings.presence import heard_powers
+from lowalt.recordings.presence import heard_powers, strongest_mps
 from lowalt.recordings.twin import RADARS, Twin
 from lowalt.recordings.twin_scenes import Library
 
@@ -26,13 +26,6 @@ COLUMNS = ("radar", "number", "low", "high", "windows", "right_percent", "chance
 SHARED = 0.025
 """Share of each class's windows that may lie beyond either end of the speeds that all classes share."""
 RECEIVERS, FOLDS = 2, 5
-
-
-def speed_mps(intervals: np.ndarray, twin: Twin) -> np.ndarray:
-    """Return the speed (n,) m/s of the strongest line of intervals (n, symbols)."""
-    power, heard = heard_powers(intervals, twin)
-    speeds = np.linspace(twin.slowest_mps, twin.fastest_mps, int(heard.sum()))
-    return speeds[power[:, heard].argmax(axis=1)]
 
 
 def receiver_numbers(quiet: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:
@@ -68,7 +61,7 @@ def rows(name: str, library: Library, count: int) -> list[list]:
             library.simulated(name, category, count, "shortcuts", RECEIVERS, without)[0].reshape(-1, twin.symbols)
             for without in (False, True)
         )
-        parts.append({"speed": speed_mps(windows, twin), **receiver_numbers(quiet, twin)})
+        parts.append({"speed": strongest_mps(windows, twin), **receiver_numbers(quiet, twin)})
         labels += [label] * count * RECEIVERS
     labels = np.array(labels)
     scenes = np.repeat(np.arange(len(labels) // RECEIVERS), RECEIVERS)

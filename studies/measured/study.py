@@ -1,6 +1,6 @@
 """Recordings of real radars held against the twins of these radars.
 
-    python studies/measured/study.py pairs | compare | noise | recognise --inputs FOLDER --out FOLDER
+    python studies/measured/study.py pairs | compare | noise | recognise | labels --inputs FOLDER --out FOLDER
     python studies/measured/study.py presence | page --out FOLDER
 
 FOLDER of the inputs: one folder a measured set (`sets.yaml`). `--out` gets the tables measured-*.csv, the pictures and
@@ -19,7 +19,7 @@ from recorded_sets import Measured, recordings, usable
 
 from lowalt.config.command import dispatch, run
 from lowalt.files.atomic import replacing
-from lowalt.files.csv_tables import write_csv
+from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
 from lowalt.recordings.twin import RADARS
@@ -139,23 +139,50 @@ def presence(arguments: list[str]) -> None:
 
 
 def recognise(arguments: list[str]) -> None:
-    """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
+    """Train networks on the twins and ask them about recordings: measured-windows.csv, measured-recognition.csv and
+    measured-accuracy.csv."""
     inputs = _inputs("recognise", recognise.__doc__, arguments, trains=True)
-    from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
+    from accuracy import ACCURACY, RECOGNITION, WINDOWS, accuracy_rows, radar_rows
     from fetch import addresses
 
     from lowalt.recordings.twin_training import settings
 
-    options, block = inputs.options, settings(inputs.options.recognition)
+    options, library = inputs.options, inputs.library
     named = addresses(load_yaml(options.only, "list of recordings")) if options.only else None
     taken = [one for one in inputs.recordings if named is None or f"{one.set}/{one.name}" in named]
-    shared = taken, inputs.library, block, options.models, options.out, options.reuse
+    blocks = {name: settings(options.recognition, twin.slowest_mps > 0) for name, twin in library.twins.items()}
     # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
     # last radar takes longest, so it starts first.
-    calls = [partial(radar_rows, name, *shared) for name in reversed(inputs.library.twins)]
-    rows = [row for rows in reversed(together(calls, options.jobs, "spawn")) for row in rows]
+    calls = [partial(radar_rows, name, taken, library, blocks[name], options.models, options.reuse)
+             for name in reversed(library.twins)]  # fmt: skip
+    found = list(reversed(together(calls, options.jobs, "spawn")))
+    windows, rows = ([row for of_radar in found for row in of_radar[part]] for part in (0, 1))
+    seed = next(iter(blocks.values()))["seed"]
+    _write(options.out, "windows", WINDOWS, windows)
     _write(options.out, "recognition", RECOGNITION, rows)
-    _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, block["seed"]))
+    _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, seed))
+
+
+def draw_labels(arguments: list[str]) -> None:
+    """Draw the labels of every recording over its spectrogram, and below what networks say of each window where
+    measured-windows.csv is there: label-SET-FILE.png."""
+    inputs = _inputs("labels", draw_labels.__doc__, arguments)
+    from accuracy import WINDOWS, window_s
+    from labels import intervals_of, picture, read_labels
+
+    folder, labels = inputs.options.out, read_labels()
+    table = folder / "measured-windows.csv"
+    said = read_csv(table, *WINDOWS) if table.is_file() else []
+    for recording in inputs.recordings:
+        intervals = intervals_of(labels, recording.set, recording.name)
+        of_file = [row for row in said if (row["set"], row["file"]) == (recording.set, recording.name)]
+        twin = recording.twin(inputs.library)
+        outcomes: dict[str, list[tuple[float, str]]] = {}
+        for row in of_file:
+            outcomes.setdefault(f"network {row['seed']}", []).append((float(row["start_s"]), row["said"]))
+        image = picture(recording.read(), twin.carrier_hz, intervals, recording.name, window_s(twin), outcomes)
+        with replacing(folder / f"label-{recording.set}-{recording.name}.png") as temporary:
+            temporary.write_bytes(image)
 
 
 def write_page(arguments: list[str]) -> None:
@@ -182,6 +209,7 @@ COMMANDS = {
     "noise": noise,
     "presence": presence,
     "recognise": recognise,
+    "labels": draw_labels,
     "page": write_page,
 }
 

@@ -94,6 +94,14 @@ def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndar
     )
 
 
+def strongest_mps(intervals: np.ndarray, twin: Twin) -> np.ndarray:
+    """Return the speed (n,) m/s of the strongest line of intervals (n, symbols) that a target may have."""
+    power, heard = heard_powers(intervals, twin)
+    cells = np.fft.fftshift(np.fft.fftfreq(intervals.shape[1]))
+    speeds = np.abs(speeds_shown(cells * 2 * twin.edge_mps, twin.edge_mps, twin.sides)[1])
+    return speeds[heard][power[:, heard].argmax(axis=1)]
+
+
 def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) -> np.ndarray:
     """Return which intervals (n, symbols) of one recording hold a target, (n,) bool: a line, Hann window, that stands
     `detect_db` above the recording's own noise floor.
