@@ -28,6 +28,9 @@ MIRRORED = 0.9
 """Least correlation of a spectrum with its mirror about a quarter of the rate that shows I and Q in turn."""
 SAME_SHARE = 0.999
 """Least squared correlation of I and Q that makes them the same signal."""
+NEARLY_SAME = 0.8
+"""Least squared correlation at which two columns of sound are no I and Q."""
+SLOW_SHARE = 1e-3
 SIDE_RATIO = 4.0
 """How many times stronger the wrong side of the Doppler axis must be to call the channels swapped (6 dB)."""
 
@@ -152,6 +155,24 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
             raise InputError(f"{path}: I and Q hold the same signal (squared correlation {alike:.6f}), expected "
                              "in-phase and quadrature, or channel 'real'")  # fmt: skip
         refuse_swapped(path, values, moves)
+
+
+def refuse_alike(path: Path, values: np.ndarray) -> None:
+    """Refuse two columns of sound as I and Q where one nearly repeats the other, as a trigger and a beat note do.
+
+    What is slower than `SLOW_SHARE` of the rate does not count: a target that moves by a small part of a wavelength
+    draws nearly a line, too.
+    values: (samples,) complex. Raises: InputError naming the file.
+    """
+    fast = slice(2 + round(SLOW_SHARE * len(values)), None)
+    shown = (values - values.mean()) * np.hanning(len(values))
+    first, second = (np.fft.rfft(part)[fast] for part in (shown.real, shown.imag))
+    powers = np.sum(np.abs(first) ** 2) * np.sum(np.abs(second) ** 2)
+    alike = np.sum((first * second.conj()).real) ** 2 / max(powers, 1e-300)
+    if alike > NEARLY_SAME:
+        raise InputError(f"{path}: two columns that nearly repeat each other (squared correlation {alike:.3f}), as "
+                         "in-phase and quadrature of a moving target do not, expected channel 'real' with one of the "
+                         "`columns`, or trust 'record'")  # fmt: skip
 
 
 def refuse_swapped(path: Path, values: np.ndarray, moves: str | None) -> None:

@@ -11,7 +11,7 @@ from lowalt.files.errors import InputError
 from lowalt.recordings import faults
 from lowalt.recordings.chirps import slow_time
 from lowalt.recordings.column_names import rises_evenly, role, unit
-from lowalt.recordings.formats import RAW, READERS, Table
+from lowalt.recordings.formats import RAW, READERS, Table, refuse_kind
 from lowalt.recordings.layouts import GROUPS, TYPES, contradiction, parted, raw_readings, readings
 from lowalt.recordings.record import Record
 
@@ -144,8 +144,7 @@ def table_of(record: Record) -> Table:
     kind = path.suffix.lower()
     if not record.recorded:
         raise InputError(f"{path}: the record of a radar without any recording, expected the key `file`")
-    if kind not in READERS:
-        raise InputError(f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}")
+    refuse_kind(path)
     try:
         table = READERS[kind](path, record)
     except InputError:
@@ -174,6 +173,9 @@ def read(record: Record) -> Baseband:
     values = channel_of(table, record)
     _refuse_misread(table, record)
     faults.check(path, values, None if record.chirps else record.moves)
+    # Two columns of sound may be any two channels.
+    if np.iscomplexobj(values) and path.suffix.lower() == ".wav" and record.trust is None:
+        faults.refuse_alike(path, values)
     if record.chirps is None:
         return Baseband(values, rate)
     samples, receivers = record.chirps["samples"], record.chirps.get("receivers", 1)

@@ -1,4 +1,4 @@
-"""Tables of samples out of WAV, MAT, CSV, NPY, SigMF and raw files, as they stand in the file.
+"""Tables of samples out of WAV, MAT, HDF5, CSV, NPY, SigMF and raw files, as they stand in the file.
 
 This module only reads. `lowalt.recordings.files` picks the channel, `lowalt.recordings.faults` judges it.
 """
@@ -16,7 +16,8 @@ import numpy as np
 from lowalt.files.atomic import text_file
 from lowalt.files.errors import InputError, lacking
 from lowalt.files.json_objects import read_object
-from lowalt.recordings.chirps import in_chirps
+from lowalt.recordings.chirps import chirp_rows, in_chirps
+from lowalt.recordings.faults import agreed_rate
 from lowalt.recordings.layouts import number_type
 from lowalt.recordings.mat_files import read_mat
 from lowalt.recordings.record import Record
@@ -30,6 +31,19 @@ RAW = {
     ".cu8": ("uint8", "iqiq"), ".cs8": ("int8", "iqiq"), ".cs16": ("int16", "iqiq"),
 }  # fmt: skip
 """Endings of numbers without a header, and the type and layout that an ending stands for where the record has none."""
+
+COMPRESSED = (".mp3", ".m4a", ".aac", ".ogg", ".opus", ".wma")
+"""Endings of sound without what ears do not hear."""
+
+
+def refuse_kind(path: Path) -> None:
+    """Raise InputError where no reader knows a file's ending, with what to do."""
+    kind = path.suffix.lower()
+    if kind in COMPRESSED:
+        raise InputError(f"{path}: {kind} keeps what ears hear and drops faint lines of a radar, expected the recording "
+                         "as it was made, saved as .wav")  # fmt: skip
+    if kind not in READERS:
+        raise InputError(f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}")
 
 
 class Table(NamedTuple):
@@ -67,9 +81,10 @@ def _wav(path: Path, record: Record) -> Table:
 
 
 def _mat(path: Path, record: Record) -> Table:
-    """Read the record's variable of a MATLAB file, or its only one; `rec.iq` is a field of a struct."""
+    """Read the record's variable of a MATLAB or HDF5 file, or its only one; `rec.iq` is a field of a struct, `rec/iq` or
+    `rec.iq` an array in a group."""
     variables = read_mat(path)
-    name = record.variable
+    name = record.variable and record.variable.strip("/").replace("/", ".")
     if name is None:
         arrays = [key for key, value in variables.items() if value.size > 1]
         if len(arrays) != 1:
@@ -118,6 +133,9 @@ def _csv(path: Path, record: Record) -> Table:
     names = () if all(map(_is_number, first)) else tuple(cell.strip() for cell in lines[0].split(delimiter))
     rows = [plain(line) for line in lines[bool(names) :]]
     values = np.loadtxt(rows, complex if any("j" in row for row in rows) else float, delimiter=delimiter, ndmin=2)
+    if record.chirps:
+        stream, times = chirp_rows(values, record.chirps["samples"], str(path))
+        return Table([stream], rate_hz=None if times is None else agreed_rate(path, None, None, times))
     columns = [column if np.iscomplexobj(column) and column.imag.any() else column.real for column in values.T]
     return Table(columns, names)
 
@@ -198,6 +216,6 @@ def _sigmf(path: Path, record: Record) -> Table:
 
 
 READERS: dict[str, Callable[[Path, Record], Table]] = {
-    ".wav": _wav, ".mat": _mat, ".csv": _csv, ".txt": _csv, ".npy": _npy, ".sigmf-meta": _sigmf,
+    ".wav": _wav, ".mat": _mat, ".h5": _mat, ".hdf5": _mat, ".csv": _csv, ".txt": _csv, ".npy": _npy, ".sigmf-meta": _sigmf,
     ".sigmf-data": _sigmf, **dict.fromkeys(RAW, _raw),
 }  # fmt: skip
