@@ -1,6 +1,7 @@
 """The test of networks on recordings, counted from what `lowalt predict` answers, window by window.
 
-A window counts where one interval of `labels.yaml` holds it as a whole.
+A window counts where one interval of `labels.yaml` holds it as a whole. A recording that is not in that file, such as
+one of a user's own, is as a whole what its record's label says.
 
 measured-windows.csv: one row a radar, training seed, recording and labelled window: what it is and what is said.
 measured-recognition.csv: one row a radar, training seed, recording and label, with the number of windows by what is
@@ -111,7 +112,7 @@ def radar_rows(
     that are there and train none.
     """
     labels = read_labels()
-    measured = [one for one in recordings if one.radar == name and intervals_of(labels, one.set, one.name)]
+    measured = [one for one in recordings if one.radar == name]
     windows, rows = [], []
     if not measured:
         return windows, rows
@@ -126,7 +127,7 @@ def radar_rows(
         trained = loaded(folder / "model.pt", name)
         for recording in measured:
             found = answers(trained, settings, record_of(recording), recording.name)
-            intervals = intervals_of(labels, recording.set, recording.name)
+            intervals = intervals_of(labels, recording.set, recording.name, recording.record.label)
             said = said_of(found, list(trained.classes), window_s(twin), intervals)
             about = recording.set, recording.half, recording.name
             windows += [[name, seed, *about, *each] for each in zip(*said, strict=True)]

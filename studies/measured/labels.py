@@ -52,9 +52,13 @@ def read_labels(path: Path = LABELS) -> dict[str, dict[str, list[Interval]]]:
     return result
 
 
-def intervals_of(labels: dict[str, dict[str, list[Interval]]], name: str, file: str) -> list[Interval]:
-    """Return the intervals of a set's file; none where it has no labels."""
-    return next((found for pattern, found in labels.get(name, {}).items() if fnmatch(file, pattern)), [])
+def intervals_of(
+    labels: dict[str, dict[str, list[Interval]]], name: str, file: str, whole: str | None = None
+) -> list[Interval]:
+    """Return the intervals of a set's file; where it has no labels, one of the class `whole` that holds all of it, or
+    none."""
+    unlabelled = [(0.0, np.inf, whole)] if whole else []
+    return next((found for pattern, found in labels.get(name, {}).items() if fnmatch(file, pattern)), unlabelled)
 
 
 def label_of(start_s: float, window_s: float, intervals: list[Interval]) -> str | None:
@@ -94,7 +98,7 @@ def picture(
         for first, last, what in stretches:
             words = what.split(TOGETHER)
             for place, word in enumerate(words):
-                panel.axvspan(first, last, place / len(words), (place + 1) / len(words), color=COLOURS[word], lw=0)
+                panel.axvspan(first, min(last, times[-1]), place / len(words), (place + 1) / len(words), color=COLOURS[word], lw=0)
         panel.set_ylabel(name, rotation=0, ha="right", va="center", fontsize=8)
         panel.set_yticks([])
     corners = (0.0, times[-1], speeds[kept][0], speeds[kept][-1])

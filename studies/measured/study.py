@@ -174,7 +174,7 @@ def draw_labels(arguments: list[str]) -> None:
     table = folder / "measured-windows.csv"
     said = read_csv(table, *WINDOWS) if table.is_file() else []
     for recording in inputs.recordings:
-        intervals = intervals_of(labels, recording.set, recording.name)
+        intervals = intervals_of(labels, recording.set, recording.name, recording.record.label)
         of_file = [row for row in said if (row["set"], row["file"]) == (recording.set, recording.name)]
         twin = recording.twin(inputs.library)
         outcomes: dict[str, list[tuple[float, str]]] = {}

@@ -262,7 +262,7 @@ def intervals(
 
 SCENES = "config/measured/scenes.yaml"
 """The usual scenes and receiver, for whatever the record of a radar does not state."""
-ROOM_M = 2.5
+ROOM_M = 3.0
 """Least distance between the ends of a walk."""
 
 
