@@ -28,6 +28,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, runs
 from lowalt.recognition.runs import Trained
+from lowalt.recognition.zoo import opened
 from lowalt.recordings.answers import UNNAMED, Answers, answers
 from lowalt.recordings.record import Record
 from lowalt.recordings.twin import Twin
@@ -104,27 +105,20 @@ def record_of(recording: Measured) -> Record:
 
 
 def radar_rows(
-    name: str, recordings: list[Measured], library: Library, block: dict, models: Path, reuse: bool = False
+    name: str, recordings: list[Measured], library: Library, block: dict, models: Path | None, reuse: bool = False
 ) -> tuple[list[list], list[list]]:
     """Train one network a seed on the twin `name` and return the rows of `WINDOWS` and of `RECOGNITION`.
 
-    models: where the networks go, one folder a seed, and the windows that they learn from; reuse: take the networks
-    that are there and train none.
+    models: where the networks go, one folder a seed, and the windows that they learn from; None asks the network of
+    this name in the zoo, whose seed is "zoo"; reuse: take the networks that are there and train none.
     """
     labels = read_labels()
     measured = [one for one in recordings if one.radar == name]
     windows, rows = [], []
     if not measured:
         return windows, rows
-    twin, classes = library.twins[name], tuple(library.scenes[name])
-    if not reuse:
-        samples = {fold: simulated(library, name, block, fold, classes, models) for fold in ("train", "validation")}
-    settings = {"radar": asdict(twin), "images": block["images"]}
-    for seed in block["seeds"]:
-        folder = models / f"{name}-{seed}"
-        if not reuse:
-            train(block, samples, name, seed, folder, classes)
-        trained = loaded(folder / "model.pt", name)
+    twin = library.twins[name]
+    for seed, (trained, settings) in networks(name, library, block, models, reuse):
         for recording in measured:
             found = answers(trained, settings, record_of(recording), recording.name)
             intervals = intervals_of(labels, recording.set, recording.name, recording.record.label)
@@ -134,6 +128,25 @@ def radar_rows(
             rows += [[name, seed, recording.device, *about, label, *counts(label, outcomes)]
                      for label, outcomes in by_label(said)]  # fmt: skip
     return windows, rows
+
+
+def networks(
+    name: str, library: Library, block: dict, models: Path | None, reuse: bool
+) -> Iterator[tuple[int | str, tuple[Trained, dict]]]:
+    """Yield the seed of each network of a radar, the network, and how its images are made; arguments: as
+    `radar_rows`."""
+    if models is None:
+        yield "zoo", opened(name)
+        return
+    classes = tuple(library.scenes[name])
+    if not reuse:
+        samples = {fold: simulated(library, name, block, fold, classes, models) for fold in ("train", "validation")}
+    settings = {"radar": asdict(library.twins[name]), "images": block["images"]}
+    for seed in block["seeds"]:
+        folder = models / f"{name}-{seed}"
+        if not reuse:
+            train(block, samples, name, seed, folder, classes)
+        yield seed, (loaded(folder / "model.pt", name), settings)
 
 
 def window_s(twin: Twin) -> float:
@@ -166,8 +179,8 @@ class _Files(NamedTuple):
     """The files of a label: windows of each, and of each its right and its named windows by seed, percent."""
 
     windows: dict[tuple[str, str], int]
-    right: dict[tuple[str, str], dict[int, float]]
-    named: dict[tuple[str, str], dict[int, float]]
+    right: dict[tuple[str, str], dict[int | str, float]]
+    named: dict[tuple[str, str], dict[int | str, float]]
 
     @property
     def by_device(self) -> Right:
@@ -182,7 +195,7 @@ class _Files(NamedTuple):
         return _Files(*({key: item for key, item in part.items() if key[0] == device} for part in self))
 
 
-def _mean(parts: list[_Files], seed: int) -> float:
+def _mean(parts: list[_Files], seed: int | str) -> float:
     """Right windows (percent) of a seed: the mean over classes of the mean over files."""
     return float(np.mean([np.mean([seeds[seed] for seeds in part.right.values()]) for part in parts]))
 

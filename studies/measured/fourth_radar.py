@@ -23,7 +23,7 @@ from lowalt.recordings.answers import answers
 from lowalt.recordings.own_radar import trained_radar
 from lowalt.recordings.record import record
 from lowalt.recordings.presence import strongest_mps
-from lowalt.recordings.twin import Twin, targets_move
+from lowalt.recordings.twin import Twin
 from lowalt.recordings.twin_training import RECOGNITION, settings
 from lowalt.recordings.windows import looks
 
@@ -65,7 +65,7 @@ def main(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     first = load_yaml(RECORDS, "records")["records"][0]
     about = record(first, options.inputs, first["file"])
-    expected = trained_radar(about, options.out / "hb100", settings(options.recognition, targets_move(about)))
+    expected = trained_radar(about, options.out / "hb100", settings(options.recognition))
     print(f"expected: {expected['percent']:.1f} % of {expected['windows']} simulated windows right")
     found = [row for model in (str(expected["file"]), KNOWN) for row in rows(model, options.inputs)]
     write_csv(options.out / "measured-fourth.csv", COLUMNS, found)

@@ -1,8 +1,9 @@
 """Can a class be told without its micro-Doppler? Linear classifiers on one number of each simulated window.
 
-    python studies/measured/shortcuts.py --out FOLDER [--count N] [--radars RECORDS]
+    python studies/measured/shortcuts.py --out FOLDER [--count N]
 
-Of windows that networks learn from, measured-shortcuts.csv says how well a linear classifier tells the classes by one
+Of windows of the scenes at any speed (`any_speed.yaml`) and of those of the radar's record, which the column `scenes`
+names, measured-shortcuts.csv says how well a linear classifier tells the classes by one
 number alone, in percent, the mean over the classes, cross-validated over scenes: `speed` of the strongest line (m/s),
 within the speeds that all classes share; and of the same windows without their targets the `level` (dB), the `colour`,
 noise of the slowest third of the speeds over that of the fastest (dB), and the `hum`, the strongest narrow line over
@@ -13,16 +14,18 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from any_speed import RADAR, any_speed
 from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import GroupKFold, cross_val_predict
 
+from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
 from lowalt.files.csv_tables import write_csv
 from lowalt.recordings.presence import heard_powers, strongest_mps
-from lowalt.recordings.twin import RADARS, Twin
+from lowalt.recordings.twin import Twin
 from lowalt.recordings.twin_scenes import Library
 
-COLUMNS = ("radar", "number", "low", "high", "windows", "right_percent", "chance_percent")
+COLUMNS = ("scenes", "number", "low", "high", "windows", "right_percent", "chance_percent")
 SHARED = 0.025
 """Share of each class's windows that may lie beyond either end of the speeds that all classes share."""
 RECEIVERS, FOLDS = 2, 5
@@ -51,14 +54,14 @@ def told_percent(number: np.ndarray, labels: np.ndarray, scenes: np.ndarray) -> 
     return 100 * float(np.mean([(named[labels == label] == label).mean() for label in np.unique(labels)]))
 
 
-def rows(name: str, library: Library, count: int) -> list[list]:
-    """Return the rows of `COLUMNS` of a radar, from `count` scenes a class."""
+def rows(title: str, library: Library, count: int) -> list[list]:
+    """Return the rows of `COLUMNS` under a title, from `count` scenes a category of the library."""
     parts = []
     labels = []
-    for label, category in enumerate(library.scenes[name]):
-        twin = library.twins[name]
+    for label, category in enumerate(CATEGORIES):
+        twin = library.twins[RADAR]
         windows, quiet = (
-            library.simulated(name, category, count, "shortcuts", RECEIVERS, without)[0].reshape(-1, twin.symbols)
+            library.simulated(RADAR, category, count, "shortcuts", RECEIVERS, without)[0].reshape(-1, twin.symbols)
             for without in (False, True)
         )
         parts.append({"speed": strongest_mps(windows, twin), **receiver_numbers(quiet, twin)})
@@ -75,7 +78,7 @@ def rows(name: str, library: Library, count: int) -> list[list]:
             high = min(float(np.quantile(part[number], 1 - SHARED)) for part in parts)
         inside = (values >= low) & (values <= high)
         right = told_percent(values[inside], labels[inside], scenes[inside])
-        result.append([name, number, f"{low:.3g}", f"{high:.3g}", int(inside.sum()), f"{right:.1f}", f"{chance:.1f}"])
+        result.append([title, number, f"{low:.3g}", f"{high:.3g}", int(inside.sum()), f"{right:.1f}", f"{chance:.1f}"])
     return result
 
 
@@ -84,10 +87,9 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser(prog="shortcuts.py", description=main.__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder to write")
     line.add_argument("--count", type=int, default=200, help="scenes a class")
-    line.add_argument("--radars", default=RADARS, help="folder of the records of radars")
-    line.add_argument("--radar", default="cw_24ghz", help="name of the radar")
     options = line.parse_args(arguments)
-    table = rows(options.radar, Library.read(options.radars), options.count)
+    table = rows("at any speed", Library.read(over=any_speed()[0]), options.count)
+    table += rows("of the record", Library.read(), options.count)
     write_csv(options.out / "measured-shortcuts.csv", COLUMNS, table)
     for row in table:
         print(*row, sep=", ")

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from any_speed import ANY_SPEED, any_speed
 from recorded_sets import Measured, recordings, usable
 
 from lowalt.config.command import dispatch, run
@@ -46,11 +47,12 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
     if name == "compare":
         line.add_argument("--count", type=int, default=60, help="simulated windows per class")
     if trains:
-        line.add_argument("--models", required=True, type=Path, help="folder of the networks")
+        line.add_argument("--models", type=Path, help="folder of the networks (default: ask those of the zoo)")
         line.add_argument("--recognition", type=Path, default=Path("config/measured/recognition.yaml"))
     if name == "recognise":
         line.add_argument("--reuse", action="store_true", help="take the networks that --models holds, train none")
         line.add_argument("--only", type=Path, help="list of files by set (.yaml): take no other recordings")
+        line.add_argument("--any-speed", action="store_true", help=f"learn from the scenes of {ANY_SPEED.name}")
         line.add_argument("--jobs", type=int, default=os.cpu_count(), help="radars at a time")
     options = line.parse_args(arguments)
     library = Library.read(options.radars)
@@ -148,19 +150,21 @@ def recognise(arguments: list[str]) -> None:
     from lowalt.recordings.twin_training import settings
 
     options, library = inputs.options, inputs.library
+    over, block = None, settings(options.recognition)
+    if options.any_speed:
+        over, learning = any_speed()
+        library, block = Library.read(options.radars, over), settings(options.recognition, learning)
     named = addresses(load_yaml(options.only, "list of recordings")) if options.only else None
     taken = [one for one in inputs.recordings if named is None or f"{one.set}/{one.name}" in named]
-    blocks = {name: settings(options.recognition, twin.slowest_mps > 0) for name, twin in library.twins.items()}
     # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
     # last radar takes longest, so it starts first.
-    calls = [partial(radar_rows, name, taken, library, blocks[name], options.models, options.reuse)
-             for name in reversed(library.twins)]  # fmt: skip
+    calls = [partial(radar_rows, name, taken, library, block, options.models, options.reuse)
+             for name in reversed(over or library.twins)]  # fmt: skip
     found = list(reversed(together(calls, options.jobs, "spawn")))
     windows, rows = ([row for of_radar in found for row in of_radar[part]] for part in (0, 1))
-    seed = next(iter(blocks.values()))["seed"]
     _write(options.out, "windows", WINDOWS, windows)
     _write(options.out, "recognition", RECOGNITION, rows)
-    _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, seed))
+    _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, block["seed"]))
 
 
 def draw_labels(arguments: list[str]) -> None:

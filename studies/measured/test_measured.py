@@ -179,9 +179,8 @@ def test_each_network_says_something_of_every_labelled_window(tmp_path):
     (tmp_path / "inputs/vehicle_24ghz").mkdir(parents=True)
     drive(tmp_path / "inputs/vehicle_24ghz", 22050, label="Vehicle")
     block = load_yaml("config/measured/recognition.yaml")
-    block |= {"size": 24, "receivers": 1}
-    block["moving"] = {"echoes": {"train": 2, "validation": 1}, "seeds": [0, 1]}
-    block["moving"]["training"] = {"steps": 2, "batch": 4, "validate_every": 1}
+    block |= {"size": 24, "echoes": {"train": 2, "validation": 1}, "receivers": 1}
+    block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
     (tmp_path / "recognition.yaml").write_text(yaml.safe_dump(block))
     asked = ["recognise", "--inputs", tmp_path / "inputs", "--recognition", tmp_path / "recognition.yaml", "--jobs", 1]
     only = {"vehicle_24ghz": [{"repository": "a/b", "commit": "c", "folder": "", "files": {"drive.wav": "0"}}]}

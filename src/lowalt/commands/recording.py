@@ -148,11 +148,10 @@ def _train(options: argparse.Namespace) -> Answer:
     """Train a network for the radar of a record."""
     from lowalt.recordings.own_radar import trained_radar
     from lowalt.recordings.record import read_record
-    from lowalt.recordings.twin import targets_move
     from lowalt.recordings.twin_training import settings
 
     record = read_record(shipped(options.record))
-    facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition, targets_move(record)))
+    facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition))
     each = ", ".join(f"{label} {percent:.0f}" for label, percent in facts["percent_by_class"].items())
     then = f"lowalt predict {options.out.with_suffix('')} {options.record}"
     if not record.recorded:

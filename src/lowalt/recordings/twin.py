@@ -125,11 +125,6 @@ MOST_SAMPLES = 1_000_000
 """Largest number of simulated samples of a window."""
 
 
-def targets_move(record: Record) -> bool:
-    """Whether targets move in front of the radar of a record, so that what is slower than a speed is left out."""
-    return (record.twin or {}).get("slowest_mps", SLOWEST_MPS) > 0
-
-
 def twin_of(record: Record, rate_hz: float) -> Twin:
     """Return the twin of the radar that made a recording at `rate_hz` samples (or chirps, or OFDM symbols) a second.
 

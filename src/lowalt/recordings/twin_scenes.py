@@ -262,7 +262,7 @@ def intervals(
 
 SCENES = "config/measured/scenes.yaml"
 """The usual scenes and receiver, for whatever the record of a radar does not state."""
-ROOM_M = 3.0
+ROOM_M = 2.5
 """Least distance between the ends of a walk."""
 
 
@@ -270,8 +270,6 @@ def _placed(scene: dict, said: dict) -> dict:
     """A usual scene with the distances, heights and beam of a record's block `twin`."""
     near, far = said["distance_m"]
     scene = {**scene, "height_m": said["height_m"]}
-    if "scene" in scene.get("second", {}):
-        scene["second"] = {**scene["second"], "scene": _placed(scene["second"]["scene"], said)}
     scene["beam"] = {"width_deg": said["beam_deg"], "floor_db": -20.0}
     if scene["course"] == "hover":
         scene["distance_m"] = [near, far]
@@ -283,23 +281,20 @@ def _placed(scene: dict, said: dict) -> dict:
     return scene
 
 
-def scenes_of(record: Record, twin: Twin, snr_db: list[float], usual: dict) -> dict[str, list[dict]]:
-    """Return the scenes of each category of a record, their receivers filled in; where targets move, also those of
-    `NO_CLASS`.
+def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, list[dict]]:
+    """Return the scenes of each class of a record, their receivers filled in.
 
-    snr_db: range of SNR (dB); usual: the content of `SCENES`, for whatever the record's block `twin` does not say; its
-    block `moving` is for radars in front of which targets move.
+    snr_db: range of SNR (dB); usual: the content of `SCENES`, for whatever the record's block `twin` does not say.
     """
     said = record.twin or {}
-    if twin.slowest_mps:
-        moving = usual["moving"]
-        scenes = {label: [moving["common"][label] | scene for scene in part] for label, part in moving["scenes"].items()}
-        usual = {"receiver": moving["receiver"], "scenes": scenes}
     receiver = usual["receiver"] | said.get("receiver", {}) | {"snr_db": snr_db}
     # Values are drawn in this order, whatever the order of the files is.
     receiver = {key: receiver[key] for key in Receiver.__dataclass_fields__ if key in receiver}
     result = {}
     for label in said.get("classes", CATEGORIES):
+        if label == NO_CLASS:
+            result[label] = [{"others": list(KINDS), "receiver": receiver}]
+            continue
         scenes = said.get("scenes", {}).get(label)
         if scenes is None:
             scenes = [_placed(scene, said) for scene in usual["scenes"][label]]
@@ -308,8 +303,6 @@ def scenes_of(record: Record, twin: Twin, snr_db: list[float], usual: dict) -> d
         if names := said.get("subtypes", {}).get(label):
             scenes = [{**scene, "subtypes": names} for scene in scenes]
         result[label] = [{**scene, "receiver": receiver | scene.get("receiver", {})} for scene in scenes]
-    if twin.slowest_mps:
-        result[NO_CLASS] = [{"others": list(KINDS), "receiver": receiver}]
     return result
 
 
@@ -332,7 +325,7 @@ class Library:
         own = dict.fromkeys(name for about, *_ in radars.values() for name in (about.twin or {}).get("targets", []))
         table, records = usual["targets"]["table"], usual["targets"]["records"]
         known = load_records(shipped(table), [*map(shipped, records), *own])
-        scenes = {name: scenes_of(about, twin, snr_db, usual) for name, (about, twin, snr_db) in radars.items()}
+        scenes = {name: scenes_of(about, snr_db, usual) for name, (about, _, snr_db) in radars.items()}
         return cls(int(usual["seed"]), {name: twin for name, (_, twin, _) in radars.items()}, scenes, known)
 
     @classmethod

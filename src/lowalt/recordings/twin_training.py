@@ -29,15 +29,13 @@ from lowalt.tiles.image_settings import Images
 RECOGNITION = "config/measured/recognition.yaml"
 
 
-def settings(path: str | Path = RECOGNITION, moving: bool = False) -> dict:
+def settings(path: str | Path = RECOGNITION, over: dict | None = None) -> dict:
     """Return the recognition settings: the default run's block with the file's network, training and augmentation.
 
-    moving: whether targets move in front of the radar, for which the file's block `moving` lies over the rest.
+    over: keys to lay over those of the file.
     Raises: InputError naming a missing key.
     """
-    block = load_yaml(shipped(path), "recognition of recordings")
-    if moving:
-        block = merge(block, block.get("moving", {}))
+    block = merge(load_yaml(shipped(path), "recognition of recordings"), over or {})
     try:
         default = load_yaml(shipped(block["default"]))
         result = merge(default["recognition"], {key: block[key] for key in ("size", "training", "augmentation")})
