@@ -31,8 +31,7 @@ from lowalt.recognition.runs import Trained
 from lowalt.recognition.zoo import opened
 from lowalt.recordings.answers import UNNAMED, Answers, answers
 from lowalt.recordings.record import Record
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_others import NO_CLASS
+from lowalt.recordings.twin import NO_CLASS, Twin
 from lowalt.recordings.twin_scenes import Library
 from lowalt.recordings.twin_training import simulated, train
 

@@ -12,8 +12,6 @@ from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.numerics.portable import rms
 from lowalt.recordings.twin import Twin
 
-NO_CLASS = "none of these"
-"""Name of the class of what belongs to no class."""
 NOTHING = "nothing"
 """Kind of which the receiver alone is heard."""
 GRAVITY_MPS2 = 9.81

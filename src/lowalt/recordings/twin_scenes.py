@@ -38,10 +38,10 @@ from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
-from lowalt.recordings.twin import RADARS, Twin, records, twin_of
+from lowalt.recordings.twin import NO_CLASS, RADARS, Twin, records, twin_of
 from lowalt.recordings.twin_courses import Course, drive, hover, straight, to_and_fro
 from lowalt.recordings.twin_echo import beam_gain, echo, sized, still_row, strengthened, textured
-from lowalt.recordings.twin_others import KINDS, NO_CLASS, NOTHING, other_echo
+from lowalt.recordings.twin_others import KINDS, NOTHING, other_echo
 from lowalt.recordings.twin_receiver import Receiver, received
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
