@@ -27,7 +27,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from lowalt.files.atomic import FULL, NEARLY_FULL_BYTES, free_bytes
 from lowalt.files.errors import InputError
 from lowalt.machine import progress
-from lowalt.workflow import closing, mends, status
+from lowalt.workflow import closing, status
 from lowalt.workflow.board import Board, Job
 
 EVERY_S = {True: 1.0, False: 30.0}

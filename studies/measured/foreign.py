@@ -4,8 +4,8 @@
 
 Some inputs are simulated at each network's own carrier, rate and channel: white noise, and a hand that waves in front
 of a body that stands still (`hand`). The others are public recordings (`foreign.yaml`). The table
-measured-foreign.csv has one row a network and input, with the number of windows by what `lowalt predict` says. A recording at another carrier is refused: its windows
-are 0.
+measured-foreign.csv has one row a network and input, with the number of windows by what `lowalt predict` says. A
+recording at another carrier is refused: its windows are 0.
 """
 
 import argparse

@@ -21,8 +21,8 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.zoo import opened
 from lowalt.recordings.answers import answers
 from lowalt.recordings.own_radar import trained_radar
-from lowalt.recordings.record import record
 from lowalt.recordings.presence import strongest_mps
+from lowalt.recordings.record import record
 from lowalt.recordings.twin import Twin
 from lowalt.recordings.twin_training import RECOGNITION, settings
 from lowalt.recordings.windows import looks

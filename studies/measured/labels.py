@@ -98,11 +98,15 @@ def picture(
         for first, last, what in stretches:
             words = what.split(TOGETHER)
             for place, word in enumerate(words):
-                panel.axvspan(first, min(last, times[-1]), place / len(words), (place + 1) / len(words), color=COLOURS[word], lw=0)
+                panel.axvspan(
+                    first, min(last, times[-1]), place / len(words), (place + 1) / len(words), color=COLOURS[word], lw=0
+                )
         panel.set_ylabel(name, rotation=0, ha="right", va="center", fontsize=8)
         panel.set_yticks([])
     corners = (0.0, times[-1], speeds[kept][0], speeds[kept][-1])
-    panels[-1].imshow(level_db, extent=corners, origin="lower", aspect="auto", vmin=-5, vmax=np.quantile(level_db, 0.999))
+    panels[-1].imshow(
+        level_db, extent=corners, origin="lower", aspect="auto", vmin=-5, vmax=np.quantile(level_db, 0.999)
+    )
     panels[-1].set(xlabel="time (s)", ylabel="radial speed (m/s)")
     seen = {word for stretches in strips.values() for _, _, what in stretches for word in what.split(TOGETHER)}
     handles = [plt.Rectangle((0, 0), 1, 1, color=COLOURS[word]) for word in COLOURS if word in seen]

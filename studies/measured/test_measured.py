@@ -213,13 +213,14 @@ def recognised(radar, seed, device, half, file, label, windows, right):
 
 
 def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
-    rows = [
-        recognised("cw", 0, "one", "test", "a", "Bird", 10, 30.0), recognised("cw", 1, "one", "test", "a", "Bird", 10, 50.0),
-        recognised("cw", 0, "two", "test", "a", "Bird", 20, 80.0), recognised("cw", 1, "two", "test", "a", "Bird", 20, 80.0),
-        recognised("cw", 0, "one", "test", "b", "UAV", 5, 90.0), recognised("cw", 1, "one", "test", "b", "UAV", 5, 90.0),
-        recognised("cw", 0, "one", "test", "b", "nothing", 5, 7.0), recognised("cw", 1, "one", "test", "b", "nothing", 5, 7.0),
-        recognised("cw", 0, "one", "tuning", "d", "UAV", 3, 10.0),
-    ]  # fmt: skip
+    rows = [recognised("cw", 0, "one", "tuning", "d", "UAV", 3, 10.0)]
+    for seed, of_a in ((0, 30.0), (1, 50.0)):
+        rows += [
+            recognised("cw", seed, "one", "test", "a", "Bird", 10, of_a),
+            recognised("cw", seed, "two", "test", "a", "Bird", 20, 80.0),
+            recognised("cw", seed, "one", "test", "b", "UAV", 5, 90.0),
+            recognised("cw", seed, "one", "test", "b", "nothing", 5, 7.0),
+        ]
     found = {tuple(line[:3]): line[3:] for line in accuracy.accuracy_rows(rows, 1)}
     assert {key: line[:4] for key, line in found.items()} == {
         ("cw", "tuning", "UAV"): [1, 1, 3, 10.0], ("cw", "test", "Bird"): [2, 2, 30, 60.0],
@@ -253,7 +254,9 @@ def test_windows_count_where_one_interval_holds_them_and_are_right_by_its_label(
     beyond[4] = 31.0
     shares = np.eye(4)[[0, 3, 0, 2, 0, 0, 0, 0]]
     nowhere = np.zeros(8, bool)
-    found = accuracy.said_of(Answers(starts, present, shares, nowhere, beyond, nowhere, 20.0, []), classes, 0.4, intervals)
+    found = accuracy.said_of(
+        Answers(starts, present, shares, nowhere, beyond, nowhere, 20.0, []), classes, 0.4, intervals
+    )
     rows = {label: accuracy.counts(label, outcomes) for label, outcomes in accuracy.by_label(found)}
     assert rows["nothing"][0] == 2 and rows["nothing"][-2] == 100.0
     both = dict(zip(accuracy.COUNTED, rows["Vehicle+Pedestrian"][1:-2], strict=True))

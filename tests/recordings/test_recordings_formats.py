@@ -196,7 +196,9 @@ def test_an_array_of_hdf5_is_named_by_its_path(tmp_path):
     for name in ("sessions/first/frame", "/sessions/first/frame", "sessions.first.frame"):
         np.testing.assert_allclose(read(entry(tmp_path, "a.h5", variable=name)).values, values, atol=0.8)
     np.testing.assert_array_equal(read(entry(tmp_path, "a.h5", variable="native")).values, values)
-    with pytest.raises(InputError, match=r"variables \['native', 'sessions.first.frame'\], expected the record to name"):
+    with pytest.raises(
+        InputError, match=r"variables \['native', 'sessions.first.frame'\], expected the record to name"
+    ):
         read(entry(tmp_path, "a.h5"))
     (tmp_path / "b.hdf5").write_bytes(b"\x89HDF\r\n\x1a\nnothing")
     with pytest.raises(InputError, match=r"b.hdf5: not a readable .hdf5 file"):

@@ -27,7 +27,9 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     actions = recording.add_subparsers(dest="action", required=True)
     meaning = "layouts that fit the file's bytes, the best first, a picture, and a draft of its record"
     inspect = add_command(actions, "inspect", _inspect, meaning, example)
-    inspect.add_argument("file", type=Path, help="the samples: WAV, MAT, HDF5, CSV, NPY, SigMF, or numbers without a header")
+    inspect.add_argument(
+        "file", type=Path, help="the samples: WAV, MAT, HDF5, CSV, NPY, SigMF, or numbers without a header"
+    )
     inspect.add_argument("--carrier", type=hertz, metavar="HZ", help="carrier, where the file does not say it")
     inspect.add_argument("--rate", type=hertz, metavar="HZ", help="samples a second, where the file does not say it; "
                          "of chirps, chirps a second")  # fmt: skip

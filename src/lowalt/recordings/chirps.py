@@ -35,8 +35,8 @@ def chirp_rows(rows: np.ndarray, samples: int, where: str) -> tuple[np.ndarray, 
         return values.reshape(-1), times
     if values.shape[1] == 2 * samples:
         return (values[:, :samples] + 1j * values[:, samples:]).reshape(-1), times
-    raise InputError(f"{where}: rows of {rows.shape[1]} columns, expected the {samples} samples of a chirp, or twice as "
-                     "many for in-phase and quadrature, and perhaps its time")  # fmt: skip
+    raise InputError(f"{where}: rows of {rows.shape[1]} columns, expected the {samples} samples of a chirp, or twice "
+                     "as many for in-phase and quadrature, and perhaps its time")  # fmt: skip
 
 
 def slow_time(stream: np.ndarray, samples: int, receivers: int = 1, receiver: int = 0) -> np.ndarray:

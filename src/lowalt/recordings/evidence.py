@@ -17,8 +17,8 @@ ORDER = 32
 REPEATS = 0.3
 """Least correlation of the innovations' power with which a stream counts as chirps."""
 AROUND, ANEW = 4, 4.0
-"""Samples of a row from which the next one is predicted, and how many times the squared error must grow at a place where
-the samples begin anew."""
+"""Samples of a row from which the next one is predicted, and how many times the squared error must grow at a place
+where the samples begin anew."""
 SHORTEST_CHIRP = 16
 STRETCHES = 16
 """Stretches over which the phase of a line and of its image is compared."""

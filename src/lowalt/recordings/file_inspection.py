@@ -14,7 +14,15 @@ from lowalt.files.errors import InputError
 from lowalt.recordings import faults
 from lowalt.recordings.chirps import slow_time
 from lowalt.recordings.column_names import rises_evenly, role
-from lowalt.recordings.evidence import are_powers, begins_anew, chirp_length, code_bits, image_of, receivers_of, step_bits
+from lowalt.recordings.evidence import (
+    are_powers,
+    begins_anew,
+    chirp_length,
+    code_bits,
+    image_of,
+    receivers_of,
+    step_bits,
+)
 from lowalt.recordings.files import channel_of, table_of, times_of
 from lowalt.recordings.formats import RAW, Table, refuse_kind
 from lowalt.recordings.layouts import raw_readings, readings
@@ -132,7 +140,7 @@ def _of_chirps(array: np.ndarray) -> list[Candidate]:
 
 
 def _of_rows(path: Path, table: Table) -> tuple[list[Candidate], float | None, float | None]:
-    """Readings of a text matrix with a chirp a row, and perhaps a last column of times: one real channel, or I and Q."""
+    """Readings of a text matrix with a chirp a row, one real channel or I and Q, and perhaps a last column of times."""
     last = np.asarray(table.columns[-1], float)
     timed = bool((np.diff(last) > 0).all())
     samples = len(table.columns) - timed

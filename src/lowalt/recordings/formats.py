@@ -40,8 +40,8 @@ def refuse_kind(path: Path) -> None:
     """Raise InputError where no reader knows a file's ending, with what to do."""
     kind = path.suffix.lower()
     if kind in COMPRESSED:
-        raise InputError(f"{path}: {kind} keeps what ears hear and drops faint lines of a radar, expected the recording "
-                         "as it was made, saved as .wav")  # fmt: skip
+        raise InputError(f"{path}: {kind} keeps what ears hear and drops faint lines of a radar, expected the "
+                         "recording as it was made, saved as .wav")  # fmt: skip
     if kind not in READERS:
         raise InputError(f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}")
 
@@ -81,8 +81,10 @@ def _wav(path: Path, record: Record) -> Table:
 
 
 def _mat(path: Path, record: Record) -> Table:
-    """Read the record's variable of a MATLAB or HDF5 file, or its only one; `rec.iq` is a field of a struct, `rec/iq` or
-    `rec.iq` an array in a group."""
+    """Read the record's variable of a MATLAB or HDF5 file, or its only one.
+
+    `rec.iq` is a field of a struct, `rec/iq` or `rec.iq` an array in a group.
+    """
     variables = read_mat(path)
     name = record.variable and record.variable.strip("/").replace("/", ".")
     if name is None:
@@ -216,6 +218,6 @@ def _sigmf(path: Path, record: Record) -> Table:
 
 
 READERS: dict[str, Callable[[Path, Record], Table]] = {
-    ".wav": _wav, ".mat": _mat, ".h5": _mat, ".hdf5": _mat, ".csv": _csv, ".txt": _csv, ".npy": _npy, ".sigmf-meta": _sigmf,
-    ".sigmf-data": _sigmf, **dict.fromkeys(RAW, _raw),
+    ".wav": _wav, ".mat": _mat, ".h5": _mat, ".hdf5": _mat, ".csv": _csv, ".txt": _csv, ".npy": _npy,
+    ".sigmf-meta": _sigmf, ".sigmf-data": _sigmf, **dict.fromkeys(RAW, _raw),
 }  # fmt: skip

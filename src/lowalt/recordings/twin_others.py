@@ -52,7 +52,9 @@ def _branches(times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     count = int(rng.integers(8, 30))
     rates = _loguniform(0.3, 4.0, rng, count)[:, None]
     sway = (_loguniform(0.05, 1.5, rng) * rng.uniform(0.2, 1, count)[:, None]) / (2 * np.pi * rates)
-    return rng.uniform(0, 3, count)[:, None] + sway * np.sin(2 * np.pi * rates * times + rng.uniform(0, 6.3, (count, 1)))
+    return rng.uniform(0, 3, count)[:, None] + sway * np.sin(
+        2 * np.pi * rates * times + rng.uniform(0, 6.3, (count, 1))
+    )
 
 
 def _rain(times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -106,7 +108,9 @@ def other_echo(kind: str, twin: Twin, samples: int, rng: np.random.Generator) ->
     times = np.arange(samples) / twin.rate_hz
     distances = KINDS[kind](times, rng)
     strength = 10 ** (rng.normal(0, 6, (len(distances), 1)) / 20)
-    fading = 1 + 0.5 * np.sin(2 * np.pi * rng.uniform(0.2, 4, strength.shape) * times + rng.uniform(0, 6.3, strength.shape))
+    fading = 1 + 0.5 * np.sin(
+        2 * np.pi * rng.uniform(0.2, 4, strength.shape) * times + rng.uniform(0, 6.3, strength.shape)
+    )
     wave_number = 4 * np.pi * twin.carrier_hz / SPEED_OF_LIGHT
     echo = (strength * fading * np.exp(-1j * wave_number * distances)).sum(axis=0)
     return echo / rms(echo)

@@ -15,7 +15,6 @@ from types import FrameType
 from typing import Any
 
 from lowalt.config.command import refusing
-from lowalt.files.atomic import FULL
 from lowalt.files.errors import InputError
 from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal, take, take_over
 
