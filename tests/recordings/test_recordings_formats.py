@@ -13,7 +13,10 @@ from lowalt.files.errors import InputError
 from lowalt.recordings import read, read_record
 from lowalt.recordings.faults import clipped, lost
 from lowalt.recordings.file_inspection import inspect_recording
+from lowalt.recordings.files import Baseband
 from lowalt.recordings.record import record
+from lowalt.recordings.twin import radars
+from lowalt.recordings.windows import looks
 
 RATE = 12000.0
 FAULTS = Path(__file__).parents[2] / "shared/data/faults/recordings"
@@ -271,13 +274,21 @@ def test_compressed_sound_is_refused_with_what_to_do(tmp_path):
         inspect_recording(tmp_path / "a.mp3")
 
 
-def test_lost_packets_are_found_and_zeros_of_a_quiet_channel_are_not():
+def test_lost_packets_are_found_and_zeros_of_a_quiet_channel_are_not(tmp_path):
     values = np.round(wave().real)
     gaps = values.copy()
     gaps[1000:1200] = 0
     gaps[3000:3010] = 0
     np.testing.assert_array_equal(np.flatnonzero(lost(gaps)), np.arange(1000, 1200))
     assert lost(gaps + 0j)[1000:1200].all() and not lost(values).any() and not lost(np.zeros(100)).any()
+    # A window of which samples are lost is left out, and the others stay.
+    np.save(tmp_path / "a.npy", np.tile(values, 4))
+    whole = read(entry(tmp_path, "a.npy", "real"))
+    twin = radars()["cw_24ghz"]
+    torn = whole.values.copy()
+    torn[5000:5300] = 0
+    found = looks(entry(tmp_path, "a.npy", "real"), twin, Baseband(torn, RATE))
+    assert np.flatnonzero(found.lost).tolist() == [1] and len(found.intervals) == 5
     quiet = np.round(1.4 * np.sin(2 * np.pi * np.arange(6000) / 500))
     assert not lost(quiet).any()
 
