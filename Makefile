@@ -135,7 +135,7 @@ benchmark: $(SETUP)  ## the benchmark: its data compared with the kept checksums
 	$(SNAKEMAKE) --configfile config/$(BENCHMARK).yaml -- $(SUBMITTED)
 	$(BIN)/lowalt benchmark score $(SUBMITTED) --track unseen
 
-study:  ## a study of studies/: make study NAME=rotors
+study:  ## a study of studies/: make study NAME=heights
 	$(MAKE) --no-print-directory -C studies/$(NAME)
 
 check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/reference and compare every byte

@@ -26,7 +26,6 @@ include: "workflow/rules/report.smk"
 onstart:
     print(*filter(None, (RUN.sources, RUN.folding)), sep="\n", file=sys.stderr)
     with refusing():
-        RUN.launch.before(workflow)
         space.before(workflow, RUN.plan, config)
 
 
@@ -77,7 +76,7 @@ rule prepared:
 
 rule models:
     input:
-        expand("results/{run}/models/{training}/model.pt", run=RUN.name, training=RUN.trainings),
+        expand("results/{run}/models/{training}/model.safetensors", run=RUN.name, training=RUN.trainings),
         f"results/{RUN.name}/config.yaml",
     localrule: True
 

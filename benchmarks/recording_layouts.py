@@ -16,9 +16,9 @@ import numpy as np
 from scipy.io import savemat, wavfile
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.file_inspection import inspect_recording
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
-from lowalt.recordings.file_inspection import inspect_recording
 
 CARRIER_HZ, RATE_HZ, COUNT, SPEED_MPS = 3.3e9, 5000.0, 8192, 3.0
 WAVE_M = SPEED_OF_LIGHT / CARRIER_HZ

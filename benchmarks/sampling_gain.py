@@ -17,8 +17,8 @@ import numpy as np
 
 from lowalt.config.command import run
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.channel import SAMPLINGS, symbol_rate
 from lowalt.files.csv_tables import write_csv
-from lowalt.recordings.channel import SAMPLINGS, symbol_rate
 
 SYMBOL_RATE_HZ = 3000.0
 CARRIER_HZ = 24e9

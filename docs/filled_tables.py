@@ -9,8 +9,8 @@ next to the paper's, and which orderings hold; `presets`: those of `make accurac
 
 from pathlib import Path
 
-from lowalt.benchmark import baseline_table
 from lowalt.config.command import run
+from lowalt.extensions.benchmark import baseline_table
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError

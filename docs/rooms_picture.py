@@ -12,7 +12,7 @@ from matplotlib import pyplot as plt
 
 from lowalt.config.command import run
 from lowalt.files.atomic import replacing
-from lowalt.files.package_plan import PACKAGE, ROOMS, modules, purpose, rooms_imported
+from lowalt.files.package_plan import EXTENSIONS, PACKAGE, ROOMS, modules, purpose, rooms_imported
 from lowalt.report.figures.style import png
 
 WIDTH = 60
@@ -25,6 +25,12 @@ def imports() -> tuple[list[str], list[str]]:
         (room, other) for room in ROOMS for path in modules(room) for other in rooms_imported(path) if other != room
     ]
     return [room for room, _ in pairs], [other for _, other in pairs]
+
+
+def extensions_in_words() -> str:
+    """Return a line for each extension: its name, and its purpose."""
+    lines = [f"{name.rpartition('/')[2]}: {purpose(PACKAGE / name / '__init__.py')}" for name in EXTENSIONS]
+    return "\n".join(["extensions, which build on the core and which no room imports:", *lines])
 
 
 def inner_rooms(room: str) -> list[str]:
@@ -63,7 +69,8 @@ def draw() -> bytes:
     for side in panel.spines.values():
         side.set_visible(False)
     panel.set_xlabel("a dot: files of the row's room import the column's room; all dots lie left of the grey diagonal")
-    figure.tight_layout()
+    figure.text(0.02, 0.012, extensions_in_words(), fontsize=9.5, color="0.25", linespacing=1.5, va="bottom")
+    figure.tight_layout(rect=(0, 0.12, 1, 1))
     return png(figure, 64)
 
 

@@ -21,17 +21,17 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.faults import RATE_SHARE
+from lowalt.extensions.recordings.files import Baseband, read
+from lowalt.extensions.recordings.formats import READERS
+from lowalt.extensions.recordings.presence import present
+from lowalt.extensions.recordings.record import Record, read_record, record
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.windows import windows
 from lowalt.files.atomic import sha256
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings.faults import RATE_SHARE
-from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.formats import READERS
-from lowalt.recordings.presence import present
-from lowalt.recordings.record import Record, read_record, record
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import Library
-from lowalt.recordings.windows import windows
 
 HALVES = ("tuning", "test")
 SET_FILE = "set.yaml"
@@ -77,7 +77,7 @@ class Measured(NamedTuple):
     def read(self) -> Baseband:
         """Return the recording's samples, at the one of its possible rates that the file has.
 
-        Raises: InputError as `lowalt.recordings.read`, and where the file has none of the rates.
+        Raises: InputError as `lowalt.extensions.recordings.read`, and where the file has none of the rates.
         """
         baseband = read(self.record)
         if not self.rates_hz:

@@ -72,7 +72,7 @@ def trained(
         settings = settings_of(config, data, job.scheme, job.seed)
         runs.train(samples, job.scheme, job.protocol, settings, folder, build=build)
         pairs = evaluated_folds(job.protocol)
-        model = runs.load(folder / "model.pt", build=build)
+        model = runs.load(folder / "model.safetensors", build=build)
         runs.evaluate(model, source(job.scheme, pairs, "asked"), config["recognition"]["evaluation"], path)
     return path
 

@@ -9,14 +9,13 @@ from meshes import write_bird, write_quad
 from skips import Skips
 
 # Files that take long, the longest first. Two processes share the files of tests, one file at a time: a long file that
-# begins last would keep one of them alone at the end. `test_effects` compiles the effects' machine code before
-# `test_contributing` copies the tree: in the copy it would be compiled once more.
+# begins last would keep one of them alone at the end.
 LONG = (
-    "test_workflow", "test_effects", "test_workflow_reruns", "test_recognition_resume", "test_recognition_training",
+    "test_workflow", "test_workflow_reruns", "test_recognition_resume", "test_recognition_training",
     "test_wheel", "test_contributing", "test_recognition_ranks", "test_echo", "test_bytes",
-    "test_house", "test_dataset", "test_workflow_locks", "test_classes", "test_effects_occlusion",
+    "test_house", "test_dataset", "test_workflow_locks", "test_classes",
     "test_recognition_sharing", "test_recognition_memory",
-    "test_report_plots", "test_effects_every", "test_attacks", "test_recordings_unseen", "test_benchmarks_long_run",
+    "test_report_plots", "test_attacks", "test_recordings_unseen",
     "test_skips", "test_workflow_board", "test_targets_more",
 )  # fmt: skip
 

@@ -9,6 +9,8 @@ import torch
 
 from craft import craft
 from fuzzed_seals import ARCHIVE, PNG
+from lowalt.extensions.recordings.files import read
+from lowalt.extensions.recordings.record import Record
 from lowalt.files.atomic import existing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
@@ -16,8 +18,6 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.table import COLUMNS, read_table
 from lowalt.recognition import checkpoint, freeze, schemes
 from lowalt.recognition.predict_sample import images_of
-from lowalt.recordings.files import read
-from lowalt.recordings.record import Record
 from lowalt.shards.sample_table import SAMPLE, map_samples
 from lowalt.shards.sample_table import write as write_table
 from lowalt.targets.cloud import read as read_cloud

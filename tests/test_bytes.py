@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from emulation import EMULATED, able, run
-from lowalt.benchmark import frozen_bytes
 from lowalt.config.layers import load
+from lowalt.extensions.benchmark import frozen_bytes
 from lowalt.shards import build, manifest
 from lowalt.shards.dataset import Dataset
 
@@ -77,7 +77,7 @@ def test_the_tiny_data_set_has_the_bytes_of_its_manifest(name, threads, tmp_path
 @pytest.mark.parametrize("name", NAMES)
 def test_samples_of_the_benchmark_have_their_kept_checksums_on_another_processor(name, tmp_path):
     """One sample of each subtype and some of every other part; natively `tests/benchmark` makes them again."""
-    run(name, "-m", "lowalt.benchmark", "results", "--samples", "--out", str(tmp_path))
+    run(name, "-m", "lowalt.extensions.benchmark", "results", "--samples", "--out", str(tmp_path))
     made, kept = ((folder / frozen_bytes.SAMPLES).read_text().splitlines()
                   for folder in (tmp_path, ROOT / frozen_bytes.REFERENCE))  # fmt: skip
     assert len(made) == len(kept) == 64

@@ -83,7 +83,7 @@ def test_signals_of_scenes_agree_but_for_the_last_bit_of_few(tmp_path):
 TOWN = """
 import sys
 import numpy as np
-from lowalt.benchmark.definition import config_of
+from lowalt.extensions.benchmark.definition import config_of
 from lowalt.shards.dataset import Dataset
 dataset = Dataset(config_of("town"))
 images, signals, _ = zip(*(dataset.made(dataset.place(number)) for number in (0, len(dataset) // 2)))

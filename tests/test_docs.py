@@ -17,7 +17,7 @@ from key_pages import configuration_page
 
 from lowalt.__main__ import main
 from lowalt.config.layers import load
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, install_command
 from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
@@ -118,6 +118,24 @@ def test_every_extra_that_a_command_installs_exists():
         name for _, command in NAMED for some in re.findall(r"-e '\.\[(.+)\]'", command) for name in some.split(",")
     ]
     assert len(named) > 3 and not set(named) - set(extras)
+
+
+def test_a_missing_package_is_asked_for_by_its_own_name():
+    """No index holds this package, so a stranger could publish one of its name."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for extra, packages in extras.items():
+        start, said = "pip install ", install_command(extra)
+        assert said.startswith(start)
+        # The metadata writes the bounds of versions in an order of its own.
+        asked = {frozenset(re.findall(r"[\w.-]+(?:\[\w+\])?", package)) for package in shlex.split(said)[2:]}
+        assert asked == {frozenset(re.findall(r"[\w.-]+(?:\[\w+\])?", package)) for package in packages}
+    texts = [*ROOT.glob("src/**/*.py"), *ROOT.glob("src/**/*.jinja"), *ROOT.glob("workflow/**/*"), *PAGES, *OTHERS]
+    from_index = []
+    for path in texts:
+        for line in path.read_text().splitlines() if path.is_file() else ():
+            if re.search(r"pip install (?!.*--no-index)[^`]*\blowalt\b", line):
+                from_index.append(f"{path}: {line}")
+    assert not from_index
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

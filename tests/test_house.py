@@ -4,6 +4,7 @@ import ast
 import functools
 import io
 import subprocess
+import tokenize
 from collections import Counter
 from pathlib import Path
 
@@ -14,12 +15,12 @@ from PIL import Image
 from scipy import ndimage
 
 from forks import printed
-from lowalt.files.package_plan import PACKAGE, ROOMS, modules, rooms_imported
+from lowalt.files.package_plan import EXTENSIONS, PACKAGE, ROOMS, modules, rooms_imported
 from lowalt.scene.effects import PLACES
 
 ROOT = Path(__file__).parent.parent
 GROUND = ("files", "machine", "numerics", "config")
-STAGES = [name for name in ROOMS if name not in (*GROUND, "drafting", "measure", "workflow", "commands")]
+STAGES = [name for name in ROOMS if name not in (*GROUND, "measure", "workflow", "commands")]
 
 
 @pytest.mark.parametrize("stage", ROOMS)
@@ -45,7 +46,8 @@ PROGRAMS = {
         "    os.wait()\n"
         "else:\n"
         "    sys.exit()\n"
-        "names = [n for n in sys.modules if n.startswith('lowalt.scene.effects.') and n.count('.') == 4]\n"
+        "folders = ('lowalt.scene.effects.', 'lowalt.extensions.')\n"
+        "names = [n for n in sys.modules if n.startswith(folders) and n.count('.') > 2]\n"
         "print(*(n.rpartition('.')[2] for n in names), flush=True)\n"
         "os._exit(0)"
     ),
@@ -72,7 +74,7 @@ def test_a_run_without_effects_imports_nothing_of_them(said):
 
 
 def test_the_plan_of_the_package_names_every_room():
-    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} == set(ROOMS)
+    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"extensions"} == set(ROOMS)
 
 
 def test_the_picture_of_the_house_has_a_mark_for_every_import_between_rooms():
@@ -125,13 +127,13 @@ def test_every_function_says_what_it_does():
     assert not bare
 
 
-def test_functions_have_at_most_60_lines_and_files_400():
+def test_functions_have_at_most_80_lines_and_files_600():
     files = python_files("src", "benchmarks", "tests", "docs", "examples")
     lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in files}
     long = [f"{path.name}: {name}" for path in files for name, more_lines, _ in file(path).functions
-            if more_lines >= 60]  # fmt: skip
+            if more_lines >= 80]  # fmt: skip
     assert not long
-    assert not {str(path): count for path, count in lines.items() if count > 400}
+    assert not {str(path): count for path, count in lines.items() if count > 600}
 
 
 def test_no_name_of_a_class_stands_for_two_things():
@@ -157,20 +159,64 @@ def test_no_tracked_file_is_large_or_names_this_machine():
     assert not named
 
 
-CEILINGS = {
-    "commands": (17, 1529), "config": (9, 1224), "drafting": (11, 2177), "echo": (28, 2646), "files": (12, 786),
-    "machine": (10, 554), "measure": (6, 589), "motion": (10, 999), "noise": (3, 168), "numerics": (13, 1025),
-    "recognition": (42, 4682), "recordings": (24, 3072), "report": (33, 1903), "scene": (87, 8255),
-    "shards": (24, 3081), "spectra": (15, 924), "targets": (36, 5103), "tiles": (15, 1470), "workflow": (15, 1780),
-    "benchmark": (11, 900),
+SKIPPED = {
+    tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENCODING,
+    tokenize.ENDMARKER,
 }  # fmt: skip
-"""Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
 
 
-def test_no_room_grows_beyond_its_ceiling():
-    files = {room: list((ROOT / "src/lowalt" / room).rglob("*.py")) for room in CEILINGS}
-    lines = {room: sum(len(path.read_text().splitlines()) for path in paths) for room, paths in files.items()}
-    grown = {room: (len(paths), lines[room]) for room, paths in files.items()
-             if len(paths) > CEILINGS[room][0] or lines[room] > CEILINGS[room][1]}  # fmt: skip
-    assert not grown
-    assert set(CEILINGS) == {path.name for path in (ROOT / "src/lowalt").iterdir() if any(path.glob("*.py"))}
+def tokens(text: str) -> int:
+    """The number of tokens of a Python source, without comments, documentation and line ends."""
+    documented = {
+        line
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        for line in range(node.lineno, node.end_lineno + 1)
+    }
+    found = tokenize.generate_tokens(io.StringIO(text).readline)
+    return sum(token.type not in SKIPPED and token.start[0] not in documented for token in found)
+
+
+TOKENS = {
+    "files": 4251,
+    "machine": 2882,
+    "numerics": 8128,
+    "config": 8549,
+    "targets": 48833,
+    "motion": 8948,
+    "echo": 21714,
+    "scene": 49900,
+    "noise": 1220,
+    "spectra": 5353,
+    "tiles": 11261,
+    "shards": 21410,
+    "recognition": 34663,
+    "measure": 5432,
+    "report": 15833,
+    "workflow": 12036,
+    "commands": 6347,
+    "extensions/benchmark": 7982,
+    "extensions/drafting": 23451,
+    "extensions/formats": 659,
+    "extensions/recordings": 26839,
+    "extensions/town": 20073,
+}
+"""Tokens of each room and extension. A commit that needs more than SLACK above it raises its figure and says why."""
+SLACK = 1.05
+
+
+def sizes() -> dict[str, int]:
+    """Tokens of each room of the core and of each extension."""
+    return {room: sum(tokens(path.read_text()) for path in modules(room)) for room in (*ROOMS, *EXTENSIONS)}
+
+
+def test_tokens_count_neither_documentation_nor_line_ends():
+    packed = "a, b = f(x), 2\n"
+    assert tokens(packed) == 10
+    assert tokens('"""What it\nholds."""\n\n# Why.\na, b = (\n    f(x),\n    2\n)\n') == tokens(packed) + 2
+
+
+def test_no_room_and_no_extension_grows_by_more_than_the_slack():
+    found = sizes()
+    assert set(ROOMS) <= set(found) <= set(TOKENS)
+    assert not {room: count for room, count in found.items() if count > SLACK * TOKENS[room]}

@@ -142,32 +142,6 @@ def memory(kept):
     return dict(zip(module.COLUMNS, row, strict=True))
 
 
-def looks(kept, monkeypatch):
-    module = program("studies/detection/study.py")
-    monkeypatch.setattr(module, "SUBTYPES", {kept["class"]: module.SUBTYPES[kept["class"]]})
-    monkeypatch.setattr(module, "RATES", (float(kept["false_alarm"]),))
-    snrs = (float(kept["snr_db"]),) if kept["snr_db"] else module.SCENES[kept["scene"]][1]
-    monkeypatch.setattr(module, "SNRS", snrs)
-    monkeypatch.setitem(module.SCENES, kept["scene"], (module.SCENES[kept["scene"]][0], snrs))
-    found = module.table(kept["scene"], module.looks(kept["scene"], 20))
-    (row,) = [row for row in found if row[3] == kept["range_m"]]
-    return dict(zip(module.COLUMNS, row, strict=True))
-
-
-def neighbours(kept):
-    module = program("studies/detection/neighbours.py")
-    level = float(kept["weaker_by_db"] or "-inf")
-    distance = int(kept["distance_cells"] or module.DISTANCES[0])
-    row = module.row(module.network(), (kept["cfar"], kept["range_window"]), level, distance, int(kept["looks"]))
-    return dict(zip(module.COLUMNS, row, strict=True))
-
-
-def made_rotors(kept):
-    module = program("studies/rotors/made.py")
-    row = module.row(int(kept["rotors"]), int(kept["blades"]), int(kept["lines"]), int(kept["draws"]))
-    return dict(zip(module.COLUMNS, row, strict=True))
-
-
 def precision(kept):
     module = program("benchmarks/signal_precision.py")
     rows = module.rows(module.Dataset(module.overlaid([])), float(kept["snr_db"]))
@@ -195,11 +169,9 @@ REMADE = {
     "results/benchmarks/fuzz.csv": fuzzed, "results/benchmarks/interval_coverage.csv": coverage,
     "results/benchmarks/planted_faults.csv": fault, "results/benchmarks/rounding.csv": rounding,
     "results/benchmarks/scene_levels.csv": scene_level, "results/benchmarks/target_levels.csv": target_level,
-    "results/benchmarks/training_memory.csv": memory, "studies/detection/results/detection.csv": looks,
+    "results/benchmarks/training_memory.csv": memory,
     "results/benchmarks/recording_layouts.csv": layout,
     "results/benchmarks/sampling_gain.csv": gain, "results/benchmarks/signal_precision.csv": precision,
-    "studies/detection/results/neighbours.csv": neighbours,
-    "studies/rotors/results/made.csv": made_rotors,
 }  # fmt: skip
 
 

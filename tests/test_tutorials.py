@@ -17,14 +17,14 @@ import pytest
 import yaml
 
 import lowalt
-import lowalt.benchmark
+import lowalt.extensions.benchmark
 import small_benchmark
 from dataset import build, publish
 from lowalt.__main__ import main
-from lowalt.benchmark import definition, frozen_bytes
-from lowalt.benchmark.submission import read as read_submission
 from lowalt.commands import workflow
 from lowalt.config.layers import load
+from lowalt.extensions.benchmark import definition, frozen_bytes
+from lowalt.extensions.benchmark.submission import read as read_submission
 from lowalt.files.yaml_files import load_yaml
 from lowalt.shards.build import write_run
 
@@ -93,7 +93,7 @@ def test_every_tutorial_is_followed_here():
     pages = {path.stem for path in FOLDER.glob("*.md")}
     assert pages == {
         "first_data_set", "trajectory", "target", "effect", "backbone", "pytorch", "hugging_face", "recording",
-        "benchmark",
+        "benchmark", "extension",
     }  # fmt: skip
 
 
@@ -109,10 +109,10 @@ def test_a_submission_to_the_benchmark(checkout, monkeypatch):
     """On a small copy of the benchmark; its data come from the test, so that no workflow starts and no byte is kept."""
     small_benchmark.shrink(monkeypatch)
     monkeypatch.setattr(workflow, "ended", lambda options: {"status": small_benchmark.write(Path("results")) is None})
-    monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: frozen_bytes.Compared([], []))
+    monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: [])
     printed, _ = followed("benchmark", checkout, monkeypatch)
     assert "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
-    test = lowalt.benchmark.load("unseen", "test")
+    test = lowalt.extensions.benchmark.load("unseen", "test")
     right = read_submission("mine.csv", test.track).argmax(1) == test.labels
     assert f"accuracy {100 * right.mean():.1f} (" in printed
     definition.truth.cache_clear()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+import pointwise_echo
 from lowalt.config.network import SPEED_OF_LIGHT, Network
-from lowalt.echo import echo_matrix
 
 
 def moving(network: Network, speed_mps: float) -> np.ndarray:
@@ -30,7 +30,7 @@ def radar(**waveform) -> Network:
 def test_one_subcarrier_is_a_continuous_wave(speed_mps):
     network = radar(kind="cw")
     places = moving(network, speed_mps)
-    found = echo_matrix(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0), "subcarriers")[:, 0]
+    found = pointwise_echo.subcarriers(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0))[:, 0]
     tau = delays(places)
     direct = (np.exp(-2j * np.pi * 24e9 * tau) / tau**2).sum(axis=1)
     np.testing.assert_allclose(found / found[0], direct / direct[0], atol=1e-8)
@@ -43,7 +43,7 @@ def test_the_subcarriers_of_a_band_are_the_samples_of_an_fmcw_sweep(speed_mps):
     samples, sweep_hz, sweep_s = 128, 150e6, 50e-6
     network = radar(kind="fmcw", sweep_hz=sweep_hz, sweep_s=sweep_s, samples=samples)
     places, slope = moving(network, speed_mps), sweep_hz / sweep_s
-    found = echo_matrix(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0), "cells")
+    found = pointwise_echo.range_cells(network, network.stations[0], places, np.ones(3), places[0].mean(axis=0))
     within_s = np.arange(samples) * sweep_s / samples
     later = places[:, None] + within_s[:, None, None] * np.array([speed_mps, 0.0, 0.0])
     tau = delays(later)

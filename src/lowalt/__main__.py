@@ -12,6 +12,8 @@ from importlib import import_module
 
 from lowalt.commands.command_table import COMMANDS
 from lowalt.config.command import refusal, warn_in_one_line
+from lowalt.config.core_commands import CORE_COMMANDS, Command
+from lowalt.config.extensions import extensions_in_words, function_offered
 from lowalt.files.errors import InputError
 
 
@@ -19,18 +21,32 @@ def command_line(asked: str) -> argparse.ArgumentParser:
     """Return the parser of `lowalt`, with the options of the command `asked`, or of all for "completion"."""
     examples = "\n".join(f"  {entry.example}" for entry in COMMANDS.values())
     line = argparse.ArgumentParser(
-        prog="lowalt", description=__doc__, epilog=f"examples:\n{examples}",
+        prog="lowalt",
+        description=__doc__,
+        epilog=f"examples:\n{examples}\n\n{extensions_in_words()}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+    )
     commands = line.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    modules = {entry.module: None for name, entry in COMMANDS.items() if asked in (name, "completion")}
-    added = {module: import_module(f"lowalt.commands.{module}") for module in modules}
     for name, entry in COMMANDS.items():
-        if entry.module in added:
-            added[entry.module].add_to(commands, name)
+        if asked in (name, "completion"):
+            _add(commands, name, entry)
         else:
             commands.add_parser(name, help=entry.meaning)
     return line
+
+
+def _add(commands: argparse._SubParsersAction, name: str, entry: Command) -> None:
+    """Add a command with its options; one whose extension is faulty gets a sentence in their place."""
+    if name in CORE_COMMANDS:
+        import_module(entry.module).add_to(commands, name)
+        return
+    try:
+        add_to = function_offered("commands", name, entry.module, "add_to")
+    except (InputError, ImportError) as error:
+        print(f"error: {refusal(error)}", file=sys.stderr)
+        commands.add_parser(name, help=entry.meaning).set_defaults(act=None)
+    else:
+        add_to(commands, name)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -38,6 +54,8 @@ def main(arguments: list[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else arguments
     line = command_line(next((word for word in words if not word.startswith("-")), ""))
     options = line.parse_args(words)
+    if options.act is None:
+        return 2
     warn_in_one_line()
     try:
         answer = options.act(options)

@@ -27,7 +27,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from lowalt.files.atomic import FULL, NEARLY_FULL_BYTES, free_bytes
 from lowalt.files.errors import InputError
 from lowalt.machine import progress
-from lowalt.workflow import closing, status
+from lowalt.workflow import closing, mends, status
 from lowalt.workflow.board import Board, Job
 
 EVERY_S = {True: 1.0, False: 30.0}
@@ -51,15 +51,6 @@ FOLLOWS = "input files updated by another job"
 
 INTERRUPTED = "on user request"
 """Part of the message with which Snakemake answers Ctrl-C and SIGTERM."""
-
-
-def quiet_on_a_full_disk(file: logging.FileHandler, record: logging.LogRecord) -> None:
-    """Report that a line could not be written to a log file, unless its disk is full, which the run itself reports.
-
-    Python would print two tracebacks for every such line.
-    """
-    if getattr(sys.exc_info()[1], "errno", None) not in FULL:
-        logging.Handler.handleError(file, record)
 
 
 def short_reason(reason: str) -> str:
@@ -108,8 +99,8 @@ class LogHandler(LogHandlerBase):
         self._drawn, self._shown = 0, 0.0
         self._full, self._outcome = False, "ended"
         self._page: Path | None = None
-        # Snakemake keeps its own log on the run's disk.
-        logging.FileHandler.handleError = quiet_on_a_full_disk
+        # Snakemake keeps its own log on the run's disk, and begins it before it reads any rule.
+        mends.quiet_logs_on_a_full_disk()
         self._guard, self._stop = threading.RLock(), threading.Event()
         self._ticker = threading.Thread(target=self._tick, daemon=True)
 

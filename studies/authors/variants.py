@@ -129,7 +129,7 @@ def samples_of(subtype: str, changes, folder: Path) -> Dataset:
 
 def main(run: Path, out: Path) -> None:
     """Ask the run's networks about every variant and write the shares of their answers."""
-    networks = [load_model(path) for path in sorted(run.glob("models/unseen/abc-vrp-trp-vt/*/model.pt"))]
+    networks = [load_model(path) for path in sorted(run.glob("models/unseen/abc-vrp-trp-vt/*/model.safetensors"))]
     rows = []
     for subtypes, words, changes in VARIANTS:
         subtypes = [subtypes] if isinstance(subtypes, str) else subtypes

@@ -14,8 +14,8 @@ import torch
 from imagenet_weights import BACKBONE, write_weights
 from torch import nn
 
-from lowalt.benchmark.definition import MAIN, config_of
-from lowalt.benchmark.part_samples import VIEWS, TrackSamples
+from lowalt.extensions.benchmark.definition import MAIN, config_of
+from lowalt.extensions.benchmark.part_samples import VIEWS, TrackSamples
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.recognition.recogniser import Palettes, backbone

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import kendalltau
 
-from lowalt.benchmark.baseline_table import COLUMNS, TABLE
-from lowalt.benchmark.benchmark_tracks import TRACKS, Track
-from lowalt.benchmark.scoring import Values, difference, values_of
+from lowalt.extensions.benchmark.baseline_table import COLUMNS, TABLE
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track
+from lowalt.extensions.benchmark.scoring import Values, difference, values_of
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.recognition.predictions import Predictions

@@ -21,7 +21,7 @@ from features import features, spectral_moments
 from frozen import embedded, embedded_chunk, embedded_of
 from signals import Signals, features_of, told
 
-from lowalt.benchmark.part_samples import TrackSamples
+from lowalt.extensions.benchmark.part_samples import TrackSamples
 from lowalt.recognition.batches import epoch_order
 from lowalt.recognition.schemes import Scheme
 
@@ -99,7 +99,7 @@ def network(given: Given, scheme: Scheme, build: Callable, source: Callable[[Tra
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
 
-    block, model = given.config["recognition"], given.folder / "model.pt"
+    block, model = given.config["recognition"], given.folder / "model.safetensors"
     if not model.is_file():
         samples = {"train": source(given.train), "validation": source(given.validation)}
         kept = {key: block[key] for key in ("network", "training", "augmentation")}

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from features import features
 
-from lowalt.benchmark.definition import PARTS, config_of, run_name
-from lowalt.benchmark.part_samples import TrackSamples
 from lowalt.config.network import Network
+from lowalt.extensions.benchmark.definition import PARTS, config_of, run_name
+from lowalt.extensions.benchmark.part_samples import TrackSamples
 from lowalt.files.atomic import replacing
 from lowalt.recognition.samples import Samples, fingerprint
 from lowalt.tiles.signals import load_signals

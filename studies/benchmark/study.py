@@ -25,12 +25,12 @@ from methods import KEPT, METHODS, SEEDLESS, Given
 from signals import cost_s
 
 import trainings
-from lowalt.benchmark import baseline_table, scoring
-from lowalt.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
-from lowalt.benchmark.confirm import confirm
-from lowalt.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
-from lowalt.benchmark.part_samples import TrackSamples
 from lowalt.config.command import run
+from lowalt.extensions.benchmark import baseline_table, scoring
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
+from lowalt.extensions.benchmark.confirm import confirm
+from lowalt.extensions.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
+from lowalt.extensions.benchmark.part_samples import TrackSamples
 from lowalt.files.atomic import replacing, slug
 from lowalt.machine.hardware import describe
 from lowalt.recognition import model_file
@@ -190,7 +190,7 @@ def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
 def confirmed(rows: list[dict], data: str, zoo: Path) -> list[dict]:
     """Keep the models of CONFIRMED in a zoo, and return the rows with their confirmed results."""
     for (name, method), entry in CONFIRMED.items():
-        model, config = place(method, name, 0) / "model.pt", config_of(MAIN)
+        model, config = place(method, name, 0) / "model.safetensors", config_of(MAIN)
         content = replace(model_file.of_run(model), input={block: config[block] for block in model_file.INPUT})
         keep(content, model, TrackSamples(named(name), "validation", data), entry, zoo)
         found = confirm(zoo / f"{entry}.safetensors", named(name)).percent

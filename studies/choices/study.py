@@ -101,7 +101,7 @@ def trial(job: tuple[str, int, int], table: dict, config: dict, data: Path, out:
     runs.train(samples, scheme, f"without fold {fold}", settings, folder)
     asked = joined_sources(part_of(whole, held), samples["validation"])
     about = {"candidate": name, "fold": fold, "held": out_of}
-    runs.evaluate(runs.load(folder / "model.pt"), asked, config["recognition"]["evaluation"], path, more=about)
+    runs.evaluate(runs.load(folder / "model.safetensors"), asked, config["recognition"]["evaluation"], path, more=about)
     return path
 
 

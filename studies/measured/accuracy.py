@@ -24,16 +24,16 @@ from labels import EMPTY, TOGETHER, Interval, intervals_of, label_of, read_label
 from recorded_sets import HALVES, Measured
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.answers import UNNAMED, Answers, answers
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import NO_CLASS, Twin
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.twin_training import simulated, train
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recognition import checkpoint, runs
+from lowalt.recognition import model_file, runs
 from lowalt.recognition.runs import Trained
 from lowalt.recognition.zoo import opened
-from lowalt.recordings.answers import UNNAMED, Answers, answers
-from lowalt.recordings.record import Record
-from lowalt.recordings.twin import NO_CLASS, Twin
-from lowalt.recordings.twin_scenes import Library
-from lowalt.recordings.twin_training import simulated, train
 
 COUNTED = (*CATEGORIES, NO_CLASS, *UNNAMED)
 """What is said of a window."""
@@ -50,7 +50,7 @@ def loaded(path: Path, name: str) -> Trained:
 
     Raises: InputError where the file is missing, damaged, or was trained on another twin than `name`.
     """
-    twin = checkpoint.model(path)[1].get("twin")
+    twin = model_file.read(path).model.get("twin")
     if twin != name:
         raise InputError(f"{path}: trained on the twin {twin!r}, expected {name!r}")
     return runs.load(path)
@@ -145,7 +145,7 @@ def networks(
         folder = models / f"{name}-{seed}"
         if not reuse:
             train(block, samples, name, seed, folder, classes)
-        yield seed, (loaded(folder / "model.pt", name), settings)
+        yield seed, (loaded(folder / "model.safetensors", name), settings)
 
 
 def window_s(twin: Twin) -> float:

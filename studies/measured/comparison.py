@@ -21,10 +21,10 @@ from spectral_figures import INTERVAL, interval_figures, unit
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.windows import at_symbol_rate
 from lowalt.numerics.streams import stream
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import Library
-from lowalt.recordings.windows import at_symbol_rate
 
 FIGURES = (
     "pair", "set", "label", "figure", "unit", "files", "measured", "measured_low", "measured_high", "scenes", "before",

@@ -18,13 +18,13 @@ from accuracy import COUNTED
 
 from lowalt.config.command import run
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.answers import Answers, answers
+from lowalt.extensions.recordings.record import Record, record
+from lowalt.extensions.recordings.twin import Twin, radars
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
 from lowalt.recognition.zoo import opened
-from lowalt.recordings.answers import Answers, answers
-from lowalt.recordings.record import Record, record
-from lowalt.recordings.twin import Twin, radars
 
 RECORDS = Path(__file__).with_name("foreign.yaml")
 COLUMNS = ("network", "input", "windows", *COUNTED)

@@ -16,16 +16,16 @@ from accuracy import COUNTED, counts, said_of, window_s
 from labels import intervals_of, read_labels
 
 from lowalt.config.command import run
+from lowalt.extensions.recordings.answers import answers
+from lowalt.extensions.recordings.own_radar import trained_radar
+from lowalt.extensions.recordings.presence import strongest_mps
+from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_training import RECOGNITION, settings
+from lowalt.extensions.recordings.windows import looks
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.zoo import opened
-from lowalt.recordings.answers import answers
-from lowalt.recordings.own_radar import trained_radar
-from lowalt.recordings.presence import strongest_mps
-from lowalt.recordings.record import record
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_training import RECOGNITION, settings
-from lowalt.recordings.windows import looks
 
 RECORDS = Path(__file__).with_name("fourth_radar.yaml")
 KNOWN = "bird_drone_10ghz"

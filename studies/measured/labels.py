@@ -8,9 +8,9 @@ from scipy.signal import stft
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.files import Baseband
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings.files import Baseband
 from lowalt.report.figures.style import plt, png
 
 LABELS = Path(__file__).with_name("labels.yaml")

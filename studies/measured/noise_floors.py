@@ -13,8 +13,8 @@ import numpy as np
 from recorded_sets import Measured
 from scipy.optimize import least_squares
 
+from lowalt.extensions.recordings.presence import noise_floor
 from lowalt.files.errors import InputError
-from lowalt.recordings.presence import noise_floor
 
 BANDS_HZ = (5.0, 10.0, 20.0, 40.0, 75.0, 150.0, 300.0, 600.0, 1200.0)
 NOISE = ("set", "half", "file", "windows", *(f"floor_{band:.0f}_db" for band in BANDS_HZ), "slow_db", "left_db")

@@ -11,12 +11,12 @@ from recorded_sets import Measured
 from spectral_figures import spectrogram
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.presence import speeds_shown
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import clouds_of, heard, samples, stretch
+from lowalt.extensions.recordings.windows import at_symbol_rate
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
-from lowalt.recordings.presence import speeds_shown
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import clouds_of, heard, samples, stretch
-from lowalt.recordings.windows import at_symbol_rate
 
 FLOOR_DB = -45.0
 

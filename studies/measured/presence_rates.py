@@ -18,11 +18,11 @@ import math
 import numpy as np
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.channel import coherent_intervals
+from lowalt.extensions.recordings.presence import present
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch, value
 from lowalt.numerics.streams import stream
-from lowalt.recordings.channel import coherent_intervals
-from lowalt.recordings.presence import present
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch, value
 
 PRESENCE = ("radar", "scene", "snr_db", "recordings", "windows", "taken_percent", "low", "high")
 HOVER = ("UAV", "Bird")

@@ -20,10 +20,10 @@ from sklearn.model_selection import GroupKFold, cross_val_predict
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
+from lowalt.extensions.recordings.presence import heard_powers, strongest_mps
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.csv_tables import write_csv
-from lowalt.recordings.presence import heard_powers, strongest_mps
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import Library
 
 COLUMNS = ("scenes", "number", "low", "high", "windows", "right_percent", "chance_percent")
 SHARED = 0.025

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.signal import find_peaks, welch
 
-from lowalt.recordings.presence import speeds_shown
+from lowalt.extensions.recordings.presence import speeds_shown
 from lowalt.spectra import magnitudes
 from lowalt.spectra.settings import Fourier
 

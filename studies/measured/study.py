@@ -19,12 +19,12 @@ from any_speed import ANY_SPEED, any_speed
 from recorded_sets import Measured, recordings, usable
 
 from lowalt.config.command import dispatch, run
+from lowalt.extensions.recordings.twin import RADARS
+from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
-from lowalt.recordings.twin import RADARS
-from lowalt.recordings.twin_scenes import Library
 
 HERE = Path(__file__).parent
 PAIRS = HERE / "pictures.yaml"
@@ -76,7 +76,7 @@ def pairs(arguments: list[str]) -> None:
     from comparison import unmended
     from pairs import measured_stretch, picture, simulated_stretch
 
-    from lowalt.recordings.twin import Twin
+    from lowalt.extensions.recordings.twin import Twin
 
     inputs, block = _inputs("pairs", pairs.__doc__, arguments), load_yaml(PAIRS)
     records = inputs.library.records
@@ -147,7 +147,7 @@ def recognise(arguments: list[str]) -> None:
     from accuracy import ACCURACY, RECOGNITION, WINDOWS, accuracy_rows, radar_rows
     from fetch import addresses
 
-    from lowalt.recordings.twin_training import settings
+    from lowalt.extensions.recordings.twin_training import settings
 
     options, library = inputs.options, inputs.library
     over, block = None, settings(options.recognition)

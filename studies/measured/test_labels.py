@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from labels import label_of, read_labels
 
+from lowalt.extensions.recordings.answers import Answers
 from lowalt.files.errors import InputError
-from lowalt.recordings.answers import Answers
 
 
 def recognised(radar, seed, device, half, file, label, windows, right):

@@ -19,12 +19,12 @@ from recorded_sets import SETS, halves, recordings, usable
 from scipy.io import wavfile
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.answers import Answers
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recordings.answers import Answers
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import Library
 
 HERE = Path(__file__).parent
 # Several studies have a program of this name.
@@ -203,7 +203,7 @@ def test_each_network_says_something_of_every_labelled_window(tmp_path):
     assert (tmp_path / "trained/label-vehicle_24ghz-drive.wav.png").is_file()
     (tmp_path / "models/cw_24ghz-0").rename(tmp_path / "models/uav_3ghz-0")
     with pytest.raises(InputError, match="trained on the twin 'cw_24ghz', expected 'uav_3ghz'"):
-        accuracy.loaded(tmp_path / "models/uav_3ghz-0/model.pt", "uav_3ghz")
+        accuracy.loaded(tmp_path / "models/uav_3ghz-0/model.safetensors", "uav_3ghz")
 
 
 def test_a_recording_counts_once_under_two_names(tmp_path, capsys, library):

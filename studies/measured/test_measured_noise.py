@@ -7,9 +7,9 @@ from noise_floors import BANDS_HZ, NOISE, row
 from presence_rates import noise_rows, target_rows
 from recorded_sets import Measured
 
-from lowalt.recordings.record import record
-from lowalt.recordings.twin_receiver import shaped
-from lowalt.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.twin_receiver import shaped
+from lowalt.extensions.recordings.twin_scenes import Library
 
 
 @pytest.fixture(scope="module")

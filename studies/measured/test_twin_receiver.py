@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_echo import radii, sized
+from lowalt.extensions.recordings.twin_receiver import (
+    Receiver,
+    clipped,
+    controlled,
+    highpassed,
+    quantised,
+    received,
+    shaped,
+)
+from lowalt.extensions.recordings.twin_scenes import MARGIN, Library, clouds_of, intervals, samples, stretch
 from lowalt.files.errors import InputError
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_echo import radii, sized
-from lowalt.recordings.twin_receiver import Receiver, clipped, controlled, highpassed, quantised, received, shaped
-from lowalt.recordings.twin_scenes import MARGIN, Library, clouds_of, intervals, samples, stretch
 
 QUIET = {
     "snr_db": 80.0, "flicker_db": -80.0, "flicker_hz": 5.0, "wander_db": 0.0, "leak_db": -80.0, "hum_db": -80.0,

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_courses import drive, hover, straight, to_and_fro
+from lowalt.extensions.recordings.twin_echo import beam_gain, blade_points, echo, still_row, strengthened, textured
+from lowalt.extensions.recordings.twin_others import KINDS, other_echo
+from lowalt.extensions.recordings.twin_receiver import Receiver, received
+from lowalt.extensions.recordings.twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch
 from lowalt.files.errors import InputError
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_courses import drive, hover, straight, to_and_fro
-from lowalt.recordings.twin_echo import beam_gain, blade_points, echo, still_row, strengthened, textured
-from lowalt.recordings.twin_others import KINDS, other_echo
-from lowalt.recordings.twin_receiver import Receiver, received
-from lowalt.recordings.twin_scenes import MARGIN, Library, clouds_of, heard, samples, stretch
 from lowalt.targets.records import load_records
 
 QUIET = {

@@ -142,7 +142,7 @@ def trained(config: dict, views: Path, scheme: Scheme, seed: int, path: Path) ->
     classes = list(predictions.CATEGORIES)
     settings = {**block, "seed": seed, "colour_map": config["images"]["colour_map"], "classes": classes}
     runs.train(parts, scheme, "unseen", scheme.settled(settings), path.parent)
-    model = runs.load(path.with_name("model.pt"))
+    model = runs.load(path.with_name("model.safetensors"))
     runs.evaluate(model, of(evaluated_folds("unseen")), config["recognition"]["evaluation"], path)
 
 

@@ -98,7 +98,7 @@ def answered(trial: Trial, config: dict) -> Path:
     samples = {"train": read("train", chunks=chunks_of(trial.models)),
                "validation": read("validation", chunks=TEST_CHUNKS)}  # fmt: skip
     runs.train(samples, scheme, "unseen", settings, trial.path.parent)
-    model = runs.load(trial.path.parent / "model.pt")
+    model = runs.load(trial.path.parent / "model.safetensors")
     asked = ViewSamples(
         [path for group in ("seen", "unseen") for path in files_of(config, group, "test", TEST_CHUNKS)],
         scheme.columns, {("seen", "test"), ("unseen", "test")},

@@ -21,6 +21,8 @@ import numpy as np
 
 import trainings
 from lowalt.config.command import run
+from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.town import DEFAULTS
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.numerics.streams import stream
@@ -31,10 +33,8 @@ from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import ViewSamples
 from lowalt.recognition.schemes import TABLE, Scheme, named
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.effects.channel.town import DEFAULTS
 from lowalt.scene.explanation import CLOSE_CELLS, samples, scene_of
 from lowalt.scene.observe import observe
-from lowalt.scene.town.buildings import read
 from lowalt.shards import ShardSet
 
 HERE = Path(__file__).parent
@@ -120,7 +120,7 @@ def evaluated(out: Path) -> dict[tuple[str, str], list[Evaluated]]:
     for trained_on, seed in product(TRAINED_ON, config["recognition"]["seeds"]):
         job, folder = trainings.Job(scheme, PROTOCOL, seed), out / trained_on
         trainings.trained(job, config, data_of(trained_on), folder, partial(source, trained_on, size=size))
-        model = runs.load(folder / f"models/{job.name}/model.pt")
+        model = runs.load(folder / f"models/{job.name}/model.safetensors")
         for scene in SCENES:
             path = folder / f"{scene}/{job.name}.csv"
             if not path.with_suffix(".json").is_file():

@@ -14,10 +14,10 @@ import numpy as np
 from match import CARRIER_HZ, SLAB_M, ray_tracer
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.town import image_paths
+from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.town import DEFAULTS
 from lowalt.files.csv_tables import write_csv
-from lowalt.scene.effects.channel.town import DEFAULTS
-from lowalt.scene.town import image_paths
-from lowalt.scene.town.buildings import read
 
 WIDE_M, TALL_M, EDGE_M, UNDER_M = 2000.0, 800.0, 30.0, 5.0
 """Half the screen's width; its height where its side is the near edge; the top edge's height, at which waves pass the

@@ -17,12 +17,12 @@ import numpy as np
 
 from lowalt.config.layers import overlaid
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m
+from lowalt.extensions.town import image_paths, shadow_loops
+from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.facets import Occluders, Town
+from lowalt.extensions.town.town import DEFAULTS
 from lowalt.files.atomic import replacing
 from lowalt.motion.drawing import region_polygon
-from lowalt.scene.effects.channel.town import DEFAULTS
-from lowalt.scene.town import image_paths, shadow_loops
-from lowalt.scene.town.buildings import read
-from lowalt.scene.town.facets import Occluders, Town
 
 CARRIER_HZ = 4.9e9
 SLAB_M = 1000.0

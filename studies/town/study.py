@@ -9,13 +9,13 @@ import numpy as np
 from lowalt.config.layers import overlaid
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.extensions.town import image_paths
+from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.footprints import moved
+from lowalt.extensions.town.town import DEFAULTS
 from lowalt.files.atomic import replacing
 from lowalt.scene import explanation
 from lowalt.scene.chain import received_signal
-from lowalt.scene.effects.channel.town import DEFAULTS
-from lowalt.scene.town import image_paths
-from lowalt.scene.town.buildings import read
-from lowalt.scene.town.footprints import moved
 
 HERE = Path(__file__).parent
 ORIGIN = (11.575, 48.137)

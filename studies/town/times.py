@@ -17,10 +17,10 @@ import numpy as np
 from study import HERE, write_blocks
 
 from lowalt.config.layers import overlaid
+from lowalt.extensions.town.town import paths
 from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.scene import explanation
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.effects.channel.town import paths
 from lowalt.scene.observe import observe
 
 GRID_M = (np.arange(-740.0, 1170.0, 60.0), np.arange(-780.0, 1130.0, 60.0))

@@ -18,27 +18,28 @@ from typing import NamedTuple
 import numpy as np
 import recorded_sets
 import rejection
-from study import logits
+import torch
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.extensions.recordings import twin_training
+from lowalt.extensions.recordings.channel import coherent_intervals
+from lowalt.extensions.recordings.files import Baseband, read
+from lowalt.extensions.recordings.presence import present
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import Twin
+from lowalt.extensions.recordings.twin_scenes import MARGIN, Library, samples, stretch
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
+from lowalt.extensions.recordings.windows import at_symbol_rate
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
 from lowalt.recognition import runs, zoo
-from lowalt.recognition.samples import fingerprint, joined
+from lowalt.recognition.inference import Machine
+from lowalt.recognition.samples import Samples, fingerprint, joined
 from lowalt.recognition.schemes import TABLE, named
-from lowalt.recordings import twin_training
-from lowalt.recordings.channel import coherent_intervals
-from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.presence import present
-from lowalt.recordings.record import Record
-from lowalt.recordings.twin import Twin
-from lowalt.recordings.twin_scenes import MARGIN, Library, samples, stretch
-from lowalt.recordings.window_samples import Windows, facts, rendered
-from lowalt.recordings.windows import at_symbol_rate
 from lowalt.tiles.image_settings import Images
 
 FOLDER = Path("config/measured")
@@ -50,6 +51,15 @@ ASKED = 200
 """Windows of each kind of EMPTY that the networks are asked about."""
 MODELS = Path("results/unknown/twins")
 COLUMNS = ("network", "windows", "score", "known", "count", "kept_percent", "right_percent")
+
+
+def logits(model: torch.nn.Module, samples: Samples, batch: int = 256) -> np.ndarray:
+    """Return the logits (n, classes) float64 of all samples of a source."""
+    model = Machine.here("fp32").placed(model).eval()
+    with torch.inference_mode():
+        parts = [model(torch.from_numpy(samples.views(np.arange(start, min(start + batch, len(samples.facts))))))
+                 for start in range(0, len(samples.facts), batch)]  # fmt: skip
+    return torch.cat(parts).double().numpy()
 
 
 @dataclass(frozen=True)
@@ -156,7 +166,7 @@ def with_empty(radar: Radar, library: Library, block: dict, fold: str) -> Kept:
 
 def with_extra(radar: Radar, library: Library, block: dict, folder: Path) -> Radar:
     """Return the radar with a network of five classes that is trained here, unless that is done."""
-    path = folder / radar.name / "model.pt"
+    path = folder / radar.name / "model.safetensors"
     if not path.is_file():
         windows = {fold: with_empty(radar, library, block, fold) for fold in ("train", "validation")}
         settings = {key: block[key] for key in ("seed", "size", "network", "training", "augmentation")}

@@ -76,7 +76,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs
     monkeypatch.setitem(sys.modules, "torch", None)
     assert main(["predict", "default-seen", str(sample)]) == 2
     assert capsys.readouterr().err == (
-        "error: the package torch is not installed, expected `pip install 'lowalt[recognition]'`\n"
+        "error: the package torch is not installed, expected `pip install torch torchvision timm`\n"
     )
     with pytest.raises(ModuleNotFoundError, match="nowhere"):
         refusal(ModuleNotFoundError("nowhere", name="nowhere"))

@@ -37,29 +37,3 @@ def test_planning_a_run_imports_no_compiler_and_no_network():
 
 def test_a_package_that_is_imported_is_seen():
     assert imported("import numpy; raise SystemExit(2)") == {"numpy"}
-
-
-COMPILER = "torch._dynamo"
-"""torch's compiler, which takes longer to import than the rest of torch."""
-
-
-@pytest.mark.parametrize(("program", "compiler"), [
-    pytest.param("import timm", True, marks=pytest.mark.slow),
-    ("from lowalt.recognition.light_timm import timm; timm.create_model('test_resnet', num_classes=0)", False),
-    ("from lowalt.recognition.zoo import opened; opened('default-seen')", False),
-])  # fmt: skip
-def test_a_network_is_built_without_the_compiler_of_torch(program, compiler):
-    """The first program shows that timm alone still imports it."""
-    text = f"import sys\n{program}\nprint({COMPILER!r} in sys.modules)"
-    run = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines()[-1] == str(compiler)
-
-
-def test_what_needs_the_compiler_still_finds_it():
-    text = (
-        "from lowalt.recognition.light_timm import timm\nimport torch\nfrom torchvision.ops import roi_align\n"
-        "print(roi_align(torch.ones(1, 1, 8, 8), [torch.tensor([[0.0, 0, 4, 4]])], 2).tolist())\n"
-        "print(torch.compile(torch.nn.Identity()) is not None)"
-    )
-    run = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines() == [str([[[[1.0, 1.0], [1.0, 1.0]]]]), "True"]

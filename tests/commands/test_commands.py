@@ -188,11 +188,11 @@ def test_predict_names_the_classes_by_their_probability(tmp_path, capsys):
     train(write_views(tmp_path / "views.npz"), trained, with_training(steps=2, validate_every=2))
     signals = np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4).astype(np.complex64)
     np.save(tmp_path / "a.npy", signals)
-    line = ["predict", str(trained / "model.pt"), str(tmp_path / "a.npy")]
+    line = ["predict", str(trained / "model.safetensors"), str(tmp_path / "a.npy")]
     assert main([*line, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     settings = {key: CONFIG[key] for key in ("network", "spectra", "images")}
-    assert found == predict_sample.predict(runs.load(trained / "model.pt"), tmp_path / "a.npy", settings)
+    assert found == predict_sample.predict(runs.load(trained / "model.safetensors"), tmp_path / "a.npy", settings)
     assert main(line) == 0
     shown = [text.split()[-1] for text in capsys.readouterr().out.splitlines()]
     assert shown == sorted(found, key=found.get, reverse=True)

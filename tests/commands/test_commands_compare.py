@@ -5,8 +5,8 @@ import json
 import pytest
 
 from lowalt.__main__ import main
-from lowalt.benchmark import baseline_table
 from lowalt.commands import workflow
+from lowalt.extensions.benchmark import baseline_table
 from lowalt.files.errors import LONGEST
 from run_folders import run_folder
 

@@ -14,9 +14,10 @@ from lowalt.commands import workflow
 from lowalt.commands.command_line import as_json
 from lowalt.commands.command_table import COMMANDS
 from lowalt.config.layers import load, plain
+from lowalt.extensions.drafting import mesh_picture
 from lowalt.files.atomic import replacing
 from lowalt.machine.progress import Reporter
-from lowalt.report.figures import mesh_picture, target_picture
+from lowalt.report.figures import target_picture
 from lowalt.scene import explanation
 from lowalt.scene.checks import check
 from lowalt.scene.effects import PLACES
@@ -29,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 CONFIG, SCHEMA = ROOT / "config/default.yaml", ROOT / "workflow/schemas/config.schema.yaml"
 PAGE = (ROOT / "docs/reference/json.md").read_text()
 STATION = {"method", "decisions", "rms_change", "other_cells"}
-STATIC = ("settings", "stages", "method", "otherwise", "materials", "dropped")
+STATIC = ("settings", "stages", "method", "otherwise", "materials", "dropped", "notes")
 """Keys whose own keys are names of settings, stages, fields, filters, materials or reasons that the reference does not
 list."""
 

@@ -9,8 +9,9 @@ import pytest
 import yaml
 
 from lowalt.__main__ import main as lowalt_command
-from lowalt.commands import explain, target, workflow
+from lowalt.commands import explain, workflow
 from lowalt.config.layers import overlaid
+from lowalt.extensions.drafting import target
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 

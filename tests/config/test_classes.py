@@ -69,7 +69,7 @@ def test_every_command_takes_the_classes_of_the_table_and_any_stations(tmp_path,
     # Of five motion models of a subtype three are for training and one for the test, at every SNR.
     assert views.shape == (3 * len(SNRS) * len(targets), 3 * count, SIZE, SIZE)
     assert count == 1 or not np.array_equal(views[:, :3], views[:, 3:6])
-    trained = load_model(tmp_path / "model/model.pt")
+    trained = load_model(tmp_path / "model/model.safetensors")
     assert trained.classes == names and trained.model.classifier.out_features == len(names)
     predictions = read_csv(tmp_path / "p.csv")
     columns = [f"p_{classes.word(name)}" for name in names]

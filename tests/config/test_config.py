@@ -58,11 +58,11 @@ def test_a_wrong_value_is_refused_by_key_value_and_expectation(overlay, words):
 
 
 def test_a_null_takes_out_what_a_lower_layer_has_wherever_the_key_may_be_left_out():
-    layers = {"effects": {"adc": {"bits": 8}}, "recognition": {"processes": 3}, "targets": {"own": {"x": "x.yaml"}}}
-    nulls = {"effects": {"adc": None}, "recognition": {"processes": None}, "targets": {"own": {"x": None}},
+    layers = {"effects": {"adc": {"bits": 8}}, "recognition": {"gpu": True}, "targets": {"own": {"x": "x.yaml"}}}
+    nulls = {"effects": {"adc": None}, "recognition": {"gpu": None}, "targets": {"own": {"x": None}},
              "network": {"stations": {"C": None}}, "spectra": {"vt": None}, "echo": {"tolerance": None}}  # fmt: skip
     found = check(merge(merge(copy.deepcopy(DEFAULT), layers), nulls), SCHEMA)
-    assert found["effects"] == found["targets"].pop("own") == {} and "processes" not in found["recognition"]
+    assert found["effects"] == found["targets"].pop("own") == {} and "gpu" not in found["recognition"]
     assert list(found["network"]["stations"]) == ["A", "B"] and list(found["spectra"]) == ["vrp", "trp"]
     assert found["echo"] == DEFAULT["echo"]
 

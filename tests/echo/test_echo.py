@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import pointwise_echo
 import reference
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.echo import Path, Rigid, echo_matrix, echo_signal
+from lowalt.echo import Rigid, echo_signal
 
 
 def network(**changes) -> Network:
@@ -76,7 +77,7 @@ def test_any_arrays_and_any_number_of_subcarriers(data):
     motion = cloud_in_motion(rng, 3, data.draw(st.integers(1, 8)), centre, 0.05 * away, 0.1 * away)
     rcs = rng.uniform(0.1, 2, len(motion.points))
     truth = reference.range_cells(net, seen, positions(motion), rcs, motion.translation[0, 0])
-    cells = echo_matrix(net, seen, motion, rcs, motion.translation[0, 0], "cells")
+    cells = pointwise_echo.range_cells(net, seen, motion, rcs, motion.translation[0, 0])
     # The direct sum's own plain phases are the coarser side: 2e-16 of the largest phase.
     noise = 1e-11 + 1e-14 * 4 * np.pi * 1.2 * net.carrier_hz / SPEED_OF_LIGHT * away
     assert relative(cells, truth) < noise
@@ -86,21 +87,17 @@ def test_any_arrays_and_any_number_of_subcarriers(data):
     assert np.allclose(abs(cells[np.arange(3), result.cell]), strongest, rtol=1e-12)
 
 
-def test_signal_cells_and_subcarriers_agree_and_paths_add():
+def test_signal_cells_and_subcarriers_agree():
     net = network(subcarriers=24)
     rng = np.random.default_rng(5)
     motion = cloud_in_motion(rng, 4, 7, (90.0, 40.0, 10.0))
-    seen, rcs, aim = net.stations[0], np.ones(7), motion.translation[0, 0]
-    paths = [Path(0.0, rng.normal(size=(4, 7))), Path(rng.uniform(0, 1e-6, (4, 1)), 0.3 - 0.4j)]
-    truth = reference.subcarriers(net, seen, positions(motion), rcs, aim, paths)
-    assert relative(echo_matrix(net, seen, motion, rcs, aim, "subcarriers", paths), truth) < 1e-9
-    cells = echo_matrix(net, seen, motion, rcs, aim, "cells", paths)
-    assert relative(cells, np.fft.ifft(truth, axis=1)) < 1e-9
-    result = echo_signal(net, seen, motion, rcs, aim, paths=paths)
+    arguments = net, net.stations[0], motion, np.ones(7), motion.translation[0, 0]
+    truth = reference.subcarriers(net, net.stations[0], positions(motion), np.ones(7), motion.translation[0, 0])
+    assert relative(pointwise_echo.subcarriers(*arguments), truth) < 1e-9
+    cells = pointwise_echo.range_cells(*arguments)
+    result = echo_signal(*arguments)
     assert (result.cell == abs(cells).argmax(axis=1)).all()
-    direct = echo_signal(net, seen, motion, rcs, aim)
-    one = echo_signal(net, seen, motion, rcs, aim, paths=[Path()])
-    assert relative(one.signal, direct.signal) < 1e-12
+    assert relative(pointwise_echo.signal(*arguments).signal, result.signal) < 1e-12
 
 
 def test_a_moving_point_is_in_its_cell_with_its_doppler():

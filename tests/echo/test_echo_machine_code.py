@@ -139,6 +139,40 @@ def test_products_of_complex_numbers_are_fused_in_no_kernel_that_is_done_as_writ
     assert ended.stdout == "True\n", ended.stderr
 
 
+SHARED = """
+import platform
+import numpy as np
+from numba import njit
+from numba.core.registry import cpu_target
+
+
+def loop(a, b, out):
+    for k in range(len(out)):
+        out[k] = a[k] * b[k]
+
+
+def other(a, b, out):
+    for k in range(len(out)):
+        out[k] = a[k] * b[k]
+
+
+rng = np.random.default_rng(1)
+a, b = rng.normal(size=(2, 300, 2)).view(complex)[..., 0]
+found = np.empty(300, complex)
+njit(fastmath={"contract"})(other)(a, b, found.copy())
+njit(loop)(a, b, found)
+written = (a.real * b.real - a.imag * b.imag) + 1j * (a.real * b.imag + a.imag * b.real)
+fuses = platform.machine() != "x86_64" or "+fma" in cpu_target.target_context.codegen().magic_tuple()[2]
+print((found == written).all() != fuses)
+"""
+
+
+def test_plain_numba_still_compiles_a_product_once_for_all_kernels(tmp_path):
+    (tmp_path / "shared.py").write_text(SHARED)
+    ended = subprocess.run([sys.executable, "shared.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert ended.stdout == "True\n", ended.stderr
+
+
 CALLED = """
 import platform
 import numpy as np

@@ -8,8 +8,9 @@ from numpy.polynomial.polynomial import polyval
 from scipy.spatial.transform import Rotation
 from test_echo import cloud_in_motion, network, positions
 
+import pointwise_echo
 from lowalt.config.network import Station
-from lowalt.echo import Path, Rigid, api, echo_matrix, echo_signal, refine
+from lowalt.echo import Rigid, api, echo_signal, refine
 from lowalt.echo.fast import error_model
 from lowalt.echo.fast.cell_kernel import PLACES
 from lowalt.echo.fast.error_model import echo_plan, pointwise_bound
@@ -51,7 +52,7 @@ def test_no_point_lies_beyond_the_extents_of_its_target(rigid, stretched):
     places, first = positions(motion), motion.translation[:, motion.part[0]]
     if not rigid:
         motion, first = places, places[:, 0]
-    scene, radio, refs, aims, _ = api.prepared(NET, SEEN, motion, rcs, places[0, 0], None, "")
+    scene, radio, refs, aims = api.prepared(NET, SEEN, motion, rcs, places[0, 0], "")
     sample, out = refine.compute(scene, radio, refs, aims, None)[3], np.empty((6, 5))
     worst = fill_extents(sample, refs, out)
     away = np.linalg.norm(places - first[:, None], axis=2)
@@ -188,21 +189,17 @@ def on_axis(cells: float) -> tuple[Station, np.ndarray]:
 def test_the_pointwise_bound_of_one_point_in_the_beam_is_that_of_its_sum_and_of_its_direction():
     """At a whole cell the value is the amplitude, and on the axis the peak one, so both parts count once."""
     station, place = on_axis(30.0)
-    found = echo_signal(NET, station, place, 1.0, place[0, 0], paths=[Path()])
+    found = pointwise_echo.signal(NET, station, place, 1.0, place[0, 0])
     share, direction = found.method.pointwise_bound
     assert share > 0 and direction > 0 and found.bound == pytest.approx(share + direction, rel=1e-6, abs=0)
-    assert (found.method.cheap, found.method.exact, found.method.general) == (0, 0, 1)
-    # Over several paths both count with the sizes of their gains.
-    more = echo_signal(NET, station, place, 1.0, place[0, 0], paths=[Path(), Path(0.0, -3j)])
-    assert more.bound * abs(more.signal[0]) == pytest.approx(4 * found.bound * abs(found.signal[0]), rel=1e-6, abs=0)
 
 
 def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
     """A point so near the middle between two cells that the bounds are a good part of what they differ by."""
     station, place = on_axis(30.5 + 4e-13)
     arguments = (NET, station, place, 1.0, place[0, 0])
-    strengths = np.sort(abs(echo_matrix(*arguments, "cells", paths=[Path()])[0]))
-    lead, found = strengths[-1] - strengths[-2], echo_signal(*arguments, paths=[Path()])
+    strengths = np.sort(abs(pointwise_echo.range_cells(*arguments)[0]))
+    lead, found = strengths[-1] - strengths[-2], pointwise_echo.signal(*arguments)
     bound = found.bound * abs(found.signal[0])
     assert 0.05 * lead < bound < 0.4 * lead
     assert found.gap[0] == pytest.approx(lead - 2 * bound, rel=0.01, abs=0)

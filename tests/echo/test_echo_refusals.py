@@ -7,7 +7,7 @@ import pytest
 from test_echo import network
 
 from lowalt.config.network import Station
-from lowalt.echo import Path, Rigid, echo_matrix, echo_signal
+from lowalt.echo import Rigid, echo_signal
 from lowalt.echo.echo_input import target
 from lowalt.files.errors import InputError
 
@@ -15,7 +15,7 @@ NET = network(symbols=2)
 SEEN = NET.stations[0]
 PLACES = np.random.default_rng(1).normal(50, 3, (2, 3, 3))
 STILL = Rigid(np.zeros((2, 3, 3, 3)), PLACES, np.ones((3, 3)), np.arange(3))
-GOOD = {"motion": PLACES, "rcs_m2": 1.0, "aim_m": (9.0, 9.0, 9.0), "tolerance": None, "paths": None}
+GOOD = {"motion": PLACES, "rcs_m2": 1.0, "aim_m": (9.0, 9.0, 9.0), "tolerance": None}
 
 
 def inside(places: np.ndarray, at: tuple[int, int]) -> np.ndarray:
@@ -32,7 +32,6 @@ REFUSED = [
     ({"motion": np.zeros((2, 0, 3))}, r"positions has shape \(2, 0, 3\), expected \(N, L, 3\)"),
     ({"motion": np.zeros((2, 3))}, r"positions has shape \(2, 3\)"),
     ({"motion": inside(PLACES, (1, 2))}, "position of point 2 at symbol 1 is .*, the place of station A .r = 0"),
-    ({"motion": inside(PLACES, (1, 2)), "paths": [Path(), Path(1e-7)]}, "position of point 2 at symbol 1"),
     ({"motion": STILL._replace(rotation=np.zeros((2, 3, 3, 2)))}, r"motion.rotation has shape \(2, 3, 3, 2\), "),
     ({"motion": STILL._replace(rotation=np.zeros((0, 3, 3, 3)))}, r"motion.rotation .*expected \(N, P, 3, 3\)"),
     ({"motion": STILL._replace(rotation=np.full((2, 3, 3, 3), np.nan))}, r"motion.rotation\[0, 0, 0, 0\] is nan"),
@@ -48,10 +47,6 @@ REFUSED = [
     ({"motion": target(PLACES, 1.0)}, "rcs_m2 is 1.0, expected None: a Target holds its cross sections"),
     ({"aim_m": SEEN.position_m}, "aim_m is .*no direction to aim at"),
     ({"aim_m": (np.nan, 0.0, 25.0)}, r"aim_m\[0\] is nan"),
-    ({"paths": []}, "paths is empty, expected at least one path"),
-    ({"paths": [Path(), Path(np.inf)]}, r"paths\[1\].delay_s has a NaN or infinite value"),
-    ({"paths": [Path(0.0, complex(0, np.nan))]}, r"paths\[0\].gain has a NaN or infinite value"),
-    ({"paths": [Path(0.0, np.ones((2, 5)))]}, r"paths\[0\].gain has shape \(2, 5\), expected to broadcast to \(2, 3\)"),
     *(({"tolerance": wrong}, "tolerance is .*, expected null or a number between 0 and 1")
       for wrong in (0.0, 1.0, -1e-3, float("nan"), "1e-3", 2)),
 ]  # fmt: skip
@@ -77,11 +72,6 @@ def test_a_wrong_argument_is_named_with_its_sample(change, told):
 def test_a_station_that_cannot_hear_itself_is_named(change, told):
     with pytest.raises(InputError, match=f"station A.*{told}"):
         echo_signal(NET, dataclasses.replace(SEEN, **change), PLACES, 1.0, (9.0, 9.0, 9.0))
-
-
-def test_a_matrix_of_anything_but_cells_or_subcarriers_is_refused():
-    with pytest.raises(InputError, match="columns is 'pixels', expected 'cells' or 'subcarriers'"):
-        echo_matrix(NET, SEEN, PLACES, 1.0, (9.0, 9.0, 9.0), "pixels")
 
 
 def test_numbers_whose_sum_overflows_are_finite_all_the_same_and_read_only_arrays_are_taken():

@@ -56,7 +56,7 @@ def test_array_sums_hold_twenty_digits_and_their_limits(count):
 
 def prepared(net, station, motion, rcs, aim):
     """What `echo_signal` prepares and computes before values are rounded: (arguments of `nearest.correct`)."""
-    scene, radio, refs, aims, _ = api.prepared(net, station, motion, rcs, aim, None, "")
+    scene, radio, refs, aims = api.prepared(net, station, motion, rcs, aim, "")
     found, _, method, sample = refine.compute(scene, radio, refs, aims, None)
     return sample, refs, found, method.pointwise_bound
 

@@ -9,10 +9,11 @@ import pytest
 import torch
 import yaml
 
+import model_files
 from configured import Inputs, parts
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, samples
+from lowalt.recognition import samples
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.dataset_samples import DatasetSamples, opened, stations_of
 from lowalt.recognition.views import ShardSamples
@@ -85,7 +86,7 @@ def test_a_training_on_made_samples_ends_in_the_same_weights(run, tmp_path):
     weights = []
     for name, source in (("dataset", run / "config.yaml"), ("index", run / "shards" / "index.json")):
         main([*line, f"--{name}", str(source), "--out", str(tmp_path / name)])
-        weights.append(checkpoint.load(tmp_path / name / "model.pt")[1]["weights"])
+        weights.append(model_files.load(tmp_path / name / "model.safetensors")[1]["weights"])
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[1])
     with pytest.raises(InputError, match="one of --views, --index and --dataset"):
         main([*line, "--out", str(tmp_path / "none")])

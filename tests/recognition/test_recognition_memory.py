@@ -90,7 +90,7 @@ def test_workers_read_in_order_and_live_as_long_as_their_reader():
 
 
 def test_evaluation_by_workers_writes_the_same_bytes(views, trained, tmp_path):
-    model, source = runs.load(trained / "model.pt"), sources(views)["validation"]
+    model, source = runs.load(trained / "model.safetensors"), sources(views)["validation"]
     block = {"batch": 7, "threads": 1, "precision": "fp32", "mirror": True}
     for name, more in (("here", {}), ("workers", {"workers": 2})):
         runs.evaluate(model, source, {**block, **more}, tmp_path / f"{name}.csv")

@@ -1,6 +1,5 @@
-"""Several ranks, over one node and two: they train and evaluate as one; batch norm takes its statistics over all."""
+"""Several ranks: they train and evaluate as one, and batch norm is refused where no GPU shares its statistics."""
 
-import copy
 import csv
 import json
 import os
@@ -12,11 +11,11 @@ import timm
 import torch
 from torch import nn
 
-from lowalt.config.layers import load_yaml
-from lowalt.recognition import batch_norm, checkpoint, predictions, runs
+import model_files
+from lowalt.files.errors import InputError
+from lowalt.recognition import predictions, runs
 from lowalt.recognition.__main__ import main
-from lowalt.recognition.batch_norm import over_ranks
-from lowalt.workflow.launch import Launch
+from lowalt.recognition.inference import Machine
 from trainings import SCHEME, SETTINGS, sources, with_training
 
 # One process imports torch, which takes seconds, and becomes two ranks by forks, with the variables that torchrun sets.
@@ -64,9 +63,8 @@ def training_line(folder, views, name, batch):
     """A command line that trains six steps without random images, into `folder`/`name`."""
     settings = {**with_training(steps=6, validate_every=3, batch=batch), "scheme": SCHEME.record}
     settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
-    # The shipped backbone, whose batch norm needs the statistics of the whole batch.
-    shipped = load_yaml("config/default.yaml")["recognition"]["network"]["backbone"]
-    settings["network"] = {**SETTINGS["network"], "dropout": 0.0, "backbone": shipped}
+    # A backbone without batch norm, whose statistics torch shares between GPUs alone.
+    settings["network"] = {**SETTINGS["network"], "dropout": 0.0, "backbone": "test_convnext"}
     return ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
             "--out", str(folder / name)]  # fmt: skip
 
@@ -74,7 +72,7 @@ def training_line(folder, views, name, batch):
 def evaluation_line(folder, views, trained, name):
     """A command line that evaluates a finished training, into `folder`/`name`."""
     settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32", "mirror": False})
-    return ["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.pt"),
+    return ["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.safetensors"),
             "--out", str(folder / name)]  # fmt: skip
 
 
@@ -101,8 +99,7 @@ def test_two_ranks_train_as_one_with_both_their_samples(both):
     """Gradients are means over the ranks' equal shares, so a step is that of one rank with the whole batch."""
     weights, losses = {}, {}
     for name, ranks in (("one", 1), ("two", 2), ("half", 1)):
-        found = checkpoint.load(both / name / "model.pt")[1]["weights"]
-        assert any("running_var" in key for key in found)
+        found = model_files.load(both / name / "model.safetensors")[1]["weights"]
         weights[name] = torch.cat([value.flatten() for value in found.values() if value.is_floating_point()])
         with (both / name / "history.csv").open(newline="") as file:
             losses[name] = [float(row["validation_loss"]) for row in csv.DictReader(file)]
@@ -119,75 +116,30 @@ def test_a_rank_beside_the_first_writes_and_says_nothing(views, trained, tmp_pat
     settings = with_training(steps=2, validate_every=1, checkpoint_s=0)
     runs.train(sources(views), SCHEME, "seen", settings, tmp_path / "run", events=True)
     block = {"batch": 64, "threads": 1, "precision": "fp32", "mirror": False}
-    runs.evaluate(runs.load(trained / "model.pt"), sources(views)["validation"], block, tmp_path / "some.csv")
+    runs.evaluate(runs.load(trained / "model.safetensors"), sources(views)["validation"], block, tmp_path / "some.csv")
     assert not list(tmp_path.iterdir()) and not capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_two_nodes_of_one_process_train_to_the_bytes_of_the_workflow_s_launcher_of_two(views, tmp_path):
-    """The launcher: the words that the rule `train` puts before the module (`recognition.processes: 2`)."""
+def test_torchrun_starts_such_a_training(views, tmp_path):
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
-    nodes = ["torch.distributed.run", "--nnodes", "2", "--nproc-per-node", "1", "--master-addr", "127.0.0.1"]
-    nodes += ["--master-port", str(20002 + os.getpid() % 20000), "--node-rank"]
-    for name, launchers in (("one", [Launch.of({"processes": 2}).words]), ("two", [[*nodes, "0"], [*nodes, "1"]])):
-        line = ["-m", "lowalt.recognition"] if name == "two" else ["lowalt.recognition"]
-        line += training_line(tmp_path, views, name, 8)
-        commands = [[sys.executable, "-m", *words, *line] for words in launchers]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-        for process in [subprocess.Popen(command, env=environment, **pipes) for command in commands]:
-            said, _ = process.communicate(timeout=300)
-            assert process.returncode == 0, said[-3000:]
-        assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == 2
-    for name in ("model.pt", "history.csv"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+    torchrun = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m"]
+    command = [*torchrun, "lowalt.recognition", *training_line(tmp_path, views, "two", 8)]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr[-3000:]
+    assert json.loads((tmp_path / "two/run.json").read_text())["ranks"] == 2
 
 
-@pytest.fixture
-def ranks(monkeypatch):
-    """Stands for so many ranks with the same images: a sum over them is that many times each one's."""
-    found = {"count": 1}
-    monkeypatch.setattr(batch_norm.distributed, "all_reduce", lambda values: values.mul_(found["count"]))
-    return found
-
-
-def layer():
-    """A layer with weights, running means and settings of its own."""
-    torch.manual_seed(4)
-    own = nn.BatchNorm2d(3, eps=1e-2, momentum=0.3)
-    for value in (own.weight, own.bias, own.running_mean):
-        nn.init.normal_(value)
-    own.running_var.uniform_(0.5, 2)
-    return own
-
-
-@pytest.mark.parametrize("count", [1, 2])
-def test_a_step_of_all_ranks_is_that_of_one_with_the_whole_batch(ranks, count):
-    ranks["count"] = count
-    own = layer()
-    shared = over_ranks(nn.Sequential(copy.deepcopy(own)))[0]
-    assert type(shared) is batch_norm.BatchNormOverRanks and (shared.eps, shared.momentum) == (1e-2, 0.3)
-    images = (5 + torch.randn(2, 3, 4, 5)).requires_grad_()
-    both = torch.cat([images.detach()] * count).requires_grad_()
-    wanted, found = own(both), shared(images)
-    torch.testing.assert_close(found, wanted[:2], rtol=1e-4, atol=1e-4)
-    assert found.dtype == images.dtype and found.is_contiguous(memory_format=torch.channels_last)
-    gradient = torch.randn_like(found)
-    found.backward(gradient)
-    wanted.backward(torch.cat([gradient] * count))
-    torch.testing.assert_close(images.grad, both.grad[:2], rtol=1e-3, atol=1e-4)
-    for name in ("running_mean", "running_var", "num_batches_tracked"):
-        torch.testing.assert_close(getattr(shared, name), getattr(own, name), rtol=1e-4, atol=1e-5)
-    before = shared.running_mean.clone()
-    torch.testing.assert_close(shared.eval()(both), own.eval()(both), rtol=1e-4, atol=1e-4)
-    assert torch.equal(shared.running_mean, before) and shared.num_batches_tracked == 1
-
-
-def test_every_batch_norm_of_a_backbone_is_replaced_with_its_activation(ranks):
-    torch.manual_seed(5)
-    own = timm.create_model("test_efficientnet", num_classes=0).train()
-    shared = over_ranks(copy.deepcopy(own))
-    counts = [sum(isinstance(one, nn.BatchNorm2d) for one in model.modules()) for model in (own, shared)]
-    assert counts[0] == counts[1] == sum(type(one) is batch_norm.BatchNormOverRanks for one in shared.modules()) > 3
-    images = torch.randn(4, 3, 32, 32)
-    torch.testing.assert_close(shared(images), own(images), rtol=1e-3, atol=1e-3)
-    assert shared.state_dict().keys() == own.state_dict().keys()
+def test_batch_norm_over_ranks_of_processors_is_refused_and_over_gpus_shared():
+    own = timm.create_model("test_resnet", num_classes=0)
+    on_processors, on_gpus = (Machine(torch.device(kind), "fp32", 0, 2) for kind in ("cpu", "cuda"))
+    with pytest.raises(
+        InputError,
+        match=r"share no batch norm, and the backbone has [a-z0-9.]+; expected GPUs",
+    ):
+        on_processors.with_shared_statistics(own)
+    assert Machine(torch.device("cpu"), "fp32").with_shared_statistics(own) is own
+    names = own.state_dict().keys()
+    shared = on_gpus.with_shared_statistics(own)
+    norms = [layer for layer in shared.modules() if isinstance(layer, nn.modules.batchnorm._BatchNorm)]
+    assert norms and all(isinstance(layer, nn.SyncBatchNorm) for layer in norms) and shared.state_dict().keys() == names

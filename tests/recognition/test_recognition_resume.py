@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 import torch
 
+import model_files
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, recipe, runs, samples, training
@@ -97,33 +98,36 @@ def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys,
     line = killed_at(stream(2, "kill").uniform(0, 0.3 * (kills > 1), kills), views, tmp_path, settings)
     main(line)
     assert "resumed at step" in capsys.readouterr().err
-    name, state = checkpoint.load(tmp_path / "killed" / "model.pt")
+    name, state = model_files.load(tmp_path / "killed" / "model.safetensors")
     weights, history = train(views, tmp_path / "whole", with_training(steps=steps, validate_every=10))
     assert equal(state["weights"], weights)
     assert (tmp_path / "killed" / "history.csv").read_text() == history
     assert json.loads(name)["protocol"] == "seen"
 
 
-def test_foreign_damaged_and_missing_checkpoints_are_refused_by_name(views, trained, tmp_path):
-    name, state = checkpoint.load(trained / "model.pt")
+def test_foreign_damaged_and_missing_checkpoints_and_models_are_refused_by_name(views, trained, tmp_path):
+    name, _ = model_files.load(trained / "model.safetensors")
     other = tmp_path / "other"
     checkpoint.save(other / "checkpoint.pt", name, {})
     with pytest.raises(InputError, match="another run, its settings differ"):
         train(views, other)
-    with pytest.raises(InputError, match=r"model\.pt"):
-        runs.load(tmp_path / "model.pt")
-    raw = (trained / "model.pt").read_bytes()
-    (tmp_path / "cut.pt").write_bytes(raw[: len(raw) // 2])
-    with pytest.raises(InputError, match=r"cut\.pt"):
-        runs.load(tmp_path / "cut.pt")
-    state["weights"] = {key: value + 1 if value.ndim == 2 else value for key, value in state["weights"].items()}
-    content = torch.load(trained / "model.pt", weights_only=True)
-    torch.save({**content, "state": state}, tmp_path / "changed.pt")
-    with pytest.raises(InputError, match=r"changed\.pt: checkpoint is damaged"):
-        runs.load(tmp_path / "changed.pt")
-    checkpoint.save(tmp_path / "empty.pt", name, {"weights": {}})
-    with pytest.raises(InputError, match=r"empty\.pt: model: missing key"):
-        runs.load(tmp_path / "empty.pt")
+    saved = torch.load(other / "checkpoint.pt", weights_only=True)
+    torch.save({**saved, "state": {"a": 1}}, other / "checkpoint.pt")
+    with pytest.raises(InputError, match=r"checkpoint\.pt: checkpoint is damaged"):
+        train(views, other)
+    with pytest.raises(InputError, match=r"model\.safetensors"):
+        runs.load(tmp_path / "model.safetensors")
+    raw = (trained / "model.safetensors").read_bytes()
+    cut, changed, empty = (tmp_path / f"{word}.safetensors" for word in ("cut", "changed", "empty"))
+    cut.write_bytes(raw[: len(raw) // 2])
+    with pytest.raises(InputError, match=r"cut\.safetensors"):
+        runs.load(cut)
+    changed.write_bytes(raw[:-1] + bytes([raw[-1] ^ 1]))
+    with pytest.raises(InputError, match=r"changed\.safetensors: model file is damaged"):
+        runs.load(changed)
+    model_files.save(empty, name, {"weights": {}})
+    with pytest.raises(InputError, match=r"empty\.safetensors: .*missing key"):
+        runs.load(empty)
 
 
 def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path, monkeypatch):

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 import torch
 
+import model_files
 from dataset import RENDER, SNRS, build
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.recognition import checkpoint, predict_sample, predictions, recogniser, runs, samples, schemes, score, views
+from lowalt.recognition import predict_sample, predictions, recogniser, runs, samples, schemes, score, views
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.protocols import folds
 from lowalt.shards import ShardSet
@@ -36,7 +37,7 @@ def model(tmp_path_factory):
     torch.manual_seed(1)
     palettes = np.zeros((3, 256, 3), np.uint8)
     weights = recogniser.Recogniser(SCHEME, BLOCK, SIZE, palettes, 4).state_dict()
-    path = tmp_path_factory.mktemp("model") / "model.pt"
+    path = tmp_path_factory.mktemp("model") / "model.safetensors"
     # The palettes are part of the weights: a model keeps the colours it was trained on.
     about = {
         "scheme": vars(SCHEME),
@@ -47,7 +48,7 @@ def model(tmp_path_factory):
         "colour_map": "gray",
     }
     weights["palettes.table"] = torch.randn(2, 256, 3)
-    checkpoint.save(path, "{}", {"weights": weights, **about})
+    model_files.save(path, "{}", {"weights": weights, **about})
     return path
 
 

@@ -9,10 +9,11 @@ import torch
 import yaml
 
 import lowalt
+import model_files
 from lowalt.config.layers import merge
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import checkpoint, runs, score
+from lowalt.recognition import runs, score
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.sample_sources import Source
@@ -41,15 +42,25 @@ def run(tmp_path_factory):
 def test_one_call_trains_and_another_evaluates_as_the_commands_do(run, tmp_path):
     trained = lowalt.train(run, "A:VRP+TRP+VT", "seen", out=tmp_path / "model", steps=3)
     history = (tmp_path / "model/history.csv").read_text()
-    assert checkpoint.model(tmp_path / "model/model.pt")[1]["protocol"] == "seen" and "\n3," in history
+    assert model_files.load(tmp_path / "model/model.safetensors")[1]["protocol"] == "seen" and "\n3," in history
     found = lowalt.evaluate(trained, run)
     assert found == lowalt.evaluate(trained, run)
     block = json.dumps(yaml.safe_load((run / "config.yaml").read_text())["recognition"]["evaluation"])
     index, table = str(run / "shards/index.json"), str(tmp_path / "p.csv")
     main(
-        ["evaluate", "--settings", block, "--index", index, "--model", str(tmp_path / "model/model.pt"), "--out", table]
+        [
+            "evaluate",
+            "--settings",
+            block,
+            "--index",
+            index,
+            "--model",
+            str(tmp_path / "model/model.safetensors"),
+            "--out",
+            table,
+        ]
     )
-    assert found == score.score(table, index, "seen") == lowalt.evaluate(tmp_path / "model/model.pt", run)
+    assert found == score.score(table, index, "seen") == lowalt.evaluate(tmp_path / "model/model.safetensors", run)
     parts = [line.rpartition(",")[2] for line in (tmp_path / "p.csv").read_text().splitlines()]
     assert parts[0] == "part" and parts.count("test") == found["samples"] and set(parts[1:]) == {"test", "validation"}
 

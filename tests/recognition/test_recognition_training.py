@@ -14,6 +14,7 @@ import torch
 from torch import nn
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
+import model_files
 from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, inference, recipe, runs, samples
 from lowalt.recognition import training as loop
@@ -57,7 +58,7 @@ def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(view
     if kept.exists():
         _, state = checkpoint.load(kept)
         assert np.isfinite(state["at"]["loss_sum"])
-    assert not (tmp_path / "model.pt").exists()
+    assert not (tmp_path / "model.safetensors").exists()
 
 
 def test_weights_that_a_finite_loss_steps_beyond_the_largest_number_are_never_written(views, tmp_path):
@@ -92,7 +93,7 @@ def test_a_batch_of_one_class_is_survived_and_a_set_without_one_refused(views, t
     facts = found["train"].facts
     found["train"].facts = facts.take(np.arange(len(facts)))
     runs.train(found, SCHEME, "seen", with_training(batch=1, steps=8, validate_every=8), tmp_path / "one")
-    assert (tmp_path / "one" / "model.pt").exists()
+    assert (tmp_path / "one" / "model.safetensors").exists()
     few = np.flatnonzero(facts.label != 2)
     found["train"].facts, found["train"].images = facts.take(few), found["train"].images[few]
     with pytest.raises(InputError, match=r"no training sample of \['Vehicle'\]"):
@@ -148,7 +149,7 @@ def test_weights_lie_in_memory_as_asked_and_products_stand_for_convolutions_in_f
 
 
 def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
-    model = runs.load(trained / "model.pt").model
+    model = runs.load(trained / "model.safetensors").model
     groups = recipe.optimiser(model, {**TRAINING, "backbone_rate": 0.1}).param_groups
     members = [id(value) for group in groups for value in group["params"]]
     assert sorted(members) == sorted(id(value) for value in model.parameters())
@@ -195,7 +196,10 @@ def test_a_compiled_network_trains_to_the_same_history(views, tmp_path):
     command = [sys.executable, "-c", program, views, tmp_path / "compiled", json.dumps(settings)]
     ended = subprocess.run(command, env={**os.environ, "PYTHONPATH": PATHS}, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
-    weights, history = checkpoint.load(tmp_path / "compiled/model.pt")[1]["weights"], tmp_path / "compiled/history.csv"
+    weights, history = (
+        model_files.load(tmp_path / "compiled/model.safetensors")[1]["weights"],
+        tmp_path / "compiled/history.csv",
+    )
     assert weights.keys() == plain[0].keys()
     one, other = (np.loadtxt(text.splitlines()[1:], delimiter=",") for text in (plain[1], history.read_text()))
     np.testing.assert_allclose(other, one, rtol=1e-3)
@@ -283,7 +287,7 @@ def test_the_final_weights_are_those_validated_last_of_the_best(monkeypatch, vie
 
     monkeypatch.setattr(loop, "probabilities", told)
     runs.train(sources(views), SCHEME, "seen", with_training(steps=12, validate_every=3), tmp_path)
-    weights = checkpoint.load(tmp_path / "model.pt")[1]["weights"]
+    weights = model_files.load(tmp_path / "model.safetensors")[1]["weights"]
     assert all(torch.equal(value, kept[2][name]) for name, value in weights.items())
     assert len({float(state["classifier.0.weight"].sum()) for state in kept}) == 4
 

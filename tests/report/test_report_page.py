@@ -6,10 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from lowalt.extensions.benchmark import benchmark_results
 from lowalt.files.csv_tables import read_csv
 from lowalt.report.inputs import FILES, KEPT, Inputs
 from lowalt.report.page import PARTS, assembled, rendered
-from lowalt.report.sections import benchmark_results, recognition_cost, simulation_cost
+from lowalt.report.sections import recognition_cost, simulation_cost
 from pages import browsed, sound
 
 ROWS = (("b", "10.5"), ("c", ""), ('a, "x"', "-9 (1 to 2)"), *((f"d{number}", f"{20 + number}") for number in range(7)))

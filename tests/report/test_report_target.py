@@ -8,9 +8,10 @@ from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgba
 
 from craft import craft, row
-from lowalt.drafting.guesses import Component
-from lowalt.drafting.inspection import Inspection
-from lowalt.report.figures import mesh_picture, target_picture
+from lowalt.extensions.drafting import mesh_picture
+from lowalt.extensions.drafting.guesses import Component
+from lowalt.extensions.drafting.inspection import Inspection
+from lowalt.report.figures import target_picture
 
 
 @pytest.fixture

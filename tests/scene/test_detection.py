@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.linalg import toeplitz
 from scipy.stats import beta
 
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.numerics.streams import stream
 from lowalt.scene import set_noise
 from lowalt.scene.effects.detection import canceller, cell_error, detector
@@ -88,6 +90,20 @@ def test_the_clutter_filter_spares_targets_beyond_its_notch_which_grows_with_win
     assert canceller.land(200, 4.9e9, 2.5e-3, 0.0, 50.0).shape[1] == 1
     # Speeds fold: a target that seems to stand still is lost whatever its true speed.
     assert loss(1.0, 50.0, 2 * SPEED_MPS) > 20
+
+
+@pytest.mark.parametrize(("symbols", "wind", "depth"), [(60, 1.0, 50.0), (61, 4.5, 50.0), (200, 4.5, 60.0)])
+def test_the_land_s_components_span_what_numpy_s_eigenvectors_do(symbols, wind, depth):
+    still, slope = windblown(wind, 4.9e9)
+    decay_s = slope * SPEED_OF_LIGHT / 4.9e9 / (4 * np.pi)
+    moving = toeplitz(1 / (1 + (2.5e-3 * np.arange(symbols) / decay_s) ** 2)) / (1 + still)
+    beside = np.eye(symbols) - 1 / symbols
+    power, basis = np.linalg.eigh(beside @ moving @ beside)
+    basis = basis[:, power > 10 ** (-depth / 10)]
+    found = canceller.land(symbols, 4.9e9, 2.5e-3, wind, depth)
+    assert found.shape == (symbols, basis.shape[1] + 1)
+    np.testing.assert_allclose(found.T @ found, np.eye(found.shape[1]), atol=1e-13)
+    np.testing.assert_allclose(found @ found.T, basis @ basis.T + 1 / symbols, atol=1e-8)
 
 
 def test_noise_behind_a_canceller_is_that_of_its_cell():

@@ -101,8 +101,55 @@ def test_a_factor_of_another_shape_than_the_contract_s_is_refused_in_one_sentenc
     Path("half.py").write_text(HALF.replace('settings["share"] * rng.random() + 0 * view.places[..., 0]', factor))
     cloud, row = target(np.random.default_rng(1))
     asked = scene({"half.py": {}}, network())
-    with pytest.raises(InputError, match=r"half\.py: factor of shape"):
+    with pytest.raises(InputError, match=r"half\.py: visible gives an array of shape"):
         SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).arrived()
+
+
+ACTING = {
+    "visible": "view, rng", "visible_one_way": "view, rng", "cross_sections": "cloud, wavelength_m",
+    "receive": "samples, look, rng", "filtered": "cells", "scatter": "view, rng", "heard": "sample",
+}  # fmt: skip
+WELL = {
+    "visible": "np.ones(view.places.shape[:2])", "visible_one_way": "np.ones(view.places.shape[:2])",
+    "cross_sections": "cloud.rcs_m2.copy()", "receive": "samples.copy()", "filtered": "cells.copy()",
+    "scatter": "Still(np.zeros((len(view.times_s), view.network.subcarriers), complex))",
+    "heard": "np.zeros((len(sample.view.times_s), sample.view.network.subcarriers), complex)",
+}  # fmt: skip
+"""An effect's own function that changes nothing, by name."""
+
+
+def received_with(function: str, result: str):
+    """The signal of a scene with an own effect whose function returns this."""
+    Path("mine.py").write_text(
+        "import numpy as np\nfrom lowalt.scene.view import Still\nSOURCE = 'a test'\nDEFAULTS = {}\n"
+        "def put(array, value):\n    array = array.astype(np.result_type(array, type(value)))\n"
+        "    array.flat[0] = value\n    return array\n"
+        f"def {function}(settings, {ACTING[function]}):\n    return {result}\n"
+    )
+    cloud, row = target(np.random.default_rng(1))
+    asked = scene({"mine.py": {}}, network())
+    return SceneSample(asked, observe(asked, asked.network.stations[0], cloud, row)).received().signal
+
+
+@pytest.mark.parametrize("function", ACTING)
+@pytest.mark.parametrize("value", ["np.nan", "np.inf"])
+def test_a_result_that_is_not_finite_is_refused_in_one_sentence(half, function, value):
+    well = WELL[function]
+    bad = f"Still(put({well}.response, {value}))" if function == "scatter" else f"put({well}, {value})"
+    assert np.isfinite(received_with(function, well)).all()
+    with pytest.raises(InputError, match=rf"mine\.py: {function} gives NaN or infinity, expected finite numbers"):
+        received_with(function, bad)
+
+
+@pytest.mark.parametrize("function", ["visible", "visible_one_way", "cross_sections"])
+def test_a_complex_factor_is_refused_in_one_sentence(half, function):
+    with pytest.raises(InputError, match=rf"mine\.py: {function} gives an array of complex128, expected real numbers"):
+        received_with(function, f"put({WELL[function]}, 1j)")
+
+
+def test_a_cross_section_below_zero_is_refused(half):
+    with pytest.raises(InputError, match=r"mine\.py: cross_sections gives -1 m2, expected no number below 0"):
+        received_with("cross_sections", "put(cloud.rcs_m2, -1.0)")
 
 
 def test_an_edited_file_is_loaded_again_and_leaves_no_byte_code_beside_it(half):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import pointwise_echo
 import reference_effects
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.echo import echo_matrix
 from lowalt.files.errors import InputError
 from lowalt.scene.response import ImagePath, response
 from scenes import A, B, drifting, link, linked, network, view_of
@@ -101,7 +101,7 @@ def test_it_agrees_with_the_echo_engine_at_any_range():
         aim = np.array([range_m, 0.3 * range_m, 10.0 + 0.2 * range_m])
         places = drifting(rng, aim, 3, 6, min(1.5, range_m / 4))
         found = response(view_of(radio, places, np.ones(6), aim))
-        assert relative(found, echo_matrix(radio, A, places, 1.0, aim, "subcarriers")) < 1e-10
+        assert relative(found, pointwise_echo.subcarriers(radio, A, places, 1.0, aim)) < 1e-10
 
 
 def test_a_point_in_the_station_is_refused_by_its_symbol():

@@ -11,6 +11,7 @@ from test_shards_card import CONFIG
 
 from dataset import SEED, SNRS, build
 from lowalt.config.network import Network
+from lowalt.extensions.formats.sigmf import main as sigmf
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals
 from lowalt.shards import ShardSet, clean
@@ -18,7 +19,6 @@ from lowalt.shards.__main__ import main
 from lowalt.shards.card import main as card
 from lowalt.shards.sample_record import npy
 from lowalt.shards.sample_table import map_samples
-from lowalt.shards.sigmf import main as sigmf
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
 from pictures import NETWORK

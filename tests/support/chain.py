@@ -94,7 +94,7 @@ def recognised(folder, network, config, clouds, targets=TARGETS):
         scheme=schemes.named(table, name, list(stations)).record, **settings,
     )  # fmt: skip
     evaluation = {"batch": 8, "threads": 1, "precision": "fp32", "mirror": False}
-    model = ("--model", folder / "model/model.pt")
+    model = ("--model", folder / "model/model.safetensors")
     run("recognition", "evaluate", "--views", *views, *model, "--out", folder / "p.csv", **evaluation)
     run("recognition", "evaluate", *index, *model, "--out", folder / "direct.csv", **evaluation)
     assert (folder / "p.csv").read_bytes() == (folder / "direct.csv").read_bytes()

@@ -15,7 +15,7 @@ from scipy.io import savemat, wavfile
 import towns
 from craft import craft, row
 from fuzzed_folders import folders
-from fuzzed_seals import ARCHIVE, CHECKPOINT, INDEX, JSON, MATLAB, MODEL, PNG, YAML
+from fuzzed_seals import ARCHIVE, INDEX, JSON, MATLAB, MODEL, PNG, YAML
 from fuzzing import Reader
 from shown_meshes import dae, ply, prism, skinned
 
@@ -29,8 +29,8 @@ def _bytes(write: Callable[[Path], object], name: str) -> bytes:
 
 def _recording(kind: str) -> Callable[[Path], object]:
     """A reader of recordings of one kind."""
-    from lowalt.recordings.files import read
-    from lowalt.recordings.record import record
+    from lowalt.extensions.recordings.files import read
+    from lowalt.extensions.recordings.record import record
 
     more = {
         ".wav": {}, ".csv": {"columns": ["i", "q"], "rate_hz": 800.0}, ".sigmf-meta": {},
@@ -75,8 +75,8 @@ def _recordings() -> list[Reader]:
 
 def _semicolons(path: Path) -> object:
     """Read a table with semicolons, decimal commas and complex cells."""
-    from lowalt.recordings.files import read
-    from lowalt.recordings.record import record
+    from lowalt.extensions.recordings.files import read
+    from lowalt.extensions.recordings.record import record
 
     block = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", "times": "t"}
     return read(record({**block, "file": path.name}, path.parent, "record"))
@@ -121,8 +121,8 @@ def _meshes() -> list[Reader]:
 
 def _towns() -> list[Reader]:
     """Readers of buildings, each with a good file."""
-    from lowalt.scene.effects.channel.town import DEFAULTS
-    from lowalt.scene.town.buildings import read
+    from lowalt.extensions.town.buildings import read
+    from lowalt.extensions.town.town import DEFAULTS
 
     def buildings(path: Path) -> object:
         """Read a town; a Mitsuba scene has its mesh next to it."""
@@ -137,7 +137,7 @@ def _towns() -> list[Reader]:
 
 def _robots() -> list[Reader]:
     """Readers of robots' descriptions, each with a good file."""
-    from lowalt.drafting.robot_files import read_robot
+    from lowalt.extensions.drafting.robot_files import read_robot
     from made_robots import MJCF, SDF, urdf
 
     files = {".urdf": urdf(blade="").replace('<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'),
@@ -150,12 +150,12 @@ def _texts() -> list[Reader]:
     """Readers of configurations, tables and other texts, each with a good file."""
     from lowalt.config.command import settings
     from lowalt.config.layers import check, merge
+    from lowalt.extensions.recordings.record import read_record
+    from lowalt.extensions.recordings.twin_scenes import Library
     from lowalt.files.csv_tables import read_csv
     from lowalt.files.yaml_files import load_yaml
     from lowalt.motion import read_table, write_table
     from lowalt.recognition import freeze, paper_claims, schemes
-    from lowalt.recordings.record import read_record
-    from lowalt.recordings.twin_scenes import Library
     from lowalt.shards import manifest
     from lowalt.targets.records import load_records, load_table
     from lowalt.workflow.run import Run
@@ -284,16 +284,10 @@ def _index(render: dict) -> bytes:
 
 def _models() -> list[Reader]:
     """Readers of trained models."""
-    import torch
-
-    from lowalt.recognition import checkpoint, model_file, zoo_files
+    from lowalt.recognition import model_file, zoo_files
 
     path = zoo_files.path_of("default-seen")
-    known = model_file.read(path)
-    state = {**known.model, "weights": {"a": torch.ones(5)}}
-    trained = _bytes(lambda p: checkpoint.save(p, json.dumps(known.identity), state), "a.pt")
     return [
-        Reader("trained model", "a.pt", trained, checkpoint.model, seal=CHECKPOINT),
         Reader("model file", "a.safetensors", path.read_bytes(), model_file.read, share=0.2, seal=MODEL),
     ]
 

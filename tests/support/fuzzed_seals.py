@@ -6,20 +6,17 @@ import hashlib
 import io
 import json
 import struct
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
-import torch
 import yaml
 from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 from scipy.io import loadmat, savemat
 
-from lowalt.recognition import checkpoint, model_file
+from lowalt.recognition import model_file
 from lowalt.tiles.png import SIGNATURE
 
 Parts = dict[str, bytes]
@@ -104,25 +101,6 @@ def _signed_model(parts: Parts) -> bytes:
     return save_tensors(tensors, {"lowalt": text})
 
 
-def _checkpoint(data: bytes) -> Parts:
-    """The identity and the settings of a checkpoint."""
-    content = torch.load(io.BytesIO(data), weights_only=True)
-    settings = {name: value for name, value in content["state"].items() if name != "weights"}
-    return {"identity": content["identity"].encode(), "settings": json.dumps(settings).encode()}
-
-
-def _signed_checkpoint(parts: Parts) -> bytes:
-    """A checkpoint of an identity and settings, with one weight, and the SHA-256 of all."""
-    try:
-        settings = json.loads(parts["settings"])
-    except (ValueError, RecursionError):
-        settings = parts["settings"].decode(errors="replace")
-    state = settings | {"weights": {"a": torch.ones(5)}} if isinstance(settings, dict) else settings
-    with tempfile.TemporaryDirectory() as folder:
-        checkpoint.save(Path(folder) / "a.pt", parts["identity"].decode(errors="replace"), state)
-        return (Path(folder) / "a.pt").read_bytes()
-
-
 def _unsigned(data: bytes) -> Parts:
     """The content of an index without its checksum."""
     content = json.loads(data)
@@ -140,7 +118,6 @@ def _plain_matlab(data: bytes) -> Parts:
 YAML = Seal(_json_of_yaml, lambda parts: parts["json"].replace(b"Infinity", b".inf").replace(b"NaN", b".nan"))
 JSON = Seal(lambda data: {"json": data}, lambda parts: parts["json"])
 MODEL = Seal(_model, _signed_model)
-CHECKPOINT = Seal(_checkpoint, _signed_checkpoint)
 ARCHIVE = Seal(_members, _archive)
 PNG = Seal(_chunks, _png)
 INDEX = Seal(_unsigned, _index)

@@ -29,8 +29,8 @@ def steering(counts, kappa, theta, phi):
     return np.kron(horizontal, vertical)
 
 
-def subcarriers(network, station, positions_m, rcs_m2, aim_m, paths=((0.0, 1.0),)):
-    """Received signal y (N, M) of Eqs. 7 and 24 with the known symbol removed; `paths` of (delay s, gain)."""
+def subcarriers(network, station, positions_m, rcs_m2, aim_m):
+    """Received signal y (N, M) of Eqs. 7 and 24 with the known symbol removed."""
     n_symbols, n_points = positions_m.shape[:2]
     kappa = station.frequency_hz / network.carrier_hz
     frequency = station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
@@ -48,25 +48,22 @@ def subcarriers(network, station, positions_m, rcs_m2, aim_m, paths=((0.0, 1.0),
                 steering(network.receive, kappa, theta, phi), steering(network.transmit, kappa, theta, phi)
             )
             gain = np.conj(beam_r) @ channel @ np.conj(beam_t)
-            for delay, factor in paths:
-                whole = np.broadcast_to(factor, (n_symbols, n_points))[n, l]
-                later = np.broadcast_to(delay, (n_symbols, n_points))[n, l]
-                result[n] += alpha * gain * whole * np.exp(-2j * np.pi * frequency * (2 * r / C + later))
+            result[n] += alpha * gain * np.exp(-2j * np.pi * frequency * 2 * r / C)
     return result
 
 
-def range_cells(network, station, positions_m, rcs_m2, aim_m, paths=((0.0, 1.0),)):
+def range_cells(network, station, positions_m, rcs_m2, aim_m):
     """All range cells (N, M): the inverse DFT over subcarriers as a matrix (Eq. 25)."""
     m = np.arange(network.subcarriers)
     # The exponent is reduced in integers, so that large M costs no digits.
     turn = np.outer(m, m) % network.subcarriers / network.subcarriers
     inverse = np.exp(2j * np.pi * turn) / network.subcarriers
-    return subcarriers(network, station, positions_m, rcs_m2, aim_m, paths) @ inverse
+    return subcarriers(network, station, positions_m, rcs_m2, aim_m) @ inverse
 
 
-def echo(network, station, positions_m, rcs_m2, aim_m, paths=((0.0, 1.0),)):
+def echo(network, station, positions_m, rcs_m2, aim_m):
     """Signal (N,) at the strongest cell of every symbol, and that cell (N,); the lowest index wins a tie."""
-    cells = range_cells(network, station, positions_m, rcs_m2, aim_m, paths)
+    cells = range_cells(network, station, positions_m, rcs_m2, aim_m)
     best = np.argmax(abs(cells), axis=1)
     return cells[np.arange(len(cells)), best], best
 

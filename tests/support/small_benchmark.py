@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from lowalt.benchmark import definition
 from lowalt.config.layers import overlaid
+from lowalt.extensions.benchmark import definition
 from lowalt.files.atomic import slug
 from lowalt.recognition.views import cache_shard
 from lowalt.shards.build import rows_of, write_run
@@ -25,9 +25,9 @@ def shrink(monkeypatch) -> None:
     """Let every part of the definition be small for the rest of a test."""
     small = lambda part: overlaid([*definition.overlays(part), LESS])  # noqa: E731
     for module in ("definition", "part_samples", "frozen_bytes", "confirm"):
-        monkeypatch.setattr(f"lowalt.benchmark.{module}.config_of", small)
+        monkeypatch.setattr(f"lowalt.extensions.benchmark.{module}.config_of", small)
     # What is kept of the baselines belongs to all motion models.
-    monkeypatch.setattr("lowalt.benchmark.baselines.path_of", lambda track: Path("none"))
+    monkeypatch.setattr("lowalt.extensions.benchmark.baselines.path_of", lambda track: Path("none"))
     definition.truth.cache_clear()
 
 

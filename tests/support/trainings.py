@@ -3,8 +3,9 @@
 import numpy as np
 import torch
 
+import model_files
 from lowalt.numerics.streams import stream
-from lowalt.recognition import checkpoint, runs, samples, schemes
+from lowalt.recognition import runs, samples, schemes
 
 TRAINING = {
     "steps": 24, "batch": 8, "snrs_per_model": 1, "rate": 3e-3, "backbone_rate": 1.0, "weight_decay": 0.05,
@@ -57,7 +58,7 @@ def sources(path):
 def train(path, folder, settings=SETTINGS):
     """Train into a folder; return the weights and the text of history.csv."""
     runs.train(sources(path), SCHEME, "seen", settings, folder)
-    return checkpoint.load(folder / "model.pt")[1]["weights"], (folder / "history.csv").read_text()
+    return model_files.load(folder / "model.safetensors")[1]["weights"], (folder / "history.csv").read_text()
 
 
 def equal(one, other):

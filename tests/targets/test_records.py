@@ -276,7 +276,7 @@ def test_one_file_is_enough_for_real_inputs_and_none_is_refused(tmp_path):
 
 def test_the_command_makes_a_record_with_its_row(tmp_path, monkeypatch):
     from lowalt.__main__ import main
-    from lowalt.commands import target
+    from lowalt.extensions.drafting import target
     from lowalt.targets.cloud import read
 
     monkeypatch.setattr(target, "_picture", lambda cloud, out: str(out))

@@ -23,7 +23,7 @@ from lowalt.targets.skeleton import circle, joint
 from moving_clouds import row
 
 ROOT = Path(__file__).parents[2]
-LAYERS = [ROOT / "config/default.yaml", ROOT / "studies/more/config.yaml"]
+LAYERS = [ROOT / "config/default.yaml", ROOT / "config/more.yaml"]
 CONFIG = load(LAYERS, ROOT / "workflow/schemas/config.schema.yaml")
 RECORDS = records_of(CONFIG["targets"])
 LEGS = ("left fore", "right hind", "right fore", "left hind")

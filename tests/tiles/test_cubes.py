@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import pointwise_echo
 from lowalt.config.layers import canonical
 from lowalt.config.network import SPEED_OF_LIGHT
-from lowalt.echo import Rigid, echo_matrix
+from lowalt.echo import Rigid
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.motion import poses, write_table
@@ -94,7 +95,7 @@ def test_cells_without_noise_are_those_of_the_echo_s_definition_and_the_chosen_o
     aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
     signal = dataset.maker.signal(row, np.inf)
     cube = dataset.maker.cubes(row, np.inf, signal)[1]
-    expected = echo_matrix(network, network.stations[1], motion, cloud.rcs_m2, aim, "cells")
+    expected = pointwise_echo.range_cells(network, network.stations[1], motion, cloud.rcs_m2, aim)
     assert abs(cube.cells - expected).max() < 1e-7 * abs(expected).max()
     assert (cube.chosen == abs(expected).argmax(axis=1)).all() and (cube.signal == signal[1]).all()
 

@@ -184,7 +184,7 @@ def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
         assert "files/errors.py" in imported
 
 
-VOUCHING = {"SHA256SUMS": ("clouds/", "motion/"), "index.json": ("",), "model.pt": ("",)}
+VOUCHING = {"SHA256SUMS": ("clouds/", "motion/"), "index.json": ("",), "model.safetensors": ("",)}
 """Inputs that hold checksums of other files, or stand for the folder that one job writes: prefixes of the others."""
 OF_OTHER_KINDS = {"shard": {"echo"}}
 """Settings that a stage asks for and this kind of data set has no use for: only cubes are made from echoes again."""

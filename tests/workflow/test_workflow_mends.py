@@ -1,5 +1,6 @@
 """Mends of Snakemake: plain Snakemake still has each fault, and with its mend it has it no more."""
 
+import logging
 import os
 import re
 import signal
@@ -183,3 +184,13 @@ def test_a_profile_that_asks_rarely_is_not_asked_more_often(executors):
     waiting._next_seconds_between_status_checks = 60.0
     waiting.next_seconds_between_status_checks = 70.0
     assert waiting.next_seconds_between_status_checks == 60.0
+
+
+def test_plain_logging_prints_tracebacks_on_a_full_disk_and_the_mended_one_nothing(monkeypatch, capsys):
+    record = logging.makeLogRecord({"msg": "a line"})
+    for plain in (True, False):
+        monkeypatch.setattr(logging.FileHandler, "handleError", logging.Handler.handleError)
+        if not plain:
+            mends.quiet_logs_on_a_full_disk()
+        logging.FileHandler("/dev/full").emit(record)
+        assert ("Traceback" in capsys.readouterr().err) == plain

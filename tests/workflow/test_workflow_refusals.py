@@ -91,9 +91,6 @@ def test_what_suits_is_taken(overlay):
     (recognition(table="a.csv"), "recognition.table: 'a.csv' is not there"),
     ({"report": {"accuracy": "a.csv"}}, "report.accuracy: 'a.csv' is not there"),
     ({"targets": {"select": ["crow"]}}, r"targets.select: \['crow'\], expected perhaps \['Crow'\]$"),
-    (recognition(processes=0), "recognition.processes: value 0"),
-    *((recognition(processes=processes, nodes=nodes), f"nodes: {nodes} with recognition.processes: {processes}, exp")
-      for processes, nodes in ((6, 4), (1, 2))),
 ])  # fmt: skip
 def test_what_does_not_is_refused_with_its_key_and_what_was_expected(overlay, words):
     with pytest.raises(InputError, match=words) as refused:

@@ -82,9 +82,6 @@ CHANGES = {
         overlay={"shards": {"kind": "signal"}},
         expected=with_what_follows(SHARD | SETTINGS | MANIFEST, images=False),
     ),
-    "nodes": Change(
-        TRAIN, ("'lowalt.recognition.nodes', '2', '1'",), overlay={"recognition": {"processes": 2, "nodes": 2}}
-    ),
     "evaluation batch": Change(EVALUATE, overlay={"recognition": {"evaluation": {"batch": 32}}}),
     "protocol": Change(
         TABLES | MANIFEST, ("Set of input files has changed",), overlay={"recognition": {"protocols": ["unseen"]}}

@@ -73,7 +73,7 @@ rule train:
         ),
         frozen=f"{DATA}/SHA256SUMS",
     output:
-        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.safetensors",
         history="results/{run}/models/{protocol}/{scheme}/{train_seed}/history.csv",
     log:
         "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
@@ -83,16 +83,15 @@ rule train:
     priority: RUN.images_of_job
     conda:
         "../../envs/environment.yaml"
-    threads: config["recognition"]["training"]["threads"] * RUN.launch.per_node
+    threads: config["recognition"]["training"]["threads"]
     resources:
-        **RUN.launch.training,
+        gpu=RUN.gpus,
     params:
         settings=settings.training,
-        launcher=RUN.launch.words,
         source=options.samples,
         events=["--tensorboard"] if config["recognition"]["tensorboard"] else [],
     shell:
-        "python -m {params.launcher:q} lowalt.recognition train --settings {params.settings:q} {params.source:q}"
+        "python -m lowalt.recognition train --settings {params.settings:q} {params.source:q}"
         " --frozen {input.frozen:q} --protocol {wildcards.protocol:q}"
         ' {params.events:q} --out "$(dirname {output.model:q})" 2> {log:q}'
 
@@ -107,7 +106,7 @@ rule evaluate:
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
-        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.safetensors",
     output:
         table="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.csv",
         about="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.json",
@@ -119,7 +118,7 @@ rule evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     resources:
-        **RUN.launch.evaluation,
+        gpu=RUN.gpus,
     params:
         settings=settings.evaluation,
         source=options.samples,
@@ -165,7 +164,7 @@ rule transfer_evaluate:
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
-        model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+        model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.safetensors",
     output:
         table="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.csv",
         about="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.json",
@@ -177,7 +176,7 @@ rule transfer_evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     resources:
-        **RUN.launch.evaluation,
+        gpu=RUN.gpus,
     params:
         settings=settings.evaluation,
         source=options.samples,

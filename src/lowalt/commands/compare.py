@@ -5,9 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lowalt.commands.command_line import Answer, add_command
+from lowalt.config.extensions import function_offered, offered
 from lowalt.config.layers import of_run
 from lowalt.config.schema import check_brought
 from lowalt.files.csv_tables import number, read_csv
+from lowalt.files.errors import InputError
 from lowalt.files.json_objects import read_object
 from lowalt.workflow.closing import averages
 
@@ -80,22 +82,24 @@ def _change(part: str, first: object, second: object) -> str:
     return f"   {second - first:+.4g}{share}"
 
 
-def methods(first: str, second: str) -> Answer:
-    """Compare two methods of the benchmark's table, track by track. Raises: InputError for an unknown method."""
-    from lowalt.benchmark.baseline_table import words
-    from lowalt.benchmark.baselines import compared
-    from lowalt.commands.benchmark import against
-
-    facts = compared(first, second)
-    lines = [f"{against(track, one['difference'], 12)}; {words(one['first'])} | {words(one['second'])}"
-             for track, one in facts.items()]  # fmt: skip
-    return Answer({"tracks": facts}, "\n".join([f"paired difference in percent: {first} | {second}", *lines]))
+def others(first: str, second: str) -> Answer:
+    """Compare what an extension knows by these names. Raises: InputError where none does."""
+    refusals = []
+    for name, module in offered("comparisons").items():
+        compare_named = function_offered("comparisons", name, module, "compared_named")
+        try:
+            return Answer(*compare_named(first, second))
+        except InputError as error:
+            refusals.append(str(error))
+    if not refusals:
+        raise InputError(f"{first}: no such folder, expected that of a finished run")
+    raise InputError("; ".join(refusals))
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Compare two runs, or two methods of the benchmark. Raises: as `compared` and `methods`."""
+    """Compare two runs, or what an extension compares. Raises: as `compared` and `others`."""
     if not any(map(Path.exists, options.runs)):
-        return methods(*map(str, options.runs))
+        return others(*map(str, options.runs))
     pairs, blocks = compared(*options.runs), []
     for part, rows in pairs.items():
         wide = max(map(len, rows), default=0)

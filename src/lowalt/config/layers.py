@@ -13,7 +13,7 @@ import yaml
 
 from lowalt.config.command import parser, run
 from lowalt.config.network import OFDM
-from lowalt.config.schema import check_brought, faults, plain, with_numbers
+from lowalt.config.schema import check_brought, faults, plain, with_extensions, with_numbers
 from lowalt.files.atomic import write_file
 from lowalt.files.errors import LONGEST, InputError
 from lowalt.files.shipped import located, shipped
@@ -109,7 +109,7 @@ def check(config: dict, schema_path: str | Path) -> dict:
     removed; a bandwidth becomes a number of subcarriers. The configuration is changed in place.
     Raises: InputError with one line per fault.
     """
-    schema = load_yaml(schema_path)
+    schema = with_extensions(schema_path)
     _without_nulls(config, schema)
     with_numbers(config, schema)
     if isinstance(config.get("network"), dict):

@@ -14,6 +14,7 @@ from typing import Any
 
 import jsonschema
 
+from lowalt.config.extensions import offered
 from lowalt.files.errors import InputError, instead, shown
 from lowalt.files.shipped import SHIPPED
 from lowalt.files.yaml_files import load_yaml
@@ -155,10 +156,23 @@ def faults(settings: object, schema: dict, whole: str = "configuration") -> list
     return list(lines.values())
 
 
+def with_extensions(path: str | Path) -> dict:
+    """Return the schema of the configuration in a file, with the effects and spectra of extensions as further keys.
+
+    The modules of extensions check their own settings.
+    """
+    schema = load_yaml(path)
+    for block in ("effects", "spectra"):
+        known = schema.get("properties", {}).get(block, {}).get("properties", {})
+        for name in offered(block):
+            known.setdefault(name, {"type": "object"})
+    return schema
+
+
 @functools.cache
 def _brought() -> dict:
     """The schema of settings in files, together with the configuration's schema, with which it shares blocks."""
-    return {**load_yaml(BROUGHT)["$defs"], "config": load_yaml(SHIPPED / "workflow/schemas/config.schema.yaml")}
+    return {**load_yaml(BROUGHT)["$defs"], "config": with_extensions(SHIPPED / "workflow/schemas/config.schema.yaml")}
 
 
 def of_brought(part: str) -> dict:

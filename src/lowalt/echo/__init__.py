@@ -1,6 +1,6 @@
 """The echo: the signal that a base station receives from moving scattering points, exactly or to a tolerance."""
 
-from lowalt.echo.api import EchoResult, Path, echo_matrix, echo_signal, echo_signals
+from lowalt.echo.api import EchoResult, echo_signal, echo_signals
 from lowalt.echo.echo_input import Rigid
 
-__all__ = ["EchoResult", "Path", "Rigid", "echo_matrix", "echo_signal", "echo_signals"]
+__all__ = ["EchoResult", "Rigid", "echo_signal", "echo_signals"]

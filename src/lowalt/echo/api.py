@@ -1,32 +1,19 @@
-"""The echo's public functions: the strongest cell's signal, all range cells, or all subcarriers of one station."""
+"""The echo's public functions: the strongest range cell's signal of one station or of all."""
 
-from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy import fft
 
 from lowalt.config.network import Network, Station
 from lowalt.echo import refine
 from lowalt.echo.echo_input import EchoInput, Rigid, Target, check, target
-from lowalt.echo.pointwise import all_subcarriers, results
+from lowalt.echo.pointwise import results
 from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
 from lowalt.echo.refine import Method
 from lowalt.echo.rounding import nearest
 from lowalt.files.errors import BelowFloor, InputError
-
-
-class Path(NamedTuple):
-    """One two-way propagation path from the station to every point and back.
-
-    delay_s: delay relative to the direct path (s); gain: complex factor. Each is a number or an array that broadcasts
-    to (N, L). The direct path is Path(0.0, 1.0).
-    """
-
-    delay_s: float | np.ndarray = 0.0
-    gain: complex | np.ndarray = 1.0
 
 
 class EchoResult(NamedTuple):
@@ -36,7 +23,7 @@ class EchoResult(NamedTuple):
     of symbols whose two strongest cells differ by less than a relative 1e-12, so that rounding decides; bound: proved
     bound of the error relative to max |signal|, inf if none is proved; method: how it was computed, and why;
     gap: (N,) float64, proved lower bound of |Y| at the strongest cell minus |Y| at any other, 0 if there is none;
-    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included. With a tolerance it is an
+    totals: (N,) float64, sum of all points' |amplitudes|, array gains included. With a tolerance it is an
     upper bound that exceeds the sum by at most the tolerance times the largest value.
     """
 
@@ -56,15 +43,14 @@ def echo_signal(
     rcs_m2: np.ndarray | float | None,
     aim_m: np.ndarray,
     tolerance: float | None = None,
-    paths: Sequence[Path] | None = None,
     sample: str = "",
 ) -> EchoResult:
     """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M range cells.
 
     motion: `Rigid`, positions (N, L, 3) in metres, or an already checked `echo_input.Target`, with rcs_m2 None;
     rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error allowed, relative to
-    the sample's max |Y_bin|, None for the exact closed form; paths: all propagation paths (default: only the
-    direct one); sample: a name for error messages.
+    the sample's max |Y_bin|, None for the exact closed form; sample: a name for error
+    messages.
     Raises: InputError naming the argument, its value and the sample; BelowFloor (a subclass) for a tolerance below the
     error bound that float64 can prove for this sample. Source: paper Eqs. 7 and 22 to 25.
 
@@ -78,18 +64,12 @@ def echo_signal(
         ((400,), 46, True)
     """
     _check_tolerance(tolerance, sample)
-    scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)
+    scene, radio, refs, aims = prepared(network, station, motion, rcs_m2, aim_m, sample)
     found, left, method, seen = refine.compute(scene, radio, refs, aims, tolerance)
-    if paths is not None:
-        left = np.arange(len(refs))
-        method = method._replace(single=False, cheap=0, exact=0, general=len(refs))
     if len(left):
-        risks = np.zeros(len(refs))
-        check_fault(results.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
-        share, direction = method.pointwise_bound
-        found.bounds[left] = found.totals[left] * share + risks[left] * direction
-        found.gaps[left] = np.maximum(found.gaps[left] - 2 * found.bounds[left], 0.0)
-    if tolerance is None and paths is None:
+        fault = results.bounded(scene, radio, refs, left, aims, method.pointwise_bound, found)
+        check_fault(fault, scene, station, sample)
+    if tolerance is None:
         method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
     largest = float(abs(found.values).max())
     worst = float(found.bounds.max())
@@ -121,29 +101,6 @@ def echo_signals(
     ])  # fmt: skip
 
 
-def echo_matrix(
-    network: Network,
-    station: Station,
-    motion: Rigid | Target | np.ndarray,
-    rcs_m2: np.ndarray | float | None,
-    aim_m: np.ndarray,
-    columns: Literal["cells", "subcarriers"],
-    paths: Sequence[Path] | None = None,
-    sample: str = "",
-) -> np.ndarray:
-    """Return (N, M) complex128: all range cells Y_k,r (Eq. 25), or all subcarriers Y_k, known symbol removed (Eq. 24).
-
-    Each is right to some 1e-14 of the sum of the points' amplitudes; `echo_signal` is right to its own last digits.
-    Other arguments and errors as for `echo_signal`; InputError also for any other `columns`.
-    """
-    if columns not in ("cells", "subcarriers"):
-        raise InputError(f"columns is {columns!r}, expected 'cells' or 'subcarriers'")
-    scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)
-    fault, result = all_subcarriers.found(scene, radio, refs, aims, routes)
-    check_fault(fault, scene, station, sample)
-    return fft.ifft(result, axis=1, overwrite_x=True) if columns == "cells" else result
-
-
 def _named(sample: str) -> str:
     """The sample's name as the start of a message."""
     return f"{sample}: " if sample else ""
@@ -156,8 +113,8 @@ def _check_tolerance(tolerance, sample: str) -> None:
         raise InputError(f"{_named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1")
 
 
-def prepared(network, station, motion, rcs_m2, aim_m, paths, sample):
-    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams' cosines, paths).
+def prepared(network, station, motion, rcs_m2, aim_m, sample):
+    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams' cosines).
 
     Arguments and errors as for `echo_signal`.
     """
@@ -170,32 +127,7 @@ def prepared(network, station, motion, rcs_m2, aim_m, paths, sample):
     radio = radar(network, station)
     refs = reference(scene.translation[:, scene.part[0] if len(scene.part) else 0], radio)
     aims = aim_cosines(scene.aim, radio.station, radio.sine, radio.cosine)
-    points = len(scene.part) or scene.translation.shape[1]
-    return scene, radio, refs, aims, _paths(paths, (len(refs), points), sample)
-
-
-def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) -> results.Paths:
-    """Return the checked delays and gains of all paths."""
-    if paths is None:
-        return results.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
-    where = _named(sample)
-    if len(paths) == 0:
-        raise InputError(f"{where}paths is empty, expected at least one path")
-    result = []
-    for name, kind in (("delay_s", np.float64), ("gain", np.complex128)):
-        arrays = [np.asarray(getattr(path, name), kind) for path in paths]
-        for index, array in enumerate(arrays):
-            if not np.isfinite(array).all():
-                raise InputError(f"{where}paths[{index}].{name} has a NaN or infinite value, expected finite numbers")
-            try:
-                np.broadcast_to(array, shape)
-            except ValueError:
-                raise InputError(
-                    f"{where}paths[{index}].{name} has shape {array.shape}, expected to broadcast to {shape}"
-                ) from None
-        widest = np.broadcast_shapes((1, 1), *(array.shape for array in arrays))
-        result.append(np.stack([np.broadcast_to(array, widest) for array in arrays]))
-    return results.Paths(*result)
+    return scene, radio, refs, aims
 
 
 def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> None:

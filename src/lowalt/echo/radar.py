@@ -79,7 +79,7 @@ class Radar(NamedTuple):
 def radar(network: Network, station: Station) -> Radar:
     """Return the constants of `station`, each rounded once from exact fractions.
 
-    Source: spec: alpha, a0, kappa and the effective carrier f_k + (M-1) df / 2.
+    Source: paper, Eqs. 4, 7 and 24.
     """
     low, spacing, carrier = map(Fraction, (station.frequency_hz, network.subcarrier_spacing_hz, network.carrier_hz))
     (transmit_h, transmit_v), (receive_h, receive_v) = network.transmit, network.receive

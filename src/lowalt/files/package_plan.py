@@ -1,6 +1,6 @@
-"""The plan of the package: its rooms in the order in which data passes them, and which room imports which.
+"""The plan of the package: the core's rooms, each importing only earlier ones, and the extensions, which import any.
 
-A room imports only earlier rooms: `tests/test_house.py` checks this, and `docs/rooms_picture.py` draws it.
+A room of the core imports no extension: `tests/test_house.py` checks this, and `docs/rooms_picture.py` draws it.
 """
 
 import ast
@@ -9,19 +9,23 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 ROOMS = (
-    "files", "machine", "numerics", "config", "targets", "drafting", "motion", "echo", "scene", "noise", "spectra",
-    "tiles", "shards", "recognition", "recordings", "benchmark", "measure", "report", "workflow", "commands",
+    "files", "machine", "numerics", "config", "targets", "motion", "echo", "scene", "noise", "spectra",
+    "tiles", "shards", "recognition", "measure", "report", "workflow", "commands",
 )  # fmt: skip
 
 
+EXTENSIONS = tuple(f"extensions/{path.parent.name}" for path in sorted(PACKAGE.glob("extensions/*/__init__.py")))
+"""The folders of the extensions; none where they have been removed."""
+
+
 def modules(room: str) -> list[Path]:
-    """Return the Python files of a room, including those in its subfolders, sorted."""
+    """Return the Python files of a room or an extension, including those in its subfolders, sorted."""
     return sorted((PACKAGE / room).rglob("*.py"))
 
 
 @cache
 def rooms_imported(path: Path) -> frozenset[str]:
-    """Return the rooms from which a file imports, including its own room if it imports from there.
+    """Return the rooms and extensions from which a file imports, including its own if it imports from there.
 
     The result is cached per process.
     """
@@ -34,7 +38,9 @@ def rooms_imported(path: Path) -> frozenset[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.append(node.module)
     parts = [name.split(".") for name in names]
-    return frozenset(part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in ROOMS)
+    own = [part[1:] for part in parts if part[0] == PACKAGE.name and len(part) > 1]
+    extensions = {f"extensions/{part[1]}" for part in own if part[0] == "extensions" and len(part) > 1}
+    return frozenset(part[0] for part in own if part[0] in ROOMS) | extensions
 
 
 def purpose(path: Path) -> str:

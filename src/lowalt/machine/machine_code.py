@@ -46,15 +46,20 @@ class _PartsByOptions(dict):
         super().__setitem__(self._key(key), value)
 
 
+# Fault: a kernel that is done as written may round like one that fuses products. No issue upstream.
+# Cause: numba compiles its internal functions, such as the product of complex numbers, once for all kernels, with the
+# options of the first. Held in: numba 0.68. Cure: one copy for each set of options.
 cpu_target.target_context.cached_internal_func = _PartsByOptions()
 _numba_finalizes = CPUCodeLibrary._finalize_final_module
 
 
 def _finalize(library: CPUCodeLibrary) -> None:
     """Finish a kernel's machine code as numba does, but let the kernel call its own copies of other functions."""
-    # By numba's linking, all kernels of a process share the copy of a function that was loaded first. Copies round
+    # Fault: a kernel calls another copy of a function than it was compiled with. No issue upstream. Held in numba 0.68.
+    # Cause: by numba's linking, all kernels of a process share the copy of a function loaded first. Copies round
     # differently, since each is optimised with its kernel, and a process that compiles loads other copies than one that
     # finds its kernels in the cache. Even functions of two sources are shared if they have the same name.
+    # Cure: the copies are a kernel's own.
     functions = [function for function in library._final_module.functions if not function.is_declaration]
     if functions:
         # Keep a copy of the module as it is, for kernels that call this one; numba makes it of finished libraries only.

@@ -4,15 +4,18 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from scipy.special import jv
 
-from lowalt.machine.jit import VECTOR
+from lowalt.machine.jit import LEAN
+from lowalt.numerics.large_matrices import matrix_product
+from lowalt.numerics.portable import sine_cosine, sine_cosine_turns
 
 STRIP = 256
 """Places that pass through the loop together."""
 ENOUGH = 1e-14
 """Share of the largest coefficient below which the last quarter of a series must be."""
+SPARE = 24
+"""Points of a wave's series beyond its terms, so that what is left of the series does not fold back into them."""
 
 
 def orders_of(argument: float, error: float) -> int:
@@ -28,7 +31,26 @@ def orders_of(argument: float, error: float) -> int:
 
 def chebyshev_points(count: int) -> np.ndarray:
     """Return the Chebyshev points (count,) of the first kind on [-1, 1], from 1 downwards."""
-    return np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    return sine_cosine_turns((np.arange(count) + 0.5) / (2 * count))[1]
+
+
+def polynomials(count: int, at: np.ndarray) -> np.ndarray:
+    """Return the Chebyshev polynomials T_0 to T_(count - 1) at `at` (K,), shape (count, K)."""
+    result = np.ones((count, len(at)))
+    if count > 1:
+        result[1] = at
+    for order in range(2, count):
+        result[order] = 2.0 * at * result[order - 1] - result[order - 2]
+    return result
+
+
+def _to_terms(count: int, terms: int) -> np.ndarray:
+    """The matrix (count, terms) from values at `chebyshev_points(count)` to the first terms of their series."""
+    # Whole turns of a cosine are left out as whole numbers.
+    eighths = np.outer(2 * np.arange(count) + 1, np.arange(terms)) % (4 * count)
+    result = 2.0 / count * sine_cosine_turns(eighths / (4 * count))[1]
+    result[:, 0] *= 0.5
+    return result
 
 
 def interpolation(count: int, at: np.ndarray) -> np.ndarray:
@@ -36,16 +58,15 @@ def interpolation(count: int, at: np.ndarray) -> np.ndarray:
 
     Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
     """
-    order = np.arange(count)
-    values = np.cos(np.outer(order, np.arccos(np.clip(at, -1.0, 1.0))))
-    values[1:] *= 2.0
-    return np.cos(np.outer(np.pi * (order + 0.5) / count, order)) @ values / count
+    return matrix_product(_to_terms(count, count), polynomials(count, np.clip(at, -1.0, 1.0)))
 
 
 @lru_cache(maxsize=64)
 def band_tables(nodes: int, spread: float, count: int, error: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the matrices (Q P, K) from moments to K frequencies of the band, and (K, M) from these to all subcarriers.
+    """Return the matrices (2 Q P, 2 K) from moments to K frequencies of the band, and (K, M) from these to subcarriers.
 
+    Rows of the first stand for the moments of each of Q nodes, P real parts and then P imaginary ones; columns for K
+    real parts and then K imaginary ones.
     spread: largest |u| = 1 times the band, in turns: the phase of subcarrier m is 2 pi spread x u / 2,
     x = (2 m - M + 1) / M; error: largest one, relative to the sum of the amplitudes. Both must not be changed.
     """
@@ -53,14 +74,28 @@ def band_tables(nodes: int, spread: float, count: int, error: float) -> tuple[np
     orders, kept = orders_of(argument, error), orders_of(argument, error) + nodes
     band = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
     points = chebyshev_points(kept)
-    p = np.arange(orders)
-    bessel = np.where(p == 0, 1.0, 2.0) * (-1j) ** (p % 4) * jv(p, argument * points[:, None])
-    weights = interpolation(nodes, points)
-    to_nodes = (weights[:, None, :] * bessel.T[None]).reshape(nodes * orders, kept)
-    return np.ascontiguousarray(to_nodes), interpolation(kept, band)
+    # By the Jacobi-Anger expansion the terms are eps_p (-j)^p J_p; the waves' own series needs no Bessel functions.
+    places = chebyshev_points(orders + SPARE)
+    sine, cosine = sine_cosine(argument * points[:, None] * places)
+    to_terms = _to_terms(orders + SPARE, orders)
+    real, imag = matrix_product(cosine, to_terms).T, -matrix_product(sine, to_terms).T
+    weights = interpolation(nodes, points)[:, None, None]
+    parts = np.block([[real, imag], [-imag, real]]).reshape(1, 2 * orders, 2, kept)
+    to_nodes = (weights * parts).reshape(2 * nodes * orders, 2 * kept)
+    return to_nodes, interpolation(kept, band)
 
 
-@VECTOR
+def over_band(moments: np.ndarray, tables: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the waves' sum at all subcarriers, (N, 2, M), from moments (N, 2 Q P) and tables of `band_tables`.
+
+    Index 1 tells the real from the imaginary part.
+    """
+    to_nodes, to_band = tables
+    nodes = matrix_product(moments, to_nodes).reshape(2 * len(moments), len(to_band))
+    return matrix_product(nodes, to_band).reshape(len(moments), 2, -1)
+
+
+@LEAN
 def _summed(x, terms, work, out):
     """Fill out (K,) with the series of terms (T,) complex at x (K,), -1 to 1, by Clenshaw's rule; work: (4, STRIP)."""
     for first in range(0, len(x), STRIP):
@@ -87,7 +122,9 @@ def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.n
     """
     middle, half = 0.5 * (places.max() + places.min()), max(0.5 * float(np.ptp(places)), 1e-12)
     for count in (8, 16, 32, 64) if places.size > 256 else ():
-        terms = chebyshev.chebinterpolate(lambda x: function(middle + half * x).astype(np.complex128), count - 1)  # type: ignore[type-var]
+        values = function(middle + half * chebyshev_points(count)).astype(np.complex128)
+        parts = matrix_product(np.stack([values.real, values.imag]), _to_terms(count, count))
+        terms = parts[0] + 1j * parts[1]
         if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
             out = np.empty(places.shape, np.complex128)
             _summed(((places - middle) / half).ravel(), terms, np.empty((4, STRIP)), out.reshape(-1))

@@ -35,7 +35,7 @@ LOGARITHM = (
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
 LN_10 = 2.302585092994046
 """Natural logarithm of 10."""
-_TANGENT = (
+TANGENT = (
     3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.42857142725034663711e-01, -1.11111104054623557880e-01,
     9.09088713343650656196e-02, -7.69187620504482999495e-02, 6.66107313738753120669e-02, -5.83357013379057348645e-02,
     4.97687799461593236017e-02, -3.65315727442169155270e-02, 1.62858201153657823623e-02,
@@ -163,7 +163,7 @@ def arctan(x: np.ndarray | float) -> np.ndarray:
     ]  # fmt: skip
     near = np.choose(place, choices)
     square = near * near
-    tail = near * (square * _polynomial(square, _TANGENT))
+    tail = near * (square * _polynomial(square, TANGENT))
     high = np.choose(place, [0.0, *(anchor[0] for anchor in _ANCHORS)])
     low = np.choose(place, [0.0, *(anchor[1] for anchor in _ANCHORS)])
     result = np.where(place == 0, near - tail, high - ((tail - low) - near))

@@ -80,7 +80,7 @@ def _train(arguments: list[str]) -> None:
     _add_source(line)
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
-    line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
+    line.add_argument("--out", required=True, help="folder for model.safetensors, history.csv and run.json")
     options = line.parse_args(arguments)
     scheme, settings = with_scheme(options.settings)
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
@@ -94,7 +94,7 @@ def _evaluate(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
     _add_source(line)
-    line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--model", required=True, help="model.safetensors of a training run")
     name_backbone(line)
     line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
     line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
@@ -175,14 +175,14 @@ def _score(arguments: list[str]) -> None:
 
 
 def _export(arguments: list[str]) -> None:
-    """Write a trained model as safetensors with a card, as a torch.export program or as ONNX. Settings: none ({})."""
+    """Write a trained model as safetensors with a card, or as ONNX. Settings: none ({})."""
     from lowalt.recognition.export import export
     from lowalt.recognition.runs import load
 
     line = parser("lowalt.recognition export", _export.__doc__)
-    line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--model", required=True, help="model.safetensors of a training run")
     name_backbone(line)
-    line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md), .pt2 or .onnx")
+    line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md) or .onnx")
     options = line.parse_args(arguments)
     pick(options.settings)
     export(load(options.model, options.backbone), options.out)

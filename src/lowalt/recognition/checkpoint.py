@@ -89,21 +89,6 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
     return stored, state
 
 
-def model(path: str | Path) -> tuple[dict, dict]:
-    """Return the identity and the state of a trained model's file; nothing is built, its settings are checked.
-
-    Raises: InputError as `load`, or naming the setting that is wrong.
-    """
-    stored, state = load(path)
-    if not isinstance(state, dict):
-        raise InputError(f"{path}: not a trained model, expected a model.pt")
-    facts, settings = json_object(stored, path, "a trained model"), {**state}
-    if settings.pop("weights", None) is None:
-        raise InputError(f"{path}: not a trained model, it has no weights")
-    check_model(facts, settings, path)
-    return facts, state
-
-
 def check_model(facts: dict, settings: dict, path: str | Path) -> None:
     """Refuse a model file whose settings are wrong, or contradict the identity under which it was trained.
 

@@ -1,5 +1,5 @@
-"""A trained model for other programs: index images in, class probabilities out, as torch.export or ONNX; or its weights
-and records as safetensors, with a card.
+"""A trained model for other programs: index images in, class probabilities out, as ONNX; or its weights and
+records as safetensors, with a card.
 """
 
 from pathlib import Path
@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from lowalt.files.atomic import replacing
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, install_command
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.runs import Trained
 
@@ -27,14 +27,14 @@ class Probabilities(nn.Module):
 
 
 def export(trained: Trained, out: str | Path) -> None:
-    """Write the model as a torch.export program (.pt2) or ONNX (.onnx), for any batch size; or its weights and records
-    (.safetensors) with a card (.md) next to them.
+    """Write the model as ONNX (.onnx), for any batch size; or its weights and records (.safetensors) with a card (.md)
+    next to them.
 
     Raises: InputError for another suffix, or where ONNX is asked for and its packages are not installed.
     """
     suffix = Path(out).suffix
-    if suffix not in (".pt2", ".onnx", ".safetensors"):
-        raise InputError(f"--out {out}: expected a name ending in .safetensors, .pt2 or .onnx")
+    if suffix not in (".onnx", ".safetensors"):
+        raise InputError(f"--out {out}: expected a name ending in .safetensors or .onnx")
     if suffix == ".safetensors":
         content = model_file.of_run(trained.path)
         model_file.write(out, content)
@@ -45,12 +45,9 @@ def export(trained: Trained, out: str | Path) -> None:
     example = torch.zeros(2, len(trained.scheme.columns), trained.size, trained.size, dtype=torch.uint8)
     dynamic = {"index": {0: torch.export.Dim("batch")}}
     with torch.no_grad(), replacing(out) as temporary:
-        if suffix == ".pt2":
-            torch.export.save(torch.export.export(model, (example,), dynamic_shapes=dynamic), temporary)
-            return
         try:
             torch.onnx.export(model, (example,), temporary, dynamic_shapes=dynamic, dynamo=True, external_data=False)
         except ImportError as error:
             raise InputError(
-                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `pip install 'lowalt[export]'`"
+                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `{install_command('export')}`"
             ) from error

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
+import timm
 import torch
 from torch import distributed, nn
 
@@ -56,8 +57,7 @@ class Machine:
         elif gpu and place >= torch.cuda.device_count():
             count = torch.cuda.device_count()
             raise InputError(
-                f"recognition.processes: process {place} of this machine finds {count} GPUs, "
-                "expected no more processes than GPUs"
+                f"training: process {place} of this machine finds {count} GPUs, expected no more processes than GPUs"
             )
         device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
@@ -80,6 +80,21 @@ class Machine:
         if self.precision == "fp32":
             return contextlib.nullcontext()
         return torch.autocast(self.device.type, torch.bfloat16)
+
+    def with_shared_statistics(self, model: nn.Module) -> nn.Module:
+        """Return the model with every batch norm taking its statistics over all ranks, which torch offers on GPUs.
+
+        Raises: InputError for a batch norm that several ranks would train on processors.
+        """
+        if self.ranks == 1:
+            return model
+        layers = [name for name, layer in model.named_modules() if isinstance(layer, nn.modules.batchnorm._BatchNorm)]
+        if layers and not self.gpu:
+            raise InputError(
+                f"training: {self.ranks} processes on processors share no batch norm, and the backbone has "
+                f"{layers[0]}; expected GPUs, one process, or a backbone without batch norm"
+            )
+        return timm.layers.convert_sync_batchnorm(model)
 
     def parallel(self, model: nn.Module) -> nn.Module:
         """Return the model, wrapped for gradient exchange where there are several ranks."""

@@ -49,7 +49,7 @@ RADAR_LIMITS = """\
 
 
 def accuracy_rows(model: str | Path, protocol: str, scheme: str) -> list[dict[str, str]]:
-    """Return the rows of the run's accuracy.csv for a model.pt; none where it lies in no run with such a table."""
+    """Return the rows of the run's accuracy.csv for a model; none where it lies in no run with such a table."""
     folder = run_folder(model)
     if folder is None or not (folder / "accuracy.csv").is_file():
         return []

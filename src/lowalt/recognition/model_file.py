@@ -16,21 +16,19 @@ Source of 8 bits: Krishnamoorthi, Quantizing deep convolutional networks, arXiv:
 import hashlib
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from lowalt.config.classes import stated
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, write_file
 from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import json_object, read_object
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
-from lowalt.recognition.runs import Trained, of_state
 
 SCALE = ".scale"
 """Added to the name of a matrix: the name of its scales, (rows,) float32."""
@@ -59,25 +57,21 @@ class ModelFile:
 
 
 def run_folder(model: str | Path) -> Path | None:
-    """Return the folder of the run that a model.pt lies in, RUN/models/PROTOCOL/SCHEME/SEED/; None elsewhere."""
+    """Return the folder of the run that a model lies in, RUN/models/PROTOCOL/SCHEME/SEED/; None elsewhere."""
     parents = Path(model).resolve().parents
     return parents[4] if len(parents) > 4 and parents[3].name == "models" else None
 
 
 def of_run(path: str | Path) -> ModelFile:
-    """Return the content of a file for a training's model.pt, with the records next to it and above it.
+    """Return the content of a training's model.safetensors, with the records next to it and above it.
 
     Raises: InputError where the model is missing or damaged.
     """
-    identity, state = checkpoint.model(path)
-    tensors = {name: value.contiguous() for name, value in state.pop("weights").items()}
+    content = read(path)
     record, folder = Path(path).with_name("run.json"), run_folder(path)
     config = load_yaml(folder / "config.yaml") if folder and (folder / "config.yaml").is_file() else {}
-    return ModelFile(
-        tensors, identity, {**state, "classes": list(stated(state))},
-        read_object(record, "a run record") if record.is_file() else {},
-        {name: config[name] for name in INPUT} if config else {},
-    )  # fmt: skip
+    kept = read_object(record, "a run record") if record.is_file() else {}
+    return replace(content, run=kept, input={name: config[name] for name in INPUT} if config else {})
 
 
 def _digest(tensors: dict[str, torch.Tensor], about: dict) -> str:
@@ -125,16 +119,15 @@ def read(path: str | Path) -> ModelFile:
     return ModelFile(tensors, **about)
 
 
-def trained(content: ModelFile, path: str | Path, trusted: str = "") -> Trained:
-    """Return the model of a file's content, ready to answer; path: where it came from; trusted: as in `runs.of_state`.
+def weights_of(content: ModelFile, path: str | Path) -> dict[str, torch.Tensor]:
+    """Return the weights by name, as the network takes them; path: where they came from.
 
-    Raises: InputError where weights and settings do not fit together.
+    Raises: InputError where 8-bit weights and scales do not fit together.
     """
     try:
-        weights = restored(content.tensors) if content.weights == EIGHT else content.tensors
+        return restored(content.tensors) if content.weights == EIGHT else content.tensors
     except (KeyError, TypeError, IndexError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
-    return of_state({**content.model, "weights": weights}, path, trusted)
 
 
 def rounded(weights: Mapping[str, torch.Tensor], matrices: Collection[str]) -> dict[str, torch.Tensor]:

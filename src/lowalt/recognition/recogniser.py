@@ -9,6 +9,7 @@ from pathlib import Path
 from pickle import UnpicklingError
 
 import numpy as np
+import timm
 import torch
 from safetensors import SafetensorError
 from torch import nn
@@ -18,7 +19,6 @@ from lowalt.config.named_code import file_of
 from lowalt.files.errors import InputError
 from lowalt.recognition import own_backbone
 from lowalt.recognition.fusion import Fused
-from lowalt.recognition.light_timm import timm
 from lowalt.recognition.schemes import SPECTRA, Scheme
 from lowalt.tiles import colour_map
 

@@ -1,7 +1,7 @@
 """Build and train a network from settings, load a trained one, and evaluate it.
 
-`model.pt` holds everything needed to use the model: scheme, protocol, network settings, image size, palettes and
-weights.
+`model.safetensors` holds everything needed to use the model: scheme, protocol, network settings, image size, palettes
+and weights.
 """
 
 import json
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import timm
 import torch
 from torch import nn
 
@@ -23,10 +24,10 @@ from lowalt.files.atomic import sha256, write_file
 from lowalt.files.errors import InputError, in_one_line
 from lowalt.files.json_objects import read_object
 from lowalt.machine.hardware import describe
-from lowalt.recognition import checkpoint, inference, predictions, recipe, recogniser
+from lowalt.recognition import checkpoint, inference, model_file, predictions, recipe, recogniser
 from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recognition.light_timm import timm
+from lowalt.recognition.model_file import ModelFile
 from lowalt.recognition.recogniser import built
 from lowalt.recognition.samples import Samples, first_models
 from lowalt.recognition.schemes import Scheme, of_record
@@ -41,11 +42,11 @@ def train(
     samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False,
     build: Build = built,
 ) -> None:  # fmt: skip
-    """Train a scheme, from its checkpoint if there is one; write `model.pt`, `history.csv`, `run.json` into `folder`.
+    """Train a scheme, from its checkpoint if there is one; write `model.safetensors`, `history.csv` and `run.json`.
 
     samples: the sources "train", of which the scheme's share is kept, and "validation"; settings: {seed, size,
-    colour_map, network, training, augmentation, classes}, the classes by label; events: whether to write the metrics
-    for TensorBoard too, into `events/` of the folder; build: makes the network.
+    colour_map, network, training, augmentation, classes}, the classes by label; folder: where the files go; events:
+    whether to write the metrics for TensorBoard too, into `events/` of the folder; build: makes the network.
     Raises: InputError for a wrong setting, a checkpoint of another run, or a loss that becomes NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
@@ -122,11 +123,19 @@ class Trained:
 
 
 def load(path: str | Path, trusted: str = "", build: Build = built) -> Trained:
-    """Return the trained model of a `model.pt`; trusted, build: as in `of_state`.
+    """Return the trained model of a model file; trusted, build: as in `of_state`.
 
     Raises: InputError where the file is missing, damaged or not a model of this project.
     """
-    return of_state(checkpoint.model(path)[1], path, trusted, build)
+    return of_file(model_file.read(path), path, trusted, build)
+
+
+def of_file(content: ModelFile, path: str | Path, trusted: str = "", build: Build = built) -> Trained:
+    """Return the model of a file's content, ready to answer; path: where it came from; the rest as in `of_state`.
+
+    Raises: InputError where weights and settings do not fit together.
+    """
+    return of_state({**content.model, "weights": model_file.weights_of(content, path)}, path, trusted, build)
 
 
 def of_state(state: dict, path: str | Path, trusted: str = "", build: Build = built) -> Trained:

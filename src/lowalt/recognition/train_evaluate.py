@@ -25,7 +25,7 @@ def train(
     run: str | Path, scheme: str = "ABC:VRP+TRP+VT", protocol: str = "unseen", seed: int = 0,
     out: str | Path = "model", backbone: str = "", **training: object,
 ) -> runs.Trained:  # fmt: skip
-    """Train a scheme on the data set of a finished run and return the model, which stays in `out`/model.pt.
+    """Train a scheme on the data set of a finished run and return the model, which stays in `out`/model.safetensors.
 
     run: its folder, such as results/default; scheme: a name of config/schemes.csv; protocol: "unseen" trains on twenty
     subtypes and tests on the others, "seen" trains and tests on other motion of all; backbone: FILE.py:FUNCTION of your
@@ -45,13 +45,13 @@ def train(
     })  # fmt: skip
     samples = Source.of_run(index, settings["size"]).for_training(chosen, protocol, settings["size"])
     runs.train(samples, replace(chosen, backbone=chosen.backbone and name), protocol, settings, Path(out))
-    return runs.load(Path(out) / "model.pt", backbone)
+    return runs.load(Path(out) / "model.safetensors", backbone)
 
 
 def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = "") -> dict:
     """Return how a trained model does on the test samples of its protocol in the data set of a finished run.
 
-    model: of `train`, a file (model.pt or .safetensors), or a name of the zoo; run: a folder such as results/default;
+    model: of `train`, a file (.safetensors), or a name of the zoo; run: a folder such as results/default;
     backbone: the FILE.py:FUNCTION of a model file that names code.
     The result has `accuracy_percent`, the mean over the SNRs, `by_snr_percent`, `by_subtype_percent`, `confusion`
     (samples by true class and answer, in the order of the classes), `confusion_by_snr` and the calibration.

@@ -13,18 +13,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import timm
 import torch
 from torch import nn
 
 from lowalt.files.csv_tables import write_csv
-from lowalt.files.errors import InputError
+from lowalt.files.errors import InputError, install_command
+from lowalt.files.json_objects import json_object
 from lowalt.machine.progress import Reporter
-from lowalt.recognition import checkpoint, recogniser
-from lowalt.recognition.batch_norm import over_ranks
+from lowalt.recognition import checkpoint, model_file, recogniser
 from lowalt.recognition.batches import Augmented, Prefetch, Unchanged, batches, epoch_order
 from lowalt.recognition.inference import Machine, probabilities
-from lowalt.recognition.light_timm import timm
 from lowalt.recognition.matrix_products import as_products
+from lowalt.recognition.model_file import ModelFile
 from lowalt.recognition.objective import descent
 from lowalt.recognition.recipe import averaging, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.samples import Samples
@@ -46,7 +47,7 @@ def tensorboard(folder: str | Path, first: int) -> Metrics:
     except ImportError as error:
         raise InputError(
             f"recognition.tensorboard: the package tensorboard is not installed ({error}); "
-            "expected `pip install 'lowalt[tensorboard]'`, or recognition.tensorboard: false"
+            f"expected `{install_command('tensorboard')}`, or recognition.tensorboard: false"
         ) from error
     writer = SummaryWriter(str(folder), purge_step=first)
 
@@ -85,7 +86,7 @@ class TrainingState:
 
 
 class Trainer:
-    """One training run: `fit` ends with the best averaged weights in `model.pt` and the history in `history.csv`."""
+    """One training run: `finish` writes the best averaged weights (`model.safetensors`) and `history.csv`."""
 
     def __init__(
         self, model: nn.Module, samples: dict[str, Samples], columns: list[int], settings: dict, run: TrainingRun,
@@ -106,7 +107,7 @@ class Trainer:
         if self.block["activation_checkpointing"]:
             recogniser.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
-        shared = over_ranks(model) if machine.ranks > 1 else model
+        shared = machine.with_shared_statistics(model)
         plain = not machine.gpu and not self.block["compile"] and machine.precision == "fp32"
         shared = as_products(shared) if plain else shared
         self.model = shared.to(machine.device, memory_format=layout)
@@ -271,10 +272,12 @@ class Trainer:
         )
 
     def finish(self, extra: dict) -> None:
-        """Write `model.pt` (best averaged weights, `extra`) and `history.csv`, and delete the checkpoint."""
+        """Write `model.safetensors` (best averaged weights, `extra`) and `history.csv`, and delete the checkpoint."""
         if self.machine.rank:
             return
         folder = self.run.folder
-        checkpoint.save(folder / "model.pt", self.run.identity, {"weights": self.best_weights, **extra})
+        weights = {name: value.contiguous() for name, value in self.best_weights.items()}
+        content = ModelFile(weights, json_object(self.run.identity, folder, "a training"), extra, {}, {})
+        model_file.write(folder / "model.safetensors", content)
         write_csv(folder / "history.csv", HISTORY, [[repr(value) for value in row] for row in self.at.history])
         (folder / "checkpoint.pt").unlink(missing_ok=True)

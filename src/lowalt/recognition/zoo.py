@@ -18,7 +18,7 @@ from lowalt.recognition import model_card, model_file
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import EIGHT, ModelFile, rounded
 from lowalt.recognition.protocols import folds
-from lowalt.recognition.runs import Trained, load
+from lowalt.recognition.runs import Trained, load, of_file
 from lowalt.recognition.samples import Samples
 from lowalt.recognition.zoo_files import ZOO, path_of
 
@@ -30,20 +30,18 @@ FEWER_POINTS = 0.5
 def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Trained, dict]:
     """Return a trained model and how its images are made of signals ({network, spectra, images}; {} where unknown).
 
-    model: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo; trusted: the user's
+    model: a model file (.safetensors) of a training or another, or the name of an entry of the zoo; trusted: the user's
     FILE.py:FUNCTION for a model whose backbone is such code.
     Raises: InputError naming the entries there are, or the fault of the file.
     """
     path = path_of(model, zoo)
-    if path.suffix != ".safetensors":
-        return load(path, trusted), {}
     content = model_file.read(path)
-    return model_file.trained(content, path, trusted), content.input
+    return of_file(content, path, trusted), content.input
 
 
 def small(content: ModelFile, trusted: str = "") -> ModelFile:
     """Return a model with its trained matrices in 8 bits; trusted: as in `opened`."""
-    exact = model_file.trained(content, "model", trusted)
+    exact = of_file(content, "model", trusted)
     matrices = {name for name, value in exact.model.named_parameters() if value.ndim > 1 and not value.is_complex()}
     return replace(content, tensors=rounded(content.tensors, matrices), weights=EIGHT)
 
@@ -71,7 +69,7 @@ def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 
 def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, trusted: str = "") -> dict:
     """Write NAME.safetensors and NAME.md into the zoo and return the measurements.
 
-    model: model.pt of a training; samples: its validation fold; trusted: as in `opened`.
+    model: model.safetensors of a training; samples: its validation fold; trusted: as in `opened`.
     Raises: InputError for a name that is no plain file name, samples that are not the validation fold of the training,
     an entry of 1 MB or more, or one that loses accuracy.
     """
@@ -94,7 +92,7 @@ def kept(
     size = len(model_file.packed(reduced))
     if size >= LARGEST_BYTES:
         raise InputError(f"--model: {size} bytes in 8 bits, expected less than {LARGEST_BYTES}")
-    exact, answering = (model_file.trained(weights, model, trusted) for weights in (content, reduced))
+    exact, answering = (of_file(weights, model, trusted) for weights in (content, reduced))
     measured = held_against(exact, answering, samples)
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
@@ -111,7 +109,7 @@ def kept(
 def main(arguments: list[str]) -> None:
     """Make an entry of the zoo of a finished training: 8-bit weights, measured on the validation fold, and a card."""
     line = argparse.ArgumentParser(prog="python -m lowalt.recognition.zoo", description=main.__doc__)
-    line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--model", required=True, help="model.safetensors of a training run")
     line.add_argument("--views", nargs="+", required=True, help="caches of views (.npz) that hold the validation fold")
     line.add_argument("--name", required=True, help="name of the entry, such as default-seen")
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import jinja2
 
+from lowalt.config.extensions import function_offered, module_offered, offered
 from lowalt.report.plots import Plot, plotted
 from lowalt.report.reported_run import ReportedRun
 from lowalt.report.sections import (
     accuracy,
-    benchmark_results,
     comparisons,
     confusion,
     made_with,
@@ -42,7 +42,7 @@ class Section(NamedTuple):
 PARTS = (
     PagePart("run", "This run", (overview,)),
     PagePart("samples", "Samples", (sample_viewer,)),
-    PagePart("results", "Results", (subtypes, confusion, accuracy, comparisons, other_runs, benchmark_results)),
+    PagePart("results", "Results", (subtypes, confusion, accuracy, comparisons, other_runs)),
     PagePart("cost", "What accuracy costs in time", (recognition_cost, simulation_cost)),
     PagePart("effects", "The scene", (scene_verdict,)),
     PagePart("provenance", "Provenance", (made_with,)),
@@ -65,9 +65,13 @@ The template has the name of its module and lies in the same folder.
 TEMPLATES = Path(__file__).parent
 
 
-def templates() -> jinja2.Environment:
+ADDED_TO = "results"
+"""The part behind whose own sections those of extensions stand."""
+
+
+def templates(folder: Path = TEMPLATES) -> jinja2.Environment:
     """Return the template environment, which refuses undefined names and data that a browser cannot read."""
-    loader = jinja2.FileSystemLoader(TEMPLATES)
+    loader = jinja2.FileSystemLoader([folder, TEMPLATES])
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters["plotted"] = plotted
     # JSON has no infinity and no NaN.
@@ -94,11 +98,28 @@ def section(run: ReportedRun, name: str) -> Section:
     return Section(rendered(name, values), [value for value in (values or {}).values() if isinstance(value, Plot)])
 
 
+def added_sections(run: ReportedRun) -> str:
+    """Return the sections of extensions for which the run's manifest has the file, as HTML.
+
+    Raises: InputError for a file that is missing or damaged, or an extension without what it promises.
+    """
+    pieces = []
+    for name, module in offered("sections").items():
+        if name in run.inputs:
+            values = function_offered("sections", name, module, "values")(run)
+            file = Path(module_offered("sections", name, module).__file__ or "").with_suffix(".html")
+            pieces.append(templates(file.parent).get_template(file.name).render(values))
+    return "\n".join(pieces)
+
+
 def page(run: ReportedRun, sections: dict[str, Section]) -> str:
     """Return the whole page of the sections by their names."""
     parts = []
     for part in PARTS:
-        html = "\n".join(sections[_name(module)].html for module in part.sections).strip()
+        html = "\n".join(sections[_name(module)].html for module in part.sections)
+        if part.id == ADDED_TO:
+            html += "\n" + added_sections(run)
+        html = html.strip()
         if html:
             parts.append({"id": part.id, "title": part.title, "html": html})
     return assembled(f"run “{run.config['run']}”", parts)

@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from lowalt.config.network import Station
 from lowalt.machine.jit import VECTOR, kernel
+from lowalt.numerics.portable import TANGENT
 
 
 class Element(NamedTuple):
@@ -21,13 +21,8 @@ class Element(NamedTuple):
 
 # arctan(t) / t as a polynomial of t^2, t up to tan(pi / 8), to rounding.
 _EIGHTH = math.tan(math.pi / 8)
-_ARCTANGENT = chebyshev.Chebyshev(
-    chebyshev.chebinterpolate(
-        lambda x: np.arctan(np.sqrt(0.5 * (x + 1.0)) * _EIGHTH) / (np.sqrt(0.5 * (x + 1.0)) * _EIGHTH), 11
-    ),
-    (0.0, _EIGHTH**2),
-).convert(kind=np.polynomial.Polynomial, domain=(-1, 1), window=(-1, 1)).coef  # fmt: skip
-_A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7, _A8, _A9, _A10, _A11 = np.pad(_ARCTANGENT, (0, 12 - len(_ARCTANGENT))).tolist()
+_ARCTANGENT = (1.0, *(-coefficient for coefficient in TANGENT))
+_A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7, _A8, _A9, _A10, _A11 = _ARCTANGENT
 
 
 _SCALAR = kernel(forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})

@@ -20,6 +20,7 @@ from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.machine.progress import reported
 from lowalt.numerics.portable import rms
 from lowalt.scene import truth, waveform
+from lowalt.scene.contract import numbers
 from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.response import ImagePath, response
@@ -67,9 +68,13 @@ class SceneSample:
                 continue
             if (view, name) not in self._factors:
                 ends = [(end, end.station) for end in view.ends()] if name in one_way else [(view, self.view.station)]
-                factors = [visible(end, self.scene.drawn(view.row, station, name)) for end, station in ends]
-                if not set(map(np.shape, factors)) <= {result.shape, (len(result), 1)}:
-                    raise InputError(f"{name}: factor of shape {np.shape(factors[0])}, expected {result.shape}")
+                function, shapes = "visible_one_way" if name in one_way else "visible", [result.shape, (len(result), 1)]
+                factors = [
+                    numbers(name, function, visible(end, self.scene.drawn(view.row, station, name)), shapes, real=True)
+                    for end, station in ends
+                ]
+                if len(factors) == 2 and (factors[0] * factors[1] < 0).any():
+                    raise InputError(f"{name}: factors of unlike signs at both ends of a link, expected none below 0")
                 self._factors[view, name] = factors[0] if len(factors) == 1 else np.sqrt(factors[0] * factors[1])
             result *= self._factors[view, name]
         return result
@@ -119,8 +124,9 @@ class SceneSample:
 
     def echo(self, view: View) -> np.ndarray:
         """Return the frequency response (N, M) on all paths of a view's target, which stands still within a symbol."""
-        # Most facades reflect nothing during a look, so their paths are left out.
-        paths = [path for path in self.paths(view) if np.any(path.coefficient) and np.any(path.outward.coefficient)]
+        # Most facades reflect nothing during a look, so their paths are left out. On a link, waves that leave on a path
+        # may return on any other, so a path counts where either end uses it.
+        paths = [path for path in self.paths(view) if np.any(path.coefficient) or np.any(path.outward.coefficient)]
         if view is self.view and not paths and not self._waves:
             return self.direct
         return response(view, paths, self.routes(view, paths), **self._waves)
@@ -164,8 +170,11 @@ class SceneSample:
         """
         from_sender = self.only("from_sender")
         still = [from_sender(self.view)] if from_sender else []
-        still += [scatter(self.view, self.draws(name)) for name, scatter in self.all("scatter").items()]
-        unknown = [heard(self) for heard in self.all("heard").values()]
+        shape = len(self.view.times_s), self.scene.network.subcarriers
+        for name, scatter in self.all("scatter").items():
+            found = scatter(self.view, self.draws(name))
+            still.append(found._replace(response=numbers(name, "scatter", found.response, [shape])))
+        unknown = [numbers(name, "heard", heard(self), [shape]) for name, heard in self.all("heard").items()]
         if self.only("instants") or self.only("late_samples"):
             samples = sum(map(self._standing, still), sum(map(self._samples, self.targets)))
         else:
@@ -175,7 +184,7 @@ class SceneSample:
             samples = waveform.transmit(total, self.look.aired)
         samples = sum(unknown, samples)
         for name, receive in self.all("receive").items():
-            samples = receive(samples, self.look, self.draws(name))
+            samples = numbers(name, "receive", receive(samples, self.look, self.draws(name)), [samples.shape])
         return waveform.demodulate(samples, self.look.data)
 
     @cached_property
@@ -194,8 +203,8 @@ class SceneSample:
     def filtered(self, detection: Sequence[NamedEffect]) -> np.ndarray:
         """Return the range cells (N, M) after the linear filters among these detection effects."""
         cells = self.cells
-        for filtered in every(detection, "filtered").values():
-            cells = filtered(cells)
+        for name, filtered in every(detection, "filtered").items():
+            cells = numbers(name, "filtered", filtered(cells), [cells.shape])
         return cells
 
     def chosen(self, detection: Sequence[NamedEffect], cells: np.ndarray) -> np.ndarray:

@@ -19,6 +19,10 @@ N symbols, M subcarriers or range cells, L points of a target; arrays are float6
 
 from typing import NamedTuple
 
+import numpy as np
+
+from lowalt.files.errors import InputError
+
 PLACE_ORDER = ("motion", "transmitter", "channel", "receiver", "detection")
 """The places where effects act, in the order of the chain."""
 
@@ -48,6 +52,23 @@ ARGUMENTS = {
     "weight": "`SceneSample.weight`, the product of the amplitude factors of all or some effects",
 }
 """What functions take, with shapes and units."""
+
+
+def numbers(name: str, function: str, values: object, shapes: list[tuple[int, ...]], real: bool = False) -> np.ndarray:
+    """Return what a function of an effect gave as an array; real: whether it must not be complex.
+
+    Raises: InputError naming the effect and its function for another shape than `shapes`, complex numbers in place of
+    real ones, and NaN or infinity.
+    """
+    found = np.asarray(values)
+    if found.shape not in shapes:
+        raise InputError(f"{name}: {function} gives an array of shape {found.shape}, expected {shapes[0]}")
+    if found.dtype.kind not in ("biuf" if real else "biufc"):
+        kind = "real numbers" if real else "numbers"
+        raise InputError(f"{name}: {function} gives an array of {found.dtype}, expected {kind}")
+    if not np.isfinite(found).all():
+        raise InputError(f"{name}: {function} gives NaN or infinity, expected finite numbers")
+    return found
 
 
 class Offer(NamedTuple):

@@ -16,6 +16,8 @@ import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo.radar import radar
+from lowalt.numerics import portable
+from lowalt.numerics.quadrature import gauss_legendre
 from lowalt.scene import antenna
 from lowalt.scene.antenna import Element
 from lowalt.scene.response import cosines
@@ -106,7 +108,7 @@ def land(network: Network, station: Station, reach_m: float, element: Element | 
     low, high = _edges(station, reach_m, radio.cells)
     cells, lit = len(low), np.flatnonzero(high > low)
     low, high = low[lit], high[lit]
-    node, share = np.polynomial.legendre.leggauss(nodes)
+    node, share = gauss_legendre(nodes)
     t = (0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node).ravel()
     step = (0.5 * (high - low)[:, None] * share).ravel()
     rings = ellipses(t, half, heights)
@@ -126,7 +128,7 @@ def land(network: Network, station: Station, reach_m: float, element: Element | 
     points[:, 1] = 0.5 * (places[0, 1] + places[1, 1]) + along * axis[1] + aside * axis[0]
     narrow = np.sqrt(1.0 - (half / t[ring]) ** 2)
     area = centre_rate * short * c + 0.5 * narrow * long_rate * c * c + 0.5 * short_rate / narrow * s * s
-    r = [np.linalg.norm(points - mast, axis=1) for mast in places]
+    r = [portable.norm(points - mast) for mast in places]
     weight = area * (step * 2.0 * np.pi / counts)[ring]
     weight *= np.sqrt(heights[0] * heights[1] / (r[0] * r[1])) / (r[0] * r[1]) ** 2
     if element is not None:

@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.scene.checks import refuse_unmodelled
+from lowalt.scene.contract import numbers
 from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.view import Perturbations, View, located
 from lowalt.targets.cloud import Cloud
@@ -27,11 +29,9 @@ class Scene:
     def stream(self, name: str, row: dict, *ends: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
         # Each SNR has a stream of its own, so its noise does not depend on the other SNRs.
-        levels = [effect.snr_db for effect in self.effects if effect.name == name]
+        levels = [effect.snr_db for effect in self.effects if effect.name == name and effect.snr_db is not None]
         # The stream of a user's own effect has the name of its file, wherever that lies.
-        return stream(
-            self.seed, "effect", name.rpartition("/")[2], row["subtype"], row["model"], *ends, *filter(None, levels)
-        )
+        return stream(self.seed, "effect", name.rpartition("/")[2], row["subtype"], row["model"], *ends, *levels)
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
         """Return the random stream of an effect, or of another name, at a station, from its start.
@@ -55,8 +55,11 @@ class Scene:
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     """Return the cloud with the cross sections that the scene gives its points."""
     wavelength_m = SPEED_OF_LIGHT / scene.network.carrier_hz
-    for cross_sections in every(scene.effects, "cross_sections").values():
-        cloud = replace(cloud, rcs_m2=cross_sections(cloud, wavelength_m))
+    for name, cross_sections in every(scene.effects, "cross_sections").items():
+        rcs_m2 = numbers(name, "cross_sections", cross_sections(cloud, wavelength_m), [cloud.rcs_m2.shape], real=True)
+        if (rcs_m2 < 0).any():
+            raise InputError(f"{name}: cross_sections gives {rcs_m2.min():g} m2, expected no number below 0")
+        cloud = replace(cloud, rcs_m2=rcs_m2)
     return cloud
 
 

@@ -36,6 +36,11 @@ def _run(name: str, source: bytes) -> ModuleType:
         exec(compile(source, name, "exec"), module.__dict__)
     except Exception as error:
         raise InputError(f"effects: {name}: {type(error).__name__}: {str(error)[:200]}") from error
+    return kept_contract(name, module)
+
+
+def kept_contract(name: str, module: ModuleType) -> ModuleType:
+    """Return the module of an effect from outside of the core. Raises: InputError where it breaks the contract."""
     defaults = getattr(module, "DEFAULTS", None)
     if not isinstance(defaults, dict) or not all(isinstance(key, str) for key in defaults):
         raise InputError(f"effects: {name}: DEFAULTS is {str(defaults)[:100]}, expected every parameter with its value")

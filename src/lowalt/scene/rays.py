@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.echo import Rigid
+from lowalt.numerics import portable
 from lowalt.scene import rays_loops
 
 LEAF = 4
@@ -76,10 +77,11 @@ def _trees(same: _Same) -> dict[int, Tree]:
 
 def _around(axis: np.ndarray, rotation: np.ndarray, toward: np.ndarray) -> np.ndarray:
     """Symbols (N,), sorted by the azimuth of the station, in direction `toward` (N, 3), around a part's axis (3,)."""
-    seen = np.einsum("nji,nj->ni", rotation, toward)
+    seen = portable.applied(rotation.swapaxes(1, 2), toward)
     right = np.cross(axis, np.eye(3)[abs(axis).argmin()])
-    right /= np.linalg.norm(right)
-    return np.arctan2(seen @ np.cross(axis, right), seen @ right).argsort(kind="stable")
+    right /= portable.norm(right)
+    along, across = portable.dot(seen, right), portable.dot(seen, np.cross(axis, right))
+    return portable.arctan2(across, along).argsort(kind="stable")
 
 
 def hidden_by(

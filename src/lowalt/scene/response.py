@@ -16,7 +16,8 @@ import numpy as np
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
-from lowalt.numerics.chebyshev_series import band_tables, chebyshev_points, orders_of
+from lowalt.numerics import portable
+from lowalt.numerics.chebyshev_series import band_tables, chebyshev_points, orders_of, over_band
 from lowalt.scene import response_loops, spherical
 from lowalt.scene.view import View
 
@@ -74,8 +75,8 @@ def response(
     # Rounded up to a power of sqrt(2), so that a few tables serve all samples.
     reach = 2.0 ** (np.ceil(2 * np.log2(max(reach, 1e-3))) / 2)
     band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
-    to_nodes, to_band = band_tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers, ERROR)
-    shape = len(view.times_s), len(out.kappas), 2, len(to_nodes) // len(out.kappas)
+    tables = band_tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers, ERROR)
+    shape = len(view.times_s), len(out.kappas), 2, len(tables[0]) // (2 * len(out.kappas))
     result = np.empty((len(out.places), len(back.places), *shape))
     fault = response_loops.moments(out, back, same, strength, reach, result)
     if fault:
@@ -87,11 +88,8 @@ def response(
         if same and b < a:
             continue
         weight = 2.0 if same and a != b else 1.0
-        moments = weight * (result[a, b, :, :, 0] + 1j * result[a, b, :, :, 1]).reshape(len(view.times_s), -1)
+        bands = over_band(weight * result[a, b].reshape(len(view.times_s), -1), tables)
         range_m = out.centre[a] + back.centre[b]
-        nodes = moments @ to_nodes
-        # The matrix to all subcarriers is real: two real products take half the time of a complex one.
-        bands = nodes.real @ to_band, nodes.imag @ to_band
         response_loops.add_turned(bands, -out.turns * range_m, -range_m * band_m / network.subcarriers, total)
     return total
 
@@ -111,7 +109,8 @@ def _half_diagonal(counts: np.ndarray) -> float:
 def cosines(station: Station, places: np.ndarray) -> np.ndarray:
     """Return the direction cosines (..., 2), across and up, of places (..., 3) m as a station's array sees them."""
     away = places - np.asarray(station.position_m)
-    return np.stack([away @ station.horizontal, away[..., 2]], axis=-1) / np.linalg.norm(away, axis=-1)[..., None]
+    across = portable.dot(away, station.horizontal)
+    return np.stack([across, away[..., 2]], axis=-1) / portable.norm(away)[..., None]
 
 
 def _end(
@@ -133,7 +132,7 @@ def _end(
         radio.kappa, frequencies(network, view.station, squint), squint, radio.centre_hz / SPEED_OF_LIGHT,
         cosines(station, beams.aims_m)[current], images, coefficient,
         # Reflection keeps distances, so images lie around their mean as the points do around theirs.
-        np.linalg.norm(images.mean(axis=3) - mast_m, axis=2), np.empty((0, 0, 0, 0), np.complex128),
+        portable.norm(images.mean(axis=3) - mast_m), np.empty((0, 0, 0, 0), np.complex128),
     )  # fmt: skip
     return end._replace(gains=spherical.gains(end, ERROR)) if wavefront else end
 

@@ -189,13 +189,13 @@ def moments(out, back, same, strength, reach, result):
 
 @LOOPS
 def add_turned(values, start, step, result):
-    """Add values (N, M) exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result (N, M).
+    """Add values exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result (N, M).
 
-    values: real and imaginary parts.
+    values: (N, 2, M), real and imaginary parts.
     """
     middle = 0.5 * (result.shape[1] - 1)
     for n in range(len(result)):
-        real, imag, out, first = values[0][n], values[1][n], result[n], start[n] - np.rint(start[n])
+        real, imag, out, first = values[n, 0], values[n, 1], result[n], start[n] - np.rint(start[n])
         for m in range(np.uint64(result.shape[1])):
             c, s = phasor(first + (np.float64(m) - middle) * step[n])
             out[m] += complex(real[m] * c - imag[m] * s, real[m] * s + imag[m] * c)

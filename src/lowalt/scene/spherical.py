@@ -11,6 +11,7 @@ from scipy import fft
 
 from lowalt.machine.jit import INNER_VECTOR
 from lowalt.numerics.chebyshev_series import chebyshev_points, orders_of
+from lowalt.numerics.large_matrices import multiply
 from lowalt.scene.response_loops import CHUNK, LOOPS, End, phasor
 
 SYMBOLS = 600
@@ -151,7 +152,7 @@ def _polynomials(at, box, counts, powers, terms, result):
                 x, y, z, term = across[powers[t, 0]], up[powers[t, 1]], near[powers[t, 2]], table[t]
                 for i in range(np.uint64(size)):
                     term[i] = x[i] * y[i] * z[i]
-            np.dot(terms, table, sums)
+            multiply(terms, table, sums)
             for q in range(result.shape[1]):
                 real, imag, out = sums[q], sums[q + result.shape[1]], result[n, q]
                 for i in range(last - first):

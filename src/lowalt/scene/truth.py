@@ -10,6 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.numerics import portable
 from lowalt.scene.response import cosines
 from lowalt.scene.view import Displacement, View
 
@@ -20,7 +21,7 @@ def geometric(view: View) -> np.ndarray:
     moved = np.gradient(middle, view.times_s, axis=0, edge_order=2)
     ends = [station] if station.transmitter is None else [station, station.transmitter]
     ways = [middle - np.asarray(end.position_m) for end in ends]
-    ranges = [np.linalg.norm(way, axis=1) for way in ways]
+    ranges = [portable.norm(way) for way in ways]
     speeds = [(way * moved).sum(axis=1) / length for way, length in zip(ways, ranges, strict=True)]
     return np.column_stack([np.mean(ranges, axis=0), np.mean(speeds, axis=0), cosines(station, middle)])
 
@@ -33,7 +34,7 @@ def array_turns(view: View) -> np.ndarray:
     network, station, middle = view.network, view.station, view.places.mean(axis=1)
     kappa, sender = station.frequency_hz / network.carrier_hz, station.transmitter or station
     ends = (sender, network.transmit), (station, network.receive)
-    return sum(0.25 * kappa * cosines(end, middle) @ (np.array(shape) - 1.0) for end, shape in ends)
+    return sum(0.25 * kappa * portable.dot(cosines(end, middle), np.array(shape) - 1.0) for end, shape in ends)
 
 
 def observed(view: View, displacements: Iterable[Displacement], cells: int) -> tuple[np.ndarray, np.ndarray]:

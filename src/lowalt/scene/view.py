@@ -11,6 +11,7 @@ from lowalt.config.network import Network, Station
 from lowalt.echo import Rigid
 from lowalt.machine.jit import VECTOR
 from lowalt.motion.poses import Perturbation, poses
+from lowalt.numerics import portable
 from lowalt.scene.antenna import Element, gain
 from lowalt.targets.cloud import Cloud
 
@@ -167,7 +168,7 @@ class View:
 
     def ways_m(self, places: np.ndarray) -> np.ndarray:
         """Return the way from the sender by places (..., 3) m to the receiver, (...) m."""
-        return sum(np.linalg.norm(places - mast_m, axis=-1) for mast_m in self.masts_m)
+        return sum(portable.norm(places - mast_m) for mast_m in self.masts_m)
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
         """Return the element's amplitude gain toward images (N, L, 3) over that toward the points, (N, L) or 1."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.config.command import pick
+from lowalt.config.extensions import module_offered, offered
 from lowalt.files.errors import InputError
 from lowalt.spectra.interface import KnowsTimes, OfCells, Spectrum
 from lowalt.spectra.settings import windows
@@ -19,11 +20,18 @@ from lowalt.spectra.settings import windows
 LISTED = ("vrp", "trp", "vt")
 """The paper's three, in its order. Any other module comes after them, in alphabetical order."""
 _FOUND = sorted(path.stem for path in (Path(__file__).parent / "kinds").glob("*.py") if path.stem != "__init__")
-NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED))
+ADDED: dict[str, str] = offered("spectra")
+"""Modules of the spectra that extensions add, by name."""
+NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED), *ADDED)
 """Names of all spectra."""
 TIMES = "times"
 """Key of the block `spectra` that is not a spectrum: whether spectra use the instants of received symbols."""
 INSTANTS = ("even", "known")
+
+
+def module_name(name: str) -> str:
+    """Return the dotted name of a spectrum's module."""
+    return ADDED.get(name, f"lowalt.spectra.kinds.{name}")
 
 
 @functools.cache
@@ -34,7 +42,10 @@ def spectrum(name: str) -> Any:
     """
     if name not in NAMES:
         raise InputError(f"spectra: unknown spectrum {name!r}, expected some of {list(NAMES)}")
-    module = importlib.import_module(f"lowalt.spectra.kinds.{name}")
+    if name in ADDED:
+        module = module_offered("spectra", name, ADDED[name])
+    else:
+        module = importlib.import_module(f"lowalt.spectra.kinds.{name}")
     if not isinstance(module, (Spectrum, OfCells)):
         raise InputError(f"{module.__file__}: lacks a name of lowalt.spectra.interface, Spectrum or OfCells")
     return module

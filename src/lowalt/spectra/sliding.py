@@ -92,7 +92,7 @@ def transfer(re, im, window, cosine, sine, share, out):
     """Fill out (speeds, count) with the velocity-transfer spectrum of windows starting at 0 .. count - 1.
 
     re, im: (symbols,), symbols >= count + window; cosine, sine: (speeds, window + 1) of the conjugate dictionary;
-    share: 0-d array with (L / (L + 1))^2 in the working precision. Source: paper, Eq. 30 to 35.
+    share: (1,), (L / (L + 1))^2 in the working precision. Source: paper, Eq. 30 to 35.
     """
     speeds, count = out.shape
     x = np.empty(count, re.dtype)

@@ -7,6 +7,7 @@ from typing import Any
 
 from lowalt.config.named_code import buildings_of
 from lowalt.files.atomic import slug
+from lowalt.scene.effects import module_of
 from lowalt.scene.lateness import late_effects
 from lowalt.spectra.catalogue import of_cells
 from lowalt.targets.records import source_files
@@ -65,9 +66,7 @@ class DataProducts:
         buildings = buildings_of(self._config["effects"])
         if buildings is None:
             return []
-        from lowalt.scene.town.buildings import files_of
-
-        return files_of(buildings)
+        return module_of("town").files_of(buildings)
 
     def span(self, wildcards: Any) -> list[str]:
         """The motion models of a chunk within its group, as command-line words."""

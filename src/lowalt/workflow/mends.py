@@ -1,10 +1,11 @@
-"""Workarounds for faults of Snakemake and its Slurm executor, each with the fault, the upstream issue and the cure.
+"""Workarounds for faults of Snakemake, its Slurm executor and `logging`, each with fault, cause, cure and versions.
 
 `workflow/rules/common.smk` calls `install`, so that they apply to `make`, `lowalt run` and plain `snakemake`. For each
-a test shows that the installed version still has the fault.
+a test shows that the installed version still has the fault. Those of numba stand in `machine/machine_code.py`.
 """
 
 import contextlib
+import logging
 import os
 import signal
 import sys
@@ -15,6 +16,7 @@ from types import FrameType
 from typing import Any
 
 from lowalt.config.command import refusing
+from lowalt.files.atomic import FULL
 from lowalt.files.errors import InputError
 from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal, take, take_over
 
@@ -25,9 +27,11 @@ def install() -> None:
     answer_ctrl_c()
     keep_one_timer()
     ask_slurm_sooner()
+    quiet_logs_on_a_full_disk()
 
 
 # Fault: when a run is killed, its lock and its jobs remain. github.com/snakemake/snakemake/issues/2919
+# Cause: a lock is a list of files without the process that holds it. Held in: Snakemake 9.27.
 # Cure: record the lock's owner; the next run takes over the lock of a dead run and ends its orphaned jobs.
 
 
@@ -87,6 +91,7 @@ def _cleanup_locks(self: Any) -> None:
 
 
 # Fault: a second Ctrl-C interrupts the clean-up of jobs and files, with tracebacks. No issue upstream.
+# Cause: KeyboardInterrupt is handled once, and raised again inside its handler. Held in: Snakemake 9.27.
 # Cure: answer every Ctrl-C after the first with one line.
 
 ANSWER = b"already ending; the same command goes on where this run stops\n"
@@ -108,8 +113,9 @@ def _first(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-# Fault: each scheduling round starts a timer that starts another round `--max-jobs-per-timespan` later (1 s), and each
-# finished job starts a round: after n jobs there are n rounds a second. github.com/snakemake/snakemake/issues/2354
+# Fault: after n jobs Snakemake schedules n times a second. github.com/snakemake/snakemake/issues/2354
+# Cause: each scheduling round starts a timer that starts another round `--max-jobs-per-timespan` later (1 s), and each
+# finished job starts a round. Held in: Snakemake 9.27.
 # Cure: one timer at a time. A longer timespan would not help, because a finished run waits for its timers.
 
 
@@ -130,8 +136,9 @@ def _one_timer(self: Any, delay: float) -> None:
         self._next_round.start()
 
 
-# Fault: after each poll that finds no finished job, the Slurm executor waits 10 s longer, up to 180 s. It notices the
-# end of a job of 46 s only 34 s later. github.com/snakemake/snakemake-executor-plugin-slurm/issues/319
+# Fault: the end of a job of 46 s is noticed 34 s later. github.com/snakemake/snakemake-executor-plugin-slurm/issues/319
+# Cause: after each poll that finds no finished job, the Slurm executor waits 10 s longer, up to 180 s. Held in:
+# snakemake-executor-plugin-slurm 2.8.
 # Cure: each wait is 20 % longer than the last, at most 30 s; the end of a job of length T is noticed within T / 5.
 
 PLUGIN = "snakemake_executor_plugin_slurm"
@@ -153,3 +160,19 @@ def _slower(executor: Any, asked_s: float | None) -> None:
     last_s = executor._next_seconds_between_status_checks
     grown = last_s is not None and asked_s is not None and asked_s > last_s
     executor._next_seconds_between_status_checks = min(GROWTH * last_s, max(MOST_S, last_s)) if grown else asked_s
+
+
+# Fault: on a full disk every line of a log prints two tracebacks, although the run itself reports the disk. No issue.
+# Cause: `logging.Handler.handleError` prints the exception and the stack of the call. Held in: Python 3.11 to 3.13.
+# Cure: a log file says nothing of a full disk; other faults keep their tracebacks.
+
+
+def quiet_logs_on_a_full_disk() -> None:
+    """Let log files be silent where their disk is full."""
+    logging.FileHandler.handleError = _quiet  # type: ignore[method-assign]
+
+
+def _quiet(file: logging.FileHandler, record: logging.LogRecord) -> None:
+    """Report that a line could not be written to a log file, unless its disk is full."""
+    if getattr(sys.exc_info()[1], "errno", None) not in FULL:
+        logging.Handler.handleError(file, record)

@@ -87,7 +87,7 @@ class Products(DataProducts):
         """
         others = self._config["recognition"]["transfer"]
         for other in others:
-            names = ["config.yaml", *(f"models/{training}/model.pt" for training in self._run.trainings)]
+            names = ["config.yaml", *(f"models/{training}/model.safetensors" for training in self._run.trainings)]
             missing = [name for name in names if not Path(f"results/{other}/{name}").is_file()]
             if missing:
                 raise InputError(

@@ -19,7 +19,6 @@ from lowalt.spectra import Spectra
 from lowalt.targets.records import missing_inputs, records_of
 from lowalt.tiles.image_settings import Images
 from lowalt.workflow import refusals
-from lowalt.workflow.launch import Launch
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,6 @@ class Run:
         if lacking := missing_inputs(chosen, inputs):
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         refusals.refuse_data(config)
-        Launch.of(config["recognition"])
         return cls(config, inputs, network, chosen, classes, plan, schemes)
 
     @property
@@ -130,9 +128,9 @@ class Run:
         ]
 
     @cached_property
-    def launch(self) -> Launch:
-        """How a training is launched."""
-        return Launch.of(self.config["recognition"])
+    def gpus(self) -> int:
+        """Number of GPUs that a training or an evaluation asks the scheduler for."""
+        return int(self.config["recognition"].get("gpu", False))
 
     @cached_property
     def priced(self) -> list[str]:

@@ -5,8 +5,11 @@ The workflow declares them as inputs of each stage, so editing a module re-runs 
 
 import ast
 import functools
+import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
+
+from lowalt.spectra.catalogue import module_name
 
 PACKAGE = Path(__file__).parents[1]
 ROOT = PACKAGE.parent
@@ -16,7 +19,10 @@ CATALOGUE = "lowalt.spectra.catalogue"
 
 @functools.cache
 def _file(module: str) -> Path | None:
-    """File of a module of the package, None where there is none."""
+    """File of a module of the package or of an extension, None where there is none."""
+    if module.split(".")[0] != PACKAGE.name:
+        found = importlib.util.find_spec(module)
+        return Path(found.origin) if found and found.origin and found.origin.endswith(".py") else None
     base = ROOT.joinpath(*module.split("."))
     for path in (base / "__init__.py", base.with_suffix(".py")):
         if path.is_file():
@@ -35,8 +41,9 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 @functools.cache
-def _imports(path: Path) -> tuple[str, ...]:
-    """Modules of the package that a file imports: anywhere in the file, but in a `__main__` only at top level.
+def _imports(path: Path, package: str = PACKAGE.name) -> tuple[str, ...]:
+    """Modules of lowalt, and of the file's own `package`, that a file imports: anywhere in the file,
+    but in a `__main__` only at top level.
 
     Imports within a function of a `__main__` belong to one subcommand; the caller names them. Those within functions of
     the package's `__init__` serve users' attribute access, which no stage uses.
@@ -49,7 +56,7 @@ def _imports(path: Path) -> tuple[str, ...]:
             modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             modules += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return tuple(name for name in modules if name.split(".")[0] == PACKAGE.name and _file(name))
+    return tuple(name for name in modules if name.split(".")[0] in (PACKAGE.name, package) and _file(name))
 
 
 @functools.cache
@@ -61,8 +68,8 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     by name.
     Raises: ModuleNotFoundError where there is no such module.
     """
-    todo, seen, own = [], set(), [Path(name) for name in modules if name.endswith(".py")]
-    for path in own:
+    todo, seen, paths = [], set(), [Path(name) for name in modules if name.endswith(".py")]
+    for path in paths:
         todo += _imports(path)
     for module in filter(lambda name: not name.endswith(".py"), modules):
         if _file(module) is None:
@@ -73,10 +80,11 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
         if name not in seen:
             seen.add(name)
             parent = name.rpartition(".")[0]
-            todo += [*([parent] if parent else []), *_imports(_file(name))]
+            own = name.split(".")[0] == PACKAGE.name
+            todo += [*([parent] if parent and own else []), *_imports(_file(name), name.split(".")[0])]
             if name == CATALOGUE:
-                todo += [f"lowalt.spectra.kinds.{spectrum}" for spectrum in spectra]
-    return tuple(sorted({*map(_file, seen), *(path.absolute() for path in own)}))
+                todo += [module_name(spectrum) for spectrum in spectra]
+    return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
 
 
 def near(path: Path) -> str:

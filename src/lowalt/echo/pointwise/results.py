@@ -1,24 +1,19 @@
-"""Results of the pointwise kernel for a whole sample: the strongest cell's signal, all cells, or the subcarriers.
+"""Results of the pointwise kernel for a whole sample: the strongest cell's signal, or all cells.
 
 The strongest cell is the arg max over all M cells; a bound excludes those that are not computed.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.echo.echo_input import EchoInput
+from lowalt.echo.fast.workspace import Found
 from lowalt.echo.pointwise.arg_max import NEAR_TIE, strongest_of
 from lowalt.echo.pointwise.reference_range import CELL
 from lowalt.echo.pointwise.terms import PointTerms, cell_phase, cell_sum, terms
+from lowalt.echo.radar import Radar
 from lowalt.machine.jit import PLAIN
-
-
-class Paths(NamedTuple):
-    """Extra delays (s) and complex gains of all paths, each (K, N or 1, L or 1); K = 0: the direct path alone."""
-
-    delays: np.ndarray
-    gains: np.ndarray
 
 
 @PLAIN
@@ -75,44 +70,21 @@ def strongest(z, u, base, count, sums):
 
 
 @PLAIN
-def room(scene, paths):
-    """Return empty `PointTerms` for the points of a scene over all paths."""
+def room(scene):
+    """Return empty `PointTerms` for the points of a scene."""
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
-    size = count * max(1, paths.delays.shape[0])
-    return PointTerms(np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size), np.empty(size))
+    return PointTerms(np.empty((count, 3)), np.empty(count, np.complex128), np.empty(count), np.empty(count))
 
 
 @PLAIN
-def symbol(scene, radar, ref, n, aims, paths, out):
-    """Fill `out` (`PointTerms`) for symbol n with all paths; returns 1 + l for a point in the station, else 0."""
-    e, z, u, risk = out
-    count = len(e)
-    fault = terms(scene, radar, ref, n, aims, out)
-    path_count = paths.delays.shape[0]
-    if fault or path_count == 0:
-        return fault
-    # Go through the paths in reverse: the first L entries hold the direct path, which all others need.
-    for k in range(path_count - 1, -1, -1):
-        for l in range(count):  # noqa: E741
-            delay = paths.delays[k, n % paths.delays.shape[1], l % paths.delays.shape[2]]
-            gain = paths.gains[k, n % paths.gains.shape[1], l % paths.gains.shape[2]]
-            turn = radar.centre_hz * delay
-            turn -= np.rint(turn)
-            later = complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
-            z[k * count + l], u[k * count + l] = z[l] * gain * later, u[l] + radar.bandwidth_hz * delay
-            risk[k * count + l] = risk[l] * abs(gain)
-    return 0
-
-
-@PLAIN
-def signal(scene, radar, refs, symbols, aims, paths, found, risks):
+def signal(scene, radar, refs, symbols, aims, found, risks):
     """Fill `found` (`refine.Found`) and risks (N,) at `symbols`, indices of refs; gaps without roundings.
 
     Returns 0, or n L + l + 1 where point l stands in the station at symbol n.
     """
-    points, sums = room(scene, paths), np.empty((radar.subcarriers, 2))
+    points, sums = room(scene), np.empty((radar.subcarriers, 2))
     for n in symbols:
-        fault = symbol(scene, radar, refs[n], n, aims, paths, points)
+        fault = terms(scene, radar, refs[n], n, aims, points)
         if fault:
             return n * len(points.e) + fault
         base = int(refs[n, CELL])
@@ -123,11 +95,11 @@ def signal(scene, radar, refs, symbols, aims, paths, found, risks):
 
 
 @PLAIN
-def matrix(scene, radar, refs, aims, paths, out):
+def matrix(scene, radar, refs, aims, out):
     """Fill out (N, M) with all range cells, each by the closed form; returns as `signal`."""
-    points, total = room(scene, paths), radar.subcarriers
+    points, total = room(scene), radar.subcarriers
     for n in range(len(refs)):
-        fault = symbol(scene, radar, refs[n], n, aims, paths, points)
+        fault = terms(scene, radar, refs[n], n, aims, points)
         if fault:
             return n * len(points.e) + fault
         base = int(refs[n, CELL])
@@ -136,14 +108,22 @@ def matrix(scene, radar, refs, aims, paths, out):
     return 0
 
 
-@PLAIN
-def amplitudes(scene, radar, refs, aims, paths, first, z, u):
-    """Fill z and u (K, L), or (K, paths * L), with what `terms` gives at K symbols from `first` on; returns as
-    `signal`."""
-    points = room(scene, paths)
-    for n in range(len(z)):
-        fault = symbol(scene, radar, refs[first + n], first + n, aims, paths, points)
-        if fault:
-            return (first + n) * len(points.e) + fault
-        z[n], u[n] = points.z, points.u
-    return 0
+def bounded(
+    scene: EchoInput,
+    radar: Radar,
+    refs: np.ndarray,
+    symbols: np.ndarray,
+    aims: tuple[float, float],
+    pointwise_bound: tuple[float, float],
+    found: Found,
+) -> int:
+    """Fill `found` at `symbols` as `signal`, with error bounds and with gaps that allow for them; returns as `signal`.
+
+    pointwise_bound: `refine.Method.pointwise_bound`.
+    """
+    risks = np.zeros(len(refs))
+    fault = signal(scene, radar, refs, symbols, aims, found, risks)
+    share, direction = pointwise_bound
+    found.bounds[symbols] = found.totals[symbols] * share + risks[symbols] * direction
+    found.gaps[symbols] = np.maximum(found.gaps[symbols] - 2 * found.bounds[symbols], 0.0)
+    return fault

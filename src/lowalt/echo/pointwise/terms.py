@@ -1,6 +1,6 @@
 """The pointwise kernel: every point's complex amplitude and range at one symbol, whatever the geometry or arrays.
 
-Used for all range cells, subcarriers, extra paths, and for symbols that the fast kernel cannot decide.
+Used for symbols that the fast kernel cannot decide.
 """
 
 import math
@@ -14,8 +14,7 @@ from lowalt.machine.jit import LEAN, PLAIN
 
 class PointTerms(NamedTuple):
     """Values of all points at one symbol: places `e` (L, 3) m from the reference's point; complex amplitudes `z`
-    without the cell's own phase, ranges `u` in cells from the reference's cell, and risks (`terms`), each (L,), or
-    (paths * L,) with further paths."""
+    without the cell's own phase, ranges `u` in cells from the reference's cell, and risks (`terms`), each (L,)."""
 
     e: np.ndarray
     z: np.ndarray
@@ -72,7 +71,7 @@ def offsets(scene, n, place, e):
 
 @PLAIN
 def terms(scene, radar, ref, n, aims, out):
-    """Fill the first L entries of `out` (`PointTerms`) with the share of each point at symbol n.
+    """Fill `out` (`PointTerms`) with the share of each point at symbol n.
 
     ref: the symbol's row of `reference_range.reference`; aims: direction cosines of the beams. The risk is the peak
     amplitude times (r_ref + |e|) / r, which grows with the rounding of the point's direction.

@@ -113,10 +113,9 @@ def _contenders(sample: EchoSample, refs: np.ndarray, n: int, pointwise_bound: t
     """Return the cells of symbol n that may be the strongest by the error bounds of float64."""
     scene, radar, aims, part = sample.scene, sample.radar, sample.aims, slice(n, n + 1)
     here = scene._replace(translation=scene.translation[part], rotation=scene.rotation[part])
-    direct = pointwise.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
     one, risks, cells = Found.empty(1), np.zeros(1), np.empty((1, radar.subcarriers), np.complex128)
-    pointwise.signal(here, radar, refs[part], np.arange(1), aims, direct, one, risks)
-    pointwise.matrix(here, radar, refs[part], aims, direct, cells)
+    pointwise.signal(here, radar, refs[part], np.arange(1), aims, one, risks)
+    pointwise.matrix(here, radar, refs[part], aims, cells)
     strengths = abs(cells[0])
     bound = one.totals[0] * pointwise_bound[0] + risks[0] * pointwise_bound[1]
     return np.flatnonzero(strengths >= strengths.max() - 2 * bound).tolist()

@@ -10,17 +10,18 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from lowalt.config.extensions import AddedEffect, module_offered, offered
 from lowalt.config.named_code import own_effects
 from lowalt.files.errors import InputError, instead
 from lowalt.scene.contract import OFFERS, PLACE_ORDER
-from lowalt.scene.own_effect import checked, loaded, place_of
+from lowalt.scene.own_effect import checked, kept_contract, loaded, place_of
 
 LISTED = {
     "motion": "rotor_spread gusts",
     "transmitter": "slow_time data_symbols power_amplifier comb_pilots",
     "channel": (
         "pointing_error element_pattern mean_cross_section fluctuation cross_sections occlusion line_of_sight "
-        "ground_reflection walls town reflected_aspect squint wavefront symbol_motion cyclic_prefix companions "
+        "ground_reflection walls reflected_aspect squint wavefront symbol_motion cyclic_prefix companions "
         "direct_path interference clutter background_channel"
     ),
     "receiver": (
@@ -32,12 +33,20 @@ LISTED = {
 """Names of the effects whose order within their place matters, in the order of the chain."""
 
 
+ADDED: dict[str, AddedEffect] = offered("effects")
+"""Effects of extensions by name."""
+
+
 def _places() -> dict[str, str]:
-    """The place of every effect: in each place those LISTED, then the others of its folder in alphabetical order."""
+    """The place of every effect: those LISTED, then the others of its folder, and extensions' between."""
     folder, result = Path(__file__).parent, {}
     for place in PLACE_ORDER:
         files = sorted(path.stem for path in (folder / place).glob("*.py") if path.stem != "__init__")
-        result |= dict.fromkeys((*LISTED[place].split(), *files), place)
+        names = [*dict.fromkeys((*LISTED[place].split(), *files))]
+        for name, added in ADDED.items():
+            if added.place == place:
+                names.insert(names.index(added.after) + 1 if added.after in names else len(names), name)
+        result |= dict.fromkeys(names, place)
     return result
 
 
@@ -80,12 +89,16 @@ def dotted(name: str) -> str:
     if name not in PLACES:
         known = f"{instead([name], sorted(PLACES))}, or the path of an effect's Python file"
         raise InputError(f"effects: unknown effect {name!r}, expected {known}")
-    return f"{__name__}.{PLACES[name]}.{name}"
+    return ADDED[name].module if name in ADDED else f"{__name__}.{PLACES[name]}.{name}"
 
 
 def module_of(name: str) -> ModuleType:
     """Return the module of an effect, loaded. Raises: InputError where there is none."""
-    return loaded(name) if own_effects([name]) else importlib.import_module(dotted(name))
+    if own_effects([name]):
+        return loaded(name)
+    if name in ADDED:
+        return kept_contract(name, module_offered("effects", name, ADDED[name].module))
+    return importlib.import_module(dotted(name))
 
 
 def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
@@ -105,7 +118,8 @@ def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
             raise InputError(
                 f"effects.{name}: unknown parameter(s) {unknown}, expected some of {list(module.DEFAULTS)}"
             )
-        settings = checked(name, module, changed) if name in own else {**module.DEFAULTS, **changed}
+        brought = name in own or name in ADDED
+        settings = checked(name, module, changed) if brought else {**module.DEFAULTS, **changed}
         result.append(NamedEffect(name, place_of(name, module) if name in own else PLACES[name], module, settings))
     result.sort(key=lambda effect: PLACE_ORDER.index(effect.place))
     acting = [effect for effect in result if not effect.idle]

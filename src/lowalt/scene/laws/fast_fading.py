@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.numerics import portable
+from lowalt.numerics.large_matrices import upper_root
 
 OFFSETS = np.repeat([0.0447, 0.1413, 0.2492, 0.3715, 0.5129, 0.6797, 0.8844, 1.1481, 1.5195, 2.1551], 2)
 OFFSETS[1::2] *= -1
@@ -127,7 +129,7 @@ def large_scale(environment: str, link: Link, rng: np.random.Generator) -> Large
     matrix = np.eye(4)
     for (row, column), value in zip([(1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2)], table.correlation, strict=True):
         matrix[row, column] = matrix[column, row] = value
-    shadow, delay, azimuth, zenith = np.linalg.cholesky(matrix) @ rng.standard_normal(4)
+    shadow, delay, azimuth, zenith = portable.applied(upper_root(matrix).T, rng.standard_normal(4))
     (delay_mean, delay_dev), (azimuth_mean, azimuth_dev) = table.delay_spread(ghz), table.azimuth_spread(ghz)
     wide = min(10 ** (azimuth_mean + azimuth_dev * azimuth), WIDEST_DEG[0])
     tall = min(10 ** (zenith_spread(environment, link)[0] + table.zenith_deviation * zenith), WIDEST_DEG[1])

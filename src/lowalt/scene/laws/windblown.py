@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import fft
 
+from lowalt.numerics import portable
 from lowalt.scene.set_noise import white
 
 MPH = 0.44704
@@ -11,6 +12,8 @@ TAIL = 1e-3
 """Largest correlation left where the synthesised moving part wraps round."""
 FAINT = 1e-11
 """Share of the moving part's power in each of the frequencies that are not drawn."""
+LARGEST = 700.0
+"""Exponent beyond which a share of power is nothing."""
 
 
 def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
@@ -22,8 +25,9 @@ def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
     miles = wind_mps / MPH
     if miles == 0:
         return np.inf, np.inf
-    still = 489.8 * miles**-1.55 * (frequency_hz / 1e9) ** -1.21
-    return still, 1.0 / (0.1048 * (np.log10(max(miles, 1.0)) + 0.4147))
+    still = 489.8 / (portable.power(miles, 1.55) * portable.power(frequency_hz / 1e9, 1.21))
+    slope = 0.1048 * (portable.log(max(miles, 1.0)) / portable.LN_10 + 0.4147)
+    return float(still), float(1.0 / slope)
 
 
 def spectrum(count: int, step_s: float, slope_s: np.ndarray) -> np.ndarray:
@@ -32,7 +36,8 @@ def spectrum(count: int, step_s: float, slope_s: np.ndarray) -> np.ndarray:
     The images of a spectrum, 1 / step_s apart, are a geometric series. The powers of a cell add to 1.
     """
     frequency, period, slope_s = abs(fft.fftfreq(count, step_s)), 1.0 / step_s, slope_s[:, None]
-    power = np.exp(-slope_s * frequency) + np.exp(-slope_s * (period - frequency))
+    near, far = slope_s * frequency, slope_s * (period - frequency)
+    power = portable.exp(-np.minimum(near, LARGEST)) + portable.exp(-np.minimum(far, LARGEST))
     return np.sqrt(power / power.sum(axis=1, keepdims=True))
 
 

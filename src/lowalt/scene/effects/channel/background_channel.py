@@ -101,7 +101,7 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
     sums = np.bincount(number, amplitude.real) + 1j * np.bincount(number, amplitude.imag)
     steps = np.arange(network.subcarriers) * network.subcarrier_spacing_hz
     turned = np.exp(-2j * np.pi * late[:, None] * steps)
-    return Still(np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy())
+    return Still(np.broadcast_to((sums[:, None] * turned).sum(axis=0), (len(view.times_s), network.subcarriers)).copy())
 
 
 def levels(settings: dict, view: View) -> list[tuple[str, float, str]]:

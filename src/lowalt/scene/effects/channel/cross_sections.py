@@ -13,6 +13,8 @@ from scipy.special import j1
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.numerics import portable
+from lowalt.numerics.quadrature import gauss_legendre
 from lowalt.scene.view import View
 
 SOURCE = (
@@ -38,9 +40,9 @@ def _plate(cosine: np.ndarray, sine: np.ndarray, size: float) -> np.ndarray:
 @lru_cache(maxsize=256)
 def _plate_mean(size: float) -> float:
     """Mean of a plate's lobe over the sphere, by Gauss-Legendre quadrature fine enough for its side lobes."""
-    node, weight = np.polynomial.legendre.leggauss(32 + int(2 * size))
-    angle = 0.25 * np.pi * (node + 1.0)
-    return float(0.25 * np.pi * weight @ (_plate(np.cos(angle), np.sin(angle), size) * np.sin(angle)) / 2.0)
+    node, weight = gauss_legendre(32 + int(2 * size))
+    sine, cosine = portable.sine_cosine(0.25 * np.pi * (node + 1.0))
+    return float(0.25 * np.pi * portable.dot(weight, _plate(cosine, sine, size) * sine) / 2.0)
 
 
 def facet(cosine: np.ndarray, size: float, half_angle: np.ndarray | float = 1.0) -> np.ndarray:
@@ -66,7 +68,7 @@ def facet_radius_m(points: np.ndarray) -> float:
 def aspect_cosine(view: View, place_m: np.ndarray) -> np.ndarray:
     """Return the cosine (N, L) between every point's normal and its way to a place (3,) m, NaN without a normal."""
     way = place_m - view.places
-    return np.einsum("nli,nli->nl", view.normals, way) / np.sqrt(np.einsum("nli,nli->nl", way, way))
+    return portable.dot(view.normals, way) / portable.norm(way)
 
 
 def blade(view: View, mine: np.ndarray, cosines: list[np.ndarray], places_m: list[np.ndarray]) -> np.ndarray:
@@ -76,9 +78,9 @@ def blade(view: View, mine: np.ndarray, cosines: list[np.ndarray], places_m: lis
     if len(seen) == 1:
         return facet(seen[0], size)
     ways = [place_m - view.places[:, mine] for place_m in places_m]
-    bisector = sum(way / np.linalg.norm(way, axis=2, keepdims=True) for way in ways)
+    bisector = sum(way / portable.norm(way)[..., None] for way in ways)
     both = np.where((seen[0] > 0) & (seen[1] > 0), 0.5 * (seen[0] + seen[1]), 0.0)
-    return facet(both, size, 0.5 * np.linalg.norm(bisector, axis=2))
+    return facet(both, size, 0.5 * portable.norm(bisector))
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:

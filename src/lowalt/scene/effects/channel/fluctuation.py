@@ -9,6 +9,7 @@ that depends on the bistatic angle.
 import numpy as np
 
 from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.target_classes import LARGE_UAV, LARGE_UAV_DBSM, VEHICLE, VEHICLE_DBSM, Lobe, large
 from lowalt.scene.view import View
@@ -98,14 +99,14 @@ def pattern(view: View) -> np.ndarray:
     ways = [np.asarray(end.station.position_m) - view.motion.translation[:, body] for end in ends]
     away, angle = ways[0], np.zeros(len(view.times_s))
     if len(ends) == 2:
-        units = [way / np.linalg.norm(way, axis=1, keepdims=True) for way in ways]
+        units = [way / portable.norm(way)[:, None] for way in ways]
         away = units[0] + units[1]
         # The half angle by its tangent keeps small and large angles exact.
-        angle = 2.0 * np.arctan2(np.linalg.norm(units[0] - units[1], axis=1), np.linalg.norm(away, axis=1))
+        angle = 2.0 * portable.arctan2(portable.norm(units[0] - units[1]), portable.norm(away))
     loss = bistatic_loss_db(faces, angle)
     if faces is None:
         return 10 ** (-loss / 10)[:, None]
-    right, front, up = np.einsum("nij,ni->jn", view.motion.rotation[:, body], away)
+    right, front, up = portable.applied(view.motion.rotation[:, body].swapaxes(1, 2), away).T
     azimuth = np.degrees(np.arctan2(-right, front)) % 360.0
     zenith = np.degrees(np.arctan2(np.hypot(right, front), up))
     shone, floor = pattern_dbsm(faces, azimuth, zenith)

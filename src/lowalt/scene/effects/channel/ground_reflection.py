@@ -10,7 +10,7 @@ from scipy.special import i0e
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
-from lowalt.numerics import chebyshev_series
+from lowalt.numerics import chebyshev_series, portable
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.fresnel import fresnel
 from lowalt.scene.response import ImagePath
@@ -69,7 +69,7 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     station_m, mirror = np.asarray(view.station.position_m), np.array([1.0, 1.0, -1.0])
     images = view.places * mirror
     ray = images - station_m
-    sine = np.clip(-ray[..., 2] / np.sqrt(np.einsum("nli,nli->nl", ray, ray)), 0.0, 1.0)
+    sine = np.clip(-ray[..., 2] / portable.norm(ray), 0.0, 1.0)
 
     def reflected(sine: np.ndarray) -> np.ndarray:
         """Coefficient of the rough ground at grazing angles of this sine."""

@@ -13,6 +13,7 @@ from scipy.special import fresnel
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.scene.rays import hidden_by, hidden_by_bones
 from lowalt.scene.view import View
 from lowalt.targets.cloud import Cloud
@@ -32,10 +33,10 @@ def blades_m(cloud: Cloud, surfaces: dict) -> list[tuple[float, float]]:
         corners = surfaces["vertices"][surfaces["faces"][part == rotor]]
         if len(corners):
             away = corners.reshape(-1, 3) - cloud.hinges[rotor]
-            radius = float(np.linalg.norm(np.cross(away, cloud.axes[rotor]), axis=1).max())
+            radius = float(portable.norm(np.cross(away, cloud.axes[rotor])).max())
             across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             sides = 2.0 if surfaces["closed"][rotor] else 1.0
-            result.append((0.5 * float(np.linalg.norm(across, axis=1).sum()) / (sides * 2.0 * radius), radius))
+            result.append((0.5 * float(portable.total(portable.norm(across))) / (sides * 2.0 * radius), radius))
     return result
 
 
@@ -73,7 +74,7 @@ def hidden(view: View, parts: Collection[int], known: np.ndarray | None = None) 
     # Rays start a little off the point's own surface: along its normal, or toward the station where it has none.
     has_normal, offset_m = np.isfinite(cloud.normals).all(axis=1), surfaces["offset_m"]
     start = cloud.points + np.where(has_normal[:, None], offset_m[:, None] * cloud.normals, 0.0)
-    toward = np.where(has_normal, 0.0, offset_m / np.linalg.norm(view.aim_m - place_m))
+    toward = np.where(has_normal, 0.0, offset_m / portable.norm(view.aim_m - place_m))
     hidden_by(surfaces, place_m, view.motion._replace(points=start), cloud.axes, toward, parts, result)
     return result
 

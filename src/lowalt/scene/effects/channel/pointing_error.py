@@ -9,6 +9,7 @@ end of its links.
 import numpy as np
 
 from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.view import Beams, View
 
@@ -33,12 +34,12 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def turned(aim_m: np.ndarray, station_m: np.ndarray, angles_rad: np.ndarray) -> np.ndarray:
     """Return aims (K, 3) m turned about the station by angles (K, 2) rad, azimuth and elevation; their range stays."""
     d = aim_m - station_m
-    flat = np.hypot(d[:, 0], d[:, 1])
-    azimuth = np.arctan2(d[:, 1], d[:, 0]) + angles_rad[:, 0]
-    elevation = np.arctan2(d[:, 2], flat) + angles_rad[:, 1]
-    r = np.linalg.norm(d, axis=1)[:, None]
-    level = np.cos(elevation)
-    return station_m + r * np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], axis=1)
+    azimuth = portable.arctan2(d[:, 1], d[:, 0]) + angles_rad[:, 0]
+    elevation = portable.arctan2(d[:, 2], portable.norm(d[:, :2])) + angles_rad[:, 1]
+    r = portable.norm(d)[:, None]
+    up, level = portable.sine_cosine(elevation)
+    across, ahead = portable.sine_cosine(azimuth)
+    return station_m + r * np.stack([level * ahead, level * across, up], axis=1)
 
 
 def beams(settings: dict, view: View, rng: np.random.Generator) -> Beams:

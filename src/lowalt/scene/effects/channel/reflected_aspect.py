@@ -42,7 +42,7 @@ def routes(settings: dict, view: View, paths: list[ImagePath], weight: Callable[
 
     weight(view, names, but): product (N, L) of the effects' amplitude factors as `view` sees them. On a link,
     both ways by the same kind of path are the link between both images. A path without an image of the station shows
-    the direct one's side.
+    the direct one's side: in a town it is the change of the direct path, which must cancel a blocked direct path.
     """
     rest, ends = weight(view, but=FOLLOWED), view.ends()
     heard = [None, *(path.station_m for path in paths)]
@@ -50,7 +50,10 @@ def routes(settings: dict, view: View, paths: list[ImagePath], weight: Callable[
 
     def two_way(end: View, image_m: np.ndarray | None, sender_m: np.ndarray | None = None) -> np.ndarray:
         """The followed effects' factor (N, L) for a station, or a link, that stands at its image."""
-        return weight(end if image_m is None else end.seen_from(image_m, sender_m), FOLLOWED)
+        if image_m is None and sender_m is None:
+            return weight(end, FOLLOWED)
+        place_m = end.masts_m[1] if image_m is None else image_m
+        return weight(end.seen_from(place_m, sender_m), FOLLOWED)
 
     back = [two_way(ends[-1], image_m) for image_m in heard]
     out, same = back, back
@@ -59,5 +62,11 @@ def routes(settings: dict, view: View, paths: list[ImagePath], weight: Callable[
         same = [two_way(view, *images_m) for images_m in zip(heard, sent, strict=True)]
     result = np.empty((len(heard), len(heard), *view.places.shape[:2]))
     for a, b in np.ndindex(result.shape[:2]):
-        result[a, b] = rest * (same[a] if a == b else np.sqrt(out[a] * back[b]))
+        if a == b:
+            sides = same[a]
+        elif sent[a] is None and heard[b] is None:
+            sides = same[0]
+        else:
+            sides = np.sqrt(out[a] * back[b])
+        result[a, b] = rest * sides
     return result

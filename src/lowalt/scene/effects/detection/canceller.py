@@ -12,11 +12,14 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import eigh, toeplitz
+from scipy.linalg import toeplitz
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.large_matrices import matrix_product, principal_axes
 from lowalt.scene.checks import CheckedScene
+from lowalt.scene.laws.markov import root_of
 from lowalt.scene.laws.windblown import windblown
 
 SOURCE = (
@@ -73,7 +76,7 @@ def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:
     radar = settings["carrier_hz"], settings["symbol_interval_s"]
     basis = land(len(cells), *radar, settings["wind_mps"], settings["depth_db"])
     parts = np.ascontiguousarray(cells, np.complex128).view(np.float64)
-    left = (parts - basis @ (basis.T @ parts)).view(np.complex128)
+    left = (parts - matrix_product(basis, matrix_product(basis.T, parts))).view(np.complex128)
     return left * math.sqrt(len(cells) / max(len(cells) - basis.shape[1], 1))
 
 
@@ -92,6 +95,9 @@ def land(symbols: int, carrier_hz: float, interval_s: float, wind_mps: float, de
     decay_s = beta * SPEED_OF_LIGHT / carrier_hz / (4 * np.pi)
     lag_s = interval_s * np.arange(symbols)
     moving = toeplitz(1 / (1 + (lag_s / decay_s) ** 2)) / (1 + still)
-    beside = moving - moving.mean(axis=0)
-    power, basis = eigh(beside - beside.mean(axis=1, keepdims=True))
+    beside = moving - portable.mean(moving, axis=0)
+    covariance = beside - portable.mean(beside)[:, None]
+    root = root_of(covariance)
+    # Rounding would leave a little of the constant in faint axes, and what stands still may be loud.
+    power, basis = principal_axes(root - portable.mean(root, axis=0))
     return np.hstack([constant, basis[:, power > 10 ** (-depth_db / 10)]])

@@ -10,11 +10,13 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from scipy import fft
 from scipy.linalg import toeplitz
 
 from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.chebyshev_series import chebyshev_points, interpolation
+from lowalt.numerics.large_matrices import matrix_product, upper_root
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.laws.offsets import turned
 from lowalt.scene.waveform import Look
@@ -95,9 +97,9 @@ def slow_grid(symbols: int, interval_s: float, useful_s: float, samples: int) ->
     """
     line_hz = np.arange(1, 2 * SPLIT * symbols + 1) / (2 * symbols * interval_s)
     degree = math.ceil(1.4 * np.pi * line_hz[-1] * useful_s) + 5
-    node, place = chebyshev.chebpts1(degree + 1), 2 * np.arange(samples) / samples - 1
-    blend = np.linalg.solve(chebyshev.chebvander(node, degree).T, chebyshev.chebvander(place, degree).T)
-    return line_hz, np.exp(2j * np.pi * np.outer(line_hz, (node + 1) / 2 * useful_s)), blend
+    node, place = chebyshev_points(degree + 1), 2 * np.arange(samples) / samples - 1
+    sine, cosine = portable.sine_cosine_turns(np.outer(line_hz, (node + 1) / 2 * useful_s))
+    return line_hz, cosine + 1j * sine, interpolation(degree + 1, place)
 
 
 @lru_cache(maxsize=4)
@@ -108,7 +110,7 @@ def fast_grid(lowest_hz: float, spacing_hz: float, samples: int) -> tuple[np.nda
     steps = math.ceil(OCTAVE * math.log2(bend / lowest_hz)), math.ceil(EVENLY * (half_hz - bend) / spacing_hz)
     edge = np.concatenate([np.geomspace(lowest_hz, bend, steps[0] + 1), np.linspace(bend, half_hz, steps[1] + 1)[1:]])
     middle, lag_s = (edge[1:] + edge[:-1]) / 2, np.arange(samples) / (samples * spacing_hz)
-    return middle, np.diff(edge), np.cos(2 * np.pi * np.outer(middle, lag_s))
+    return middle, np.diff(edge), portable.sine_cosine_turns(np.outer(middle, lag_s))[1]
 
 
 def phase(settings: dict, look: Look, rng: np.random.Generator) -> np.ndarray:
@@ -131,11 +133,12 @@ def phase(settings: dict, look: Look, rng: np.random.Generator) -> np.ndarray:
     lines = np.sqrt(slow_power) * rng.standard_normal((len(line_hz), 2)).view(np.complex128)[:, 0]
     # At the starts of symbols, lines 2 N apart have equal phases: each instant takes one transform of 2 N lines.
     folded = (lines[:, None] * turns).reshape(-1, 2 * symbols, turns.shape[1]).sum(axis=0)
-    slow = fft.ifft(np.roll(folded, 1, axis=0), axis=0, norm="forward").real[:symbols] @ blend
-    lags = fast_power @ cosines
+    at_nodes = fft.ifft(np.roll(folded, 1, axis=0), axis=0, norm="forward").real[:symbols]
+    slow = matrix_product(at_nodes, blend)
+    lags = matrix_product(fast_power[None], cosines)[0]
     # A floor far below any oscillator's noise keeps the matrix positive definite where the spectrum has none.
     lags[0] += 1e-10 * lags[0] + 1e-30
-    return slow + rng.standard_normal((symbols, samples)) @ np.linalg.cholesky(toeplitz(lags)).T
+    return slow + matrix_product(rng.standard_normal((symbols, samples)), upper_root(toeplitz(lags)))
 
 
 def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:

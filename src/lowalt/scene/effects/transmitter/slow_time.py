@@ -10,6 +10,7 @@ import numpy as np
 
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.view import Sampling
 
@@ -77,8 +78,10 @@ def regridded(settings: dict, signal: np.ndarray, timing: Sampling, network: Net
     """
     if settings["regrid"] == "nudft":
         frequency = np.fft.fftfreq(network.symbols, network.symbol_interval_s)
-        times_s = timing.times_s[timing.present]
-        return np.fft.ifft(np.exp(-2j * np.pi * np.outer(frequency, times_s)) @ signal)
+        sine, cosine = portable.sine_cosine_turns(np.outer(frequency, timing.times_s[timing.present]))
+        real = portable.dot(cosine, signal.real) + portable.dot(sine, signal.imag)
+        imag = portable.dot(cosine, signal.imag) - portable.dot(sine, signal.real)
+        return np.fft.ifft(real + 1j * imag)
     result = np.zeros(network.symbols, np.complex128)
     result[timing.present] = signal
     return result

@@ -1,0 +1,10 @@
+"""The benchmark lowalt-40: its frozen definition, its tracks, scores of submissions, and the table of baselines.
+
+`load(track, part)` gives the samples of a track's part, `write(path, samples, probabilities)` a submission.
+"""
+
+from lowalt.extensions.benchmark.benchmark_tracks import TRACKS
+from lowalt.extensions.benchmark.part_samples import load
+from lowalt.extensions.benchmark.submission import write
+
+__all__ = ["TRACKS", "load", "write"]

@@ -1,0 +1,115 @@
+"""The tracks of the benchmark: which samples train, validate and test, what is predicted, and which number counts.
+
+The samples that train and validate are always those of the main part. Validation uses fold val of the subtypes that
+train. docs/benchmark.md lists the tracks.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lowalt.extensions.benchmark.definition import MAIN, Truth, truth
+from lowalt.files.errors import InputError, instead
+from lowalt.recognition.protocols import FOLDS
+from lowalt.recognition.samples import Facts
+
+USES = ("train", "validation", "test")
+UNKNOWN = "Bird"
+"""The class that the track open-set holds out."""
+_TESTED = {("unseen", "val"), ("unseen", "test")}
+
+
+@dataclass(frozen=True)
+class Track:
+    """One track. serves: whom it serves, one sentence; part: the part it tests on; stations: numbers of those that may
+    be used; shots: motion models of each unseen subtype that train too; headline: "accuracy" or "AUROC"."""
+
+    name: str
+    serves: str
+    protocol: str = "seen"
+    part: str = MAIN
+    stations: tuple[int, ...] = (0, 1, 2)
+    shots: int = 0
+    headline: str = "accuracy"
+    subtypes: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """Whether intervals draw whole subtypes, because results should hold for other subtypes too."""
+        return self.protocol == "unseen"
+
+    @property
+    def trains_as(self) -> str:
+        """Name of the track whose training serves this one: `seen` for a track that only tests elsewhere."""
+        return self.name if self.part == MAIN else self.protocol
+
+    def truth(self, part: str = "") -> Truth:
+        """Return the samples of the track's part (or another), labelled as this track asks."""
+        facts, classes = truth(part or self.part)
+        if not self.subtypes:
+            return Truth(facts, classes)
+        names, first, labels = np.unique(facts.subtype, return_index=True, return_inverse=True)
+        # Subtypes are numbered in the order of the plan, not of the alphabet.
+        order = np.argsort(first)
+        return Truth(replace(facts, label=np.argsort(order)[labels]), tuple(names[order].tolist()))
+
+    def samples(self, use: str = "test") -> Truth:
+        """Return the samples of a use, and their classes. Raises: as `numbers`."""
+        every, classes = self.truth(self.part if use == "test" else MAIN)
+        return Truth(every.take(self.numbers(use)), classes)
+
+    def numbers(self, use: str) -> np.ndarray:
+        """Return which samples of `truth(MAIN)` train or validate, or which of `truth()` test, as numbers.
+
+        Raises: InputError for another use than USES.
+        """
+        if use not in USES:
+            raise InputError(f"part {use!r}: expected one of {list(USES)}")
+        if use == "test" and self.part != MAIN:
+            return np.arange(len(self.truth().facts))
+        facts, pairs = self.truth(MAIN).facts, FOLDS[self.protocol][use]
+        if use == "test" and self.whole:
+            pairs = _TESTED
+        chosen = np.array([pair in pairs for pair in zip(facts.group.tolist(), facts.fold.tolist(), strict=True)])
+        if use == "train" and self.shots:
+            chosen |= _first(facts, self.shots)
+        if use != "test" and self.headline == "AUROC":
+            chosen &= facts.label != self.truth(MAIN).classes.index(UNKNOWN)
+        return np.flatnonzero(chosen)
+
+
+def _first(facts: Facts, count: int) -> np.ndarray:
+    """Whether each sample is of the first `count` motion models in fold train of its unseen subtype, (samples,)."""
+    chosen = np.zeros(len(facts), bool)
+    for name in np.unique(facts.subtype[facts.group == "unseen"]):
+        members = (facts.subtype == name) & (facts.fold == "train")
+        chosen |= members & np.isin(facts.model, np.unique(facts.model[members])[:count])
+    return chosen
+
+
+TRACKS = {
+    track.name: track
+    for track in (
+        Track("seen", "Serves operators who know every type that will fly."),
+        Track("unseen", "Serves surveillance: no training has seen these types.", "unseen"),
+        Track("one-station", "Serves operators of a single radar: unseen types, station A alone.", "unseen",
+              stations=(0,)),
+        Track("few-shot-1", "Serves whoever has one recorded flight of each new type.", "unseen", shots=1),
+        Track("few-shot-5", "Serves whoever has five recorded flights of each new type.", "unseen", shots=5),
+        Track("few-shot-20", "Serves whoever has twenty recorded flights of each new type.", "unseen", shots=20),
+        Track("open-set", "Serves operators who need an alarm instead of a wrong class: birds are held out.",
+              headline="AUROC"),
+        Track("forty", "Serves forensics: which of the forty types was it?", subtypes=True),
+        Track("low-snr", "Serves the detection of small and distant targets: 3 dB down to -10 dB.", part="low-snr"),
+        Track("town", "Serves deployment between buildings: trained in the paper's scene, tested in a town.",
+              part="town"),
+        Track("fr2", "Serves operators of another band: trained at 4.9 GHz, tested at 28 GHz.", part="fr2"),
+    )
+}  # fmt: skip
+
+
+def named(name: str) -> Track:
+    """Return a track by its name. Raises: InputError for an unknown one, naming those there are."""
+    if name not in TRACKS:
+        raise InputError(f"track {name!r}: expected {instead([name], TRACKS, f'one of {list(TRACKS)}')}")
+    return TRACKS[name]

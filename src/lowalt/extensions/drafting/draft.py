@@ -1,0 +1,236 @@
+"""A record drafted from the inspection of a mesh; every guess is marked for the user to confirm.
+
+The draft is a YAML text with one record; it passes the checks of `mesh_record`, so a cloud can be made of it at once.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import yaml
+from scipy.spatial import cKDTree
+
+from lowalt.config.classes import AIRBORNE
+from lowalt.extensions.drafting.guesses import TURNING, Group, alike, turning_axis
+from lowalt.extensions.drafting.inspection import Inspection
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND, body_axes
+
+MARGIN = 0.02
+"""A region extends beyond its components by this share of their largest extent."""
+
+WINGS_ALIKE = 0.05
+"""Largest mean distance of a bird's wings from their mirror image, in parts of its size."""
+
+CONFIRM = "  # GUESSED, please confirm"
+
+
+def record_text(about: list[str], subtype: str, row: list[str], settings: dict[str, str], parts: list[str]) -> str:
+    """Return a record file's text for a mesh: what it is about, then the subtype with a row of its own, settings and
+    parts, each line of `row` and `parts` as it stands in the file."""
+    lines = [*(f"# {line}" for line in about), f"{yaml.safe_dump(subtype).splitlines()[0]}:", "  source: mesh", *row]
+    lines += [*(f"  {key}: {value}" for key, value in settings.items()), "  parts:", *parts]
+    return "\n".join(lines) + "\n"
+
+
+DIGITS = 5
+"""Lengths in a draft are exact to this many digits of the target's size, wherever the file's origin lies."""
+
+
+def _places(size: float) -> int:
+    """How many decimal places of a length (m) a target of a size (m) needs."""
+    return max(0, DIGITS - 1 - int(np.floor(np.log10(size))))
+
+
+def _number(value: float, places: int) -> str:
+    """A length as text; georeferenced coordinates keep all their digits."""
+    return f"{round(float(value), places) + 0.0:.15g}"
+
+
+def numbers(values: np.ndarray, size: float) -> str:
+    """Return lengths (m) as a YAML list, exact enough for a target of a size (m)."""
+    return "[" + ", ".join(_number(value, _places(size)) for value in values) + "]"
+
+
+def _place(group: Group, inspection: Inspection) -> str:
+    """Return the place of a group on the target in words: front or rear, left or right."""
+    centre = group.centre - (inspection.low + inspection.high) / 2
+    right, front, _ = body_axes(inspection.front, inspection.up)
+    return f"{'front' if centre @ front >= 0 else 'rear'} {'right' if centre @ right >= 0 else 'left'}"
+
+
+def _diagonal(hubs: np.ndarray) -> float:
+    """The largest distance (m) between two of the hubs (R, 2)."""
+    return float(np.linalg.norm(hubs[:, None] - hubs[None], axis=2).max()) if len(hubs) else 0.0
+
+
+def size_word(category: str, extent: np.ndarray, hubs: np.ndarray) -> str:
+    """Return what the size of a target measures, as a word of the record's `size_is`: of a plane, its span."""
+    if category == "UAV":
+        return "motor diagonal" if 2 * _diagonal(hubs) > extent.max() else "largest extent"
+    return ALL_AXES if category == "Vehicle" else "length"
+
+
+def row_lines(
+    category: str, extent: np.ndarray, hubs: np.ndarray, wheel_m: float | None, table: dict[str, dict]
+) -> list[str]:
+    """Return the lines of a row for a target that the table lacks: its size is the file's, its rates and speeds are
+    those of the target of its category that is nearest in size.
+
+    extent: (3,) m along right, front and up; hubs: (R, 2) m, the rotors' in plan, or the places of its wheels; wheel_m:
+    diameter of a wheel.
+    """
+    if category == "Vehicle":
+        sizes = dict(zip(("wid_m", "len_m", "hgt_m"), extent, strict=True)) | {"wheel_diam_m": wheel_m}
+    elif category == "Bird":
+        sizes = {"size_m": extent[1]}
+    else:
+        sizes = {"size_m": extent.max() if size_word(category, extent, hubs) == "largest extent" else _diagonal(hubs)}
+    key = "len_m" if category == "Vehicle" else "size_m"
+    near = min((row for row in table.values() if row["category"] == category),
+               key=lambda row: abs(np.log(row[key] / sizes[key])))  # fmt: skip
+    cells = {"category": category} | {name: float(f"{value:.4g}") for name, value in sizes.items() if value}
+    if count := 2 if category == "Bird" else len(hubs):
+        cells["n_rotors_or_wings"] = count
+    speeds = ("vx_abs_max", "vy_abs_max", "vz_abs_max") if category in AIRBORNE else ("speed_lo", "speed_hi")
+    cells |= {name: near[name] for name in ("wheel_diam_m", "freq_lo_hz", "freq_hi_hz", *speeds)
+              if near[name] is not None and name not in cells}  # fmt: skip
+    listed = ", ".join(f"{name}: {value}" for name, value in cells.items())
+    return [f"  row: {{{listed}}}{CONFIRM}: sizes are the file's, rates and speeds those of {near['name']}"]
+
+
+def _wings(inspection: Inspection) -> list[str]:
+    """Return the lines of two wings without elbows. Each begins at `shoulder_m`; its hinge is the middle of its root.
+
+    Raises: InputError where the two sides do not mirror one another.
+    """
+    size = float((inspection.high - inspection.low).max())
+    front, up = "xyz".index(inspection.front[-1]), "xyz".index(inspection.up[-1])
+    right = 3 - front - up
+    sign = body_axes(inspection.front, inspection.up)[0, right]
+    middle, lines = (inspection.low + inspection.high)[right] / 2, []
+    mirrored_points = inspection.points.copy()
+    mirrored_points[:, right] = 2 * middle - mirrored_points[:, right]
+    outer = np.abs(inspection.points[:, right] - middle) > inspection.shoulder_m
+    off = cKDTree(mirrored_points).query(inspection.points[outer])[0]
+    if not outer.any() or off.mean() > WINGS_ALIKE * size:
+        raise InputError(f"{inspection.path}: its sides along {'xyz'[right]} do not mirror one another, expected two "
+                         "wings: is one missing, or is --up or --front another axis?")  # fmt: skip
+    for name, side in (("left wing", -sign), ("right wing", sign)):
+        out = side * (inspection.points[:, right] - middle)
+        root = inspection.points[(out > inspection.shoulder_m) & (out < 1.3 * inspection.shoulder_m)]
+        hinge = np.median(root, axis=0) if len(root) else (inspection.low + inspection.high) / 2
+        hinge[right] = middle + side * inspection.shoulder_m
+        corners = [["null"] * 3, ["null"] * 3]
+        corners[0 if side > 0 else 1][right] = _number(hinge[right], _places(size))
+        # Tail feathers may spread as wide as the wing's root, behind it.
+        along = inspection.points[out > 0.4 * out.max(), front]
+        slack = 0.25 * np.ptp(along)
+        reach = (along.min() - slack, along.max() + slack)
+        corners[0][front], corners[1][front] = (_number(end, _places(size)) for end in reach)
+        box = ", ".join("[" + ", ".join(corner) + "]" for corner in corners)
+        lines.append(f"    {name}: {{kind: wing, region: {{box: [{box}]}}, hinge: {numbers(hinge, size)}}}{CONFIRM}")
+    return lines
+
+
+def alternating(hubs: np.ndarray) -> list[str]:
+    """Return senses ccw and cw in turn for rotors in their order around their middle, hubs (R, 2)."""
+    if not len(hubs):
+        return []
+    order = np.argsort(np.arctan2(*(hubs - portable.mean(hubs, 0)).T), kind="stable")
+    return [("ccw", "cw")[int(place) % 2] for place in np.argsort(order, kind="stable")]
+
+
+def mirrored(groups: list[Group]) -> bool:
+    """Return whether groups are three or more alike pieces whose places mirror one another, none near their middle:
+    the propellers of a multirotor, the wheels of a car."""
+    places = np.array([group.centre for group in groups]).reshape(-1, 3)
+    if len(groups) < 3 or any(not alike(groups[0], group) for group in groups):
+        return False
+    away = places - (places.min(axis=0) + places.max(axis=0)) / 2
+    reach = np.linalg.norm(away, axis=1)
+    images = [away * np.where(np.arange(3) == axis, -1, 1) for axis in range(3)]
+    off = [np.linalg.norm(away[:, None] - image[None], axis=2).min(axis=1).max() for image in images]
+    # Places mirror one another along an axis in which they are spread, not along the one in which they are level.
+    spread = np.ptp(places, axis=0) > 0.3 * reach.max()
+    return bool(reach.min() > 0.3 * reach.max() and (np.array(off)[spread] < 0.05 * reach.max()).any())
+
+
+def refuse_miscount(inspection: Inspection, groups: list[Group], count: int | None, picture: str) -> None:
+    """Refuse a target whose number of rotors or wheels is wrong. Where the number is not known, names must tell it, or
+    the parts must mirror one another.
+
+    Raises: InputError naming what was found, the numbered picture and the option to write.
+    """
+    kind = MOVING_KIND[inspection.category]
+    named = len({len(group) for group in groups}) == 1  # else some blades may be taken for rotors
+    named &= all(TURNING[kind].search(part.piece) for group in groups for part in group)
+    if kind == "wing" or (named or mirrored(groups) if count is None else len(groups) == count):
+        return
+    unknown = f"--{kind}s {len(groups)} where that is all" if groups else f"at least one, or --{kind}s 0"
+    raise InputError(
+        f"{inspection.path}: {len(groups)} {kind}s found, expected {unknown if count is None else count}; otherwise "
+        f"name each {kind}'s pieces as numbered in {picture}, such as --moving 3 5+6 7 9. A {kind} that has no number "
+        "is joined to the body: separate it first"
+    )
+
+
+def chosen(inspection: Inspection, words: list[str]) -> list[Group]:
+    """Return the groups of components that words such as 5+6 number, from 1 in the order of an inspection.
+
+    Raises: InputError naming the word that is no such number.
+    """
+    most = len(inspection.components)
+    for word in words:
+        if not all(number.isdecimal() and 1 <= int(number) <= most for number in word.split("+")):
+            raise InputError(f"--moving is {word!r}, expected numbers from 1 to {most} joined by +")
+    return [Group(inspection.components[int(number) - 1] for number in word.split("+")) for word in words]
+
+
+def drafted(
+    inspection: Inspection, subtype: str, file: str, table: dict[str, dict], groups: list[Group],
+    stated_axes: Sequence[str] = (),
+) -> str:  # fmt: skip
+    """Return a record file's text for a subtype, from an inspected mesh.
+
+    `file` is the mesh's path inside the folder of inputs, `table` of targets; a subtype that it lacks gets a row of its
+    own. `groups` are the components that move, `stated_axes` those of "up" and "front" that the user stated. Lines that
+    end in CONFIRM hold guesses. Boxes take moving parts out of the body; a bird's wings are the surface farther out
+    than `shoulder_m`.
+    Raises: InputError where the two sides of a bird do not mirror one another.
+    """
+    category, kind = inspection.category, MOVING_KIND[inspection.category]
+    groups = sorted(groups, key=lambda group: group[0].centre.tolist())
+    frame = body_axes(inspection.front, inspection.up)
+    hubs = np.array([frame[:2] @ group.centre for group in groups]).reshape(-1, 2)
+    extent = np.abs(frame @ (inspection.high - inspection.low))
+    wheel_m = max((float(group.extent.max()) for group in groups), default=None)
+    row = row_lines(category, extent, hubs, wheel_m, table) if subtype not in table else []
+    size, sure = float((inspection.high - inspection.low).max()), inspection.up_from.startswith("as ")
+    up_mark = f"  # {inspection.up_from}" if sure else f"{CONFIRM}: {inspection.up[-1]} or -{inspection.up[-1]}"
+    up_mark = "" if "up" in stated_axes else up_mark
+    parts = [
+        f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
+        *(_wings(inspection) if category == "Bird" else []),
+    ]
+    names: dict[str, int] = {}
+    for group, sense in zip(groups, alternating(hubs), strict=True):
+        place = f"{_place(group, inspection)} {kind}"
+        names[place] = names.get(place, 0) + 1
+        name = place if names[place] == 1 else f"{place} {names[place]}"
+        slack = MARGIN * float(group.extent.max())
+        box = f"[{numbers(group.low - slack, size)}, {numbers(group.high + slack, size)}]"
+        turn = f", sense: {sense}" * (kind == "rotor")
+        axis = turning_axis(group, "xyz".index(inspection.up[-1]), inspection.low, inspection.high)
+        if kind == "rotor" and axis != int(group.extent.argmin()):
+            turn = f", axis: {np.eye(3)[axis].astype(int).tolist()}{turn}"
+        parts.append(f"    {name}: {{kind: {kind}, region: {{box: {box}, whole: true}}{turn}}}{CONFIRM}")
+    about = [f"Drafted from {file}. Lengths are in metres along the file's axes.",
+             "Confirm each line that is marked, then remove the mark."]  # fmt: skip
+    settings = {
+        "unit": f"{inspection.unit}{CONFIRM * inspection.unit_from.startswith('guessed')}",
+        "up": f"{inspection.up}{up_mark}", "front": f"{inspection.front}{inspection.front_from.comment}",
+        "size_is": size_word(category, extent, hubs),
+        "licence": "unknown  # the licence of the mesh",
+    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})  # fmt: skip
+    return record_text(about, subtype, row, settings, parts)

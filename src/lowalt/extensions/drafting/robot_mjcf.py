@@ -1,0 +1,145 @@
+"""Reading MJCF: bodies, classes of defaults, geoms and hinges. Source: MuJoCo, XML reference."""
+
+import math
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from lowalt.extensions.drafting.guesses import TURNING
+from lowalt.extensions.drafting.robot_geometry import (
+    DEEPEST,
+    Files,
+    Robot,
+    direction,
+    numbers,
+    place_of,
+    primitive,
+    shown,
+)
+from lowalt.numerics import portable
+
+
+def _clear(values: dict[str, str]) -> bool:
+    """Return whether a colour is fully transparent."""
+    return values.get("rgba", "1").split()[3:] == ["0"]
+
+
+class _Mjcf:
+    """A robot of MJCF. `values` are an element's attributes over those of its class."""
+
+    def __init__(self, root: Element, base: Path, files: Files) -> None:
+        self.root, self.base, self.files, self.robot = root, base, files, Robot()
+        self.defaults: dict[str, dict[str, dict[str, str]]] = {"main": {}}
+        compiler: dict[str, str] = {}
+        for element in root.iter("compiler"):
+            compiler |= element.attrib
+        self.degrees, self.order = compiler.get("angle", "degree") == "degree", compiler.get("eulerseq", "xyz")
+        for default in root.findall("default"):
+            self.default(default, "main", {})
+        folder = compiler.get("meshdir", compiler.get("assetdir", "."))
+        assets = [self.values(mesh, "") for mesh in root.findall("asset/mesh")]
+        self.meshes = {values.get("name", Path(values["file"]).stem): (f"{folder}/{values['file']}", values)
+                       for values in assets if "file" in values}  # fmt: skip
+        self.hidden = {element.get("name") for element in root.findall("asset/material") if _clear(element.attrib)}
+
+    def default(self, element: Element, name: str, above: dict) -> None:
+        """Take the defaults of a class and of those inside it."""
+        self.defaults[name] = of_class = {tag: dict(values) for tag, values in above.items()}
+        for child in element:
+            if child.tag != "default":
+                of_class[child.tag] = of_class.get(child.tag, {}) | child.attrib
+        for child in element.findall("default"):
+            self.default(child, child.get("class", ""), of_class)
+
+    def values(self, element: Element, childclass: str) -> dict[str, str]:
+        """An element's attributes over those of its class."""
+        of_class = self.defaults.get(element.get("class") or childclass or "main", self.defaults["main"])
+        return of_class.get(element.tag, {}) | element.attrib
+
+    def place(self, values: dict[str, str]) -> np.ndarray:
+        """The place (4, 4) of a body or geom."""
+        turn = Rotation.identity()
+        if "quat" in values:
+            turn = Rotation.from_quat(numbers(values["quat"], 4, ()), scalar_first=True)
+        elif "euler" in values:
+            # Small letters turn with the body, which are scipy's capitals.
+            turn = Rotation.from_euler(self.order.swapcase(), numbers(values["euler"], 3, ()), degrees=self.degrees)
+        elif "axisangle" in values:
+            *axis, angle = numbers(values["axisangle"], 4, ())
+            turn = Rotation.from_rotvec(direction(np.array(axis)) * angle, degrees=self.degrees)
+        elif "zaxis" in values:
+            turn = Rotation.align_vectors([numbers(values["zaxis"], 3, ())], [[0, 0, 1]])[0]
+        elif "xyaxes" in values:
+            x, y = numbers(values["xyaxes"], 6, ()).reshape(2, 3)
+            x = direction(x)
+            y = direction(y - x * portable.dot(x, y))
+            turn = Rotation.from_matrix(np.stack([x, y, np.cross(x, y)], axis=1))
+        return place_of(numbers(values.get("pos"), 3, (0, 0, 0)), turn)
+
+    def geom(self, values: dict[str, str], above: np.ndarray) -> np.ndarray:
+        """Return the triangles (K, 3, 3) of a geom that viewers show: not transparent, no plane, groups 0 to 2."""
+        kind = values.get("type", "mesh" if "mesh" in values else "sphere")
+        clear = _clear(values) or values.get("material") in self.hidden
+        if int(values.get("group", "0")) > 2 or clear or kind in ("plane", "hfield", "sdf"):
+            return np.zeros((0, 3, 3))
+        place = self.place(values)
+        if kind == "mesh":
+            if values.get("mesh") not in self.meshes:
+                raise ValueError(f"mesh {values.get('mesh')!r} is no asset")
+            file, asset = self.meshes[values["mesh"]]
+            triangles = self.files.mesh(file, self.base, numbers(asset.get("scale"), 3, (1, 1, 1)))
+        else:
+            size = np.array([float(word) for word in values.get("size", "").split()])
+            if "fromto" in values:
+                ends = numbers(values["fromto"], 6, ()).reshape(2, 3)
+                size = np.array([size[0], portable.norm(ends[1] - ends[0]) / 2])
+                place = place_of(ends.mean(axis=0), Rotation.align_vectors([ends[1] - ends[0]], [[0, 0, 1]])[0])
+            # Lengths are halves here.
+            whole = {"box": 2 * size, "sphere": size[:1], "ellipsoid": size}
+            triangles = primitive(kind, whole[kind] if kind in whole else size * [1, 2])
+        return shown(triangles, portable.product(above, place))
+
+    def body(self, element: Element, parent: str, above: np.ndarray, childclass: str, depth: int) -> None:
+        """Take a body and those inside it."""
+        if depth > DEEPEST:
+            raise ValueError(f"bodies deeper than {DEEPEST}")
+        name = element.get("name") or f"body {len(self.robot.surfaces)}"
+        childclass = element.get("childclass", childclass)
+        here = portable.product(above, self.place(element.attrib))
+        geoms = [self.values(geom, childclass) for geom in element.findall("geom")]
+        self.robot.surfaces[name] = []
+        for values in geoms:
+            part = values.get("name", "")
+            owner = part if TURNING["rotor"].search(part) or TURNING["wheel"].search(part) else name
+            self.robot.surfaces.setdefault(owner, []).append(self.geom(values, here))
+            if owner != name:  # a geom that its name calls a rotor or a wheel is a link of its own, fixed to its body
+                self.robot.fixed.append((name, owner))
+        joints = [self.values(joint, childclass) for joint in element.findall("joint")] if parent else []
+        hinges = [values for values in joints if values.get("type", "hinge") == "hinge"]
+        for values in hinges[-1:]:
+            hinge, axis = numbers(values.get("pos"), 3, (0, 0, 0)), numbers(values.get("axis"), 3, (0, 0, 1))
+            limited = "range" in values and values.get("limited") != "false"
+            low, high = values["range"].split() if limited else (None, None)
+            if low and self.degrees:
+                low, high = (str(math.radians(float(end))) for end in (low, high))
+            hinge, axis = shown(hinge, here), portable.applied(here[:3, :3], axis)
+            self.robot.turns(values.get("name", name), (parent, name), hinge, axis, (low, high))
+        if parent and not hinges:
+            self.robot.fixed.append((parent, name))
+        for child in element.findall("body"):
+            self.body(child, name, here, childclass, depth + 1)
+
+
+def mjcf(root: Element, base: Path, files: Files) -> Robot:
+    """Return the robot of an MJCF file in the folder `base`; the world's own geoms (floors) are left.
+
+    Raises: InputError for files that are missing or outside; other exceptions for a damaged description.
+    """
+    for include in root.findall("include"):
+        root.extend(files.parsed(files.find(include.get("file", ""), base)))
+    reader = _Mjcf(root, base, files)
+    for body in root.findall("worldbody/body"):
+        reader.body(body, "", np.eye(4), "", 0)
+    return reader.robot

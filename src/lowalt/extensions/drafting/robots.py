@@ -1,0 +1,203 @@
+"""From a robot's own description to a drafted record: the parts that turn are chosen and written into one GLB.
+
+`robot_files` reads URDF, SDF and MJCF. All three are in metres with z up and, by convention, x to the front.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.extensions.drafting.draft import alternating, record_text, row_lines, size_word
+from lowalt.extensions.drafting.front import LEVEL, Front, Shape, Turning, front_of
+from lowalt.extensions.drafting.guesses import TURNING
+from lowalt.extensions.drafting.robot_geometry import Joint, Robot
+from lowalt.files.atomic import write_file
+from lowalt.files.errors import InputError
+from lowalt.targets.mesh_files import LARGEST_TRIANGLES
+from lowalt.targets.mesh_record import MOVING_KIND, body_axes
+
+WHICH = (
+    "expected --category UAV, --category Bird or --category Vehicle, with --rotors N or --wheels N where no name tells "
+    "their number"
+)
+STEERING_WHEEL = re.compile(r"steering[ _-]?wheel", re.IGNORECASE)
+MOTOR = re.compile(r"(?<![a-z])mot(or)?(?![a-z])", re.IGNORECASE)
+STEERED = re.compile(r"steer", re.IGNORECASE)
+
+
+def _names(joint: Joint) -> tuple[str, str]:
+    """The names of a joint and of the link that it turns."""
+    return joint.name, joint.child.rsplit("::", 1)[-1]
+
+
+def _steers(joint: Joint) -> bool:
+    """Return whether a joint turns a steering wheel, which is no wheel that rolls: its axle is not level."""
+    names = " ".join(_names(joint))
+    return bool(STEERING_WHEEL.search(names) or (STEERED.search(names) and abs(joint.axis[2]) > LEVEL))
+
+
+def _called(joint: Joint, kind: str) -> bool:
+    """Return whether a joint or its link is called a rotor, wheel or wing."""
+    return any(TURNING[kind].search(name) for name in _names(joint)) and not (kind == "wheel" and _steers(joint))
+
+
+def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Joint]:
+    """Return the joints of a robot whose links are parts of a kind: those that its names call so, else those called
+    motors, else all that turn without end and are called nothing else.
+
+    ahead: (3,) where the front is known; wings beat about it, and joints that sweep or twist them are held.
+    """
+    able = [joint for joint in robot.joints if (joint.endless or kind == "wing") and not _steers(joint)]
+    able = [joint for joint in able if any(robot.surfaces.get(link) for link in robot.below(joint.child))]
+    named = [joint for joint in able if _called(joint, kind)]
+    if kind == "wing":
+        return [joint for joint in named if ahead is None or abs(joint.axis @ ahead) > LEVEL]
+    others = [joint for joint in able if joint.endless and not any(_called(joint, word) for word in TURNING)]
+    return named or [joint for joint in others if any(map(MOTOR.search, _names(joint)))] or others
+
+
+def category_of(robot: Robot) -> str:
+    """Return "UAV" where parts called rotors turn, "Vehicle" where wheels do; where none turns, the links' names tell.
+
+    Raises: InputError where both or neither are there.
+    """
+    kinds = ("rotor", "wheel")
+    turning_joints = [joint for joint in robot.joints if joint.endless and not _steers(joint)]
+    called = {kind: sum(_called(joint, kind) for joint in turning_joints) for kind in kinds}
+    # A plane may have one wheel beside a motor; a vehicle has at least two, or nothing else that turns.
+    least = {"rotor": 1, "wheel": min(2, len(turning_joints))}
+    named = [kind for kind in kinds if called[kind] and called[kind] >= least[kind]]
+    if not any(called.values()):
+        named = [kind for kind in kinds if any(TURNING[kind].search(link) for link in robot.surfaces)]
+    if len(named) == 1:
+        return "UAV" if named == ["rotor"] else "Vehicle"
+    seen = "both rotors and wheels" if named else "neither rotors nor wheels"
+    raise InputError(f"its category cannot be seen, the names of its parts tell {seen}: {WHICH}")
+
+
+def parts_of(
+    robot: Robot, kind: str, ahead: np.ndarray | None = None
+) -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
+    """Return the joints of the parts of a kind by name, and the triangles (K, 3, 3) m of "body" and of each part.
+
+    ahead: (3,) the direction to the front, of which wings need to know.
+    Raises: InputError where nothing is left for the body.
+    """
+    joints, taken, triangles = {}, {}, {}
+    chosen = turning(robot, kind, ahead)
+    ends = {joint.child for joint in chosen}
+    for joint in chosen:
+        name = joint.child.replace("::", " ")
+        name = name if name not in joints and name != "body" else joint.name.replace("::", " ")
+        joints[name] = joint
+        for link in robot.below(joint.child, ends):
+            taken.setdefault(link, name)
+    for link, surfaces in robot.surfaces.items():
+        triangles.setdefault(taken.get(link, "body"), []).extend(surfaces)
+    if "body" not in triangles:
+        raise InputError("no surface is left for the body, expected links that do not turn")
+    parts = {name: np.concatenate(surfaces) for name, surfaces in triangles.items() if sum(map(len, surfaces))}
+    return {name: joint for name, joint in joints.items() if name in parts}, parts
+
+
+def write_parts(path: Path, triangles: dict[str, np.ndarray]) -> None:
+    """Write the surfaces of parts into one GLB file, each a node of its name.
+
+    Raises: InputError where they are too many.
+    """
+    import trimesh
+
+    if sum(map(len, triangles.values())) > LARGEST_TRIANGLES:
+        raise InputError(f"{path}: more than {LARGEST_TRIANGLES} triangles, expected fewer")
+    scene = trimesh.Scene()
+    for name, corners in triangles.items():
+        shape = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False)
+        shape.merge_vertices()
+        scene.add_geometry(shape, node_name=name, geom_name=name)
+    write_file(path, scene.export(file_type="glb"))
+
+
+def _above(robot: Robot, joint: Joint, joints: dict[str, Joint]) -> str:
+    """The name of the part on which a joint hangs, "" for the body."""
+    ends = {other.child for other in joints.values()}
+    return next((name for name, other in joints.items()
+                 if other is not joint and joint.parent in robot.below(other.child, ends)), "")  # fmt: skip
+
+
+def part_lines(
+    robot: Robot, joints: dict[str, Joint], kind: str, file: str, hubs: np.ndarray, up: np.ndarray
+) -> list[str]:
+    """Return the lines of a record's parts: a body, and each part with its hinge, axis and (of a rotor) sense.
+
+    hubs: (R, 2) m, the hinges in plan; up: (3,) the direction up in the file.
+    """
+    lines = [f"    body: {{kind: body, meshes: [{{file: {file!r}, geometry: [body]}}]}}"]
+    senses = alternating(hubs)
+    for (name, joint), sense in zip(joints.items(), senses, strict=True):
+        hinge, axis = ([float(f"{value:.6g}") for value in vector + 0.0] for vector in (joint.hinge, joint.axis))
+        known = robot.senses.get(joint.name)
+        if known and np.dot(axis, up) < 0:  # a record's sense is seen from above
+            known = {"ccw": "cw", "cw": "ccw"}.get(known)
+        turn = f", sense: {known or sense}" if kind == "rotor" else ""
+        if kind == "wing" and (above := _above(robot, joint, joints)):
+            turn = f", parent: {above!r}"
+        mark = "  # GUESSED sense: neighbours turn in turn" if kind == "rotor" and not known else ""
+        lines.append(
+            f"    {name!r}: {{kind: {kind}, meshes: [{{file: {file!r}, geometry: [{name!r}]}}], hinge: {hinge}, "
+            f"axis: {axis}{turn}}}{mark}"
+        )
+    held = [joint.name for joint in robot.joints if joint not in joints.values()]
+    return lines + ([f"    # Held as drawn: {', '.join(held)}."] if held else [])
+
+
+def shape_of(robot: Robot, joints: dict[str, Joint], category: str, up: np.ndarray) -> Shape:
+    """Return what is seen of a robot, whose parts of the category's kind turn at `joints`; up: (3,)."""
+    surfaces = {link.rsplit("::", 1)[-1]: np.concatenate(parts) for link, parts in robot.surfaces.items() if parts}
+    surfaces = {link: part for link, part in surfaces.items() if len(part)}
+    centres = {link: (part.min(axis=(0, 1)) + part.max(axis=(0, 1))) / 2 for link, part in surfaces.items()}
+    corners = np.concatenate(list(surfaces.values()))
+    points = np.concatenate([corners.reshape(-1, 3), corners.mean(axis=1)])
+    ends = {joint.child for joint in joints.values()}
+    upright = [joint for joint in robot.joints if not joint.endless and abs(joint.axis @ up) > LEVEL]
+    steered = [joint.hinge for joint in upright if ends & set(robot.below(joint.child))]
+    turning_parts = [Turning(name, joint.hinge, joint.axis, signed=True) for name, joint in joints.items()]
+    return Shape(category, up, points, centres, turning_parts, steered)
+
+
+def front_of_robot(robot: Robot, joints: dict[str, Joint], category: str, axes: tuple[str | None, str | None]) -> Front:
+    """Return the front of a robot; axes: up and front where the user states them. Raises: InputError as `front_of`."""
+    up = axes[0] or "z"
+    upward = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
+    return front_of(shape_of(robot, joints, category, upward), axes[1], "x" if up[-1] != "x" else None, "y")
+
+
+def drafted_robot(
+    robot: Robot, parts: tuple[dict[str, Joint], dict[str, np.ndarray]], category: str, table: dict[str, dict],
+    names: tuple[str, str, str], axes: tuple[str | None, str | None] = (None, None),
+) -> str:  # fmt: skip
+    """Return a record file's text of a robot whose joints tell its moving parts.
+
+    parts: the joints by name and the triangles (K, 3, 3) m of every part; names: the subtype, the file described and
+    the GLB of the parts inside the folder of inputs; axes: up and front where the user states them. A subtype that the
+    table of targets lacks gets a row of its own.
+    Raises: InputError where the parts contradict one another or the user about the front.
+    """
+    (joints, triangles), (subtype, source, file) = parts, names
+    up = axes[0] or "z"
+    front = front_of_robot(robot, joints, category, axes)
+    frame = body_axes(front.axis, up)
+    corners = np.concatenate(list(triangles.values())).reshape(-1, 3)
+    extent = np.ptp(corners @ frame.T, axis=0)
+    hubs = np.array([frame[:2] @ joint.hinge for joint in joints.values()]).reshape(-1, 2)
+    across = [float(np.delete(np.ptp(triangles[name].reshape(-1, 3), axis=0), np.abs(joint.axis).argmax()).max())
+              for name, joint in joints.items()]  # fmt: skip
+    row = row_lines(category, extent, hubs, max(across, default=None), table) if subtype not in table else []
+    settings = {
+        "unit": "m", "up": up, "front": front.axis + front.comment,
+        "size_is": size_word(category, extent, hubs), "licence": "unknown  # the licence of the description",
+    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})  # fmt: skip
+    about = [f"Drafted from {source}, whose surfaces {file} holds in metres along the axes of the description."]
+    return record_text(
+        about, subtype, row, settings, part_lines(robot, joints, MOVING_KIND[category], file, hubs, frame[2])
+    )

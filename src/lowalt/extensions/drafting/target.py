@@ -1,0 +1,179 @@
+"""`lowalt target inspect | new | make | show`: from a user's mesh to a cloud and a picture."""
+
+import argparse
+import os
+import re
+from pathlib import Path
+
+import yaml
+
+from lowalt.commands.command_line import Answer, add_command
+from lowalt.commands.command_table import COMMANDS
+from lowalt.extensions.drafting.data_sheet import add_sheets
+from lowalt.extensions.drafting.inspection import Inspection, described, inspect_mesh
+from lowalt.extensions.drafting.new import SEED, Asked, draft
+from lowalt.files.atomic import slug, write_file
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED
+from lowalt.targets.cloud import read, write
+from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.records import estimates, load_table, merge, read_records, with_row
+
+AXES = ("x", "-x", "y", "-y", "z", "-z")
+KINDS = ("UAV", "Bird", "Vehicle")
+TABLE = SHIPPED / "config/targets.csv"
+INNER = ("points", "owner", "groups", "sides_seen")
+"""Parts of an inspection that a program is not told."""
+
+
+def _unit(text: str) -> str | float:
+    """Unit of a command line: a name of UNITS_M, or metres. Raises: ArgumentTypeError for other text."""
+    if text in UNITS_M:
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r}, expected one of {list(UNITS_M)} or metres")
+    return value
+
+
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
+    """Add `target` and its four commands to a parser's commands."""
+    _, meaning, example = COMMANDS[name]
+    target = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
+    actions = target.add_subparsers(dest="action", required=True)
+    meaning = "unit, sizes, pieces and possible moves of a mesh file, and a picture"
+    inspect = add_command(actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl")
+    inspect.add_argument("--category", default="UAV", choices=KINDS)
+    inspect.add_argument("--out", type=Path, help="picture to write (default: the file's name and -inspect.png, here)")
+    meaning = "draft a record of a mesh or a robot's description; figures to confirm are marked"
+    example = 'lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml'
+    new = add_command(actions, "new", _new, meaning, example)
+    new.add_argument("--subtype", help="the published target whose place it takes; another name (default: the file's) "
+                     "makes a row of its own")  # fmt: skip
+    new.add_argument("--category", choices=KINDS, help="of a target with a row of its own")
+    for line in (inspect, new):
+        line.add_argument("file", type=Path, help="mesh, or for `new` a robot's description: URDF, SDF or MJCF")
+        line.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
+        line.add_argument("--size", type=float, dest="size_m", help="largest extent of the target (m), not --unit")
+    for axis in ("up", "front"):
+        new.add_argument(
+            f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
+        )
+    new.add_argument(
+        "--rotors", "--wheels", type=int, dest="count", metavar="N", help="number of its rotors or wheels, 0 for none"
+    )
+    new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
+                     "for two that are one rotor or wheel")  # fmt: skip
+    new.add_argument("--out", type=Path, help="record file to write (default: print it)")
+    example = "lowalt target make mydrone.yaml --inputs inputs"
+    make = add_command(actions, "make", _make, "one record to one cloud and a picture", example)
+    make.add_argument("record", type=Path, help="YAML file of records")
+    make.add_argument("--subtype", help="which record of the file (default: its only one)")
+    make.add_argument("--seed", type=int, default=SEED)
+    make.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
+    for line in (new, make):
+        line.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
+        line.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
+                          help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
+    add_sheets(actions)
+    meaning = "picture of a cloud with axes, hinges, normals, its motion and its spectra"
+    example = "lowalt target show results/default/clouds/crow.npz --out crow.png"
+    show = add_command(actions, "show", _show, meaning, example)
+    show.add_argument("cloud", type=Path)
+    show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png)")
+
+
+def _write(path: Path, data: bytes) -> Path:
+    """Write a file and return its path."""
+    write_file(path, data)
+    return path
+
+
+def _inspect(options: argparse.Namespace) -> Answer:
+    """Inspect a mesh and draw it."""
+    from lowalt.extensions.drafting.mesh_picture import inspection_picture
+
+    seen = inspect_mesh(options.file, options.category, options.unit, size_m=options.size_m)
+    out = _write(options.out or Path(f"{options.file.stem}-inspect.png"), inspection_picture(seen))
+    facts = {name: value for name, value in vars(seen).items() if name not in INNER} | {
+        "components": [vars(part) | {"extent": part.extent, "centre": part.centre} for part in seen.components],
+        "pieces": [{"name": name, "triangles": count, "extent": extent} for name, count, extent in seen.pieces],
+        **({"wings_from_m": seen.shoulder_m} if seen.category == "Bird" else {}),
+        "picture": out,
+        "front_from": seen.front_from.words,
+    }
+    return Answer(facts, f"{described(seen)}\n\npicture  {out}")
+
+
+def _new(options: argparse.Namespace) -> Answer:
+    """Draft a record of a mesh file or a robot's description."""
+    stem = (options.out or options.file).stem
+    asked = Asked(
+        options.file, options.inputs, load_table(options.table), options.subtype, options.category, options.unit,
+        options.size_m, options.up, options.front, options.count, options.moving, f"{stem}.glb",
+        Path(f"{stem}-pieces.png"),
+    )  # fmt: skip
+
+    def show(seen: Inspection) -> None:
+        """Draw the numbered pieces of a mesh."""
+        from lowalt.extensions.drafting.mesh_picture import inspection_picture
+
+        _write(asked.picture, inspection_picture(seen, numbered=True))
+
+    made = draft(asked, show)
+    files = {options.out: made.text.encode(), options.inputs / asked.glb: made.glb}
+    files = {path: data for path, data in files.items() if path is not None and data is not None}
+    for path in files:
+        if path.exists():
+            raise InputError(f"{path}: is there already, expected a new file")
+    for path, data in files.items():
+        _write(path, data)
+    moving, marks = len(yaml.safe_load(made.text)[asked.name]["parts"]) - 1, made.text.count("GUESSED")
+    facts = {"file": options.out, "text": made.text, "moving_parts": moving, "marked_lines": marks}
+    if options.out is None:
+        return Answer(facts, made.text)
+    ask = re.search(r"  front: .*GUESSED", made.text) and "; which way is front is not sure: confirm it or give --front"
+    said = f"{options.out}: {moving} moving parts drafted; confirm the {marks} marked lines{ask or ''}"
+    return Answer(facts, said)
+
+
+def _make(options: argparse.Namespace) -> Answer:
+    """Make the cloud of a record and a picture of it."""
+    from lowalt.targets.make import make
+
+    records = read_records(options.record)
+    subtype = options.subtype or (next(iter(records)) if len(records) == 1 else None)
+    if subtype not in records:
+        raise InputError(f"{options.record}: --subtype is {subtype!r}, expected one of {list(records)}")
+    where, record = f"{options.record}: {subtype}", records[subtype]
+    row = load_table(options.table).get(subtype)
+    if "row" in record:
+        row = with_row(row, subtype, record.pop("row"), where)
+    if row is None:
+        raise InputError(f"{where}: no row in {options.table}, expected a key `row` or the name of a published subtype")
+    record = merge(row, record, where)
+    cloud = make(record, options.inputs, options.seed)
+    out = options.out or Path(f"{slug(subtype)}.npz")
+    write(out, cloud)
+    picture = _picture(out, out.with_suffix(".png"))
+    guessed, figures = estimates(cloud.record)
+    facts = {"file": out, "points": len(cloud.points), "parts": cloud.kinds, "picture": picture}
+    words = f"; {guessed} of its {figures} figures are estimates" if guessed else ""
+    said = f"{out}: {len(cloud.points)} points in {len(cloud.kinds)} parts; {picture}{words}"
+    return Answer({**facts, "estimates": guessed, "figures": figures}, said)
+
+
+def _picture(cloud: Path, out: Path) -> str:
+    """Draw a cloud's file and return the picture's path."""
+    from lowalt.report.figures.target_picture import target_picture
+
+    return str(_write(out, target_picture(read(cloud))))
+
+
+def _show(options: argparse.Namespace) -> Answer:
+    """Draw a cloud's file."""
+    picture = _picture(options.cloud, options.out or options.cloud.with_suffix(".png"))
+    return Answer({"picture": picture}, picture)

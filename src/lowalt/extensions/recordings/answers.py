@@ -1,0 +1,121 @@
+"""What a network of a measured radar's twin says of every window of a recording."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.extensions.recordings.files import read
+from lowalt.extensions.recordings.presence import beyond_mps, present
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import Twin, radars
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
+from lowalt.extensions.recordings.windows import looks
+from lowalt.files.errors import InputError
+from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.runs import Trained
+from lowalt.tiles.image_settings import Images
+
+ANOTHER = 0.02
+"""Relative distance between carriers from which on a recording is of another radar than the network's."""
+
+
+UNNAMED = ("nothing", "beyond", "clipped", "lost")
+"""Outcomes of windows that no network names."""
+
+
+class Answers(NamedTuple):
+    """Of n windows: their starts (n,) s, whether each holds a target (n,) bool, class probabilities (n, classes),
+    whether each is clipped (n,) bool, the speed (n,) m/s of a line beyond `fastest_mps`, NaN for none, and whether
+    samples of it are lost (n,) bool; `notes` say for which reasons an answer may be wrong.
+
+    A window that is clipped, lost or has such a line counts as one without a target: the network cannot know it.
+    """
+
+    starts_s: np.ndarray
+    present: np.ndarray
+    probabilities: np.ndarray
+    clipped: np.ndarray
+    beyond_mps: np.ndarray
+    lost: np.ndarray
+    fastest_mps: float
+    notes: list[str]
+
+    def outcomes(self, classes: list[str]) -> list[str]:
+        """Return what each window is: the most probable of `classes`, or one of `UNNAMED`."""
+        names = np.array(classes, object)[self.probabilities.argmax(axis=1)]
+        names[~self.present] = "nothing"
+        names[np.isfinite(self.beyond_mps)] = "beyond"
+        names[self.clipped] = "clipped"
+        names[self.lost] = "lost"
+        return names.tolist()
+
+    def words(self, number: int, outcome: str) -> str:
+        """Return what is said of one window by its outcome: its class and probability, or why it has none."""
+        said = {
+            "nothing": "nothing there", "clipped": "clipped by the receiver",
+            "lost": "samples are lost: exact zeros",
+            "beyond": f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g} m/s of this "
+                      "network",
+        }  # fmt: skip
+        return said.get(outcome) or f"{100 * self.probabilities[number].max():6.2f} %  {outcome}"
+
+
+def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
+    """Return what a network says of every window of a recording.
+
+    settings: how the network's images are made of signals (`zoo.opened`), with the block `radar`; where: the record's
+    path. Raises: InputError where the network knows no recordings, the recording's carrier or channel is not the
+    radar's, or the file cannot be read.
+    """
+    known = radars()
+    if "radar" not in settings:
+        raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(known)}")
+    radar = Twin.from_settings(settings["radar"])
+    if not radar.near(record.carrier_hz):
+        near = [name for name, other in known.items() if other.near(record.carrier_hz)]
+        raise InputError(
+            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {radar.carrier_hz:.3g}, "
+            + (f"expected a network of {near}" if near else "expected a network of your own radar, which "
+               "`lowalt recording train` makes; the zoo has none")
+        )  # fmt: skip
+    twin = radar.at_carrier(record.carrier_hz)
+    baseband = read(record)
+    found = looks(record, twin, baseband)
+    intervals = found.intervals.astype(np.complex64)
+    images = rendered(intervals, twin, Images.from_settings(settings["images"]), trained.size)
+    count, numbers = len(intervals), np.arange(len(intervals))
+    samples = Windows(images, facts(np.zeros(count, int), [record.name] * count, numbers, np.zeros(count), ""))
+    shares = probabilities(trained.model, samples, numbers, Machine.here("fp32"), 64)
+    values = baseband.values if twin.channel == "complex" else baseband.values.real
+    beyond = beyond_mps(values, baseband.rate_hz, twin, count)
+    starts, there = numbers * twin.symbols * twin.symbol_interval_s, ~(found.clipped | found.lost)
+    empty = intervals[_empty(record, starts, twin, where, there)] if record.empty_s and not twin.slowest_mps else None
+    there[there] = present(intervals[there], twin, empty)
+    there &= ~np.isfinite(beyond)
+    notes = _notes(record, radar, settings.get("caution", ""), there.any())
+    return Answers(starts, there, shares, found.clipped, beyond, found.lost, twin.fastest_mps, notes)
+
+
+def _empty(record: Record, starts_s: np.ndarray, twin: Twin, where: str, sound: np.ndarray) -> np.ndarray:
+    """Which of the sound windows (n,) bool, by their starts (n,) s, lie where the record says that nothing was."""
+    first, last = record.empty_s
+    window_s = twin.symbols * twin.symbol_interval_s
+    inside = sound & (starts_s >= first) & (starts_s + window_s <= last)
+    if not inside.any():
+        raise InputError(f"{where}: empty_s is {record.empty_s}, expected a stretch that holds at least one of "
+                         f"the {len(starts_s)} windows of {window_s:.3g} s, not clipped")  # fmt: skip
+    return inside
+
+
+def _notes(record: Record, radar: Twin, caution: str, found: bool) -> list[str]:
+    """For which reasons answers on a recording may be wrong; caution: what the network's file says of them; found:
+    whether any window holds a target."""
+    notes = [caution] if found and caution else []
+    if abs(record.carrier_hz / radar.carrier_hz - 1) > ANOTHER:
+        at, here = radar.carrier_hz / 1e9, record.carrier_hz / 1e9
+        notes.append(f"this network learned a radar at {at:.4g} GHz, and the recording is at {here:.4g} GHz: expect "
+                     "wrong classes; `lowalt recording train` makes a network for its radar")  # fmt: skip
+    if found and not radar.slowest_mps and record.empty_s is None:
+        notes.append("targets of this network may hover, so hum and slow noise count as targets: the record's key "
+                     "`empty_s: [FROM, TO]` names seconds without any target")  # fmt: skip
+    return notes

@@ -1,0 +1,167 @@
+"""`lowalt recording inspect | train`: from a radar's file to a record of it, and from the record to a recogniser."""
+
+import argparse
+import math
+import os
+import shlex
+from pathlib import Path
+
+from lowalt.commands.command_line import Answer, add_command, positive
+from lowalt.commands.command_table import COMMANDS
+from lowalt.extensions.recordings.file_inspection import FileInspection, Seen, inspect_recording
+from lowalt.files.atomic import write_file
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+
+DRAFTED = "# Drafted by `lowalt recording inspect`."
+"""First line of a draft; only a file that begins with it is written over."""
+WORDS = {"iqiq": "I and Q in turn", "iiqq": "all I, then all Q", "dca2": "DCA1000, two lanes: I0 I1 Q0 Q1",
+         "dca4": "DCA1000, four lanes", "polar": "magnitude and phase"}  # fmt: skip
+
+
+def add_to(commands: argparse._SubParsersAction, name: str) -> None:
+    """Add `recording` and its commands to a parser's commands."""
+    _, meaning, example = COMMANDS[name]
+    recording = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
+    hertz = positive(1e15, "hertz, such as 24e9")
+    actions = recording.add_subparsers(dest="action", required=True)
+    meaning = "layouts that fit the file's bytes, the best first, a picture, and a draft of its record"
+    inspect = add_command(actions, "inspect", _inspect, meaning, example)
+    inspect.add_argument(
+        "file", type=Path, help="the samples: WAV, MAT, HDF5, CSV, NPY, SigMF, or numbers without a header"
+    )
+    inspect.add_argument("--carrier", type=hertz, metavar="HZ", help="carrier, where the file does not say it")
+    inspect.add_argument("--rate", type=hertz, metavar="HZ", help="samples a second, where the file does not say it; "
+                         "of chirps, chirps a second")  # fmt: skip
+    inspect.add_argument("--take", type=int, default=1, metavar="N", help="draft the N-th reading (default: the first)")
+    inspect.add_argument("--out", type=Path, help="record to write (default: the file's name and .yaml, here)")
+    meaning = "simulate the radar of a record, train a network for it, and say which accuracy to expect"
+    train = add_command(actions, "train", _train, meaning, "lowalt recording train walk.yaml --out my_radar")
+    train.add_argument("record", type=Path, help="record of a recording, or of a radar without one, with the block "
+                       "twin")  # fmt: skip
+    train.add_argument("--out", type=Path, required=True, help="network to write, my_radar for my_radar.safetensors")
+    train.add_argument("--recognition", default="config/measured/recognition.yaml", help="network and training")
+
+
+def _described(seen: Seen) -> str:
+    """A reading in words."""
+    keys, words = seen.keys, []
+    if "variable" in keys:
+        words.append(f"variable {keys['variable']}")
+    if "dtype" in keys:
+        words.append(keys["dtype"])
+    if keys["channel"] == "real":
+        words.append("one real channel")
+    elif "layout" in keys:
+        words.append(WORDS[keys["layout"]])
+    elif "columns" not in keys or len(keys["columns"]) == 1:
+        words.append("complex samples")
+    if "columns" in keys:
+        words.append(f"columns {', '.join(map(str, keys['columns']))}")
+    if "chirps" in keys:
+        words.append(f"chirps of {keys['chirps']['samples']} samples")
+        if keys["chirps"].get("receivers", 1) > 1:
+            words.append(f"of {keys['chirps']['receivers']} receivers")
+    return ", ".join(words)
+
+
+def _line(inspection: FileInspection, seen: Seen) -> str:
+    """A reading's strongest line in words."""
+    speed = inspection.speed_mps(seen)
+    if not inspection.rate_hz:
+        return f"{seen.line_hz:+.4f} of the rate"
+    hertz = f"{seen.line_hz:+.1f} Hz" if seen.values.dtype.kind == "c" else f"{seen.line_hz:.1f} Hz"
+    if math.isnan(speed):
+        return hertz
+    return f"{hertz} = {speed:+.2f} m/s" if seen.values.dtype.kind == "c" else f"{hertz} = {speed:.2f} m/s, sign lost"
+
+
+def drafted(inspection: FileInspection, seen: Seen, folder: Path) -> str:
+    """Return the text of a record of a reading, relative to the folder that it is written to; guesses are marked."""
+    mark = "" if seen.said else f"  # GUESSED: fits its samples best, {seen.bits:.2f} bits a byte"
+    path = Path(os.path.relpath(inspection.path.resolve(), folder.resolve())).as_posix()
+    lines = [
+        DRAFTED,
+        "# Confirm the lines marked GUESSED.",
+        f"file: {path!r}",
+        f"carrier_hz: {inspection.carrier_hz:.9g}",
+    ]
+    chirps = "chirps" in seen.keys
+    lines.append(f"rate_hz: {inspection.rate_hz:.9g}" + ("  # chirps a second" if chirps else ""))
+    for key, value in seen.keys.items():
+        text = "{" + ", ".join(f"{name}: {item}" for name, item in value.items()) + "}" if key == "chirps" else value
+        lines.append(f"{key}: {list(value) if key == 'columns' else text}{mark}")
+    waveform = "fmcw" if chirps else "cw"
+    lines += ["# For `lowalt recording train`, with your own figures (m, m, degrees):",
+              f"# twin: {{waveform: {waveform}, distance_m: [2, 10], height_m: [-1, 2], beam_deg: 60}}"]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _next(inspection: FileInspection, seen: Seen, out: Path) -> str:
+    """The command to type next."""
+    missing = [
+        f"--{name.removesuffix('_hz')} HZ" for name in ("carrier_hz", "rate_hz") if not getattr(inspection, name)
+    ]
+    if missing:
+        return f"lowalt recording inspect {shlex.quote(str(inspection.path))} {' '.join(missing)}"
+    from lowalt.extensions.recordings.twin import radars
+
+    names = [name for name, twin in radars().items() if twin.near(inspection.carrier_hz)
+             and (twin.channel == "real" or seen.keys["channel"] == "complex")]  # fmt: skip
+    if names:
+        return f"lowalt predict {names[0]} {shlex.quote(str(out))}"
+    return f"lowalt recording train {shlex.quote(str(out))} --out my_radar"
+
+
+def _inspect(options: argparse.Namespace) -> Answer:
+    """Inspect a recording, draw it and draft its record."""
+    from lowalt.extensions.recordings.recording_picture import recording_picture
+
+    inspection = inspect_recording(options.file, options.carrier, options.rate)
+    count = len(inspection.readings)
+    if not 1 <= options.take <= count:
+        raise InputError(f"--take is {options.take}, expected 1 to {count}, a reading of the list")
+    seen, out = inspection.readings[options.take - 1], options.out or Path(f"{options.file.stem}.yaml")
+    ready = bool(inspection.carrier_hz and inspection.rate_hz)
+    if ready and out.exists() and not out.read_text(errors="replace").startswith(DRAFTED):
+        raise InputError(f"{out}: is there already and no draft, expected --out with another name")
+    picture = Path(f"{options.file.stem}-inspect.png")
+    write_file(picture, recording_picture(inspection, [_described(one) for one in inspection.readings]))
+    text = drafted(inspection, seen, out.parent) if ready else None
+    if text:
+        write_file(out, text)
+    then = _next(inspection, seen, out)
+    facts = {
+        "path": inspection.path, "carrier_hz": inspection.carrier_hz, "rate_hz": inspection.rate_hz,
+        "readings": [{"keys": one.keys, "bits": one.bits, "said": one.said, "line_hz": one.line_hz,
+                      "line_mps": inspection.speed_mps(one)} for one in inspection.readings],
+        "notes": inspection.notes, "picture": picture, "file": out if text else None, "text": text, "next": then,
+    }  # fmt: skip
+    rows = [f"{number}  {_line(inspection, one):<32}  {_described(one)}" + (" (the file says so)" if one.said else "")
+            for number, one in enumerate(inspection.readings, 1)]  # fmt: skip
+    lines = [f"{inspection.path}: readings, the best first, each with its strongest line", *rows,
+             *(f"note: {note}" for note in inspection.notes), f"picture  {picture}"]  # fmt: skip
+    if text:
+        lines.append(f"record   {out}, of reading {options.take}; another: --take N")
+    return Answer(facts, "\n".join([*lines, f"next     {then}"]))
+
+
+def _train(options: argparse.Namespace) -> Answer:
+    """Train a network for the radar of a record."""
+    from lowalt.extensions.recordings.own_radar import trained_radar
+    from lowalt.extensions.recordings.record import read_record
+    from lowalt.extensions.recordings.twin_training import settings
+
+    record = read_record(shipped(options.record))
+    facts = trained_radar(record, options.out.with_suffix(""), settings(options.recognition))
+    each = ", ".join(f"{label} {percent:.0f}" for label, percent in facts["percent_by_class"].items())
+    then = f"lowalt predict {options.out.with_suffix('')} {options.record}"
+    if not record.recorded:
+        then = f"lowalt recording inspect FILE --carrier {record.carrier_hz:g}"
+    lines = [
+        f"{facts['file']}: {facts['percent']:.1f} % of {facts['windows']} simulated windows right ({each}), which no "
+        f"training saw; its mean probability is {facts['mean_probability_percent']:.1f} %",
+        "Real recordings differ from their simulation: design/measured.md says by how much for three radars.",
+        f"next     {then}",
+    ]
+    return Answer(facts, "\n".join(lines))

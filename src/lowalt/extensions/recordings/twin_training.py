@@ -1,0 +1,112 @@
+"""Networks of measured radars, which learn from simulated windows of their twins alone.
+
+The images are those of the data set: spectra, tiles and shrinking by the same functions, one station. Recordings are
+never trained or validated on.
+"""
+
+import hashlib
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from torch import nn
+
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.layers import load_yaml, merge
+from lowalt.extensions.recordings.twin_scenes import Library
+from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.recognition.checkpoint import identity
+from lowalt.recognition.inference import Machine
+from lowalt.recognition.recipe import check, seeded
+from lowalt.recognition.recogniser import built
+from lowalt.recognition.schemes import named
+from lowalt.recognition.training import Trainer, TrainingRun
+from lowalt.tiles.image_settings import Images
+
+RECOGNITION = "config/measured/recognition.yaml"
+
+
+def settings(path: str | Path = RECOGNITION, over: dict | None = None) -> dict:
+    """Return the recognition settings: the default run's block with the file's network, training and augmentation.
+
+    over: keys to lay over those of the file.
+    Raises: InputError naming a missing key.
+    """
+    block = merge(load_yaml(shipped(path), "recognition of recordings"), over or {})
+    try:
+        default = load_yaml(shipped(block["default"]))
+        result = merge(default["recognition"], {key: block[key] for key in ("size", "training", "augmentation")})
+        simulation = {key: block[key] for key in ("scheme", "echoes", "receivers", "seeds")}
+        table = str(shipped(result["table"]))
+        return {**result, **simulation, "table": table, "images": default["images"], "seed": default["seed"]}
+    except KeyError as error:
+        raise InputError(f"{path}: key {error} is missing") from None
+
+
+def _intervals(library: Library, name: str, category: str, block: dict, fold: str, kept: Path | None) -> tuple:
+    """The intervals of a category for a fold, and their subtypes; out of the folder `kept` where it has them."""
+    count, receivers = block["echoes"][fold], block["receivers"]
+    made_of = identity(twin=asdict(library.twins[name]), scenes=library.scenes[name][category], seed=library.seed,
+                       count=count, receivers=receivers, fold=fold, name=name, category=category)  # fmt: skip
+    path = None if kept is None else kept / f"{hashlib.sha256(made_of.encode()).hexdigest()[:16]}.npz"
+    if path is not None and path.is_file():
+        with np.load(path, allow_pickle=False) as data:
+            return data["intervals"], data["subtypes"].tolist()
+    intervals, subtypes = library.simulated(name, category, count, fold, receivers)
+    intervals = intervals.astype(np.complex64)
+    if path is not None:
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, intervals=intervals, subtypes=np.array(subtypes))
+    return intervals, subtypes
+
+
+def simulated(
+    library: Library, name: str, block: dict, fold: str, classes: tuple[str, ...] = tuple(CATEGORIES),
+    kept: Path | None = None,
+) -> Windows:  # fmt: skip
+    """Return the windows of a twin's classes for a fold of the block's `echoes`: disjoint random streams per fold.
+
+    kept: folder that keeps the signals of each class, so that making them can be interrupted.
+    """
+    images, parts = Images.from_settings(block["images"]), []
+    labels, names, models, snrs = [], [], [], []
+    count, receivers = block["echoes"][fold], block["receivers"]
+    for label, category in enumerate(classes):
+        intervals, subtypes = _intervals(library, name, category, block, fold, kept)
+        every_interval = intervals.reshape(-1, intervals.shape[-1])
+        parts.append(rendered(every_interval, library.twins[name], images, block["size"]))
+        labels += [label] * count * receivers
+        names += np.repeat(subtypes, receivers).tolist()
+        models += np.repeat(np.arange(count), receivers).tolist()
+        snrs += list(range(receivers)) * count
+    return Windows(np.concatenate(parts), facts(np.array(labels), names, np.array(models), np.array(snrs, float), fold))
+
+
+def train(
+    block: dict, windows: dict[str, Windows], name: str, seed: int, folder: str | Path,
+    classes: tuple[str, ...] = tuple(CATEGORIES),
+) -> nn.Module:  # fmt: skip
+    """Return the network trained on simulated windows {"train": ..., "validation": ...} of the twin `name`.
+
+    block: as `settings` gives it; seed: of the weights and the order; folder: of the files that training writes.
+    """
+    keys, colours = ("recordings", name, seed), block["images"]["colour_map"]
+    seeded(block["seed"], keys, block["training"]["threads"])
+    scheme = named(block["table"], block["scheme"], ["A"])
+    model = built(scheme, block["network"], block["size"], colours, len(classes))
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    training = {key: block[key] for key in ("seed", "augmentation")}
+    training |= {"training": check(block["training"]), "classes": list(classes)}
+    run = TrainingRun(keys, identity(twin=name, seed=seed, settings=block), Path(folder))
+    trainer = Trainer(model, windows, scheme.columns, training, run, Machine.here(block["training"]["precision"]))
+    trainer.fit()
+    weights = trainer.best_weights
+    trainer.finish({
+        "scheme": scheme.record, "protocol": "seen", "network": block["network"], "size": block["size"], "seed": seed,
+        "colour_map": colours, "classes": list(classes), "twin": name,
+    })  # fmt: skip
+    model.load_state_dict(weights)
+    return model.eval()

@@ -1,0 +1,64 @@
+"""The triangles of a file of buildings as its reader finds them, with the names of their materials."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.extensions.town.materials import named
+from lowalt.targets.mesh_files import metres, pieces
+
+
+class Surfaces(NamedTuple):
+    """Triangles as a reader finds them: corners (F, 3, 3) m; material (F,), numbers of `names`, "" where the file names
+    none; left_out: what the reader left out, in words, with how many; notes: what it read otherwise than the file
+    states, in the same way; unknown: names of materials that no table has, one for each surface."""
+
+    corners: np.ndarray
+    material: np.ndarray
+    names: tuple[str, ...]
+    left_out: Mapping[str, int]
+    notes: Mapping[str, int]
+    unknown: Sequence[str]
+
+
+def such_as(values: Iterable[str]) -> str:
+    """Return the first three different values of a file in words, ", such as 'a' and 'b'"."""
+    different = list(dict.fromkeys(values))[:3]
+    return ", such as " + " and ".join(repr(value[:40]) for value in different)
+
+
+def joined(
+    parts: Iterable[tuple[np.ndarray, str]], left_out: Mapping[str, int], notes: Mapping[str, int],
+    unknown: Sequence[str],
+) -> Surfaces:  # fmt: skip
+    """Return the surfaces of parts, each the corners (F, 3, 3) and the name of their material.
+
+    left_out, notes, unknown: see `Surfaces`.
+    """
+    parts = list(parts)
+    names = tuple(dict.fromkeys(name for _, name in parts))
+    material = np.repeat([names.index(name) for _, name in parts], [len(corners) for corners, _ in parts])
+    corners = np.concatenate([np.zeros((0, 3, 3)), *(corners for corners, _ in parts)])
+    return Surfaces(corners, material.astype(np.int64), names, left_out, notes, unknown)
+
+
+def mesh_parts(path: Path, unit: str, up: str) -> tuple[list[tuple[np.ndarray, str]], list[str]]:
+    """Return the corners (F, 3, 3) m, z up, and the material's name of each piece of a mesh file, "" for none that is
+    known, and the names of pieces that are called like no material.
+
+    Raises: InputError as the readers of `targets.mesh_files`.
+    """
+    result, unknown = [], []
+    for piece in pieces(path):
+        corners = np.asarray(piece.vertices, float)[piece.faces] * metres(unit)
+        if up == "y":
+            corners = np.stack([corners[..., 0], -corners[..., 2], corners[..., 1]], axis=-1)
+        material = next(filter(None, map(named, piece.names)), "")
+        result.append((corners, material))
+        # A piece without a name of its own has its file's.
+        own = [name for name in piece.names if name and name not in (path.name, path.stem)]
+        if own and not material:
+            unknown.append(own[0])
+    return result, unknown

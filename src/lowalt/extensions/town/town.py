@@ -1,0 +1,114 @@
+"""A town: buildings from a file block, reflect and diffract the waves between a station and a target.
+
+Every ray of every point is traced past all buildings: the direct one, where it is blocked over roofs and around edges,
+and those by one or two of all walls, roofs and the ground. Out by any path and back by any other add. The SNRs of the
+configuration refer to the echo on the direct path in free space, so a blocked target is weaker by the loss that
+buildings cause. Echoes of land and of the buildings themselves are those of `clutter` and `background_channel`, which
+know no shadows. `ground_reflection`, `walls` and `line_of_sight` would count the same waves twice and are refused.
+"""
+
+import numpy as np
+
+from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.echo.radar import radar
+from lowalt.extensions.town import image_paths, shadow_loops
+from lowalt.extensions.town.buildings import read
+from lowalt.files.errors import InputError
+from lowalt.scene.checks import CheckedScene, above_ground
+from lowalt.scene.response import ImagePath
+from lowalt.scene.view import View
+
+SOURCE = (
+    "image method and Fresnel coefficients: Balanis, Advanced Engineering Electromagnetics, sections 5.3 and 7.4; "
+    "materials: ITU-R P.2040-3, Table 3; diffraction: ITU-R P.526-15, sections 4.1 and 4.3, and Deygout 1966; "
+    "rays per cell of 0.5 m: estimate, below the radius of the first Fresnel zone at 100 m and 4.9 GHz"
+)
+DEFAULTS = {
+    "buildings": None, "origin": None, "unit": "m", "up": "z", "height_m": None, "material": "concrete",
+    "left_out": 0.1, "ground": "medium_dry_ground", "order": 2, "diffraction": True, "cell_m": 0.5,
+}  # fmt: skip
+PARTS = {"second order": {"order": 1}, "reflections": {"order": 0}, "diffraction": {"diffraction": False}}
+TWICE = ("ground_reflection", "walls", "line_of_sight")
+"""Effects that reflect or block the same waves."""
+NEAR_M = 2000.0
+"""A town that is farther from every station is at the wrong place."""
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for effects that count waves twice, no file, a wrong place, or an unknown material."""
+    if twice := [name for name in TWICE if name in scene.effects]:
+        raise InputError(f"effects: {twice} together with town, which holds the same waves; expected one or the other")
+    above_ground("town", scene.network)
+    found = read(settings)
+    refuse_place(settings, scene.network)
+    for station in scene.network.stations:
+        image_paths.epsilons(found.town, radar(scene.network, station).centre_hz, "effects.town")
+
+
+def refuse_place(settings: dict, network: Network) -> None:
+    """Refuse a town far from all stations, and a station under a roof.
+
+    Raises: InputError naming the file, the station and the distance or the height.
+    """
+    found, path = read(settings), settings["buildings"]
+    low, high = np.array(found.facts["low_m"]), np.array(found.facts["high_m"])
+    masts = [(station.name, np.asarray(station.position_m, float)) for station in network.stations]
+    away = {name: float(np.linalg.norm((mast - np.clip(mast, low, high))[:2])) for name, mast in masts}
+    nearest = min(away, key=away.__getitem__)
+    if away[nearest] > NEAR_M:
+        raise InputError(
+            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station {nearest}, expected at most "
+            f"{NEAR_M / 1000:g} km: set effects.town.origin, the place in the file of x = y = 0"
+        )
+    for name, mast in masts:
+        top = np.array([mast[0], mast[1], high[2] + 1.0])
+        if mast[2] < top[2] and shadow_loops.blocked(found.town.occluders, mast[None], top[None])[0]:
+            raise InputError(
+                f"{path}: station {name} at {mast.tolist()} m stands under a roof, expected it above the buildings: "
+                "move it, or set effects.town.origin"
+            )
+
+
+def paths(settings: dict, view: View) -> list[ImagePath]:
+    """Return the reflected paths that reach any point, and the change of the direct one where buildings are near it.
+
+    That change is a path along the direct one whose coefficient is the field there over that in free space, less one.
+    """
+    town = read(settings).town
+    radio, station_m = radar(view.network, view.station), np.array(view.station.position_m, float)
+    places = np.ascontiguousarray(view.places)
+    rays = image_paths.rays_to(places, settings["cell_m"])
+    wavelength_m = SPEED_OF_LIGHT / radio.centre_hz
+    field = image_paths.direct(town, station_m, places, rays, wavelength_m, settings["diffraction"])[1]
+    result = [ImagePath(view.places, field - 1.0)] if (field != 1.0).any() else []
+    epsilon = image_paths.epsilons(town, radio.centre_hz, "effects.town")
+    for route in image_paths.reflected(town, epsilon, station_m, places, rays, settings["order"]):
+        coefficient = route.coefficient * view.relative_gain(route.images)
+        result.append(ImagePath(route.images, coefficient, route.station_m))
+    return result
+
+
+def listed(settings: dict, network: Network, row: dict) -> dict:
+    """Return which paths lead to the origin of a target, a row of the motion table, at the first symbol.
+
+    `under_roof`: whether a roof is above it; `stations`: by name `direct`, whether the sight is free; `field_db`, the
+    direct field over that in free space; and `reflected`, the surfaces of each reflected path, as ["wall", "ground"].
+    """
+    settings = DEFAULTS | settings
+    town, place = read(settings).town, np.array([[[row["x_m"], row["y_m"], row["z_m"]]]], float)
+    rays, normal, result = image_paths.rays_to(place, 0.0), town.facets.normal, {}
+    for station in network.stations:
+        if station.transmitter is not None:
+            continue
+        frequency, station_m = radar(network, station).centre_hz, np.array(station.position_m, float)
+        wavelength_m = SPEED_OF_LIGHT / frequency
+        lit, field = image_paths.direct(town, station_m, place, rays, wavelength_m, settings["diffraction"])
+        epsilon = image_paths.epsilons(town, frequency, "effects.town")
+        found = image_paths.reflected(town, epsilon, station_m, place, rays, settings["order"])
+        kinds = ["wall" if abs(up) < 0.5 else "roof" for up in normal[:-1, 2]] + ["ground"]
+        result[station.name] = {
+            "direct": bool(lit[0, 0]), "field_db": float(np.round(20 * np.log10(max(abs(field[0, 0]), 1e-20)), 2)),
+            "reflected": [[kinds[k] for k in route.facets] for route in found],
+        }  # fmt: skip
+    roof = shadow_loops.blocked(town.occluders, place[0], place[0] + [0.0, 0.0, 1e4])[0]
+    return {"under_roof": bool(roof), "stations": result}

@@ -1,7 +1,0 @@
-"""Recordings: measured baseband as signals at a radar's symbol rate, and the twin that simulates the same radar."""
-
-from lowalt.recordings.channel import SAMPLINGS, coherent_intervals, symbol_rate
-from lowalt.recordings.files import read
-from lowalt.recordings.record import Record, read_record
-
-__all__ = ["SAMPLINGS", "Record", "coherent_intervals", "read", "read_record", "symbol_rate"]
