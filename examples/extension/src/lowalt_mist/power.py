@@ -5,12 +5,13 @@ strong.
 import numpy as np
 
 from lowalt.spectra import fourier
-from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, rows, speeds, tables  # noqa: F401
+from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, rows, speeds  # noqa: F401
 from lowalt.spectra.settings import Fourier as Settings
 
 TITLE = "power"
 SOURCE = "square of the paper's Eq. 26"
 DEFAULTS = Settings(64, 1, 256)
+tables = fourier.tables
 
 
 def definition(
