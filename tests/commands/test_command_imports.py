@@ -20,7 +20,7 @@ SLOW = (
 )
 PLANNING = (
     "from lowalt.config.layers import overlaid; from lowalt.workflow.run import Run; import "
-    "lowalt.workflow.options\n"
+    "lowalt.workflow.stages.tiles\n"
     "Run.of(overlaid([]), 'workflow/schemas/config.schema.yaml', None)"
 )
 

@@ -198,9 +198,9 @@ def test_on_a_link_the_change_of_the_direct_path_shows_the_direct_paths_side():
     )
     both = ImagePath(view.places, 0.5, mirror, ImagePath(view.places, 0.5))
 
-    def weight(seen, names=None, but=()):
+    def weight(seen, one_sided):
         """A bistatic side that is not the geometric mean of both ends' sides."""
-        if but:
+        if not one_sided:
             return np.ones(view.places.shape[:2])
         sender, receiver = seen.masts_m
         return np.full(view.places.shape[:2], 1.0 + abs(sender[2] - 3.0 * receiver[2]))

@@ -7,11 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
+from emulation import EMULATED, able
+
 ROOT = Path(__file__).parents[2]
 CORES = ("SkylakeX", "Haswell", "Nehalem", "Zen")
 """Processors whose kernels OpenBLAS is told to choose. All run here: kernels that need more than
 this processor has are refused by OpenBLAS itself, which then takes others."""
 
+
+SMALLER = "Haswell"
+"""The one of them that NumPy, numba and the C library are told to be as well: it has no AVX-512."""
 
 PROBE = """
 import sys
@@ -42,8 +47,10 @@ np.savez(path, **{name: np.stack(parts) for name, parts in found.items()})
 
 
 def started(folder: Path, core: str, *words: str) -> subprocess.Popen:
-    """A process that makes signals with the BLAS kernels of a processor and writes FOLDER/CORE.npz."""
+    """A process that makes signals as on a processor and writes FOLDER/CORE.npz."""
     more = {"OPENBLAS_CORETYPE": core, "PYTHONPATH": str(ROOT / "src"), "OMP_NUM_THREADS": "1"}
+    if core == SMALLER and able("avx2"):
+        more |= EMULATED["avx2"]
     line = [sys.executable, "-W", "ignore", "-c", PROBE, str(folder / f"{core}.npz"), *words]
     return subprocess.Popen(
         line, cwd=ROOT, env=os.environ | more, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL

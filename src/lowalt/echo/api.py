@@ -134,8 +134,8 @@ def prepared(network, station, motion, rcs_m2, aim_m, sample):
     """
     if station.transmitter is not None:
         raise InputError(
-            f"{_named(sample)}station {station.name} is a link between two stations, expected a station that hears "
-            "itself; scenes with effects.direct_path have links"
+            f"{_named(sample)}station {station.name} is a link between two stations, expected a "
+            "station that hears itself; only scenes with effects have links"
         )
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
     radio = radar(network, station)

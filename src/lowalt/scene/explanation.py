@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import yaml
 
+from lowalt.config.blocks import motion_block
 from lowalt.config.network import Network, Station, masts_m
-from lowalt.config.plan import motion_block
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import reported
 from lowalt.motion.drawing import region_polygon
@@ -34,14 +34,6 @@ from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 
-CANCELLERS = (
-    ("none", {"kind": "none"}),
-    ("mean", {"kind": "mean"}),
-    ("pulse, order 1", {"kind": "pulse", "order": 1}),
-    ("pulse, order 2", {"kind": "pulse", "order": 2}),
-    ("clutter", {"kind": "clutter"}),
-)
-"""Cancellers that a verdict compares."""
 CLOSE_CELLS = 1
 """A chosen range cell is right if it lies at most this many cells from the target's."""
 VISIBLE = 8
@@ -64,8 +56,7 @@ class Finding(NamedTuple):
     radial_mps: mean rate of the target's range over the look (m/s); right: share of symbols whose
     chosen cell is within one of the target's; over_db: power of the target in its cell over the
     mean power of the loudest cell of everything else, behind the filters (dB, inf without anything
-    else); otherwise: the share `right` with other detection: with each of CANCELLERS if the scene
-    has one, with and without a detector.
+    else); otherwise: the share `right` with other detections (`_other_detections`).
     """
 
     category: str
@@ -185,24 +176,12 @@ def finding(
     loudest = float((abs(background) ** 2).mean(axis=0).max())
     with np.errstate(divide="ignore"):
         over_db = 10 * np.log10(np.mean(abs(at_target) ** 2) / loudest) if loudest > 0 else np.inf
-    named = {effect.name for effect in sample.detection}
-    otherwise = {}
-    for kind, changed in CANCELLERS if "canceller" in named else (("", {}),):
-        detection = [
-            effect._replace(settings=effect.settings | changed)
-            if effect.name == "canceller"
-            else effect
-            for effect in sample.detection
-        ]
-        for added in ("",) if "detector" in named else ("", "detector"):
-            label = " and ".join(filter(None, (kind and f"canceller {kind}", added))) or "the same"
-            otherwise[label] = _right(
-                sample, detection + called({added: {}} if added else {}), target_cell
-            )
-    view, range_m = (
-        sample.view,
-        float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m))),
-    )
+    otherwise = {
+        label: _right(sample, detection, target_cell)
+        for label, detection in _other_detections(sample.detection).items()
+    }
+    view = sample.view
+    range_m = float(np.linalg.norm(view.aim_m - np.asarray(station.position_m)))
     ways_m = view.ways_m(view.places.mean(axis=1))
     radial_mps = float((ways_m[-1] - ways_m[0]) / (2 * (view.times_s[-1] - view.times_s[0])))
     return Finding(
@@ -217,6 +196,27 @@ def finding(
         otherwise,
         levels(sample.view, scene.effects, sample.power) if listed else [],
     )
+
+
+def _other_detections(detection: list[NamedEffect]) -> dict[str, list[NamedEffect]]:
+    """Other detections than a scene's, by label: the kinds of its effects (KINDS), without and with
+    each effect of the place that it does not name and that is worth a trial (TRIED).
+    """
+    kinds = {}
+    for number, effect in enumerate(detection):
+        for kind, settings in getattr(effect.module, "KINDS", {}).items():
+            changed = effect._replace(settings=effect.settings | settings)
+            label = f"{effect.name} {kind}"
+            kinds[label] = [*detection[:number], changed, *detection[number + 1 :]]
+    named = {effect.name for effect in detection}
+    unnamed = [name for name, place in PLACES.items() if place == "detection" and name not in named]
+    tried = [name for name in unnamed if hasattr(module_of(name), "TRIED")]
+    result = {}
+    for label, effects in (kinds or {"": detection}).items():
+        result[label or "the same"] = effects
+        for name in tried:
+            result[f"{label} and {name}" if label else name] = effects + called({name: {}})
+    return result
 
 
 def _right(sample: SceneSample, detection: Sequence[NamedEffect], target_cell: np.ndarray) -> float:
@@ -251,25 +251,38 @@ def changes(
     result = []
     parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
     others = [name for name in PLACES if name not in config["effects"]]
-    tried = [*((name, "") for name in named), *parts, *((name, "") for name in others)]
+    tried = [(name, "") for name in named] + parts + [(name, "") for name in others]
     for name, part in reported(tried, len(tried), "effects"):
         place = places.get(name) or PLACES[name]
         inside = name in named
         try:
-            changed, also = (
-                (_without_part(config, name, part), "") if part else _changed(config, name)
-            )
+            if part:
+                changed = _without_part(config, name, part)
+                also = ""
+            else:
+                changed, also = _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
         except InputError as error:
             result.append(Change(name, place, inside, refused=str(error)))
             continue
         moved = np.linalg.norm(new_signals - signals, axis=2) / np.linalg.norm(signals, axis=2)
-        cost_ms = (times_ms - new_times_ms) if inside else (new_times_ms - times_ms)
-        shares = float(np.mean(moved)), float(np.mean(cells != new_cells))
+        added_ms = new_times_ms - times_ms
+        cost_ms = -added_ms if inside else added_ms
         after = shown(new_signals)
-        more = {kind: _differing(before[kind], after[kind]) for kind in before}
-        cost = float(np.median(cost_ms)), float(np.std(cost_ms))
-        result.append(Change(name, place, inside, *shares, more, *cost, also, part=part))
+        result.append(
+            Change(
+                name,
+                place,
+                inside,
+                signal=float(np.mean(moved)),
+                cells=float(np.mean(cells != new_cells)),
+                more={kind: _differing(before[kind], after[kind]) for kind in before},
+                ms=float(np.median(cost_ms)),
+                spread_ms=float(np.std(cost_ms)),
+                also=also,
+                part=part,
+            )
+        )
     return result
 
 
@@ -330,10 +343,9 @@ def _received(
                     received_signal(scene, scene.network.station(name), *explained, clouds)
                 )
                 times_s.append(time.process_time())
-    shape = len(chosen), len(station_names)
-    signals, cells = (
-        np.array([result[k] for result in received]).reshape(*shape, -1) for k in range(2)
-    )
+    shape = (len(chosen), len(station_names))
+    signals = np.array([result.signal for result in received]).reshape(*shape, -1)
+    cells = np.array([result.cell for result in received]).reshape(*shape, -1)
     return signals, cells, 1e3 * np.diff(times_s).reshape(shape)
 
 

@@ -18,8 +18,6 @@ import numpy as np
 from lowalt.config.classes import stated
 from lowalt.config.extensions import module_offered, offered
 from lowalt.config.network import station_names
-from lowalt.config.plan import GROUPS
-from lowalt.config.sample_list import refuse_unknown
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
@@ -27,6 +25,8 @@ from lowalt.files.json_objects import json_object
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import WHAT, checked, load
+from lowalt.shards.plan import GROUPS
+from lowalt.shards.sample_list import refuse_unknown
 from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import MOST_OVERHEAD_BYTES, SAMPLE, map_samples, table_path
 from lowalt.shards.stored_cubes import cubes_of

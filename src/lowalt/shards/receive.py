@@ -22,6 +22,7 @@ from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.noise.awgn import add_noise
 from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
+from lowalt.scene.effects import needed_subtypes
 from lowalt.scene.truth import of_parts
 from lowalt.shards.dataset import Dataset
 from lowalt.spectra.cube import TRUTH
@@ -90,10 +91,10 @@ def receive(
 
     configuration: overlays on the embedded default, each a path or a dict, a whole configuration,
     or a `Dataset`, which keeps the targets between calls; station: the first one by default. Only
-    this target and its companions in the scene are made. at:
+    this target and the others that the scene adds are made. at:
     "subcarriers": Y[n, m] of Eq. 24, the known symbol removed, as a receiver without faults or
     noise finds it; "receiver": the same behind the receiver's effects and noise; "cells": range
-    cells; "canceller": range cells behind the clutter canceller; "signal": the chosen range cell of
+    cells; "canceller": range cells behind the linear filters of the detection; "signal": the chosen range cell of
     each symbol.
     snr_db: without it there is no noise but that of the scene's own receiver; with it there is
     white noise from "receiver" on, and "canceller" and "signal" are those of the data set.
@@ -130,7 +131,7 @@ def receive(
 
 
 def alone(configuration: dict | str | Path | Iterable[str | Path | dict], subtype: str) -> Dataset:
-    """Return the data set of one subtype and its companions in the scene, without any other target.
+    """Return the data set of one subtype and of those that the scene's effects need, without any other.
 
     Raises: InputError naming the key, value or file that is wrong.
     """
@@ -140,7 +141,7 @@ def alone(configuration: dict | str | Path | Iterable[str | Path | dict], subtyp
     else:
         given = [configuration] if isinstance(configuration, (dict, str, Path)) else configuration
         config = overlaid(given)
-    beside = (config["effects"].get("companions") or {}).get("subtypes", [])
+    beside = needed_subtypes(config["effects"])
     config["targets"] |= {"select": list(dict.fromkeys([subtype, *beside]))}
     return Dataset(config, inputs=config["inputs"] or os.environ.get("LOWALT_INPUTS"))
 
@@ -172,7 +173,7 @@ def _values(dataset: Dataset, sample: SceneSample, at: str, snr_db: float) -> np
         values[slice(None) if sample.view.sampling is None else sample.view.sampling.present] = (
             received
         )
-    if set_snr and not any(effect.name == "cell_noise" for effect in scene.effects):
+    if set_snr and not any(effect.offers("SET_SNR") for effect in scene.effects):
         rng = stream(scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
         noise = add_noise(np.zeros(values.shape), snr_db, rng, sample.power)
         values = values + (np.fft.fft(noise, axis=1) if at == "receiver" else noise)
@@ -193,9 +194,7 @@ def _described(
     of_part = of_parts(view)
     truth = dict(zip(TRUTH, columns.T, strict=True))
     truth |= dict(zip(("part_range_m", "part_low_mps", "part_high_mps"), of_part, strict=True))
-    even = at == "signal" and not any(
-        effect.settings.get("regrid") == "zero" for effect in sample.scene.effects
-    )
+    even = at == "signal" and all(even() for even in sample.all("even").values())
     return RawEcho(
         values,
         network.times_s if even else view.times_s,

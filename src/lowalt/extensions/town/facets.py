@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
+from lowalt.numerics import portable
 from lowalt.scene import rays
 
 GRID_M = 1e-3
@@ -167,7 +168,8 @@ def _outward(
     for number in np.setdiff1d(building, building[owner[lone]]):
         mine = order[starts[number] : starts[number + 1]]
         which = np.unique(label[mine])
-        over = planes[which, :3] @ corners[mine].reshape(-1, 3).T - planes[which, 3:]
+        held = corners[mine].reshape(-1, 3)
+        over = portable.product(planes[which, :3], held.T) - planes[which, 3:]
         result[which] = (over.max(axis=1) <= FLAT_M).astype(float) - (over.min(axis=1) >= -FLAT_M)
     return result
 

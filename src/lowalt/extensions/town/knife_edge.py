@@ -17,11 +17,14 @@ more than 3 % of itself.
 import math
 
 import numpy as np
+from numpy.polynomial.chebyshev import cheb2poly
 from scipy.special import erfcx
 
 from lowalt.extensions.town import shadow_loops
 from lowalt.extensions.town.facets import Town
 from lowalt.machine.jit import INNER, PLAIN
+from lowalt.numerics import portable
+from lowalt.numerics.chebyshev_series import chebyshev_points, to_terms
 from lowalt.scene.response_loops import phasor
 
 CLEAR = -0.78
@@ -51,12 +54,16 @@ def _pieces() -> np.ndarray:
     Each interpolates at Chebyshev points of one piece of nu / (nu + 1), in which the function is
     smooth.
     """
-    nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    nodes = chebyshev_points(DEGREE + 1)
     shares = (np.arange(PIECES)[:, None] + 0.5 * (nodes + 1.0)) / PIECES
     nu = shares / (1.0 - shares)
     values = 0.5 * (1.0 + nu) * erfcx(nu * (0.5 + 0.5j) * np.sqrt(np.pi))
-    terms = np.linalg.solve(np.vander(nodes, increasing=True), values.T).T
-    return np.ascontiguousarray(np.stack([terms.real, terms.imag], axis=1))
+    parts = np.stack([values.real, values.imag], axis=1)
+    series = portable.product(parts, to_terms(DEGREE + 1, DEGREE + 1))
+    powers = np.zeros((DEGREE + 1, DEGREE + 1))
+    for order in range(DEGREE + 1):
+        powers[order, : order + 1] = cheb2poly([*[0.0] * order, 1.0])
+    return portable.product(series, powers)
 
 
 _PIECES = _pieces()
@@ -370,8 +377,9 @@ def _past(
             others, point, places, wavelength_m
         )
         # Behind a building that takes J dB, those on its sides have this share of their effect.
-        loss_db = -20.0 * np.log10(np.clip(abs(field), 1e-20, 1.0))
-        result += share * field * (1.0 + (1.0 - np.exp(-loss_db / 6.0)) * (beside - 1.0))
+        size = np.sqrt(field.real * field.real + field.imag * field.imag)
+        loss_db = -20.0 / portable.LN_10 * portable.log(np.clip(size, 1e-20, 1.0))
+        result += share * field * (1.0 + (1.0 - portable.exp(-loss_db / 6.0)) * (beside - 1.0))
     # A blocked point behind no outline receives nothing.
     return np.where(~lit & (np.max(blocking, axis=0) < -SURE), 0.0, result)
 
@@ -391,7 +399,7 @@ def direct(
     building_of = town.building[town.facets.first[:-2]]
     starts = np.repeat(station_m[None], places.shape[1], axis=0)
     for symbol, ends in enumerate(places):
-        length = float(np.linalg.norm(ends - station_m, axis=1).max())
+        length = float(portable.norm(ends - station_m).max())
         room = -FREE * np.sqrt(wavelength_m * length / 8.0)
         count = shadow_loops.near(town.occluders, starts, ends, room, held)
         if count:

@@ -1,4 +1,5 @@
-"""Scenes have the same signals whichever kernels a BLAS chooses.
+"""Scenes have the same signals whichever kernels a BLAS chooses, and with
+the vector registers of AVX2 as with those of this processor.
 
 The comparison is of double precision, before rounding to the kept precision hides all but a few
 differences.
@@ -17,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 SCENES = ("config/scenes/triangle.yaml", "config/scenes/sensing.yaml")
 
 
-def test_signals_with_canceller_links_and_phase_noise_do_not_follow_the_kernels_of_a_blas(tmp_path):
+def test_signals_with_canceller_links_and_phase_noise_do_not_follow_the_processor(tmp_path):
     """Two scenes that call for most of the linear algebra; looks are short, and Zen, whose kernels
     are Haswell's, is left to the slow test, so that the processes take seconds."""
     assert differing(signals(tmp_path, CORES[:3], 64, "Owl", *SCENES)) == []
@@ -31,7 +32,7 @@ SHIPPED = sorted(
 
 
 @pytest.mark.slow
-def test_signals_of_every_shipped_scene_do_not_follow_the_kernels_of_a_blas(
+def test_signals_of_every_shipped_scene_do_not_follow_the_processor(
     tmp_path,
 ):
     subtypes = "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1"
