@@ -82,8 +82,8 @@ def echo_signal(
     bound = worst / largest if largest > 0 else np.inf if worst > 0 else 0.0
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
-            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 promises {bound:.1e} "
-            f"of its largest value, expected a larger tolerance or null"
+            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 "
+            f"promises {bound:.1e} of its largest value, expected a larger tolerance or null"
         )
     return EchoResult(
         found.values, found.cells, int(found.ties.sum()), bound, method, found.gaps, found.totals
@@ -150,6 +150,6 @@ def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> 
         points = len(scene.part) or scene.translation.shape[1]
         n, l = divmod(fault - 1, points)  # noqa: E741
         raise InputError(
-            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the place of station "
-            f"{station.name} (r = 0), expected r > 0"
+            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the "
+            f"place of station {station.name} (r = 0), expected r > 0"
         )

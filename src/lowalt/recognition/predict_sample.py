@@ -82,6 +82,7 @@ def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> 
         shares = trained.model(views).double().softmax(1)[0]
     if not torch.isfinite(shares).all():
         raise InputError(
-            f"{trained.path}: answers {where} with numbers that are not finite, expected another model"
+            f"{trained.path}: answers {where} with numbers that are not finite, expected another "
+            "model"
         )
     return dict(zip(trained.classes, shares.tolist(), strict=True))

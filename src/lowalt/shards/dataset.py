@@ -119,6 +119,7 @@ class Dataset:
         inputs: str | Path | None = None,
         occluders: Mapping[str, dict] | None = None,
         published: dict[str, dict] | None = None,
+        records: dict[str, dict] | None = None,
     ) -> None:
         """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and
         choose groups and folds.
@@ -130,6 +131,7 @@ class Dataset:
         the clouds are.
         published: the row of each subtype in the table of targets, which decides the classes; by
         default the records'.
+        records: the merged records of all targets; by default read from the configuration's files.
         Raises: InputError naming the key, value or file that is wrong.
         """
         if isinstance(config, (str, Path)):
@@ -137,11 +139,11 @@ class Dataset:
             config = check(load_yaml(config), shipped(SCHEMA))
             refuse_effects(config["effects"], path)
         self.config = config
-        records = {}
-        if published is None or clouds is None:
+        if records is None and (published is None or clouds is None):
             # A run's configuration names tables and records as seen from the checkout it was made
             # in.
             records = records_of(located(config)["targets"], inputs)
+        records = records or {}
         self.published = published or {name: item["published"] for name, item in records.items()}
         self.plan = Plan.of(config, self.published)
         self.listed = SampleList(self.plan, self.published, groups, folds)
@@ -170,8 +172,11 @@ class Dataset:
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
         chosen = [self.published[name] for group in self.groups for name in self.plan.groups[group]]
         network = self.maker.network
-        for folds in filter(None, (network.folding(chosen), network.range_folding(self._corners))):
-            warn(folds)
+        texts = network.folding(chosen), network.range_folding(self._corners)
+        self.folding = tuple(text for text in texts if text)
+        """Warnings that speeds or ranges fold."""
+        for text in self.folding:
+            warn(text)
 
     def __len__(self) -> int:
         return len(self.listed)

@@ -76,8 +76,7 @@ def stated_unit_m(path: Path) -> float | None:
 
 
 def stated_up_axis(path: Path) -> str | None:
-    """Return the axis that a mesh file's format or its own statement says is up, None where neither
-    says so.
+    """Return the axis that a mesh file or its format says is up, None where neither says so.
 
     Source: COLLADA 1.4.1, element up_axis.
     Raises: InputError where a COLLADA file is no XML.
@@ -121,28 +120,20 @@ def _scene(path: Path) -> list[Piece]:
     scene = trimesh.load_scene(**source, process=False)
     result = []
     for node in sorted(scene.graph.nodes_geometry):
-        place, name = scene.graph[node]
+        pose, name = scene.graph[node]
         # A chain of transforms is multiplied by the machine's BLAS; its last bits are rounded away.
-        place = np.round(place, 12)
+        pose = np.round(pose, 12)
         mesh = scene.geometry[name]
         if not isinstance(mesh, trimesh.Trimesh):
             continue
-        more = next(
-            (
-                named
-                for key, named in names.items()
-                if re.fullmatch(re.escape(key) + r"(_\d+)?", name)
-            ),
-            [],
-        )
-        piece = Piece(
-            np.asarray(mesh.vertices),
-            np.asarray(mesh.faces),
-            tuple(dict.fromkeys((str(node), name, *more))),
-        )
+        # trimesh numbers the surfaces of one geometry.
+        known = [key for key in names if re.fullmatch(re.escape(key) + r"(_\d+)?", name)]
+        more = names[known[0]] if known else []
+        chosen_by = tuple(dict.fromkeys((str(node), name, *more)))
+        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), chosen_by)
         # Values that are not finite are refused later, by name.
         with np.errstate(invalid="ignore"):
-            result.append(piece.mapped(place[:3, :3]).moved(place[:3, 3]))
+            result.append(piece.mapped(pose[:3, :3]).moved(pose[:3, 3]))
     return result
 
 
@@ -158,8 +149,8 @@ def _refuse_truncated(path: Path) -> None:
     is_text = head.startswith(b"solid") and b"facet" in head
     if not is_text and len(head) >= 84 and there < stated:
         raise InputError(
-            f"{path}: the header states {stated} triangles and the file ends after {there}, expected the "
-            "whole file: copy or export it again"
+            f"{path}: the header states {stated} triangles and the file ends after {there}, "
+            "expected the whole file: copy or export it again"
         )
 
 
@@ -211,9 +202,8 @@ def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
         mixed ^= mixed >> np.uint64(29)
         mixed = (mixed + bits[:, column]) * np.uint64(0xBF58476D1CE4E5B9)
     _, first, inverse = np.unique(mixed, return_index=True, return_inverse=True)
-    if not np.array_equal(
-        vertices[first][inverse], vertices
-    ):  # two different vertices with one hash: about never
+    # Two different vertices with one hash: about never.
+    if not np.array_equal(vertices[first][inverse], vertices):
         _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     return vertices[first], inverse.reshape(-1)[faces]
 
@@ -227,8 +217,9 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
         import pymeshlab
     except ImportError as error:
         raise InputError(
-            f"mesh records need pymeshlab, which does not load here ({error}); on a machine without a display install "
-            "the system's OpenGL libraries (Debian: libgl1 libopengl0), or use built-in records"
+            f"mesh records need pymeshlab, which does not load here ({error}); on a machine "
+            "without a display install the system's OpenGL libraries (Debian: libgl1 libopengl0), "
+            "or use built-in records"
         ) from None
     vertices, faces = _merged(vertices, faces)
     meshes = pymeshlab.MeshSet(verbose=False)
@@ -243,9 +234,7 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the edges (E, 2) of triangles (F, 3) by their vertices, one triangle that each bounds,
-    and how many do.
-    """
+    """Return the edges (E, 2) of triangles (F, 3), one triangle of each, and how many share it."""
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     _, first, uses = np.unique(key, return_index=True, return_counts=True)
@@ -253,8 +242,10 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
-    """Return a surface with its connected components, faces that share a vertex being connected,
-    and each closed component turned outward."""
+    """Return a surface with its connected components, each closed one turned outward.
+
+    Faces that share a vertex are connected.
+    """
     links = np.concatenate([faces[:, :2], faces[:, 1:]])
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(len(vertices), len(vertices)))
     label = connected_components(graph, directed=False)[1]
@@ -293,7 +284,10 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     faces = np.asarray(whole.faces, np.int64)
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
-        text = f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record is followed"
+        text = (
+            f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record "
+            "is followed"
+        )
         warn(text)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")

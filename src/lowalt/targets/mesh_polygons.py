@@ -9,6 +9,7 @@ Source: Wavefront's Object Files (.obj), version 3.0.
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,9 +20,11 @@ from lowalt.targets.surfaces import Surface
 
 @dataclass(frozen=True)
 class Piece(Surface):
-    """A named surface as it stands in the file, `vertices` in file units. `names` are all those
-    that it can be chosen by, its own first: a place in the scene and the shape there, or the
-    object, group and material of an OBJ file."""
+    """A named surface as it stands in the file, `vertices` in file units.
+
+    `names` are all those that it can be chosen by, its own first: a node of the scene and the shape
+    there, or the object, group and material of an OBJ file.
+    """
 
     names: tuple[str, ...]
 
@@ -41,9 +44,9 @@ def triangulated(
     the other, indices of vertices. Polygons of fewer than three corners have no triangle.
     Raises: InputError where a corner is no vertex.
     """
-    if len(corners) != counts.sum() or (
-        len(corners) and not 0 <= corners.min() <= corners.max() < len(vertices)
-    ):
+    missing = len(corners) != counts.sum()
+    outside = len(corners) > 0 and not 0 <= corners.min() <= corners.max() < len(vertices)
+    if missing or outside:
         raise InputError(f"a face has a corner that is none of the {len(vertices)} vertices")
     starts = np.cumsum(counts) - counts
     faces = [np.zeros((0, 3), int)]
@@ -51,11 +54,11 @@ def triangulated(
     for size in np.unique(counts[counts >= 3]):
         which = np.flatnonzero(counts == size)
         ring = corners[starts[which, None] + np.arange(size)]
-        fan = np.stack(
-            [np.repeat(ring[:, :1], size - 2, axis=1), ring[:, 1:-1], ring[:, 2:]], axis=2
-        )
-        for row in _dented(vertices[ring]) if size > 3 else ():
-            fan[row] = _ears(vertices[ring[row]], ring[row], fan[row])
+        first = np.repeat(ring[:, :1], size - 2, axis=1)
+        fan = np.stack([first, ring[:, 1:-1], ring[:, 2:]], axis=2)
+        if size > 3:
+            for row in _dented(vertices[ring]):
+                fan[row] = _ears(vertices[ring[row]], ring[row], fan[row])
         faces.append(fan.reshape(-1, 3))
         owners.append(np.repeat(which, size - 2))
     order = np.argsort(np.concatenate(owners), kind="stable")
@@ -74,19 +77,14 @@ def _dented(around: np.ndarray) -> np.ndarray:
 
 
 def _ears(around: np.ndarray, ring: np.ndarray, fan: np.ndarray) -> np.ndarray:
-    """Return the triangles of one polygon cut by earcut, or `fan` where it has no area and cannot
-    be cut.
-    """
+    """Return the triangles of one polygon cut by earcut, or `fan` where it has no area."""
     import mapbox_earcut  # viewers' own algorithm (three.js); only a polygon with a dent needs it
 
     from_first = around - around[0]
     normal = np.cross(from_first, np.roll(from_first, -1, axis=0)).sum(axis=0)
     flat = np.delete(from_first, np.abs(normal).argmax(), axis=1)
-    ears = (
-        mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
-        .reshape(-1, 3)
-        .astype(int)
-    )
+    corners = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
+    ears = corners.reshape(-1, 3).astype(int)
     if len(ears) != len(fan):
         return fan
     a, b, c = np.moveaxis(around[ears], 1, 0)
@@ -95,6 +93,27 @@ def _ears(around: np.ndarray, ring: np.ndarray, fan: np.ndarray) -> np.ndarray:
 
 
 NAMES = ("o", "g", "usemtl")
+"""Words of an OBJ file that name what follows: an object, a group, a material."""
+
+
+class _Names(NamedTuple):
+    """The names that the faces of an OBJ file stand under, "" where none was given."""
+
+    object: str
+    group: str
+    material: str
+
+
+def _vertex_index(stated: int, so_far: int) -> int:
+    """Return the index from 0 that a face of an OBJ file states from 1, -1 where it states 0.
+
+    A negative index counts back from the vertices so far.
+    """
+    if stated > 0:
+        return stated - 1
+    if stated < 0:
+        return so_far + stated
+    return -1
 
 
 def read_obj(path: Path) -> list[Piece]:
@@ -103,58 +122,51 @@ def read_obj(path: Path) -> list[Piece]:
     Raises: InputError naming the file and the line that cannot be read, or the face that has no
     such vertex.
     """
-    places: list[list[float]] = []
+    positions: list[list[float]] = []
     corners: list[int] = []
     counts: list[int] = []
     owners: list[int] = []
-    keys: dict[tuple[str, ...], int] = {}
+    keys: dict[_Names, int] = {}
     now = dict.fromkeys(NAMES, "")
     text = path.read_text(encoding="utf-8-sig", errors="replace").replace("\\\n", " ")
     for number, line in enumerate(text.splitlines(), 1):
         word, _, values = line.strip().partition(" ")
         try:
             if word == "v":
-                places.append([*map(float, values.split()[:3])])
-                if len(places[-1]) < 3:
+                positions.append([*map(float, values.split()[:3])])
+                if len(positions[-1]) < 3:
                     raise ValueError("fewer than three coordinates")
             elif word == "f":
                 face = [int(corner.split("/", 1)[0]) for corner in values.split("#", 1)[0].split()]
-                # A negative index counts back from the vertices so far.
-                corners += [
-                    index - 1 if index > 0 else len(places) + index if index else -1
-                    for index in face
-                ]
+                corners += [_vertex_index(stated, len(positions)) for stated in face]
                 counts.append(len(face))
-                owners.append(keys.setdefault(tuple(now.values()), len(keys)))
+                owners.append(keys.setdefault(_Names(*now.values()), len(keys)))
             elif word in NAMES:
                 now[word] = values.strip()
         except (ValueError, OverflowError) as error:
             raise InputError(
                 f"{path}: line {number}: {line.strip()[:60]!r} cannot be read ({error})"
             ) from None
-    vertices = np.array(places, float).reshape(-1, 3)
+    vertices = np.array(positions, float).reshape(-1, 3)
     faces, polygon = triangulated(vertices, np.array(counts, int), np.array(corners, int))
     owner = np.array(owners, int)[polygon]
     pieces = []
     # trimesh's own names of materials, from the last to the first, which records may have.
-    base = next((names[0] for names in keys if names[0]), path.name)
-    materials = list(dict.fromkeys(names[2] for names in keys))[::-1]
+    objects = {names.object for names in keys}
+    base = next((names.object for names in keys if names.object), path.name)
+    materials = list(dict.fromkeys(names.material for names in keys))[::-1]
     older = {name: f"{base}_{index}" if index else base for index, name in enumerate(materials)}
     for names, index in keys.items():
         used, inverse = np.unique(faces[owner == index], return_inverse=True)
         known = [name for name in names if name] or [path.name]
-        known += (
-            [older[names[2]]]
-            if len(materials) > 1 and older[names[2]] not in {key[0] for key in keys}
-            else []
-        )
+        if len(materials) > 1 and older[names.material] not in objects:
+            known.append(older[names.material])
         pieces.append(Piece(vertices[used], inverse.reshape(-1, 3), tuple(dict.fromkeys(known))))
     return pieces
 
 
 def stated_unit(path: Path) -> str:
-    """Return the unit that a comment at the start of an OBJ file names, as a word of `UNITS_M`; ""
-    where none does.
+    """Return the word of `UNITS_M` that a comment at the start of an OBJ file names, "" for none.
 
     Blender, SketchUp and others write such as "# File units = inches"; a comment names it after the
     word unit.
@@ -171,7 +183,9 @@ def stated_unit(path: Path) -> str:
             stated = re.match(
                 r"\s*#.*\bunits?\b\W*(?:(?:in|is|are)\b)?\W*1?\W*([a-z]+)", line, re.IGNORECASE
             )
-            for unit, pattern in words.items() if stated else ():
+            if not stated:
+                continue
+            for unit, pattern in words.items():
                 if re.fullmatch(pattern, stated[1], re.IGNORECASE):
                     return unit
     return ""

@@ -104,8 +104,9 @@ def kept(
     measured = held_against(exact, answering, samples)
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
-            f"--model: 8 bits fall from {measured['exact_percent']:.2f} to {measured['percent']:.2f} % of the "
-            f"validation fold, expected at most {FEWER_POINTS} points less"
+            f"--model: 8 bits fall from {measured['exact_percent']:.2f} to "
+            f"{measured['percent']:.2f} % of the validation fold, expected at most {FEWER_POINTS} "
+            "points less"
         )
     reduced = replace(reduced, measured=measured)
     out = zoo / f"{name}.safetensors"
@@ -141,9 +142,10 @@ def main(arguments: list[str]) -> None:
     samples = Source(views=options.views).samples(trained.scheme.columns, pairs, trained.size)
     measured = entry(options.model, samples, options.name, options.out, options.backbone)
     print(
-        f"{options.name}: {(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, validation "
-        f"{measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in 8 bits, "
-        f"{measured['changed']} of {measured['samples']} answers differ"
+        f"{options.name}: "
+        f"{(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, "
+        f"validation {measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in "
+        f"8 bits, {measured['changed']} of {measured['samples']} answers differ"
     )
 
 
