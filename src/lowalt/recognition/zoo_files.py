@@ -13,9 +13,8 @@ folder.
 
 def names(zoo: Path = ZOO) -> list[str]:
     """Return the names of all entries, sorted."""
-    return sorted(
-        {path.stem for folder in (zoo, SHIPPED / zoo) for path in folder.glob("*.safetensors")}
-    )
+    paths = [*zoo.glob("*.safetensors"), *(SHIPPED / zoo).glob("*.safetensors")]
+    return sorted({path.stem for path in paths})
 
 
 def path_of(model: str | Path, zoo: Path = ZOO) -> Path:
