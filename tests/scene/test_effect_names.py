@@ -16,7 +16,10 @@ ENGLISH = {"town", "clutter", "companions", "walls", "canceller", "detector", "f
 }
 """Names that sentences use as words: only in quotes, or behind `effects.`, do they name the effect."""
 OTHER_MEANINGS = {
-    "companions": ["scene/contract.py", "scene/chain.py"],
+    "companions": [
+        *("scene/contract.py", "scene/chain.py"),
+        *("shards/receive.py", "shards/record_types.py"),
+    ],
     "cross_sections": [
         *("scene/contract.py", "scene/chain.py", "scene/observe.py"),
         "scene/effects/channel/mean_cross_section.py",
@@ -28,7 +31,8 @@ OTHER_MEANINGS = {
     "town": ["extensions/benchmark/"],
     "walls": ["extensions/__init__.py", "extensions/town/"],
 }
-"""Files and folders in which a name means something else: a function of the contract, what
+"""Files and folders in which a name means something else: a function of the contract, a field of
+records and echoes, what
 `lowalt.receive` reads at, a kind of filter, a mean, a direction of samples, a part of the
 benchmark, a wall.
 """
