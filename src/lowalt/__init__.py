@@ -17,7 +17,7 @@ _HOMES = {
     "confusion": "recognition.train_evaluate",
     "draft_target": "extensions.drafting.scaled",
     "evaluate": "recognition.train_evaluate",
-    "inspect_recording": "recordings.file_inspection",
+    "inspect_recording": "extensions.recordings.file_inspection",
     "receive": "shards.receive",
     "train": "recognition.train_evaluate",
 }
