@@ -1,4 +1,4 @@
-"""Scenes and the benchmark's part clutter have the same signals whichever kernels a BLAS chooses, and with
+"""Scenes have the same signals whichever kernels a BLAS chooses, and with
 the vector registers of AVX2 as with those of this processor.
 
 The comparison is of double precision, before rounding to the kept precision hides all but a few
@@ -10,101 +10,32 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from emulation import EMULATED, able
+from blas_kernels import CORES, differing, signals
 
 ROOT = Path(__file__).parents[1]
-CORES = ("SkylakeX", "Haswell", "Nehalem", "Zen")
-"""Processors whose kernels OpenBLAS is told to choose. All run here: kernels that need more than
-this processor has are refused by OpenBLAS itself, which then takes others."""
-
-SMALLER = "Haswell"
-"""The one of them that NumPy, numba and the C library are told to be as well: it has no AVX-512."""
-
-PROBE = """
-import sys
-import numpy as np
-from lowalt.extensions.benchmark.definition import config_of
-from lowalt.config.layers import overlaid
-from lowalt.scene.chain import SceneSample
-from lowalt.shards.dataset import Dataset
-found = {}
-received = SceneSample.received
-def noted(sample):
-    result = received(sample)
-    found.setdefault(name, []).append(np.append(result.signal.astype(complex), result.power))
-    return result
-SceneSample.received = noted
-path, symbols, subtypes, *scenes = sys.argv[1:]
-for name in scenes:
-    config = config_of("clutter") if name == "clutter" else overlaid([f"config/scenes/{name}.yaml"])
-    config["targets"]["select"] = subtypes.split(",")
-    if int(symbols):
-        config["network"]["symbols"] = int(symbols)
-    dataset = Dataset(config)
-    for number in range(0, len(dataset), dataset.plan.models * len(dataset.plan.snrs)):
-        dataset.maker.signal(dataset.row(dataset.place(number)), np.inf)
-np.savez(path, **{name: np.stack(parts) for name, parts in found.items()})
-"""
-
-
-def started(folder: Path, core: str, *words: str) -> subprocess.Popen:
-    """A process that makes signals as on a processor and writes FOLDER/CORE.npz."""
-    more = {"OPENBLAS_CORETYPE": core, "PYTHONPATH": str(ROOT / "src"), "OMP_NUM_THREADS": "1"}
-    if core == SMALLER and able("avx2"):
-        more |= EMULATED["avx2"]
-    line = [sys.executable, "-W", "ignore", "-c", PROBE, str(folder / f"{core}.npz"), *words]
-    return subprocess.Popen(
-        line, cwd=ROOT, env=os.environ | more, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL
-    )
-
-
-def signals(
-    folder: Path, cores: tuple[str, ...], symbols: int, subtypes: str, *scenes: str
-) -> list[dict[str, np.ndarray]]:
-    """The signals of scenes by name, made with the kernels of each core; symbols: of a look, 0 for
-    all.
-    """
-    made = [started(folder, core, str(symbols), subtypes, *scenes) for core in cores]
-    for process in made:
-        _, said = process.communicate()
-        assert process.returncode == 0, said.decode()[-2000:]
-    return [dict(np.load(folder / f"{core}.npz")) for core in cores]
-
-
-def differing(made: list[dict[str, np.ndarray]]) -> list[tuple[str, str]]:
-    """Pairs (core, scene) whose signals are not those of the first core in every bit."""
-    first = made[0]
-    assert all(abs(values).max() > 0 for values in first.values())
-    return [
-        (core, name)
-        for core, values in zip(CORES, made, strict=False)
-        for name in first
-        if values[name].tobytes() != first[name].tobytes()
-    ]
+SCENES = ("config/scenes/triangle.yaml", "config/scenes/sensing.yaml")
 
 
 def test_signals_with_canceller_links_and_phase_noise_do_not_follow_the_processor(tmp_path):
     """Two scenes that call for most of the linear algebra; looks are short, and Zen, whose kernels
     are Haswell's, is left to the slow test, so that the processes take seconds."""
-    assert differing(signals(tmp_path, CORES[:3], 64, "Owl", "triangle", "sensing")) == []
+    assert differing(signals(tmp_path, CORES[:3], 64, "Owl", *SCENES)) == []
 
 
 SHIPPED = sorted(
-    path.stem for path in (ROOT / "config/scenes").glob("*.yaml") if path.stem != "paper"
+    f"config/scenes/{path.name}"
+    for path in (ROOT / "config/scenes").glob("*.yaml")
+    if path.stem != "paper"
 )
 
 
 @pytest.mark.slow
-def test_signals_of_every_shipped_scene_and_of_the_part_clutter_do_not_follow_the_processor(
-    tmp_path,
-):
-    made = signals(
-        tmp_path, CORES, 0, "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1", "clutter", *SHIPPED
-    )
-    assert set(made[0]) == {"clutter", *SHIPPED}
+def test_signals_of_every_shipped_scene_do_not_follow_the_processor(tmp_path):
+    subtypes = "DJI Mini 2,Owl,NIO ET5T 2023,Walking Pedestrian 1"
+    made = signals(tmp_path, CORES, 0, subtypes, *SHIPPED)
+    assert set(made[0]) == {Path(scene).stem for scene in SHIPPED}
     assert differing(made) == []
 
 

@@ -42,12 +42,12 @@ from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track,
 from lowalt.extensions.benchmark.confirm import Confirmed, confirm
 from lowalt.extensions.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
 from lowalt.extensions.benchmark.part_samples import TrackSamples
+from lowalt.extensions.formats.zoo import kept as keep
+from lowalt.extensions.formats.zoo_files import ZOO
 from lowalt.files.atomic import replacing, slug
 from lowalt.machine.hardware import describe
 from lowalt.recognition import model_file
 from lowalt.recognition.predictions import Predictions
-from lowalt.recognition.zoo import kept as keep
-from lowalt.recognition.zoo_files import ZOO
 
 OUT = Path(f"results/{RUN}-baselines")
 FIRST = "majority class"

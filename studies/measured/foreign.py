@@ -26,7 +26,7 @@ from lowalt.extensions.recordings.twin import Twin, radars
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
-from lowalt.recognition.zoo import opened
+from lowalt.recognition.runs import opened
 
 RECORDS = Path(__file__).with_name("foreign.yaml")
 COLUMNS = ("network", "input", "windows", "nothing", "clipped", "beyond", *CATEGORIES)

@@ -22,7 +22,7 @@ from lowalt.extensions.recordings.record import record
 from lowalt.extensions.recordings.twin_training import RECOGNITION, settings
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition.zoo import opened
+from lowalt.recognition.runs import opened
 
 RECORDS = Path(__file__).with_name("fourth_radar.yaml")
 KNOWN = "bird_drone_10ghz"

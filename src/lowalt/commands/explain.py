@@ -13,11 +13,11 @@ import numpy as np
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import merge, overlaid
-from lowalt.config.plan import Plan
 from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.progress import announced
+from lowalt.shards.plan import Plan
 from lowalt.spectra.catalogue import named
 from lowalt.targets.records import records_of
 from lowalt.workflow.space import cubes_sentence, cubes_size
@@ -150,7 +150,7 @@ def _shown(
     renderer = Renderer(seen, whole.spectra, whole.images)
     if model is not None:
         from lowalt.recognition.predict_sample import answer
-        from lowalt.recognition.zoo import opened
+        from lowalt.recognition.runs import opened
         from lowalt.tiles import split
 
         trained, _ = opened(model)

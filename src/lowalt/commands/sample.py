@@ -10,11 +10,12 @@ import numpy as np
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import overlaid
-from lowalt.config.sample_list import sample_key
 from lowalt.files.atomic import replacing, write_file
 from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset
-from lowalt.shards.receive import AT, alone, receive, write
+from lowalt.shards.kept_datasets import alone
+from lowalt.shards.receive import AT, receive, write
+from lowalt.shards.sample_list import sample_key
 from lowalt.tiles.png import encode
 
 

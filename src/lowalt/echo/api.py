@@ -64,8 +64,8 @@ def echo_signal(
         >>> from lowalt.config.layers import overlaid
         >>> network = Network.from_settings(overlaid([])["network"])
         >>> point = np.array([200.0, 100.0, 60.0])
-        >>> result = echo_signal(network, network.stations[0], np.tile(point, (network.symbols, 1,
-        1)), 0.01, point)
+        >>> still = np.tile(point, (network.symbols, 1, 1))
+        >>> result = echo_signal(network, network.stations[0], still, 0.01, point)
         >>> result.signal.shape, int(result.cell[0]), result.bound < 1e-12
         ((400,), 46, True)
     """
@@ -82,8 +82,8 @@ def echo_signal(
     bound = worst / largest if largest > 0 else np.inf if worst > 0 else 0.0
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
-            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 promises {bound:.1e} "
-            f"of its largest value, expected a larger tolerance or null"
+            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 "
+            f"promises {bound:.1e} of its largest value, expected a larger tolerance or null"
         )
     return EchoResult(
         found.values, found.cells, int(found.ties.sum()), bound, method, found.gaps, found.totals
@@ -134,8 +134,8 @@ def prepared(network, station, motion, rcs_m2, aim_m, sample):
     """
     if station.transmitter is not None:
         raise InputError(
-            f"{_named(sample)}station {station.name} is a link between two stations, expected a station that hears "
-            "itself; scenes with effects.direct_path have links"
+            f"{_named(sample)}station {station.name} is a link between two stations, expected a "
+            "station that hears itself; only scenes with effects have links"
         )
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
     radio = radar(network, station)
@@ -150,6 +150,6 @@ def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> 
         points = len(scene.part) or scene.translation.shape[1]
         n, l = divmod(fault - 1, points)  # noqa: E741
         raise InputError(
-            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the place of station "
-            f"{station.name} (r = 0), expected r > 0"
+            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the "
+            f"place of station {station.name} (r = 0), expected r > 0"
         )

@@ -77,7 +77,8 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(
-            f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number"
+            f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite "
+            "number"
         )
     # Copy a read-only array, because numba would compile the kernels a second time for it.
     return array if array.flags.writeable else array.copy()
@@ -101,7 +102,8 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
         part = np.ascontiguousarray(motion.part)
         if part.shape != (len(points),) or part.dtype.kind not in "iu":
             raise InputError(
-                f"{where}motion.part has shape {part.shape} and type {part.dtype}, expected ({len(points)},) integers"
+                f"{where}motion.part has shape {part.shape} and type {part.dtype}, expected "
+                f"({len(points)},) integers"
             )
         if part.min() < 0 or part.max() >= parts:
             raise InputError(
@@ -159,13 +161,15 @@ def check_station(network: Network, station: Station) -> None:
     """
     if not (np.isfinite(station.frequency_hz) and station.frequency_hz > 0):
         raise InputError(
-            f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive number"
+            f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive "
+            "number"
         )
     if np.shape(station.position_m) != (3,) or not all(
         map(math.isfinite, (*station.position_m, station.normal_rad))
     ):
         raise InputError(
-            f"station {station.name}: position_m {station.position_m} or normal_rad {station.normal_rad} is not finite"
+            f"station {station.name}: position_m {station.position_m} or normal_rad "
+            f"{station.normal_rad} is not finite"
         )
 
 

@@ -28,8 +28,8 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
     corners = np.array(masts_m if polygon_m is None else polygon_m, dtype=float)
     if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
         raise InputError(
-            f"motion: region polygon has shape {corners.shape}, expected three or more (x, y) corners in metres; "
-            "with fewer than three stations give motion.region.polygon_m"
+            f"motion: region polygon has shape {corners.shape}, expected three or more (x, y) "
+            "corners in metres; with fewer than three stations give motion.region.polygon_m"
         )
     try:
         hull = ConvexHull(corners).vertices
@@ -145,7 +145,8 @@ def draw_rates(
         )
     if moving and math.isnan(row["rate_hz"]):
         raise InputError(
-            f"motion of {cloud.subtype}: the table of targets has no freq_lo_hz, expected a rate in hertz"
+            f"motion of {cloud.subtype}: the table of targets has no freq_lo_hz, expected a rate "
+            "in hertz"
         )
     for index in range(moving):
         row[f"phase_{index}_rad"] = rng.uniform(0.0, 2 * math.pi)

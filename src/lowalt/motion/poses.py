@@ -95,7 +95,8 @@ def _angles(
     ]
     if bad:
         raise InputError(
-            f"motion of {cloud.subtype}, model {row['model']}: no finite rate or phase for parts {bad}"
+            f"motion of {cloud.subtype}, model {row['model']}: no finite rate or phase for parts "
+            f"{bad}"
         )
     return angles, phases
 
@@ -113,7 +114,8 @@ def _perturbed(
     still = sorted(set(added) - set(phases))
     if still:
         raise InputError(
-            f"motion of {cloud.subtype}: angles added to parts {still}, expected some of {sorted(phases)}"
+            f"motion of {cloud.subtype}: angles added to parts {still}, expected some of "
+            f"{sorted(phases)}"
         )
     for part, angle in added.items():
         name, phase = phases[part]
@@ -225,7 +227,8 @@ def poses(
     velocity = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
     if not np.isfinite([*origin, *velocity, *body.flat]).all():
         raise InputError(
-            f"motion of {cloud.subtype}, model {row['model']}: position, velocity or attitude not finite"
+            f"motion of {cloud.subtype}, model {row['model']}: position, velocity or attitude not "
+            "finite"
         )
     path = origin + times_s[:, None] * velocity
     if "turn_radps" in row:

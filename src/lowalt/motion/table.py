@@ -75,7 +75,8 @@ def read_table(path: str | Path) -> list[dict]:
         header = tuple(next(reader, ()))
         if header != (*COLUMNS, *_further(header)):
             raise InputError(
-                f"{path}: columns {sorted(set(header) ^ set(COLUMNS))} missing, unknown or out of order"
+                f"{path}: columns {sorted(set(header) ^ set(COLUMNS))} missing, unknown or out of "
+                "order"
             )
         return [_row(path, line, header, cells) for line, cells in enumerate(reader, start=2)]
 

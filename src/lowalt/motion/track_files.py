@@ -49,8 +49,9 @@ def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStart
     if len(outside):
         x, y, _ = place_m[outside[0]]
         raise InputError(
-            f"{path}: {outside[0] * look_s:g} s after its start at ({x:.1f}, {y:.1f}) m, outside the cell; expected a "
-            f"place in motion.region, at least {cell.clearance_m:g} m from all stations"
+            f"{path}: {outside[0] * look_s:g} s after its start at ({x:.1f}, {y:.1f}) m, outside "
+            f"the cell; expected a place in motion.region, at least {cell.clearance_m:g} m from "
+            "all stations"
         )
     return LookStarts(place_m, velocity_mps, _headings(velocity_mps))
 
@@ -61,8 +62,8 @@ def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
     named = METRES if rows and set(METRES) <= set(rows[0]) else DEGREES
     if len(rows) < 2 or not set(named) <= set(rows[0]):
         raise InputError(
-            f"{path}: {len(rows)} rows of the columns {list(rows[0]) if rows else []}, expected two or more of "
-            f"{list(METRES)} or {list(DEGREES)}"
+            f"{path}: {len(rows)} rows of the columns {list(rows[0]) if rows else []}, expected "
+            f"two or more of {list(METRES)} or {list(DEGREES)}"
         )
     values = np.array(
         [
@@ -74,8 +75,8 @@ def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
     if len(back):
         line = int(back[0])
         raise InputError(
-            f"{path}, line {line + 3}, column time_s: {values[line + 1, 0]:g} after {values[line, 0]:g}, expected "
-            "times that increase"
+            f"{path}, line {line + 3}, column time_s: {values[line + 1, 0]:g} after "
+            f"{values[line, 0]:g}, expected times that increase"
         )
     return values[:, 0], values[:, 1:] if named == METRES else _flat(
         values[:, 1:], cell.corners.mean(axis=0)

@@ -96,8 +96,9 @@ def _begun(rng: np.random.Generator, row: dict, cell: Cell) -> None:
         )
         row["yaw_rad"] = (row["yaw_rad"] + angle) % (2 * math.pi)
     raise InputError(
-        f"motion of {row['subtype']}: the region is too small for a turn of {math.degrees(TURN_RADPS):.0f} degrees a "
-        f"second at {float(portable.norm(velocity)):.1f} m/s, expected a larger one in motion.region.polygon_m"
+        f"motion of {row['subtype']}: the region is too small for a turn of "
+        f"{math.degrees(TURN_RADPS):.0f} degrees a second at {float(portable.norm(velocity)):.1f} "
+        "m/s, expected a larger one in motion.region.polygon_m"
     )
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.config.classes import label
-from lowalt.config.sample_list import sample_key
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import reported
 from lowalt.recognition import samples
@@ -24,6 +23,7 @@ from lowalt.scene.set_noise import in_all_cells
 from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.maker import Maker
+from lowalt.shards.sample_list import sample_key
 from lowalt.shards.sample_record import record
 from lowalt.shards.write import select
 from lowalt.spectra import Spectra

@@ -68,7 +68,8 @@ class Machine:
         elif gpu and place >= torch.cuda.device_count():
             count = torch.cuda.device_count()
             raise InputError(
-                f"training: process {place} of this machine finds {count} GPUs, expected no more processes than GPUs"
+                f"training: process {place} of this machine finds {count} GPUs, expected no more "
+                "processes than GPUs"
             )
         device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
@@ -111,8 +112,9 @@ class Machine:
         ]
         if layers and not self.gpu:
             raise InputError(
-                f"training: {self.ranks} processes on processors share no batch norm, and the backbone has "
-                f"{layers[0]}; expected GPUs, one process, or a backbone without batch norm"
+                f"training: {self.ranks} processes on processors share no batch norm, and the "
+                f"backbone has {layers[0]}; expected GPUs, one process, or a backbone without "
+                "batch norm"
             )
         return timm.layers.convert_sync_batchnorm(model)
 
@@ -133,10 +135,10 @@ class Machine:
         distributed.all_reduce(bounds, distributed.ReduceOp.MAX)
         if int(bounds.sum()):
             raise InputError(
-                f"training: rank {self.rank} computes in {self.precision} and stands at step {steps}, another rank "
-                "differs in that or in its samples; expected identical nodes that see the same "
-                "files (with an "
-                "explicit training.precision instead of auto, different nodes compute alike)"
+                f"training: rank {self.rank} computes in {self.precision} and stands at step "
+                f"{steps}, another rank differs in that or in its samples; expected identical "
+                "nodes that see the same files (with an explicit training.precision instead of "
+                "auto, different nodes compute alike)"
             )
 
 

@@ -108,7 +108,8 @@ def _accuracy(rows: list[dict[str, str]]) -> str:
         for row in rows
     ]
     return (
-        f"From the run's accuracy.csv: accuracy {whose}, with weights as trained, on the test fold of the protocol, "
+        f"From the run's accuracy.csv: accuracy {whose}, with weights as trained, on the test fold "
+        "of the protocol, "
         "evaluated as the run's\nconfiguration says (there, answers may be means over a sample and "
         "its mirror image; "
         "`lowalt predict` takes no such mean).\n\n"
@@ -180,7 +181,10 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
         expected = content.input.get("expected")
         measured = RADAR_ACCURACY.format(**expected) if expected else "Not stated.\n"
         limits = RADAR_LIMITS + (f"- {caution[0].upper()}{caution[1:]}.\n" if caution else "")
-        where = f"a radar of {radar['carrier_hz'] / 1e9:g} GHz with a\n{radar['channel']} channel, trained on its twin"
+        where = (
+            f"a radar of {radar['carrier_hz'] / 1e9:g} GHz with a\n{radar['channel']} channel, "
+            "trained on its twin"
+        )
     else:
         where = "base stations, trained"
         measured = _accuracy(accuracy)
@@ -188,8 +192,10 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
         limits = LIMITS
     parts = [
         f"---\n{yaml.safe_dump(front, sort_keys=False)}---\n\n# {name}\n",
-        f"A network that tells {', '.join(state['classes'])} apart by their echoes at {where} by lowalt "
-        f"{__version__}.\nProtocol {state['protocol']}: {MEANING.get(state['protocol'], 'of the user')}.\n",
+        f"A network that tells {', '.join(state['classes'])} apart by their echoes at {where} by "
+        "lowalt "
+        f"{__version__}.\nProtocol {state['protocol']}: "
+        f"{MEANING.get(state['protocol'], 'of the user')}.\n",
         "## Training\n",
         _table(("entry", "value"), facts),
         "## Accuracy\n",

@@ -31,7 +31,8 @@ def backbone(name: str, size: int) -> nn.Module:
     path = file_of(name)
     if path is None or not path.is_file():
         raise InputError(
-            f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that exists"
+            f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that "
+            "exists"
         )
     function = name.rpartition(":")[2]
     specification = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)

@@ -57,9 +57,9 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
 
     A signal of three stations, by a model of the zoo:
 
-        >>> from lowalt.recognition.zoo import opened
-        >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) **
-        1.4).astype(np.complex64))
+        >>> from lowalt.recognition.runs import opened
+        >>> signal = np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4)
+        >>> np.save("sample.npy", signal.astype(np.complex64))
         >>> model, settings = opened("default-seen")
         >>> list(predict(model, Path("sample.npy"), settings))
         ['UAV', 'Bird', 'Vehicle', 'Pedestrian']
@@ -82,6 +82,7 @@ def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> 
         shares = trained.model(views).double().softmax(1)[0]
     if not torch.isfinite(shares).all():
         raise InputError(
-            f"{trained.path}: answers {where} with numbers that are not finite, expected another model"
+            f"{trained.path}: answers {where} with numbers that are not finite, expected another "
+            "model"
         )
     return dict(zip(trained.classes, shares.tolist(), strict=True))

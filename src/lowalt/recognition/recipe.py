@@ -27,7 +27,8 @@ def check(block: dict) -> dict:
     block = OPTIONAL | block
     if block["accumulate"] > block["batch"]:
         raise InputError(
-            f"training: accumulate is {block['accumulate']}, expected at most batch, {block['batch']}"
+            f"training: accumulate is {block['accumulate']}, expected at most batch, "
+            f"{block['batch']}"
         )
     return block
 
@@ -106,7 +107,8 @@ def set_random_state(device: torch.device, states: dict[str, torch.Tensor]) -> N
     """
     if ("cuda" in states) != (device.type == "cuda"):
         raise InputError(
-            f"checkpoint: random states of {sorted(states)}, but this training runs on {device.type}"
+            f"checkpoint: random states of {sorted(states)}, but this training runs on "
+            f"{device.type}"
         )
     torch.set_rng_state(states["cpu"])
     if device.type == "cuda":

@@ -175,8 +175,9 @@ def checkpoint_activations(model: Recogniser) -> None:
         isinstance(layer, nn.modules.batchnorm._BatchNorm) for layer in model.backbone.modules()
     ):
         raise InputError(
-            f"training.activation_checkpointing: the backbone {name} has batch norms, whose running means would move "
-            "twice a step; expected a backbone without, such as Swin, ConvNeXt or ViT"
+            f"training.activation_checkpointing: the backbone {name} has batch norms, whose "
+            "running means would move twice a step; expected a backbone without, such as Swin, "
+            "ConvNeXt or ViT"
         )
     try:
         model.backbone.set_grad_checkpointing(True)

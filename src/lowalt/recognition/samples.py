@@ -236,7 +236,8 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
     count = len(spectra) * stations
     if images.ndim != 4 or images.shape[:2] != (len(facts), count) or images.dtype != np.uint8:
         raise InputError(
-            f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, S, S)"
+            f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, "
+            "S, S)"
         )
     return images[wanted][:, columns_in(columns, spectra, stations, str(path))], facts.take(wanted)
 

@@ -255,7 +255,8 @@ def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
     sets = sorted({run.classes for run in runs})
     if len(sets) != 1:
         raise InputError(
-            f"predictions of the classes {' and '.join(map(str, sets))}, expected one set of classes"
+            f"predictions of the classes {' and '.join(map(str, sets))}, expected one set of "
+            "classes"
         )
     return sets[0]
 

@@ -199,13 +199,17 @@ class Trainer:
         for name, value in self.model.state_dict().items():
             if value.is_floating_point() and not bool(value.isfinite().all()):
                 raise InputError(
-                    f"training: weights {name} are not finite after step {self.at.steps}; {self._advice}"
+                    f"training: weights {name} are not finite after step {self.at.steps}; "
+                    f"{self._advice}"
                 )
 
     @property
     def _advice(self) -> str:
         """Advice for the error message when numbers are not finite."""
-        return f"the last checkpoint is from before. Try a lower training.rate than {self.block['rate']}"
+        return (
+            "the last checkpoint is from before. Try a lower training.rate than "
+            f"{self.block['rate']}"
+        )
 
     def _rate(self, step: int) -> float:
         """Learning rate of a step (1, 2, ...), before a group's factor."""
@@ -236,7 +240,8 @@ class Trainer:
             )
             if self.at.skipped >= 10:
                 raise InputError(
-                    f"training: ten gradients in a row were not finite, last at step {self.at.steps}"
+                    "training: ten gradients in a row were not finite, last at step "
+                    f"{self.at.steps}"
                 )
         self.optimiser.zero_grad()
         self.at.steps += 1
@@ -340,10 +345,10 @@ class Trainer:
         if self.metrics:
             self.metrics(row["step"], {name: row[name] for name in HISTORY[3:]} | pace)
         print(
-            f"step {row['step']}/{self.block['steps']} loss {row['train_loss']:.4f} "
-            f"validation {100 * row['validation_accuracy']:.2f} % (loss {row['validation_loss']:.4f}) "
-            f"{pace['samples_per_s']:.0f} samples/s, {100 * pace['waiting_share']:.1f} % of the time waiting for data, "
-            f"{left:.0f} s left",
+            f"step {row['step']}/{self.block['steps']} loss {row['train_loss']:.4f} validation "
+            f"{100 * row['validation_accuracy']:.2f} % (loss {row['validation_loss']:.4f}) "
+            f"{pace['samples_per_s']:.0f} samples/s, {100 * pace['waiting_share']:.1f} % of the "
+            f"time waiting for data, {left:.0f} s left",
             file=sys.stderr,
             flush=True,
         )

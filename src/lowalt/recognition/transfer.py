@@ -55,8 +55,9 @@ def check_folds(own: dict, other: dict) -> None:
     """
     if own["seed"] == other["seed"] and own["split"] != other["split"]:
         raise InputError(
-            f"transfer: run {other['run']!r} has the same seed {own['seed']} and split {other['split']}, this run has "
-            f"{own['split']}; motion models tested here may have trained there. Expected equal splits"
+            f"transfer: run {other['run']!r} has the same seed {own['seed']} and split "
+            f"{other['split']}, this run has {own['split']}; motion models tested here may have "
+            "trained there. Expected equal splits"
         )
 
 
@@ -73,7 +74,8 @@ def comparison(
     for run in (*own, *other):
         if run.classes != own[0].classes:
             raise InputError(
-                f"transfer: {name} has the classes {run.classes}, expected {own[0].classes} as this run"
+                f"transfer: {name} has the classes {run.classes}, expected {own[0].classes} as "
+                "this run"
             )
         if not np.array_equal(run.test.key, test.key):
             raise InputError(

@@ -162,7 +162,7 @@ class View:
     element: Element | None = None
     """The antenna elements' pattern, None for isotropic ones."""
     occluders: dict | None = field(default=None, repr=False)
-    """The target's surfaces (see `occlusion`)."""
+    """The target's surfaces, where an effect needs them."""
     sampling: Sampling | None = None
     """Instants of all symbols and which are received, None for all at n T_r."""
 

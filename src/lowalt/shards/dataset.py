@@ -12,11 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lowalt.config.blocks import motion_block
 from lowalt.config.layers import SCHEMA, check
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
-from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
-from lowalt.config.sample_list import Place, SampleList
 from lowalt.config.splits import FOLDS
 from lowalt.files.errors import InputError, warn
 from lowalt.files.shipped import located, shipped
@@ -24,9 +22,14 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
+from lowalt.scene.effects import complete, needs_surfaces, of_record
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
+from lowalt.shards.plan import GROUPS, Plan
 from lowalt.shards.remake import CloudFolder
+from lowalt.shards.sample_list import Place, SampleList
 from lowalt.shards.sample_record import accompanied, record
+from lowalt.shards.sizes import cell_type
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import missing_inputs, records_of
@@ -116,6 +119,7 @@ class Dataset:
         inputs: str | Path | None = None,
         occluders: Mapping[str, dict] | None = None,
         published: dict[str, dict] | None = None,
+        records: dict[str, dict] | None = None,
     ) -> None:
         """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and
         choose groups and folds.
@@ -123,10 +127,11 @@ class Dataset:
         clouds: the clouds by subtype, or the folder of their files; by default they are made here,
         from the records that the configuration names and the folder `inputs` of meshes and
         recordings, each when it is first asked for.
-        occluders: each subtype's surfaces, for a scene with `occlusion`; by default made here if
+        occluders: each subtype's surfaces, for effects that need them; by default made here if
         the clouds are.
         published: the row of each subtype in the table of targets, which decides the classes; by
         default the records'.
+        records: the merged records of all targets; by default read from the configuration's files.
         Raises: InputError naming the key, value or file that is wrong.
         """
         if isinstance(config, (str, Path)):
@@ -134,11 +139,11 @@ class Dataset:
             config = check(load_yaml(config), shipped(SCHEMA))
             refuse_effects(config["effects"], path)
         self.config = config
-        records = {}
-        if published is None or clouds is None:
+        if records is None and (published is None or clouds is None):
             # A run's configuration names tables and records as seen from the checkout it was made
             # in.
             records = records_of(located(config)["targets"], inputs)
+        records = records or {}
         self.published = published or {name: item["published"] for name, item in records.items()}
         self.plan = Plan.of(config, self.published)
         self.listed = SampleList(self.plan, self.published, groups, folds)
@@ -153,7 +158,7 @@ class Dataset:
             if missing := missing_inputs(wanted, sources[-1]):
                 raise InputError("missing inputs:\n  " + "\n  ".join(missing))
             clouds = MadeOnDemand(made_cloud, *sources)
-            if occluders is None and "occlusion" in config["effects"]:
+            if occluders is None and needs_surfaces(config["effects"]):
                 occluders = MadeOnDemand(made_surfaces, *sources)
         self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
         self._masts = np.array(masts_m(config["network"]), float)
@@ -163,11 +168,15 @@ class Dataset:
         self._drawn: tuple[tuple, list[dict]] = (), []
         render = {key: config[key] for key in ("network", "spectra", "images")}
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
+        self._recorded = complete(of_record(config["effects"]))
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
         chosen = [self.published[name] for group in self.groups for name in self.plan.groups[group]]
         network = self.maker.network
-        for folds in filter(None, (network.folding(chosen), network.range_folding(self._corners))):
-            warn(folds)
+        texts = network.folding(chosen), network.range_folding(self._corners)
+        self.folding = tuple(text for text in texts if text)
+        """Warnings that speeds or ranges fold."""
+        for text in self.folding:
+            warn(text)
 
     def __len__(self) -> int:
         return len(self.listed)
@@ -206,7 +215,7 @@ class Dataset:
                 model_rows(self.plan.seed, *sources, self._motion, track, self._path),
             )
         row = {**self._drawn[1][look], "group": place.group, "model": place.model}
-        return accompanied(row, self.config["effects"], self.plan.seed, self.maker.network)
+        return accompanied(row, self._recorded, self.plan.seed, self.maker.network)
 
     def made_signal(self, place: Place) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""

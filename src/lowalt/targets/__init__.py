@@ -1,1 +1,1 @@
-"""Targets: from a subtype's record (built-in model, mesh or mocap) to its calibration point cloud."""
+"""Targets: from a subtype's record (built-in model, mesh or mocap) to its point cloud."""

@@ -31,14 +31,20 @@ def fault(record: dict) -> str | None:
     """Return the reason why a merged record is no aircraft of its layout, or None."""
     f = {name: value["si"] for name, value in record["figures"].items()}
     if "tip_chord" in f and not f["tip_chord"] <= f["root_chord"] < f["body_length"]:
-        return f"figures.root_chord is {f['root_chord']:.4g} m, expected from the tip's chord to the body's length"
+        return (
+            f"figures.root_chord is {f['root_chord']:.4g} m, expected from the tip's chord to the "
+            "body's length"
+        )
     if "wing_station" in f and not 0 < f["wing_station"] < 1:
         return (
             f"figures.wing_station is {f['wing_station']}, expected between 0 (nose) and 1 (tail)"
         )
     if f.get("boom_spacing", 0) >= record["published"]["size_m"]:
         span = record["published"]["size_m"]
-        return f"figures.boom_spacing is {f['boom_spacing']:.4g} m, expected less than the span of {span} m"
+        return (
+            f"figures.boom_spacing is {f['boom_spacing']:.4g} m, expected less than the span of "
+            f"{span} m"
+        )
     return None
 
 
@@ -163,18 +169,25 @@ def _cabin(f: dict) -> tuple[list[Surface], float, float]:
     long = f["body_length"]
     half = f["body_width"] / 2
     high = f["body_height"]
-    shape = ((0.5, 0.25, -0.25, 0.1), (0.4, 0.7, -0.42, 0.32), (0.15, 1, -0.5, 0.5), (-0.2, 0.95, -0.48, 0.5),
-             (-0.42, 0.55, -0.2, 0.42), (-0.5, 0.35, 0.0, 0.36))  # fmt: skip
-    cabin = hull(
-        [(y * long, w * half, a * high, b * high) for y, w, a, b in shape], 2.4, bow=0.03 * long
+    # Position to the front, half width, lower and upper edge, as shares of the cabin's measures.
+    shape = (
+        (0.5, 0.25, -0.25, 0.1),
+        (0.4, 0.7, -0.42, 0.32),
+        (0.15, 1, -0.5, 0.5),
+        (-0.2, 0.95, -0.48, 0.5),
+        (-0.42, 0.55, -0.2, 0.42),
+        (-0.5, 0.35, 0.0, 0.36),
     )
+    stations = [(y * long, w * half, low * high, top * high) for y, w, low, top in shape]
+    cabin = hull(stations, 2.4, bow=0.03 * long)
     top = 0.5 * high + f["mast_height"]
     start = -0.4 * long
     end = start - f["boom_length"]
     level = 0.2 * high
     wide = f["boom_diameter"] / 2
     mast = cylinder(0.06 * half, (0, 0, 0.4 * high), (0, 0, top))
-    return [cabin, mast, tube([(0, start, level), (0, end, level)], [wide, 0.7 * wide])], end, level
+    boom = tube([(0, start, level), (0, end, level)], [wide, 0.7 * wide])
+    return [cabin, mast, boom], end, level
 
 
 def _main_rotor(record: dict, f: dict) -> Part:
@@ -185,9 +198,7 @@ def _main_rotor(record: dict, f: dict) -> Part:
 
 
 def helicopter(record: dict, f: dict) -> list[Part]:
-    """Return a helicopter without a tail rotor: cabin, mast and main rotor, tail boom, two fins,
-    skids.
-    """
+    """Return a helicopter without a tail rotor: cabin, main rotor, tail boom, two fins, skids."""
     shells, end, level = _cabin(f)
     long = f["body_length"]
     half = f["body_width"] / 2
@@ -195,9 +206,8 @@ def helicopter(record: dict, f: dict) -> list[Part]:
     chord = 0.45 * f["fin_height"]
     reach = f["tail_span"] / 2
     shells += _both(foil([(0, end, level, chord, 0), (reach, end, level, chord, 0)], 0.1))
-    fin = foil(
-        [(-f["fin_height"] / 2, end, 0, chord, 0), (f["fin_height"] / 2, end, 0, chord, 0)], 0.1
-    )
+    half_fin = f["fin_height"] / 2
+    fin = foil([(-half_fin, end, 0, chord, 0), (half_fin, end, 0, chord, 0)], 0.1)
     shells += _both(fin.mapped(_UPRIGHT).moved((reach, 0, level)))
     foot = f["skid_track"] / 2
     low = -0.5 * high - f["skid_height"]
@@ -209,31 +219,31 @@ def helicopter(record: dict, f: dict) -> list[Part]:
 
 
 def tail_rotor(record: dict, f: dict) -> list[Part]:
-    """Return a helicopter with a tail rotor, its wheels drawn in: cabin, tail boom, tail plane, fin
-    and two rotors.
+    """Return a helicopter with a tail rotor, its wheels drawn in.
+
+    Its body is cabin, tail boom, tail plane and fin.
     """
     shells, end, level = _cabin(f)
     main = _main_rotor(record, f)
-    chord = 0.35 * f["fin_height"]
-    plane = foil(
-        [
-            (0, -f["tail_arm"], level, chord, 0),
-            (f["tail_span"] / 2, -f["tail_arm"], level, 0.8 * chord, 0),
-        ],
-        0.1,
-    )
+    fin_height = f["fin_height"]
+    chord = 0.35 * fin_height
+    arm = -f["tail_arm"]
+    plane = foil([(0, arm, level, chord, 0), (f["tail_span"] / 2, arm, level, 0.8 * chord, 0)], 0.1)
     fin = foil(
         [
-            (-0.4 * f["fin_height"], end - 0.3 * chord, 0, 0.6 * chord, 0),
+            (-0.4 * fin_height, end - 0.3 * chord, 0, 0.6 * chord, 0),
             (0, end, 0, 1.2 * chord, 0),
-            (0.6 * f["fin_height"], end - 0.5 * chord, 0, 0.7 * chord, 0),
+            (0.6 * fin_height, end - 0.5 * chord, 0, 0.7 * chord, 0),
         ],
         0.1,
     )
-    hub = (-0.6 * f["boom_diameter"], -f["tail_rotor_arm"], main.hinge[2] - f["tail_rotor_drop"])
+    _, _, main_height = main.hinge
+    hub_y = -f["tail_rotor_arm"]
+    hub_z = main_height - f["tail_rotor_drop"]
+    hub = (-0.6 * f["boom_diameter"], hub_y, hub_z)
     shells += [*_both(plane), fin.mapped(_UPRIGHT).moved((0, 0, level))]
     # The shaft from the fin to the tail rotor.
-    shells.append(cylinder(0.1 * f["boom_diameter"], (0, hub[1], hub[2]), hub, 8))
+    shells.append(cylinder(0.1 * f["boom_diameter"], (0, hub_y, hub_z), hub, 8))
     size = (f["tail_rotor_diameter"], f["tail_blade_chord"], f["tail_blade_count"])
     return [
         Part("body", "body", tuple(shells)),
@@ -247,9 +257,8 @@ def balloon(record: dict, f: dict) -> list[Part]:
     half = record["published"]["size_m"] / 2
     high = f["envelope_height"] / 2
     end = -high - f["line_length"]
-    load = box(
-        (f["load_width"], f["load_length"], f["load_height"]), (0, 0, end - f["load_height"] / 2)
-    )
+    size = (f["load_width"], f["load_length"], f["load_height"])
+    load = box(size, (0, 0, end - f["load_height"] / 2))
     line = tube([(0, 0, -0.99 * high), (0, 0, end)], 0.004, 6)
     return [Part("body", "body", (ellipsoid((half, half, high), sides=24), line, load))]
 

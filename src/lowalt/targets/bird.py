@@ -29,7 +29,10 @@ def fault(record: dict) -> str | None:
     f = {name: value["si"] for name, value in record["figures"].items()}
     long = f["bill"] + f["head"] + f["neck"] + f["tail"]
     if long > 0.9:
-        return f"figures bill, head, neck and tail add up to {long:.3g} of the length, expected at most 0.9"
+        return (
+            f"figures bill, head, neck and tail add up to {long:.3g} of the length, expected at "
+            "most 0.9"
+        )
     if f["span"] / f["length"] <= 2 * f["body_width"]:
         return f"figures.span is {f['span']:.3g} m, expected more than twice the body's width"
     if not 0.1 <= f["wrist"] <= 0.9:
@@ -38,9 +41,7 @@ def fault(record: dict) -> str | None:
 
 
 def _bill(front: float, root: float, depth: float) -> Surface:
-    """The slightly hooked bill from y = `root` to its tip at y = `front`; `depth` is its height at
-    the root.
-    """
+    """The slightly hooked bill from y = `root`, where it is `depth` high, to its tip at `front`."""
     sections = []
     for along, size, droop in ((0.0, 1.0, 0.0), (0.5, 0.85, 0.0), (0.88, 0.45, -0.12 * depth)):
         loop = superellipse(0.3 * size * depth, 0.5 * size * depth, 2.0, 12)
@@ -145,8 +146,10 @@ def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the bird that a merged record describes, and the entries `flap` and
-    `wing_span_m` for its cloud's record."""
+    """Return the parts of the bird that a merged record describes, and facts about its motion.
+
+    The facts, `flap` and `wing_span_m`, are for the cloud's record.
+    """
     f = {name: value["si"] for name, value in record["figures"].items()}
     length = record["published"]["size_m"]
     half_span = length * f["span"] / f["length"] / 2
@@ -155,27 +158,22 @@ def parts(record: dict) -> tuple[list[Part], dict]:
     shoulder = np.array([0.55 * body_half, forward, 0.45 * body_half])
     chord = f["wing_chord"] * half_span
     wrist = shoulder + np.array([f["wrist"] * (half_span - shoulder[0]), 0.35 * chord, 0])
-    segments = (_inner(shoulder, wrist, chord),), _outer(wrist, half_span, chord, f)
+    inner_right = _inner(shoulder, wrist, chord)
+    outer_right = _outer(wrist, half_span, chord, f)
     result = [Part("body", "body", _body(length, f))]
     for side, name in ((1, "right"), (-1, "left")):
-        place = np.diag([float(side), 1.0, 1.0])
+        mirror = np.diag([float(side), 1.0, 1.0])
         root = (side * shoulder[0], shoulder[1], shoulder[2])
-        inner, outer = (tuple(shell.mapped(place) for shell in shells) for shells in segments)
+        inner = (inner_right.mapped(mirror),)
+        outer = tuple(shell.mapped(mirror) for shell in outer_right)
         # The hinge's axis is -y on the right and +y on the left, so that a positive angle lifts the
         # tip.
         axis = (0.0, -float(side), 0.0)
         bend = (side * wrist[0], shoulder[1], shoulder[2])
         result.append(Part(f"{name} inner wing", "wing", inner, root, axis, weight=f["wrist"]))
         parent = len(result) - 1
+        share = 1 - f["wrist"]
         result.append(
-            Part(
-                f"{name} outer wing",
-                "wing",
-                outer,
-                bend,
-                axis,
-                parent=parent,
-                weight=1 - f["wrist"],
-            )
+            Part(f"{name} outer wing", "wing", outer, bend, axis, parent=parent, weight=share)
         )
     return result, {"flap": FLAP | record.get("flap", {}), "wing_span_m": 2 * half_span}

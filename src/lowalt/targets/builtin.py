@@ -18,10 +18,9 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "1": 1.0}
 
 
 def _figure(figure: list, kind: str, sources: dict, where: str) -> dict:
-    """Return the figure [value, unit, source] as a record: value, unit, source and the value in SI."""
-    value = figure[0]
-    unit = str(figure[1])
-    source = figure[2]
+    """Return the figure [value, unit, source] as a record that also has the value in SI units."""
+    value, unit, source = figure
+    unit = str(unit)
     units = [name for name in UNITS if (name != "1") == (kind == "length")]
     if unit not in units:
         raise InputError(f"{where}: unit is {unit!r}, expected one of {units}")
@@ -44,11 +43,8 @@ def check_record(merged: dict, where: str) -> dict:
     """
     category = like(merged)
     name = merged["model"]
-    models = {
-        known: model
-        for known, model in record_schema.schema()["models"].items()
-        if model["like"] == category
-    }
+    every = record_schema.schema()["models"]
+    models = {known: model for known, model in every.items() if model["like"] == category}
     if not models:
         raise InputError(
             f"{where}: source is 'builtin', which has no {category} model; expected gait or mocap"
@@ -57,12 +53,9 @@ def check_record(merged: dict, where: str) -> dict:
         raise InputError(f"{where}: model is {name!r}, expected one of {sorted(models)}")
     model = models[name]
     rotors = merged["published"]["n_rotors_or_wings"]
-    if others := sorted(
-        {"coaxial", "flap", "wheel_size"} & set(merged) - set(model.get("keys", []))
-    ):
-        raise InputError(
-            f"{where}: {others} are not for model {name}, expected {model.get('keys', [])} at most"
-        )
+    own_keys = model.get("keys", [])
+    if others := sorted({"coaxial", "flap", "wheel_size"} & set(merged) - set(own_keys)):
+        raise InputError(f"{where}: {others} are not for model {name}, expected {own_keys} at most")
     size_is = merged["size_is"]
     possible = model["size_is"]
     if size_is not in possible:
@@ -72,7 +65,8 @@ def check_record(merged: dict, where: str) -> dict:
     if rotors not in model.get("rotors", [rotors]):
         number = " or ".join(map(str, model["rotors"]))
         raise InputError(
-            f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not {rotors}"
+            f"{where}: model is {name}, expected n_rotors_or_wings {number} in its row, not "
+            f"{rotors}"
         )
     kinds = record_schema.figures(name)
     figures = merged.get("figures", {})
@@ -96,18 +90,15 @@ def check_record(merged: dict, where: str) -> dict:
 
 
 def checksum(record: dict) -> str:
-    """Return the SHA-256 of a record's canonical JSON (sorted keys, no spaces), 64 hexadecimal
-    digits.
-    """
-    return hashlib.sha256(
-        json.dumps(record, sort_keys=True, separators=(",", ":")).encode()
-    ).hexdigest()
+    """Return the SHA-256, 64 hexadecimal digits, of a record as JSON of sorted keys, no spaces."""
+    text = json.dumps(record, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def builtin_cloud(record: dict, seed: int) -> Cloud:
-    """Return the cloud of a merged record whose source is `builtin`; equal record and seed give
-    equal points.
+    """Return the cloud of a merged record whose source is `builtin`.
 
+    Equal record and seed give equal points.
     Raises: InputError where the record asks for fewer points than its parts need.
     """
     parts, facts = MODULES[like(record)].parts(record)

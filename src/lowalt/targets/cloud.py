@@ -234,7 +234,8 @@ def cloud_of(clouds: Mapping[str, Cloud], row: dict) -> Cloud:
     """
     if row["subtype"] not in clouds:
         raise InputError(
-            f"{row['subtype']}, model {row['model']}: no cloud of this subtype among {sorted(clouds)}"
+            f"{row['subtype']}, model {row['model']}: no cloud of this subtype among "
+            f"{sorted(clouds)}"
         )
     cloud = clouds[row["subtype"]]
     return scaled(cloud, row["scale"]) if "scale" in row else cloud

@@ -19,6 +19,13 @@ then 6.4 m/s.
 """
 RIM = 8
 """Points on each rim."""
+
+
+def _rim(wheel: str) -> tuple[str, ...]:
+    """The nodes around a wheel's rim, the first one again at the end."""
+    return (*(f"{wheel} rim {point + 1}" for point in range(RIM)), f"{wheel} rim 1")
+
+
 CHAINS = (
     ("head", "neck", "chest", "pelvis"),
     *both_sides("neck", "shoulder", "elbow", "hand"),
@@ -26,10 +33,8 @@ CHAINS = (
     ("rear hub", "bracket", "saddle", "rear hub"),
     ("bracket", "steerer", "saddle"),
     ("steerer", "front hub"),
-    *(
-        (*(f"{name} rim {point + 1}" for point in range(RIM)), f"{name} rim 1")
-        for name in ("front", "rear")
-    ),
+    _rim("front"),
+    _rim("rear"),
 )
 """Nodes that a line joins in pictures."""
 _BRACKET = np.array([0.0, -0.04, 0.27])

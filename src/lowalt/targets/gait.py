@@ -28,15 +28,28 @@ handbook.
 # Segment lengths are Winter's. The division of spine, neck, hand and foot among CMU's bones is an
 # estimate.
 _RIGHT = {
-    "hipjoint": (0.0955, 0, -0.045), "femur": (0, 0, -0.245), "tibia": (0, 0, -0.246),
-    "foot": (0, 0.077, -0.035), "toes": (0, 0.035, -0.004),
-    "clavicle": (0.1295, 0, 0), "humerus": (0, 0, -0.186), "radius": (0, 0, -0.146 * 2 / 3),
-    "wrist": (0, 0, -0.146 / 3), "hand": (0, 0, -0.05), "fingers": (0, 0, -0.058), "thumb": (0, 0.035, -0.03),
-}  # fmt: skip
+    "hipjoint": (0.0955, 0, -0.045),
+    "femur": (0, 0, -0.245),
+    "tibia": (0, 0, -0.246),
+    "foot": (0, 0.077, -0.035),
+    "toes": (0, 0.035, -0.004),
+    "clavicle": (0.1295, 0, 0),
+    "humerus": (0, 0, -0.186),
+    "radius": (0, 0, -0.146 * 2 / 3),
+    "wrist": (0, 0, -0.146 / 3),
+    "hand": (0, 0, -0.05),
+    "fingers": (0, 0, -0.058),
+    "thumb": (0, 0.035, -0.03),
+}
+"""Bones of the right side: right, front and up, as shares of the stature."""
 _MIDDLE = {
-    "lowerback": (0, 0, 0.081), "upperback": (0, 0, 0.081), "thorax": (0, 0, 0.081),
-    "lowerneck": (0, 0, 0.026), "upperneck": (0, 0, 0.026), "head": (0, 0, 0.130),
-}  # fmt: skip
+    "lowerback": (0, 0, 0.081),
+    "upperback": (0, 0, 0.081),
+    "thorax": (0, 0, 0.081),
+    "lowerneck": (0, 0, 0.026),
+    "upperneck": (0, 0, 0.026),
+    "head": (0, 0, 0.130),
+}
 _TRUNK_SHARE = {
     "lowerback": 1 / 3,
     "upperback": 2 / 3,
@@ -106,8 +119,7 @@ def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.
 def cycle_m(
     kind: str, stature_m: float, speed_mps: float, frames: int
 ) -> tuple[np.ndarray, float, float]:
-    """Return one cycle (frames, 31, 3) in metres, its duration (s) and the distance it covers on
-    the ground (m).
+    """Return one cycle (frames, 31, 3) m, its duration (s) and its distance on the ground (m).
 
     `kind` "walk" follows Boulic et al. 1990 at `speed_mps`; "run" follows `gait_run`, whose stride
     rate is fixed, so that the stride grows with the speed. Horizontal progress is left out; the
@@ -134,11 +146,8 @@ def cycle_m(
         stride = speed_mps * duration
     else:
         raise InputError(f"gait: {kind!r}, expected walk or run")
-    return (
-        forward_kinematics(root - portable.mean(root, 0), turned, bones_m(stature_m)),
-        duration,
-        stride,
-    )
+    nodes = forward_kinematics(root - portable.mean(root, 0), turned, bones_m(stature_m))
+    return nodes, duration, stride
 
 
 def stance_speed_mps(
@@ -148,12 +157,11 @@ def stance_speed_mps(
     height_m: float = 0.02,
     feet: list[int] = FEET,
 ) -> float:
-    """Return the mean ground speed (m/s) of the lowest foot node while it is within `height_m` of
-    the ground.
+    """Return the mean ground speed (m/s) of the lowest foot node while it carries the body.
 
-    `cycle` (F, L, 3) cyclic, `feet` the numbers of the foot nodes, front +y, horizontal progress
-    left out; `speed_mps` is added back. A foot that stands still has the speed zero. The ground is
-    the feet's lowest point.
+    A foot carries the body while it is within `height_m` of the ground. `cycle` (F, L, 3) cyclic,
+    `feet` the numbers of the foot nodes, front +y, horizontal progress left out; `speed_mps` is
+    added back. A foot that stands still has the speed zero. The ground is the feet's lowest point.
     """
     places = cycle[:, feet]
     velocity = (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)) * rate_hz / 2
@@ -190,24 +198,27 @@ def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], floa
 
 
 def check_record(merged: dict, where: str) -> dict:
-    """Return the merged record of a built-in walk or run, checked, with the defaults of `stature_m`
-    (the published height), `rate_hz` (400 frames per second) and `points` (one per node).
+    """Return the merged record of a built-in walk or run, checked, with its defaults.
 
+    They are `stature_m` (the published height), `rate_hz` (400 frames per second) and `points` (one
+    per node).
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
     if like(merged) != "Pedestrian":
         raise InputError(
-            f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or mesh"
+            f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or "
+            "mesh"
         )
     result = {"stature_m": merged["published"]["hgt_m"], "rate_hz": 400, **merged}
     if result.get("gait") == "trot":
         result = {"mass_kg": 30, **result}
     elif "mass_kg" in result:
         raise InputError(
-            f"{where}: mass_kg is given with gait {result.get('gait')!r}, expected it with trot alone"
+            f"{where}: mass_kg is given with gait {result.get('gait')!r}, expected it with trot "
+            "alone"
         )
     try:
-        names = _cycle(result, 8)[1]
+        _, names, _, _ = _cycle(result, 8)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     return result | {"points": len(names)}
@@ -220,7 +231,7 @@ def gait_cloud(record: dict, seed: int) -> Cloud:
     stride (m), cadence, height of the origin above ground (m) and foot speed in stance (m/s). The
     model draws no random numbers; `seed` is only written into the record.
     """
-    duration = _cycle(record, 2)[2]
+    _, _, duration, _ = _cycle(record, 2)
     # A cycle has a whole number of frames and keeps its duration, so the frame rate is adjusted a
     # little.
     track, names, duration, stride = _cycle(record, max(2, round(duration * record["rate_hz"])))
@@ -239,10 +250,8 @@ def gait_cloud(record: dict, seed: int) -> Cloud:
     if record["gait"] == "cycle":
         facts["cadence"] = "tied"  # wheels turn with the speed whatever `motion.cadence` is
     else:
-        feet = (
-            FEET
-            if names == NODES
-            else [number for number, name in enumerate(names) if name.endswith("paw")]
-        )
+        feet = FEET
+        if names != NODES:
+            feet = [number for number, name in enumerate(names) if name.endswith("paw")]
         facts["stance_foot_speed_mps"] = stance_speed_mps(track, rate, speed, feet=feet)
     return node_cloud(track, record | facts, names)

@@ -53,7 +53,8 @@ def timing(rv: float) -> tuple[float, float, float]:
     """
     if not 0 < rv <= 3:
         raise InputError(
-            f"gait: relative speed {rv:.3g} hip heights a second, expected more than 0 and at most 3"
+            f"gait: relative speed {rv:.3g} hip heights a second, expected more than 0 and at most "
+            "3"
         )
     length = 1.346 * np.sqrt(rv)
     duration = length / rv

@@ -85,31 +85,33 @@ def colours(cloud: Cloud) -> np.ndarray:
 
 
 def bones(names: tuple[str, ...]) -> list[tuple[int, int]]:
-    """Return the pairs of nodes that bones or bars join, by the names of a cloud's parts; none for
-    other clouds.
+    """Return the pairs of nodes, by the names of a cloud's parts, that bones or bars join.
+
+    There is none in a cloud whose parts are no nodes.
     """
     if names == NODES:
         return [(node, parent) for node, parent in enumerate(PARENTS) if parent >= 0]
     numbers = {name: number for number, name in enumerate(names)}
-    chains = [chain for chain in (*cyclist.CHAINS, *quadruped.CHAINS) if set(chain) <= set(numbers)]
-    return [(numbers[start], numbers[end]) for chain in chains for start, end in pairwise(chain)]
+    result = []
+    for chain in (*cyclist.CHAINS, *quadruped.CHAINS):
+        if set(chain) <= set(numbers):
+            result += [(numbers[start], numbers[end]) for start, end in pairwise(chain)]
+    return result
 
 
 def caption(cloud: Cloud) -> str:
-    """Return a cloud's name, points, source and size, and the distance between the ends of a
-    recording's cycle.
-    """
+    """Return a cloud's name, points, source and size, and how well a recording's cycle closes."""
     size = " x ".join(f"{value:.2g}" for value in np.ptp(cloud.points, axis=0))
     source = cloud.record["source"]
     gap = cloud.record.get("loop_mismatch_m")
-    closes = "" if source != "mocap" or gap is None else f" (closes to {100 * gap:.2g} cm)"
+    closes = ""
+    if source == "mocap" and gap is not None:
+        closes = f" (closes to {100 * gap:.2g} cm)"
     return f"{cloud.subtype}\n{len(cloud.points)} points, {source}{closes}, {size} m"
 
 
 def _panel(axes, cloud: Cloud, aspect: float) -> None:
-    """Draw a cloud that fills its panel, `aspect` times as high as wide, with bones and the nearer
-    points in front.
-    """
+    """Draw a cloud that fills its panel, which is `aspect` times as high as wide."""
     seen = shown(cloud)
     width, height = np.ptp(seen, axis=0)[:2]
     half = max(width, height / aspect) / 2 * 1.06
@@ -117,7 +119,7 @@ def _panel(axes, cloud: Cloud, aspect: float) -> None:
     # Bones between nodes show which nodes belong together.
     for bone in bones(cloud.names):
         axes.plot(*seen[list(bone), :2].T, color="#a1a1aa", linewidth=0.3 * size**0.5, zorder=0)
-    order = np.argsort(seen[:, 2])
+    order = np.argsort(seen[:, 2])  # The nearer points cover those behind.
     axes.scatter(*seen[order, :2].T, c=colours(cloud)[order], s=size, linewidths=0)
     axes.set(
         xlim=(-half, half),

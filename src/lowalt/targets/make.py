@@ -43,7 +43,8 @@ def refuse_source(record: dict, inputs: Path | None) -> None:
         raise InputError(f"settings: record.source is {source!r}, expected one of {SOURCES}")
     if source in ("mesh", "mocap") and inputs is None:
         raise InputError(
-            f"{record['subtype']}: source {source} needs the folder of real inputs, expected --inputs DIR"
+            f"{record['subtype']}: source {source} needs the folder of real inputs, expected "
+            "--inputs DIR"
         )
 
 

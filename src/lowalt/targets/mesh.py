@@ -47,11 +47,10 @@ FEWEST_SAMPLES = 100
 def pools(
     record: dict, inputs_dir: Path, rng: np.random.Generator
 ) -> tuple[dict[str, Pool], float]:
-    """Return the pool of every part by name, in body axes and the mesh's own size, and the closed
-    share of the body.
+    """Return the pool of every part by name, and the closed share of the body.
 
-    `record` is a checked mesh record. The closed share is that of the triangles in watertight
-    components.
+    Pools are in body axes and the mesh's own size. `record` is a checked mesh record. The closed
+    share is that of the triangles in watertight components.
     Raises: InputError naming the file, or the part whose region holds nothing.
     """
     frame = body_axes(record["front"], record["up"])
@@ -76,28 +75,27 @@ def pools(
     for name, part in parts.items():
         if part["kind"] != "body":
             cut[name] = hinged(cut[name], part, frame[2], frame[1], f"{where}: parts.{name}")
-    turned = {
-        name: replace(
+    turned = {}
+    for name, pool in cut.items():
+        turned[name] = replace(
             pool,
-            **{
-                key: portable.applied(frame, getattr(pool, key))
-                for key in ("points", "normals", "hinge", "axis")
-            },
+            points=portable.applied(frame, pool.points),
+            normals=portable.applied(frame, pool.normals),
+            hinge=portable.applied(frame, pool.hinge),
+            axis=portable.applied(frame, pool.axis),
         )
-        for name, pool in cut.items()
-    }
-    return turned, float(np.count_nonzero(mesh.closed[mesh.component]) / len(mesh.component))
+    closed_triangles = np.count_nonzero(mesh.closed[mesh.component])
+    return turned, float(closed_triangles / len(mesh.component))
 
 
 def _thinned(
     pool: Pool, count: int, where: str, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return a part's points and normals (count, 3): those that bound it, then others spread evenly
-    by `thin`.
-    """
+    """Return a part's points and normals (count, 3): corners, then others spread by `thin`."""
     if len(pool.points) < count:
         raise InputError(
-            f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a larger part"
+            f"{where}: {len(pool.points)} dense samples, expected {count}: fewer points or a "
+            "larger part"
         )
     pick = np.arange(len(pool.points))
     if len(pick) > pool.corners + THINNED * count:

@@ -98,8 +98,8 @@ def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     for parent in root.iter():
         if _name(parent) == "instance_controller":
             raise InputError(
-                f"{path}: has a skin or morph (instance_controller), expected plain surfaces: apply it "
-                "before exporting, or export GLB"
+                f"{path}: has a skin or morph (instance_controller), expected plain surfaces: "
+                "apply it before exporting, or export GLB"
             )
         if _name(parent) == "mesh":
             for element in parent:

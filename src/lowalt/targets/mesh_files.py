@@ -1,8 +1,8 @@
 """Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a
 target.
 
-OBJ, PLY and GLB have readers of their own (`mesh_polygons`, `mesh_glb`), which say why; trimesh
-reads STL and DAE and places a scene's surfaces. pymeshlab repairs, since its filters keep two
+OBJ has a reader of its own (`mesh_polygons`), which says why; trimesh reads STL and DAE and places
+a scene's surfaces; extensions offer readers of other formats. pymeshlab repairs, since its filters keep two
 million triangles within seconds and a gigabyte; sampling is that of `surfaces`, which is seeded
 (pymeshlab's sampling takes no seed and misses the count).
 """
@@ -12,6 +12,7 @@ import logging
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -21,11 +22,10 @@ from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import for_trimesh, stated_metres, stated_up
-from lowalt.targets.mesh_glb import read_glb
-from lowalt.targets.mesh_polygons import Piece, read_obj, read_ply, stated_unit
+from lowalt.targets.mesh_polygons import Piece, read_obj, stated_unit
 from lowalt.targets.surfaces import Surface, merged
 
-SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
+OWN_SUFFIXES = (".stl", ".obj", ".dae")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 LARGEST_TRIANGLES = 20_000_000
 """A file with more triangles is refused, since its arrays alone would take over two gigabytes."""
@@ -63,25 +63,46 @@ def metres(unit: str | float) -> float:
 def stated_unit_m(path: Path) -> float | None:
     """Return the metres that a mesh file says its unit has, None where it says nothing.
 
-    COLLADA states it (`<unit meter="...">`), an OBJ may in a comment; a GLB is in metres by its
-    standard; STL and PLY have no unit. Source: COLLADA 1.4.1, element unit; glTF 2.0, section 3.4.
+    COLLADA states it (`<unit meter="...">`), an OBJ may in a comment, an extension's format may by
+    its standard; STL has no unit. Source: COLLADA 1.4.1, element unit.
     Raises: InputError where a COLLADA file is no XML.
     """
     kind = path.suffix.lower()
     if kind == ".obj":
         return UNITS_M.get(stated_unit(path))
-    return stated_metres(path) if kind == ".dae" else 1.0 if kind == ".glb" else None
+    if kind == ".dae":
+        return stated_metres(path)
+    return getattr(_added(kind), "METRES", None)
 
 
 def stated_up_axis(path: Path) -> str | None:
-    """Return the axis that a mesh file's format or its own statement says is up, None where neither
-    says so.
+    """Return the axis that a mesh file or its format says is up, None where neither says so.
 
-    Source: glTF 2.0, section 3.4 (y up, z front); COLLADA 1.4.1, element up_axis.
+    Source: COLLADA 1.4.1, element up_axis.
     Raises: InputError where a COLLADA file is no XML.
     """
     kind = path.suffix.lower()
-    return "y" if kind == ".glb" else stated_up(path) if kind == ".dae" else None
+    if kind == ".dae":
+        return stated_up(path)
+    return getattr(_added(kind), "UP", None)
+
+
+def suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all files that are read, those of extensions last."""
+    from lowalt.config.extensions import offered
+
+    return (*OWN_SUFFIXES, *offered("meshes"))
+
+
+def _added(suffix: str) -> ModuleType | None:
+    """The module of the extension that reads files of this suffix, None where none does."""
+    if suffix in OWN_SUFFIXES:
+        return None
+    # Looking for extensions takes longer than making a built-in cloud.
+    from lowalt.config.extensions import module_offered, offered
+
+    readers = offered("meshes")
+    return module_offered("meshes", suffix, readers[suffix]) if suffix in readers else None
 
 
 def _scene(path: Path) -> list[Piece]:
@@ -99,28 +120,20 @@ def _scene(path: Path) -> list[Piece]:
     scene = trimesh.load_scene(**source, process=False)
     result = []
     for node in sorted(scene.graph.nodes_geometry):
-        place, name = scene.graph[node]
+        pose, name = scene.graph[node]
         # A chain of transforms is multiplied by the machine's BLAS; its last bits are rounded away.
-        place = np.round(place, 12)
+        pose = np.round(pose, 12)
         mesh = scene.geometry[name]
         if not isinstance(mesh, trimesh.Trimesh):
             continue
-        more = next(
-            (
-                named
-                for key, named in names.items()
-                if re.fullmatch(re.escape(key) + r"(_\d+)?", name)
-            ),
-            [],
-        )
-        piece = Piece(
-            np.asarray(mesh.vertices),
-            np.asarray(mesh.faces),
-            tuple(dict.fromkeys((str(node), name, *more))),
-        )
+        # trimesh numbers the surfaces of one geometry.
+        known = [key for key in names if re.fullmatch(re.escape(key) + r"(_\d+)?", name)]
+        more = names[known[0]] if known else []
+        chosen_by = tuple(dict.fromkeys((str(node), name, *more)))
+        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), chosen_by)
         # Values that are not finite are refused later, by name.
         with np.errstate(invalid="ignore"):
-            result.append(piece.mapped(place[:3, :3]).moved(place[:3, 3]))
+            result.append(piece.mapped(pose[:3, :3]).moved(pose[:3, 3]))
     return result
 
 
@@ -136,8 +149,8 @@ def _refuse_truncated(path: Path) -> None:
     is_text = head.startswith(b"solid") and b"facet" in head
     if not is_text and len(head) >= 84 and there < stated:
         raise InputError(
-            f"{path}: the header states {stated} triangles and the file ends after {there}, expected the "
-            "whole file: copy or export it again"
+            f"{path}: the header states {stated} triangles and the file ends after {there}, "
+            "expected the whole file: copy or export it again"
         )
 
 
@@ -148,9 +161,13 @@ def pieces(path: Path) -> list[Piece]:
     read.
     """
     path = existing(path, "mesh")
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
-    read = {".obj": read_obj, ".glb": read_glb, ".ply": read_ply}.get(path.suffix.lower(), _scene)
+    kind = path.suffix.lower()
+    added = _added(kind)
+    if added is None and kind not in OWN_SUFFIXES:
+        raise InputError(f"{path}: format {path.suffix!r}, expected one of {suffixes()}")
+    read = read_obj if kind == ".obj" else _scene
+    if added is not None:
+        read = added.pieces
     with reading(path, f"{path.suffix} mesh"):
         if path.suffix.lower() == ".stl":
             _refuse_truncated(path)
@@ -185,9 +202,8 @@ def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
         mixed ^= mixed >> np.uint64(29)
         mixed = (mixed + bits[:, column]) * np.uint64(0xBF58476D1CE4E5B9)
     _, first, inverse = np.unique(mixed, return_index=True, return_inverse=True)
-    if not np.array_equal(
-        vertices[first][inverse], vertices
-    ):  # two different vertices with one hash: about never
+    # Two different vertices with one hash: about never.
+    if not np.array_equal(vertices[first][inverse], vertices):
         _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     return vertices[first], inverse.reshape(-1)[faces]
 
@@ -201,8 +217,9 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
         import pymeshlab
     except ImportError as error:
         raise InputError(
-            f"mesh records need pymeshlab, which does not load here ({error}); on a machine without a display install "
-            "the system's OpenGL libraries (Debian: libgl1 libopengl0), or use built-in records"
+            f"mesh records need pymeshlab, which does not load here ({error}); on a machine "
+            "without a display install the system's OpenGL libraries (Debian: libgl1 libopengl0), "
+            "or use built-in records"
         ) from None
     vertices, faces = _merged(vertices, faces)
     meshes = pymeshlab.MeshSet(verbose=False)
@@ -217,9 +234,7 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the edges (E, 2) of triangles (F, 3) by their vertices, one triangle that each bounds,
-    and how many do.
-    """
+    """Return the edges (E, 2) of triangles (F, 3), one triangle of each, and how many share it."""
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     _, first, uses = np.unique(key, return_index=True, return_counts=True)
@@ -227,8 +242,10 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
-    """Return a surface with its connected components, faces that share a vertex being connected,
-    and each closed component turned outward."""
+    """Return a surface with its connected components, each closed one turned outward.
+
+    Faces that share a vertex are connected.
+    """
     links = np.concatenate([faces[:, :2], faces[:, 1:]])
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(len(vertices), len(vertices)))
     label = connected_components(graph, directed=False)[1]
@@ -248,7 +265,7 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
 
 
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
-    """Return the repaired mesh of an STL, OBJ, PLY, DAE or GLB file in metres along the file's own
+    """Return the repaired mesh of a file of a format in `suffixes`, in metres along the file's own
     axes.
 
     `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry`
@@ -267,7 +284,10 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     faces = np.asarray(whole.faces, np.int64)
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
-        text = f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record is followed"
+        text = (
+            f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record "
+            "is followed"
+        )
         warn(text)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")

@@ -86,14 +86,11 @@ def pool_of(mesh: Mesh, count: int, rng: np.random.Generator) -> Pool:
 
 
 def inside(points: np.ndarray, region: dict) -> np.ndarray:
-    """Return whether each point (N, 3) lies in a region's box or cylinder, borders included; shape
-    (N,).
-    """
+    """Return whether each point (N, 3) lies in a region's box or cylinder, borders included."""
     if "box" in region:
-        low, high = (
-            np.array([limit if value is None else value for value in corner], float)
-            for corner, limit in zip(region["box"], (-np.inf, np.inf), strict=True)
-        )
+        lowest, highest = region["box"]
+        low = np.array([-np.inf if value is None else value for value in lowest], float)
+        high = np.array([np.inf if value is None else value for value in highest], float)
         return ((points >= low) & (points <= high)).all(axis=1)
     cylinder = region["cylinder"]
     away = points - np.array(cylinder["centre"])
@@ -118,10 +115,10 @@ def taken(pool: Pool, mesh: Mesh, region: dict) -> np.ndarray:
 
 
 def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) -> None:
-    """Refuse regions (by part) that take the same surface, since the order of parts would decide
-    which part gets it.
+    """Refuse regions (by part) that take the same surface.
 
-    Two regions may touch: they may share SHARED_LIMIT of the samples of the smaller one.
+    The order of parts would decide which part gets it. Two regions may touch: they may share
+    SHARED_LIMIT of the samples of the smaller one.
     Raises: InputError naming `where` and the two parts.
     """
     masks = {name: taken(pool, mesh, region) for name, region in regions.items()}
@@ -130,8 +127,8 @@ def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) 
         smaller = min(int(left.sum()), int(right.sum()))
         if shared > SHARED_LIMIT * smaller:
             raise InputError(
-                f"{where}: the regions of parts {first!r} and {second!r} take the same surface ({shared} "
-                f"of {smaller} samples), expected disjoint regions"
+                f"{where}: the regions of parts {first!r} and {second!r} take the same surface "
+                f"({shared} of {smaller} samples), expected disjoint regions"
             )
 
 
@@ -190,13 +187,12 @@ def cut_parts(
         else:
             pools[name] = sampled(surface(part, record, inputs_dir), False)
         if not len(pools[name].points):
-            low, high = (
-                [float(f"{value:.3g}") for value in limit]
-                for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
-            )
+            low = [float(f"{value:.3g}") for value in mesh.vertices.min(axis=0)]
+            high = [float(f"{value:.3g}") for value in mesh.vertices.max(axis=0)]
             raise InputError(
-                f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface, which "
-                f"reaches from {low} to {high} m; is the unit {record['unit']!r} right?"
+                f"{where}: parts.{name}.region holds nothing of the body, expected a part of its "
+                f"surface, which reaches from {low} to {high} m; is the unit {record['unit']!r} "
+                "right?"
             )
     for region in record["drop"]:
         body = body.picked(~taken(body, mesh, region))

@@ -41,6 +41,8 @@ largest extent: that of a single blade without its hub."""
 FEWEST_WHEELS = 3
 OFF_MIDDLE = 0.1
 """A part stands on one side where it is farther from the middle than this share of its own size."""
+LISTED = 4
+"""A message names this many parts of one fault."""
 SPANS = (0.7, 6.0)
 """Least and largest wing span of a bird in parts of its published length, which measures 1.2 to 5.5
 in the table.
@@ -48,53 +50,52 @@ in the table.
 
 
 def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
-    """Return the first cause why a part's place, axis or shape is not that of its kind, "" where
-    there is none.
+    """Return why a part's position, axis or shape is not that of its kind, "" where it is.
 
     body (2, 3): the lowest and highest corner of the body, m. A wrong axis also makes a wheel wide
     and a wrong `up` turns its axis, so only the cause is named and not what follows from it.
     """
     low = pool.points.min(axis=0)
     high = pool.points.max(axis=0)
-    middle, (width, length, height) = (low + high) / 2, high - low
+    middle = (low + high) / 2
+    width, length, height = high - low
     if kind == "wheel":
         below, above = body[:, 2]
         if abs(pool.axis[0]) < ACROSS:
             way = ("right", "front", "up")[int(np.abs(pool.axis).argmax())]
             along = np.round(np.abs(pool.axis), 3).tolist()
             return (
-                f"axle points {way}, {along} (right, front, up), expected right or left: is `front` (--front) or "
-                "`up` (--up) another axis, or is it no wheel that rolls?"
+                f"axle points {way}, {along} (right, front, up), expected right or left: is "
+                "`front` (--front) or `up` (--up) another axis, or is it no wheel that rolls?"
             )
         if middle[2] > (below + above) / 2:
             return (
-                f"centre lies {middle[2] - below:.3g} m above the lowest point of a body {above - below:.3g} m "
-                "high, expected the lower half: is `up` (--up) reversed?"
+                f"centre lies {middle[2] - below:.3g} m above the lowest point of a body "
+                f"{above - below:.3g} m high, expected the lower half: is `up` (--up) reversed?"
             )
         # Twin wheels on one axle are wider than high, but round about it.
-        if width > ROUND * min(length, height) and max(length, height) > ROUND * min(
-            length, height
-        ):
+        shorter = min(length, height)
+        if width > ROUND * shorter and max(length, height) > ROUND * shorter:
             return (
-                f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m across, expected "
-                "a wheel that is thinnest along its axle"
+                f"surface measures {width:.3g} m along its axle and {length:.3g} x {height:.3g} m "
+                "across, expected a wheel that is thinnest along its axle"
             )
     elif kind == "rotor":
         reach = float((high - low).max())
         away = float(np.linalg.norm(middle - pool.hinge))
         if away > OFF_HUB * reach:
             return (
-                f"hinge lies {away:.3g} m from the middle of its surface, which reaches {reach:.3g} m, expected "
-                "the hub"
+                f"hinge lies {away:.3g} m from the middle of its surface, which reaches "
+                f"{reach:.3g} m, expected the hub"
             )
     else:
-        hinge, centre = (
-            place[0] - body[:, 0].mean() for place in (pool.hinge, pool.points.mean(axis=0))
-        )
+        middle_x = body[:, 0].mean()
+        hinge = pool.hinge[0] - middle_x
+        centre = pool.points.mean(axis=0)[0] - middle_x
         if abs(hinge) > abs(centre) or (hinge * centre < 0 and abs(hinge) > 0.1 * abs(centre)):
             return (
-                f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's middle, expected "
-                "the hinge between body and wing"
+                f"hinge lies {hinge:.3g} m and its surface {centre:.3g} m right of the body's "
+                "middle, expected the hinge between body and wing"
             )
     return ""
 
@@ -102,11 +103,10 @@ def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:
 def _doubts(
     of_kind: dict[str, list[Pool]], category: str, count: int | None, body: np.ndarray
 ) -> Iterator[str]:
-    """Yield what is unusual but possible about the parts of each kind. Wings are those that hang on
-    the body.
+    """Yield what is unusual but possible about the parts of each kind.
 
-    body (2, 3): the lowest and highest corner of the body, m; its middle parts left from right,
-    wherever the file's origin lies.
+    of_kind: the wings in it are those that hang on the body. body (2, 3): the lowest and highest
+    corner of the body, m; its middle divides left from right, wherever the file's origin lies.
     """
     middle = body[:, 0].mean()
     wheels = len(of_kind["wheel"])
@@ -117,9 +117,8 @@ def _doubts(
         yield f"{rotors} rotors, expected the {count} of its row"
     for kind in ("wheel", "wing"):
         offsets = np.array([pool.points[:, 0].mean() - middle for pool in of_kind[kind]])
-        width = max(
-            (float(np.ptp(pool.points, axis=0).max()) for pool in of_kind[kind]), default=0.0
-        )
+        extents = [float(np.ptp(pool.points, axis=0).max()) for pool in of_kind[kind]]
+        width = max(extents, default=0.0)
         # The wheels of a bicycle stand in the middle.
         aside = np.abs(offsets) > OFF_MIDDLE * width
         if len(offsets) > 1 and aside.all() and len(set(np.sign(offsets))) < 2:
@@ -127,18 +126,18 @@ def _doubts(
 
 
 def refuse_span(parts: dict[str, Pool], where: str) -> None:
-    """Refuse a bird whose wing span does not fit the length that its row states; a mesh is scaled
-    as a whole.
+    """Refuse a bird whose wing span does not fit the length that its row states.
 
+    A mesh is scaled as a whole, so that scaling cannot correct the ratio.
     Raises: InputError naming `where`, both sizes and what was expected.
     """
     low, high = _bounds(parts)
     span, length, _ = high - low
     if not SPANS[0] <= span / length <= SPANS[1]:
         raise InputError(
-            f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to tail, "
-            f"expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or `up` (--up) "
-            "another axis?"
+            f"{where}: its wings span {span:.3g} m and it measures {length:.3g} m from bill to "
+            f"tail, expected a span of {SPANS[0]} to {SPANS[1]} lengths: is `front` (--front) or "
+            "`up` (--up) another axis?"
         )
 
 
@@ -170,7 +169,9 @@ def refuse_implausible(
         if fault := _fault(kind, pool, body):
             faults.setdefault(fault, []).append(name)
     for fault, names in faults.items():
-        listed = ", ".join(names[:4]) + f" and {len(names) - 4} more" * (len(names) > 4)
+        listed = ", ".join(names[:LISTED])
+        if len(names) > LISTED:
+            listed += f" and {len(names) - LISTED} more"
         raise InputError(f"{where}: {listed}: its {fault}")
     if category == "Bird":
         refuse_span(parts, where)
@@ -186,55 +187,74 @@ def _refuse_size(
     whole_m: float,
     row_m: float | None = None,
 ) -> None:
-    """Raise InputError if a size is more than the record's limit away from `wanted_m`; all in
-    metres.
+    """Refuse a size (m) that differs from `wanted_m` by more than the record's limit.
 
-    measure: what has the size, such as "the whole mesh"; whole_m: the mesh's largest extent. The
-    error has the line to
-    write: the unit with which the size fits best, or else the scale that fits and the size of a row
-    of its own, `row_m` or by default the size.
+    measure: what has the size, such as "the whole mesh"; whole_m: the mesh's largest extent.
+    Raises: InputError with the line to write: the unit with which the size fits best, or else the
+    scale that fits and the size of a row of its own, `row_m` or by default the size.
     """
     limit = record["scale_limit"]
     unit = record["unit"]
-    if 1 / limit <= wanted_m / max(size_m, 1e-12) <= limit:
+    ratio = wanted_m / max(size_m, 1e-12)
+    if 1 / limit <= ratio <= limit:
         return
     numbers = size_m / metres(unit)
-    off = (
-        {name: abs(np.log(numbers * unit_m / wanted_m)) for name, unit_m in UNITS_M.items()}
-        if size_m
-        else {}
-    )
-    best = min(off, key=off.get, default="")
-    if best and off[best] <= np.log(limit):
-        way = f"write `unit: {best}` (--unit {best}), with which it measures {numbers * UNITS_M[best]:.4g} m"
+    misfits = {}
+    if size_m:
+        for name, unit_m in UNITS_M.items():
+            misfits[name] = abs(np.log(numbers * unit_m / wanted_m))
+    best = min(misfits, key=misfits.get, default="")
+    if best and misfits[best] <= np.log(limit):
+        way = (
+            f"write `unit: {best}` (--unit {best}), with which it measures "
+            f"{numbers * UNITS_M[best]:.4g} m"
+        )
     else:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
         own = f"`row: {{{key}: {row_m or size_m:.4g}}}`"
-        fitting = f"`unit: {metres(unit) * wanted_m / max(size_m, 1e-12):.4g}` (metres for 1.0 in the file)"
+        fitting = (
+            f"`unit: {metres(unit) * wanted_m / max(size_m, 1e-12):.4g}` (metres for 1.0 in the "
+            "file)"
+        )
         size = f"`lowalt target new --size {whole_m * wanted_m / max(size_m, 1e-12):.4g}`"
-        way = f"no unit fits: write {fitting} or draft it with {size}, or give it a row with its own size, {own}"
+        way = (
+            f"no unit fits: write {fitting} or draft it with {size}, or give it a row with its own "
+            f"size, {own}"
+        )
     raise InputError(
-        f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
-        f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit {unit!r} right? {way}"
+        f"{record['subtype']}: {measure} measures {size_m:.4g} m where {wanted_m:.4g} m is "
+        f"published: {max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the "
+        f"unit {unit!r} right? {way}"
     )
 
 
 def _bounds(parts: dict[str, Pool]) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and the highest coordinates (3,) of all parts' points."""
     low = np.min([pool.points.min(axis=0) for pool in parts.values()], axis=0)
-    return low, np.max([pool.points.max(axis=0) for pool in parts.values()], axis=0)
+    high = np.max([pool.points.max(axis=0) for pool in parts.values()], axis=0)
+    return low, high
+
+
+def _motor_diagonal_m(parts: dict[str, Pool], kinds: dict[str, str], where: str) -> float:
+    """Return the largest distance (m) between two hubs. Raises: InputError for less than two."""
+    hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
+    if len(hubs) < 2:
+        raise InputError(
+            f"{where}: size_is is 'motor diagonal' for {len(hubs)} rotors, expected at least two"
+        )
+    return portable.norm(hubs[:, None] - hubs[None]).max()
 
 
 def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[np.ndarray, dict]:
-    """Return the scale factors (3,) along right, front and up, and the facts about sizes for the
-    cloud's record.
+    """Return the scale factors (3,) along right, front and up, and the record's facts about sizes.
 
     The mesh is compared with the published size even where the record asks for no scaling, to find
     a wrong unit.
     Raises: InputError where mesh and published size differ by more than the record's limit, or
     where `size_is` is the motor diagonal and there are fewer than two rotors.
     """
-    extent = np.subtract(*_bounds(parts)[::-1])
+    low, high = _bounds(parts)
+    extent = high - low
     size_is = record["size_is"]
     where = record["subtype"]
     row = record["published"]
@@ -243,18 +263,11 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
         size = extent
         wanted = np.array([row["wid_m"], row["len_m"], row["hgt_m"]])
     else:
-        measured = {"width": extent[0], "length": extent[1], "height": extent[2]}.get(
-            size_is, whole
-        )
+        width, length, height = extent
+        extents = {"width": width, "length": length, "height": height}
+        measured = extents.get(size_is, whole)
         if size_is == "motor diagonal":
-            hubs = np.array(
-                [pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"]
-            )
-            if len(hubs) < 2:
-                raise InputError(
-                    f"{where}: size_is is {size_is!r} for {len(hubs)} rotors, expected at least two"
-                )
-            measured = portable.norm(hubs[:, None] - hubs[None]).max()
+            measured = _motor_diagonal_m(parts, kinds, where)
             # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not
             # show a wrong unit. Other sizes are the mesh's own: a gull's span may be more than
             # `limit` times its length.
@@ -267,13 +280,16 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
         largest = float(np.ptp(pool.points, axis=0).max())
         if kinds[name] != "body" and largest < whole / SMALLEST_PART:
             raise InputError(
-                f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, expected at "
-                f"least 1/{SMALLEST_PART} of it; is the unit of its file right?"
+                f"{where}: part {name} measures {largest:.3g} m in a mesh of {whole:.3g} m, "
+                f"expected at least 1/{SMALLEST_PART} of it; is the unit of its file right?"
             )
     ratio = wanted / size
-    scale = {"published": ratio, "uniform": np.full(3, ratio[1]), "none": np.ones(3)}[
-        record["scale"]
-    ]
+    if record["scale"] == "published":
+        scale = ratio
+    elif record["scale"] == "uniform":
+        scale = np.full(3, ratio[1])
+    else:
+        scale = np.ones(3)
     return scale, {"mesh_extent_m": extent.tolist(), "scale_factors": scale.tolist()}
 
 
@@ -287,12 +303,11 @@ def _turned_radius(pool: Pool) -> float:
 def sized(
     record: dict, parts: dict[str, Pool], kinds: dict[str, str], category: str
 ) -> tuple[dict[str, Pool], dict]:
-    """Return the pools scaled and centred, and the facts that the cloud's record gets; category:
-    that it is like.
+    """Return the pools scaled and centred, and the facts that the cloud's record gets.
 
-    Wheels stay round: they are scaled about their hinge to the published diameter (or by the car's
-    mean factor) and set on the ground. The origin is the middle of the extents; in plan, a
-    multirotor's is the middle of its hubs.
+    category: the published class that the target is like. Wheels stay round: they are scaled about
+    their hinge to the published diameter (or by the car's mean factor) and set on the ground. The
+    origin is the middle of the extents; in plan, a multirotor's is the middle of its hubs.
     """
     scale, facts = factors(record, parts, kinds)
     ground = _bounds(parts)[0][2] * scale[2]
@@ -300,26 +315,23 @@ def sized(
     for name, pool in parts.items():
         normals = pool.normals / scale
         normals /= portable.norm(normals)[:, None]
-        result[name] = replace(
-            pool, points=pool.points * scale, normals=normals, hinge=pool.hinge * scale
-        )
+        hinge = pool.hinge * scale
+        result[name] = replace(pool, points=pool.points * scale, normals=normals, hinge=hinge)
         if kinds[name] == "wheel":
             raw = 2 * _turned_radius(pool)
-            published = record["wheel_size"] == "published" and record["scale"] != "none"
-            diameter = (
-                record["published"]["wheel_diam_m"]
-                if published
-                else raw * float(np.sqrt(scale[1] * scale[2]))
-            )
-            hinge = np.array([*(pool.hinge * scale)[:2], ground + diameter / 2])
+            if record["wheel_size"] == "published" and record["scale"] != "none":
+                diameter = record["published"]["wheel_diam_m"]
+            else:
+                diameter = raw * float(np.sqrt(scale[1] * scale[2]))
+            hinge = np.array([*hinge[:2], ground + diameter / 2])
             points = (pool.points - pool.hinge) * (diameter / raw) + hinge
             result[name] = replace(pool, points=points, hinge=hinge)
             facts["wheel_diameter_m"] = diameter
         diameter = 2 * _turned_radius(result[name]) if kinds[name] == "rotor" else np.inf
         if diameter < SMALLEST_ROTOR_M:
             raise InputError(
-                f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the final size, "
-                f"expected at least {SMALLEST_ROTOR_M} m"
+                f"{record['subtype']}: rotor {name} has a diameter of {diameter:.2g} m at the "
+                f"final size, expected at least {SMALLEST_ROTOR_M} m"
             )
     low, high = _bounds(result)
     middle = (low + high) / 2

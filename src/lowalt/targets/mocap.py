@@ -25,9 +25,9 @@ CMU_HZ = 120
 """Rate of CMU's recordings, which their files do not say."""
 
 LONG = 20
-"""A recording longer than this many times the cycle used gives a warning, because it may hold other
-motions.
-"""
+"""A recording of more than this many cycles gives a warning, as it may hold other motions."""
+SLOWEST_MPS = 0.05
+"""A recording that drifts slower than this has no direction that could be turned to the front."""
 
 
 def check_record(merged: dict, where: str) -> dict:
@@ -43,7 +43,8 @@ def check_record(merged: dict, where: str) -> dict:
         raise InputError(f"{where}: skeleton is missing, expected the .asf of {merged['motion']}")
     if like(merged) != "Pedestrian":
         raise InputError(
-            f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or mesh"
+            f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or "
+            "mesh"
         )
     defaults = {
         "first_frame": 1,
@@ -87,56 +88,55 @@ def _read(paths: list[Path], record: dict) -> tuple[mocap_motion.Motion, int]:
 
 
 def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
-    """Return the cloud of a recording: its best cycle on the 31 nodes, which faces +y and stays in
-    its place.
+    """Return the cloud of a recording: its best cycle on the 31 nodes, which faces +y.
 
     `record` is a merged record that `check_record` has passed; its files are relative to
     `inputs_dir`. The cloud's record says which frames were used, the mismatch that the fade closes
-    (m), speed, scale and the height of the origin above ground. The uniform drift is taken out; the
-    bob and sway of the root stay. Nothing is drawn at random: the record keeps `seed`, and nothing
-    else depends on it.
+    (m), speed, scale and the height of the origin above ground. The uniform drift is taken out, so
+    that the body stays where it is; the bob and sway of the root stay. Nothing is drawn at random:
+    the record keeps `seed`, and nothing else depends on it.
     Raises: InputError naming file and frame for a faulty recording, and where it does not move.
     """
     paths = [Path(inputs_dir) / name for name in record_files(record)]
     where = str(paths[-1])
-    first = record["first_frame"]
     motion, first = _read(paths, record)
     rate_hz = motion.rate_hz
     most = record["max_acceleration_mps2"]
     mocap_motion.refuse_glitches(mocap_motion.nodes_m(motion), rate_hz, most, where, first)
-    mocap_motion.refuse_short(len(motion.root_m), motion.rate_hz, where)
+    mocap_motion.refuse_short(len(motion.root_m), rate_hz, where)
     start, end, fade, mismatch = mocap_motion.find_cycle(motion)
     if mismatch > record["max_mismatch_m"]:
         raise InputError(
-            f"{where}: the best cycle, frames {first + start} to {first + end - 1}, closes to {mismatch:.3f} m "
-            f"(root mean square over the nodes), expected at most max_mismatch_m = {record['max_mismatch_m']} m: "
-            "choose first_frame and last_frame around a steady gait"
+            f"{where}: the best cycle, frames {first + start} to {first + end - 1}, closes to "
+            f"{mismatch:.3f} m (root mean square over the nodes), expected at most max_mismatch_m "
+            f"= {record['max_mismatch_m']} m: choose first_frame and last_frame around a steady "
+            "gait"
         )
     cycle, drift = mocap_motion.closed(motion, start, end, fade)
     looped = mocap_motion.nodes_m(cycle)
     seam = np.concatenate([looped, looped[:2]])
     mocap_motion.refuse_glitches(seam, rate_hz, most, f"{where} (its closed cycle)", first + start)
     speed = float(portable.norm(drift))
-    if speed < 0.05:
+    if speed < SLOWEST_MPS:
         raise InputError(
             f"{where}: moves {speed:.3f} m/s, expected a walk or run to turn to the front"
         )
     stature = stature_m(motion.bones_m)
     scale = record["published"]["hgt_m"] / stature if record["scale"] == "published" else 1.0
     track = mocap_motion.nodes_m(mocap_motion.front(cycle, drift)) * scale
-    if "rate_hz" not in record and where.lower().endswith(
-        ".amc"
-    ):  # whose rate neither file nor record says
-        mocap_motion.refuse_strange_rate(
-            track, motion.rate_hz, speed * scale, stature * scale, where
-        )
+    # An AMC file says no rate, so that one of another rate would walk at the wrong speed.
+    if "rate_hz" not in record and where.lower().endswith(".amc"):
+        mocap_motion.refuse_strange_rate(track, rate_hz, speed * scale, stature * scale, where)
     if len(motion.root_m) > LONG * (end - start):
-        text = f"{where}: of {len(motion.root_m)} frames {first + start} to {first + end - 1} are used, which close best"
+        text = (
+            f"{where}: of {len(motion.root_m)} frames {first + start} to {first + end - 1} are "
+            "used, which close best"
+        )
         warn(f"{text}; first_frame and last_frame choose others")
     sums = {name: sha256(path) for name, path in zip(record_files(record), paths, strict=True)}
     facts = {
-        "track_rate_hz": float(motion.rate_hz),
-        "cycle_s": len(track) / motion.rate_hz,
+        "track_rate_hz": float(rate_hz),
+        "cycle_s": len(track) / rate_hz,
         "track_speed_mps": speed * scale,
         "frames_used": [first + start, first + end - 1],
         "fade_frames": fade,
@@ -144,7 +144,7 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
         "recorded_stature_m": stature,
         "scale_factor": scale,
         "origin_height_m": float(-track[..., 2].min()),
-        "stance_foot_speed_mps": stance_speed_mps(track, motion.rate_hz, speed * scale),
+        "stance_foot_speed_mps": stance_speed_mps(track, rate_hz, speed * scale),
         "files_sha256": sums,
         "checksum": sums[record["motion"]],
         "seed": seed,

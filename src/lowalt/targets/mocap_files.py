@@ -1,8 +1,7 @@
-"""Reading CMU's skeleton (.asf) and motion (.amc) text files into arrays; every error names the
-file and the frame.
+"""Reading CMU's skeleton (.asf) and motion (.amc) text files into arrays.
 
-This module knows only the formats; `mocap` turns the bones by the angles. File axes: x left, y up,
-z front.
+Every error names the file and the frame. This module knows only the formats; `mocap` turns the
+bones by the angles. File axes: x left, y up, z front.
 Source: Acclaim's ASF/AMC format as the CMU Graphics Lab Motion Capture Database writes it.
 """
 
@@ -19,7 +18,8 @@ from lowalt.numerics import portable
 from lowalt.targets.skeleton import LIMBS, NODES
 
 INCH_M = 0.0254
-_DOF = ("tx", "ty", "tz", "rx", "ry", "rz")
+_ROTATIONS = ("rx", "ry", "rz")
+_MOVES = ("tx", "ty", "tz")
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,8 @@ def _sections(path: Path) -> dict[str, list[list[str]]]:
         if words[0].startswith(":"):
             section = sections.setdefault(words[0].lower(), [])
             words = words[1:]
-        section += [words] if words else []
+        if words:
+            section.append(words)
     return sections
 
 
@@ -64,6 +65,26 @@ def _blocks(lines: list[list[str]]) -> dict[str, dict[str, list[str]]]:
         elif words[0] != "end" and blocks:
             blocks[-1].setdefault(words[0].lower(), words[1:])
     return {block["name"][0]: block for block in blocks}
+
+
+def _refuse_other_nodes(path: Path, hierarchy: list[list[str]]) -> None:
+    """Raise InputError where the lines `parent child child ...` are not those of the 31 nodes."""
+    parents = {}
+    for parent, *children in hierarchy:
+        parents |= dict.fromkeys(children, parent)
+    if parents != LIMBS:
+        wrong = sorted(name for name in {*parents, *LIMBS} if parents.get(name) != LIMBS.get(name))
+        raise InputError(f"{path}: hierarchy differs from CMU's 31 nodes at {wrong}")
+
+
+def _strange_channels(dofs: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    """The nodes whose channels CMU's files do not have: all turn, and the root alone moves."""
+    result = {}
+    for name, channels in dofs.items():
+        allowed = {*_MOVES, *_ROTATIONS} if name == "root" else set(_ROTATIONS)
+        if not set(channels) <= allowed:
+            result[name] = channels
+    return result
 
 
 def read_skeleton(path: str | Path) -> Skeleton:
@@ -80,10 +101,7 @@ def read_skeleton(path: str | Path) -> Skeleton:
     units = {words[0].lower(): words[1:] for words in sections[":units"]}
     if units.get("angle") != ["deg"]:
         raise InputError(f"{path}: units angle is {units.get('angle')}, expected deg")
-    parents = {child: words[0] for words in sections[":hierarchy"] for child in words[1:]}
-    if parents != LIMBS:
-        wrong = sorted(name for name in {*parents, *LIMBS} if parents.get(name) != LIMBS.get(name))
-        raise InputError(f"{path}: hierarchy differs from CMU's 31 nodes at {wrong}")
+    _refuse_other_nodes(path, sections[":hierarchy"])
     root = {words[0].lower(): words[1:] for words in sections[":root"]}
     bones = np.zeros((len(NODES), 3))
     axes = np.zeros((len(NODES), 3))
@@ -96,15 +114,13 @@ def read_skeleton(path: str | Path) -> Skeleton:
             block = named[name]
             index = NODES.index(name)
             direction = np.array([float(word) for word in block["direction"]])
-            if float(block["length"][0]) < 0:
-                raise InputError(
-                    f"{path}: length of {name} is {block['length'][0]}, expected at least 0"
-                )
-            bones[index] = direction / portable.norm(direction) * float(block["length"][0])
-            if block["axis"][3].upper() != "XYZ":
-                raise InputError(
-                    f"{path}: axis order of {name} is {block['axis'][3]!r}, expected XYZ"
-                )
+            length = block["length"][0]
+            if float(length) < 0:
+                raise InputError(f"{path}: length of {name} is {length}, expected at least 0")
+            bones[index] = direction / portable.norm(direction) * float(length)
+            axis_order = block["axis"][3]
+            if axis_order.upper() != "XYZ":
+                raise InputError(f"{path}: axis order of {name} is {axis_order!r}, expected XYZ")
             axes[index] = np.radians([float(word) for word in block["axis"][:3]])
             dofs[name] = tuple(word.lower() for word in block.get("dof", []))
     except (KeyError, IndexError, ValueError, ZeroDivisionError) as error:
@@ -114,14 +130,11 @@ def read_skeleton(path: str | Path) -> Skeleton:
     order = root.get("axis", ["xyz"])[0].upper()
     if order != "XYZ":
         raise InputError(f"{path}: axis order of root is {order!r}, expected XYZ")
-    wrong = {
-        name: dof
-        for name, dof in dofs.items()
-        if not set(dof) <= set(_DOF[0 if name == "root" else 3 :])
-    }
+    wrong = _strange_channels(dofs)
     if wrong or len(dofs["root"]) != 6 or any(fixed):
         raise InputError(
-            f"{path}: root order, offset or dof not as in CMU's files ({wrong or fixed or dofs['root']})"
+            f"{path}: root order, offset or dof not as in CMU's files "
+            f"({wrong or fixed or dofs['root']})"
         )
     if not (np.isfinite(bones).all() and np.isfinite(axes).all() and 0 < unit_m < math.inf):
         raise InputError(f"{path}: a length, direction or axis is not finite")
@@ -131,10 +144,10 @@ def read_skeleton(path: str | Path) -> Skeleton:
 def _frames(
     path: Path, skeleton: Skeleton, first: int, last: int | None
 ) -> tuple[dict[int, dict[str, list[float]]], bool]:
-    """Return the numbers of each node by frame, `first` to `last` by the file's own numbers, and
-    whether the file says before its first frame that its angles are in radians. A clip cut out of a
-    longer one may begin at any frame.
+    """Return the numbers of each node by frame, and whether the file's angles are in radians.
 
+    Frames are `first` to `last` by the file's own numbers; a clip cut out of a longer one may begin
+    at any frame. A file says before its first frame that its angles are in radians.
     Raises: InputError naming file and frame, as `read_motion`.
     """
     frames: dict[int, dict[str, list[float]]] = {}
@@ -167,7 +180,10 @@ def _frames(
 
 
 def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
-    """Return the numbers of a line of a frame. Raises: InputError naming `where` for a fault in it."""
+    """Return the numbers of a line of a frame.
+
+    Raises: InputError naming `where` for a fault in it.
+    """
     expected = len(skeleton.dofs.get(words[0], ()))
     try:
         values = [float(word) for word in words[1:]]
@@ -184,12 +200,12 @@ def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
 def read_motion(
     path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None
 ) -> tuple[dict[str, np.ndarray], int]:
-    """Return the channels (F, channels) of each node that has any, frames `first` to `last` by the
-    file's own numbers, both inclusive, and the number of the first: a file that begins later is
-    read from its first frame.
+    """Return the channels (F, channels) of each node that has any, and the first frame's number.
 
-    Values in file units and degrees; a file that says `:RADIANS` is converted. Frames outside
-    first..last are not checked, so that a record can leave out frames with known faults.
+    Frames are `first` to `last` by the file's own numbers, both inclusive; a file that begins later
+    is read from its first frame. Values in file units and degrees; a file that says `:RADIANS` is
+    converted. Frames outside first..last are not checked, so that a record can leave out frames
+    with known faults.
     Raises: InputError naming file and frame: a frame that lacks a node or comes out of order, a
     value that is no finite number, a node twice, an all-zero root, a frame equal to the one before
     it, fewer than two frames left.
@@ -210,10 +226,10 @@ def read_motion(
             raise InputError(
                 f"{path}: frame {frame} lacks {lacking}, expected all nodes (end it by last_frame)"
             )
-    motion = {
-        name: np.array([frames[frame][name] for frame in range(first, first + count)])
-        for name in needed
-    }
+    motion = {}
+    for name in needed:
+        rows = [frames[frame][name] for frame in range(first, first + count)]
+        motion[name] = np.array(rows)
     if radians:
         for name, values in motion.items():
             turns = [dof[0] == "r" for dof in skeleton.dofs[name]]
@@ -221,12 +237,14 @@ def read_motion(
     empty = first + np.flatnonzero(~motion["root"].any(axis=1))
     if len(empty):
         raise InputError(
-            f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by first_frame)"
+            f"{path}: frame {empty[0]} has an all-zero root, expected a tracked one (begin by "
+            "first_frame)"
         )
     still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
         raise InputError(
-            f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not frozen"
+            f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not "
+            "frozen"
         )
     return motion, first

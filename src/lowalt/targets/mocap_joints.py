@@ -1,5 +1,4 @@
-"""Recordings as people have them, BVH and arrays of joint positions (AMASS, SMPL): to a motion of
-the 31 nodes.
+"""Recordings of joints, BVH and arrays of positions (AMASS, SMPL), as a motion of the 31 nodes.
 
 Joints are known by their names; nodes between joints lie on the line between them, and those beyond
 the wrists and the head go on straight. Sources: Biovision's BVH as Meredith and Maddock describe it
@@ -9,6 +8,7 @@ the wrists and the head go on straight. Sources: Biovision's BVH as Meredith and
 import re
 import zipfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,23 +56,35 @@ NAMES = {
     "head": "head",
 }
 """Names of a joint by what it joins, the surest first, without the side and in small letters."""
+WORDS = tuple(dict.fromkeys(" ".join(NAMES.values()).split()))
+"""Every name of a joint once; after l or r it shows that the letter is a side."""
 BEYOND = {"wrist": 0.1, "hand": 0.35, "fingers": 0.6, "thumb": 0.35}
-"""Nodes beyond the wrist, in parts of the forearm."""
+"""Nodes beyond the wrist, as shares of the forearm."""
+RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
+"""Names of a frame rate (Hz) in an .npz file, the surest first."""
 MOST_NUMBERS = 100_000_000
+
+
+class _Joint(NamedTuple):
+    """A joint of a BVH file: its parent ("" at the root), its OFFSET (3,) and its CHANNELS."""
+
+    name: str
+    parent: str
+    offset: np.ndarray
+    channels: list[str]
 
 
 def _plain(name: str) -> tuple[str, str]:
     """A joint's side ("l", "r" or "") and its name without it, in small letters."""
     word = re.sub(r"[^a-z0-9]", "", re.sub(r"^.*[:|]", "", name).lower())
-    side = re.match(
-        f"left|right|[lr](?={'|'.join(dict.fromkeys(' '.join(NAMES.values()).split()))})", word
-    )
-    return (side[0][0], word[side.end() :]) if side else ("", word)
+    side = re.match(f"left|right|[lr](?={'|'.join(WORDS)})", word)
+    if side is None:
+        return "", word
+    return side[0][0], word[side.end() :]
 
 
 def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
-    """Return the positions (F, 31, 3) of the nodes, in the joints' unit and axes, from positions
-    (F, 3) by joint.
+    """Return the positions (F, 31, 3) of the nodes from those (F, 3) of joints, in their unit.
 
     A joint `NAME/end` is the end of a chain. Raises: InputError naming the joint that no name
     tells.
@@ -86,7 +98,8 @@ def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
                 return known[side, word]
         side = {"l": "left ", "r": "right "}.get(side, "")
         raise InputError(
-            f"{where}: no joint is called a {side}{part}, expected {NAMES[part].split()} among {sorted(joints)[:40]}"
+            f"{where}: no joint is called a {side}{part}, expected {NAMES[part].split()} among "
+            f"{sorted(joints)[:40]}"
         )
 
     places = {"root": joints[joint("root")]}
@@ -134,7 +147,8 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
     """
     if not np.isfinite(nodes).all() or len(nodes) < 2 or np.abs(nodes).max() > 1e6:
         raise InputError(
-            f"{where}: {len(nodes)} frames with places that are not finite, expected two good ones or more"
+            f"{where}: {len(nodes)} frames with places that are not finite, expected two good ones "
+            "or more"
         )
     reach = np.mean(nodes[:, NODES.index("head")] - nodes[:, NODES.index("ltibia")], axis=0)
     axis = int(np.abs(reach).argmax())
@@ -155,9 +169,7 @@ def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str)
 
 
 def _shortest(rest_bones: np.ndarray, bones: np.ndarray) -> np.ndarray:
-    """Return the rotations (F, N, 3, 3) that turn bones (N, 3) to the directions of bones (F, N,
-    3).
-    """
+    """Return the rotations (F, N, 3, 3) from bones (N, 3) to the directions of bones (F, N, 3)."""
     a = rest_bones / np.maximum(portable.norm(rest_bones), 1e-12)[:, None]
     b = bones / np.maximum(portable.norm(bones), 1e-12)[..., None]
     cross = np.cross(a, b)
@@ -170,57 +182,51 @@ def _shortest(rest_bones: np.ndarray, bones: np.ndarray) -> np.ndarray:
 
 
 def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
-    """Return the positions (F, 3) of each joint of a BVH file in its unit, `NAME/end` the ends of
-    chains, and its rate.
+    """Return the positions (F, 3) of each joint of a BVH file in its unit, and its rate (Hz).
 
+    The end of a chain is named `NAME/end` after the chain's last joint.
     Raises: InputError naming the file and the joint or frame that is wrong.
     """
     path = existing(path, "motion file")
     head, _, data = path.read_text(encoding="utf-8-sig", errors="replace").partition("MOTION")
     stack: list[str] = []
-    joints: list[tuple[str, str, np.ndarray, list[str]]] = []
+    joints: list[_Joint] = []
     words = iter(re.sub(r"#.*", "", head).split())
     with reading(path, "BVH motion"):
         for word in words:
             if word in ("ROOT", "JOINT", "End"):
                 name = next(words)  # after End the word Site
                 name = f"{stack[-1]}/end" if word == "End" else name
-                joints.append((name, stack[-1] if stack else "", np.zeros(3), []))
+                parent = stack[-1] if stack else ""
+                joints.append(_Joint(name, parent, np.zeros(3), []))
                 stack.append(name)
             elif word == "OFFSET":
-                joints[-1][2][:] = [float(next(words)) for _ in range(3)]
+                joints[-1].offset[:] = [float(next(words)) for _ in range(3)]
             elif word == "CHANNELS":
-                joints[-1][3].extend(next(words) for _ in range(int(next(words))))
+                joints[-1].channels.extend(next(words) for _ in range(int(next(words))))
             elif word == "}":
                 stack.pop()
         timing = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", data)
         frames = int(timing[1])
         step = float(timing[2])
         values = np.array(re.sub(r"#.*", "", data[timing.end() :]).split(), float)
-        width = sum(len(channels) for *_, channels in joints)
-        if not (
-            frames
-            and 1e-5 <= step <= 1
-            and len(values) == frames * width
-            and np.isfinite(values).all()
-        ):
+        width = sum(len(joint.channels) for joint in joints)
+        timed = frames > 0 and 1e-5 <= step <= 1
+        if not timed or len(values) != frames * width or not np.isfinite(values).all():
             raise ValueError(
                 f"{len(values)} finite numbers, expected {frames} frames of {width}, {step} s apart"
             )
-        places = _followed(joints, values.reshape(frames, width))
-    return places, 1 / step
+        positions = _followed(joints, values.reshape(frames, width))
+    return positions, 1 / step
 
 
-def _followed(
-    joints: list[tuple[str, str, np.ndarray, list[str]]], values: np.ndarray
-) -> dict[str, np.ndarray]:
+def _followed(joints: list[_Joint], values: np.ndarray) -> dict[str, np.ndarray]:
     """Return the positions (F, 3) of joints, parents first, from their channels (F, C)."""
-    if (
-        len({name for name, *_ in joints}) < len(joints)
-        or len(joints) * len(values) * 9 > MOST_NUMBERS
-    ):
+    twice = len({joint.name for joint in joints}) < len(joints)
+    numbers = len(joints) * len(values) * 9  # a rotation (3, 3) of each joint in each frame
+    if twice or numbers > MOST_NUMBERS:
         raise ValueError("a joint that stands twice, or too many frames")
-    places = {}
+    positions = {}
     turns = {}
     column = 0
     for name, parent, offset, channels in joints:
@@ -235,14 +241,14 @@ def _followed(
                 turn = portable.product(turn, rotation(axis, np.radians(values[:, column])))
             column += 1
         above = turns[parent] if parent else np.eye(3)
-        places[name] = portable.applied(above, shift) + (places[parent] if parent else 0.0)
+        start = positions[parent] if parent else 0.0
+        positions[name] = portable.applied(above, shift) + start
         turns[name] = portable.product(above, turn)
-    return places
+    return positions
 
 
 def read_joints(path: str | Path) -> tuple[dict[str, np.ndarray], float | None]:
-    """Return the positions (F, 3) m of joints of an .npz file by name, and its rate where it says
-    one.
+    """Return the positions (F, 3) m of an .npz file's joints, and its rate where it says one.
 
     The file has an array `joints` (F, J, 3), J of at least 22 in SMPL's order or named by an array
     `names` (J,), and maybe `mocap_framerate` or `fps`. AMASS itself keeps angles: its users compute
@@ -252,22 +258,20 @@ def read_joints(path: str | Path) -> tuple[dict[str, np.ndarray], float | None]:
     checked_archive(path, "motion file")
     try:
         with np.load(path, allow_pickle=False) as data:
-            rates = [
-                float(data[key])
-                for key in ("mocap_framerate", "mocap_frame_rate", "fps")
-                if key in data.files
-            ]
+            rates = [float(data[key]) for key in RATES if key in data.files]
             if "joints" not in data.files:
                 raise ValueError(
-                    f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body model makes "
-                    "them of poses"
+                    f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body "
+                    "model makes them of poses"
                 )
-            places = np.asarray(data["joints"], float)
+            positions = np.asarray(data["joints"], float)
             names = [str(name) for name in data["names"]] if "names" in data.files else SMPL
     except (*UNREADABLE, zipfile.BadZipFile, TypeError, MemoryError) as error:
         raise InputError(f"{path}: not a readable file of joints ({error})") from None
-    if places.ndim != 3 or places.shape[1] < len(names) or places.shape[2] != 3:
+    shape = positions.shape
+    if positions.ndim != 3 or shape[1] < len(names) or shape[-1] != 3:
         raise InputError(
-            f"{path}: joints has shape {places.shape}, expected (frames, at least {len(names)}, 3)"
+            f"{path}: joints has shape {shape}, expected (frames, at least {len(names)}, 3)"
         )
-    return {name: places[:, index] for index, name in enumerate(names)}, rates[0] if rates else None
+    rate = rates[0] if rates else None
+    return {name: positions[:, index] for index, name in enumerate(names)}, rate

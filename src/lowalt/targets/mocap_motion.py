@@ -116,9 +116,9 @@ def refuse_glitches(
     if len(acceleration) and acceleration.max() > limit_mps2:
         frame, node = np.unravel_index(acceleration.argmax(), acceleration.shape)
         raise InputError(
-            f"{where}: frame {first + 1 + frame}: {NODES[node]} accelerates by {acceleration.max():.0f} m/s2, "
-            f"expected at most {limit_mps2:.0f}: a glitch or a pose before the motion, to leave out by first_frame or "
-            "last_frame"
+            f"{where}: frame {first + 1 + frame}: {NODES[node]} accelerates by "
+            f"{acceleration.max():.0f} m/s2, expected at most {limit_mps2:.0f}: a glitch or a pose "
+            "before the motion, to leave out by first_frame or last_frame"
         )
 
 
@@ -154,9 +154,9 @@ def refuse_strange_rate(
     if not WALK_RATIO_S[0] <= ratio <= WALK_RATIO_S[1]:
         other = rate_hz / 2 if ratio < WALK_RATIO_S[0] else rate_hz * 2
         raise InputError(
-            f"{where}: at {rate_hz:g} frames per second it moves {speed_mps:.2f} m/s with {1 / step_s:.2g} steps per "
-            f"second, unlike a person; is it of {other:g}? Write the right rate, `rate_hz: {other:g}`, or to insist "
-            f"`rate_hz: {rate_hz:g}`"
+            f"{where}: at {rate_hz:g} frames per second it moves {speed_mps:.2f} m/s with "
+            f"{1 / step_s:.2g} steps per second, unlike a person; is it of {other:g}? Write the "
+            f"right rate, `rate_hz: {other:g}`, or to insist `rate_hz: {rate_hz:g}`"
         )
 
 

@@ -56,11 +56,25 @@ def _foot(phase: np.ndarray, stride_m: float, lift_m: float) -> np.ndarray:
     return np.stack([np.zeros(len(at)), y, lift_m * sine * sine], 1)
 
 
+_TRUNK = {
+    "withers": (0, 0.48, 0.98),
+    "back": (0, 0.1, 0.94),
+    "loin": (0, -0.25, 0.94),
+    "croup": (0, -0.5, 0.9),
+    "neck": (0, 0.7, 1.12),
+    "skull": (0, 0.86, 1.28),
+    "nose": (0, 1.1, 1.2),
+    "chest": (0, 0.45, 0.62),
+    "belly": (0, -0.05, 0.62),
+    "tail": (0, -0.7, 0.85),
+}
+"""Nodes of trunk, neck and head: right, front and up, as shares of the height at the withers."""
+
+
 def cycle_m(
     height_m: float, mass_kg: float, speed_mps: float, frames: int
 ) -> tuple[np.ndarray, tuple[str, ...], float, float]:
-    """Return one stride (frames, 27, 3) in metres, the nodes' names, its duration (s) and its
-    length (m).
+    """Return one stride (frames, 27, 3) m, the nodes' names, its duration (s) and its length (m).
 
     height_m: at the withers. The origin lies on the ground below the middle of the back.
     Raises: InputError where the legs do not reach the ground at this speed.
@@ -73,10 +87,7 @@ def cycle_m(
     sine, cosine = portable.sine_cosine_turns(2 * phase)
     bob = np.stack([np.zeros(frames), np.zeros(frames), 0.02 * h * cosine], 1)
     sway = portable.sine_cosine_turns(phase)[0]
-    spine = {"withers": (0, 0.48, 0.98), "back": (0, 0.1, 0.94), "loin": (0, -0.25, 0.94), "croup": (0, -0.5, 0.9),
-             "neck": (0, 0.7, 1.12), "skull": (0, 0.86, 1.28), "nose": (0, 1.1, 1.2), "chest": (0, 0.45, 0.62),
-             "belly": (0, -0.05, 0.62), "tail": (0, -0.7, 0.85)}  # fmt: skip
-    nodes = {name: still + h * np.array(place) + bob for name, place in spine.items()}
+    nodes = {name: still + h * np.array(shares) + bob for name, shares in _TRUNK.items()}
     nodes["nose"] = nodes["nose"] + 0.03 * h * sine[:, None] * [0, 0, 1.0]
     nodes["tail tip"] = nodes["tail"] + h * np.stack(
         [0.06 * sway, np.full(frames, -0.25), 0.04 * sine + 0.02], 1
@@ -88,18 +99,19 @@ def cycle_m(
         ("right hind", 0.13, -0.5, 0.42, 0.44, 1.0, 0.5),
         ("left hind", -0.13, -0.5, 0.42, 0.44, 1.0, 0.0),
     ):
-        top = still + h * np.array([x, y, 0.74 if "fore" in name else 0.8]) + bob
+        if "fore" in name:
+            height = 0.74
+            words = ("shoulder", "elbow", "wrist", "paw")
+        else:
+            height = 0.8
+            words = ("hip", "knee", "hock", "paw")
+        top = still + h * np.array([x, y, height]) + bob
         foot = still + h * np.array([x, y, 0.02]) + _foot(phase + later, stride, LIFT * h)
         wrist = foot + h * np.array([0, -0.03, 0.08])
         try:
             middle = joint(top, wrist, upper * h, lower * h, bend)
         except InputError as error:
             raise InputError(f"quadruped of {height_m} m at {speed_mps} m/s: {error}") from None
-        places = (top, middle, wrist, foot)
-        words = (
-            ("shoulder", "elbow", "wrist", "paw")
-            if "fore" in name
-            else ("hip", "knee", "hock", "paw")
-        )
-        nodes |= {f"{name} {word}": place for word, place in zip(words, places, strict=True)}
+        for word, positions in zip(words, (top, middle, wrist, foot), strict=True):
+            nodes[f"{name} {word}"] = positions
     return np.stack(list(nodes.values()), 1), tuple(nodes), duration, stride

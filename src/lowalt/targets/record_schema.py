@@ -1,6 +1,4 @@
-"""What a target's record may say: the keys of each source with their types and meaning, and the
-files it may name.
-"""
+"""What a target's record may say: the keys of each source, and the files that it may name."""
 
 import functools
 from pathlib import Path, PureWindowsPath
@@ -18,21 +16,21 @@ backslash is a folder on Windows only."""
 
 @functools.cache
 def schema() -> dict:
-    """Return the whole schema: `$defs`, under `sources` a JSON schema for each source and for
-    COMMON, and the built-in `models` with sets of their `figures`."""
+    """Return the whole schema of records.
+
+    `sources` holds a JSON schema for each source and for COMMON, `$defs` what they share, and
+    `models` the built-in models with sets of their `figures`.
+    """
     return load_yaml(PATH)
 
 
 def check(section: str, record: dict, where: str) -> dict:
-    """Return a record's keys with their numbers read as meant, if they are as a section of the
-    schema says.
+    """Return a record with its numbers read as meant, if it is as a section of the schema says.
 
     Raises: InputError naming `where`, the key, its value and what was expected.
     """
-    from lowalt.config.schema import (
-        faults,
-        with_numbers,
-    )  # slow to import, and a cloud is made without it
+    # Slow to import, and a cloud is made without it.
+    from lowalt.config.schema import faults, with_numbers
 
     wanted = {"$defs": schema()["$defs"], **schema()["sources"][section]}
     record = with_numbers(record, wanted)
@@ -42,26 +40,27 @@ def check(section: str, record: dict, where: str) -> dict:
 
 
 def figures(model: str) -> dict[str, str]:
-    """Return the figures that a built-in model needs by name, each a length, ratio, offset, count
-    or whole number.
+    """Return the kind of each figure that a built-in model needs, by its name.
+
+    A kind is length, ratio, offset, count or whole.
     """
-    sets = [
-        schema()["figures"][item] if isinstance(item, str) else item
-        for item in schema()["models"][model]["figures"]
-    ]
-    return {name: kind for needed in sets for name, kind in needed.items()}
+    result = {}
+    for item in schema()["models"][model]["figures"]:
+        # A word names a set of figures that several models share.
+        result |= schema()["figures"][item] if isinstance(item, str) else item
+    return result
 
 
 def record_files(record: dict) -> list[str]:
-    """Return the user's files that a merged record names, relative to the folder of inputs, each
-    once, in order.
+    """Return the user's files that a merged record names, each once, in order.
+
+    They are relative to the folder of inputs.
     """
-    files = [
-        mesh["file"] for part in record.get("parts", {}).values() for mesh in part.get("meshes", [])
-    ]
-    return list(
-        dict.fromkeys([*files, *(record[key] for key in ("skeleton", "motion") if key in record)])
-    )
+    files = []
+    for part in record.get("parts", {}).values():
+        files += [mesh["file"] for mesh in part.get("meshes", [])]
+    files += [record[key] for key in ("skeleton", "motion") if key in record]
+    return list(dict.fromkeys(files))
 
 
 def check_file_name(name: str, where: str) -> None:
@@ -72,9 +71,8 @@ def check_file_name(name: str, where: str) -> None:
     path = PureWindowsPath(name)
     if not name.strip() or path.drive or path.root or ".." in path.parts:
         raise InputError(f"{where}: file is {name!r}, expected a path inside the folder of inputs")
-    if wrong := sorted(
-        {letter for letter in name if letter in FORBIDDEN or not letter.isprintable()}
-    ):
+    wrong = {letter for letter in name if letter in FORBIDDEN or not letter.isprintable()}
+    if wrong:
         raise InputError(
-            f"{where}: file is {name!r}, expected a name without {wrong}: rename the file"
+            f"{where}: file is {name!r}, expected a name without {sorted(wrong)}: rename the file"
         )

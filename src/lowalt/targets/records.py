@@ -141,7 +141,8 @@ def load_records(
                 table[name] = with_row(table.get(name), name, record["row"], where)
             if name not in table:
                 raise InputError(
-                    f"{path}: unknown subtype {name!r}, expected a key `row` or one of {list(table)}"
+                    f"{path}: unknown subtype {name!r}, expected a key `row` or one of "
+                    f"{list(table)}"
                 )
             chosen.setdefault(name, []).append(
                 (where, {key: item for key, item in record.items() if key != "row"})
@@ -264,7 +265,8 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
     names = record_files(record)
     if names and inputs is None:
         raise InputError(
-            f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of inputs"
+            f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of "
+            "inputs"
         )
     return [str(Path(inputs) / name) for name in names]
 
@@ -278,6 +280,7 @@ def missing_inputs(records: dict[str, dict], inputs: str | Path | None) -> list[
             if inputs is None or not (Path(inputs) / file).is_file():
                 get = f"; get it from {record['where']}" if "where" in record else ""
                 lines.append(
-                    f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'}){get}"
+                    f"{name}: {record['source']} file {file} (inputs folder: "
+                    f"{inputs or 'not given'}){get}"
                 )
     return lines

@@ -78,11 +78,10 @@ def forward_kinematics(
 
 
 def stature_m(offsets_m: np.ndarray) -> float:
-    """Return the vertical extent in metres of a skeleton that stands straight, from the toes to the
-    node `head`.
+    """Return the height (m) of a skeleton that stands straight, from the toes to the node `head`.
 
     `offsets_m` (31, 3) bones in the rest pose. Legs and spine count with their whole length, hip
-    joint and foot with their vertical part in the rest pose; the mean of both legs.
+    joint and foot with their vertical extent in the rest pose; the mean of both legs.
     """
 
     def bone(name: str) -> np.ndarray:
@@ -98,16 +97,17 @@ def stature_m(offsets_m: np.ndarray) -> float:
 
 
 def rotation(axis: str, angle_rad: np.ndarray) -> np.ndarray:
-    """Return right-handed rotations (..., 3, 3) about the axis "x", "y" or "z" by `angle_rad`
-    (...).
-    """
+    """Return right-handed rotations (..., 3, 3) by `angle_rad` (...) about "x", "y" or "z"."""
     first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     angle_rad = np.asarray(angle_rad, float)
     result = np.zeros((*angle_rad.shape, 3, 3))
-    result[..., 3 - first - second, 3 - first - second] = 1.0
+    about = "xyz".index(axis)
+    result[..., about, about] = 1.0
     sin, cos = portable.sine_cosine(angle_rad)
-    result[..., first, first] = result[..., second, second] = cos
-    result[..., first, second], result[..., second, first] = -sin, sin
+    result[..., first, first] = cos
+    result[..., second, second] = cos
+    result[..., first, second] = -sin
+    result[..., second, first] = sin
     return result
 
 
@@ -135,18 +135,19 @@ def node_cloud(track_m: np.ndarray, record: dict, names: tuple[str, ...] = NODES
 
 
 def both_sides(start: str, *limb: str) -> list[tuple[str, ...]]:
-    """Return the names of the nodes of a right and a left limb that both begin at the node `start`."""
-    return [(start, *(f"{side} {name}" for name in limb)) for side in ("right", "left")]
+    """Return the nodes' names of a right and a left limb that both begin at the node `start`."""
+    right = [f"right {name}" for name in limb]
+    left = [f"left {name}" for name in limb]
+    return [(start, *right), (start, *left)]
 
 
 def joint(
     start: np.ndarray, end: np.ndarray, upper_m: float, lower_m: float, bend: float
 ) -> np.ndarray:
-    """Return where two bones meet (F, 3) that reach from `start` (F, 3) to `end` (F, 3), in a plane
-    along y and z.
+    """Return the joint (F, 3) of two bones that reach from `start` (F, 3) to `end` (F, 3).
 
-    upper_m, lower_m: lengths of the bones; bend: 1 where the joint points to the front, -1 to the
-    back.
+    They bend in a plane along y and z. upper_m, lower_m: lengths of the bones; bend: 1 where the
+    joint points to the front, -1 to the back.
     Raises: InputError where the end is farther away than both bones reach, or too near.
     Source: law of cosines.
     """
@@ -154,8 +155,8 @@ def joint(
     flat = np.sqrt(way[:, 1] ** 2 + way[:, 2] ** 2)
     if not ((flat < upper_m + lower_m).all() and (flat > abs(upper_m - lower_m)).all()):
         raise InputError(
-            f"limb: ends are {flat.min():.3g} to {flat.max():.3g} m apart, expected what bones of {upper_m:.3g} and "
-            f"{lower_m:.3g} m reach"
+            f"limb: ends are {flat.min():.3g} to {flat.max():.3g} m apart, expected what bones of "
+            f"{upper_m:.3g} and {lower_m:.3g} m reach"
         )
     along = (upper_m**2 - lower_m**2 + flat**2) / (2 * flat)
     across = np.sqrt(upper_m**2 - along**2)
@@ -168,10 +169,9 @@ def joint(
 
 
 def circle(turns: np.ndarray, radius_m: float) -> np.ndarray:
-    """Return points (F, 3) of a circle about x that turns as a wheel does which rolls to the front:
-    up, front, down.
+    """Return points (F, 3) of a circle about x that turns as a wheel which rolls to the front.
 
-    turns (F,): angle in turns, 0 at the top.
+    It goes up, front, down. turns (F,): angle in turns, 0 at the top.
     """
     sine, cosine = portable.sine_cosine_turns(turns)
     return radius_m * np.stack([np.zeros(len(turns)), sine, cosine], 1)

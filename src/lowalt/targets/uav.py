@@ -32,7 +32,10 @@ def fault(record: dict) -> str | None:
     gap = portable.norm(places - np.roll(places, 1, 0)).min()
     diameter = figures["propeller_diameter"]
     if diameter >= gap:
-        return f"figures.propeller_diameter is {diameter:.4g} m, expected less than the {gap:.4g} m between motors"
+        return (
+            f"figures.propeller_diameter is {diameter:.4g} m, expected less than the {gap:.4g} m "
+            "between motors"
+        )
     return None
 
 
@@ -47,12 +50,17 @@ def folding(record: dict, f: dict) -> list[Part]:
     ]
     arm = f["arm_diameter"] / 2
     for x, y in places:
-        front = y > 0
-        root = (0.3 * np.sign(x) * f["body_width"], (0.3 if front else -0.34) * f["body_length"])
         low = top - f["motor_height"]
-        rise = (0.15 if front else -0.3) * f["body_height"]
-        shells.append(tube([(*root, rise), (x, y, low)], [1.25 * arm, 0.9 * arm]))
-        leg = f["leg_height"] if front else 0.35 * f["leg_height"]
+        if y > 0:
+            root_y = 0.3 * f["body_length"]
+            rise = 0.15 * f["body_height"]
+            leg = f["leg_height"]
+        else:
+            root_y = -0.34 * f["body_length"]
+            rise = -0.3 * f["body_height"]
+            leg = 0.35 * f["leg_height"]
+        root = (0.3 * np.sign(x) * f["body_width"], root_y, rise)
+        shells.append(tube([root, (x, y, low)], [1.25 * arm, 0.9 * arm]))
         shells.append(tube([(x, y, low), (x * 1.02, y, low - leg)], [0.7 * arm, 0.35 * arm], 8))
     return [Part("body", "body", tuple(shells)), *rotors(places, top, f)]
 
@@ -127,16 +135,22 @@ def raised(record: dict, f: dict) -> list[Part]:
 
 
 def radial(record: dict, f: dict) -> list[Part]:
-    """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids
-    and a gimbal.
+    """Return a radial multirotor: a round centre with batteries, straight arms, skids, a gimbal.
 
     With a figure `layer_gap` each arm carries two rotors, one above the other, that turn against
     each other.
     """
     places = hubs(record, f)
     arm = f["arm_diameter"] / 2
-    shape = ((0.5, 0.25, 0.3), (0.42, 0.6, 0.42), (0.2, 0.95, 0.5), (-0.2, 0.95, 0.5), (-0.42, 0.6, 0.42),
-             (-0.5, 0.25, 0.3))  # fmt: skip
+    # Position to the front, half width and half height, as shares of the body's measures.
+    shape = (
+        (0.5, 0.25, 0.3),
+        (0.42, 0.6, 0.42),
+        (0.2, 0.95, 0.5),
+        (-0.2, 0.95, 0.5),
+        (-0.42, 0.6, 0.42),
+        (-0.5, 0.25, 0.3),
+    )
     length = f["body_length"]
     width = f["body_width"]
     height = f["body_height"]

@@ -12,7 +12,7 @@ from lowalt.targets.surfaces import Surface, cylinder, ellipsoid, foil, hull, tu
 
 
 def motor_diagonal(record: dict) -> float:
-    """Return the largest distance between motor axes (m) that gives the craft its published size."""
+    """Return the largest distance between motor axes (m) at which the craft's size is published."""
     size = record["published"]["size_m"]
     figure = record["figures"]
     if record["size_is"] in ("body diagonal", "span over ducts"):
@@ -23,7 +23,7 @@ def motor_diagonal(record: dict) -> float:
 
 
 def hubs(record: dict, figure: dict) -> np.ndarray:
-    """Return the motor axes' places (R, 2) in plan (m), counted anticlockwise seen from above.
+    """Return the motor axes' positions (R, 2) in plan (m), counted anticlockwise from above.
 
     With a `spacing_ratio` (lateral over longitudinal) four axes stand at the corners of a
     rectangle. Otherwise they stand evenly on a circle, the first by `hub_turn` of the angle between
@@ -63,19 +63,26 @@ def blade(diameter: float, chord: float, sense: int) -> Surface:
 def rotor(
     name: str, hub: np.ndarray, sense: int, figure: dict, layers: tuple[tuple[float, float], ...]
 ) -> Part:
-    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade
-    square to the arm.
+    """Return the rotor about `hub` (3,): equal blades, of which the first is square to the arm.
 
-    layers: depth below the hub (m) and turn of each layer of blades.
+    sense: 1 where the axis points up, -1 down. layers: depth below the hub (m) and turn of each
+    layer of blades.
     """
     shell = blade(figure["propeller_diameter"], figure["blade_chord"], sense)
     # Turn the blade to the hub's direction and by a quarter turn more.
     far = np.sqrt(hub[0] * hub[0] + hub[1] * hub[1])
-    sine, cosine = (hub[0] / far, -hub[1] / far) if far > 0 else (1.0, 0.0)
+    sine = 1.0
+    cosine = 0.0
+    if far > 0:
+        sine = hub[0] / far
+        cosine = -hub[1] / far
     shells = []
     for depth, turn in layers:
-        more, less = portable.sine_cosine_turns(np.array(turn))
-        sine, cosine = sine * less + cosine * more, cosine * less - sine * more
+        layer_sine, layer_cosine = portable.sine_cosine_turns(np.array(turn))
+        # The sums of angles; each layer turns on from the one above it.
+        turned = sine * layer_cosine + cosine * layer_sine
+        cosine = cosine * layer_cosine - sine * layer_sine
+        sine = turned
         matrix = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
         shells.append(shell.mapped(matrix).moved(hub - [0, 0, depth]))
     axis = (0.0, 0.0, float(sense))
@@ -90,11 +97,9 @@ def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False)
     """
     parts = []
     single = ((0.0, 0.0),)
-    layers = (
-        single
-        if apart or "layer_gap" not in figure
-        else (*single, (figure["layer_gap"], figure["layer_turn"]))
-    )
+    layers = single
+    if "layer_gap" in figure and not apart:
+        layers = (*single, (figure["layer_gap"], figure["layer_turn"]))
     for index, (x, y) in enumerate(places):
         sense = 1 if index % 2 == 0 else -1
         parts.append(rotor(f"rotor {index + 1}", np.array([x, y, height]), sense, figure, layers))
@@ -105,9 +110,7 @@ def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False)
 
 
 def motors(places: np.ndarray, top: float, figure: dict) -> list[Surface]:
-    """Return the motors as cylinders below the rotors (R, 2); their upper ends are at the height
-    `top` (m).
-    """
+    """Return the motors as cylinders below the rotors (R, 2), their upper ends at `top` (m)."""
     low = top - figure["motor_height"]
     radius = figure["motor_diameter"] / 2
     return [cylinder(radius, (x, y, low), (x, y, top)) for x, y in places]
@@ -118,12 +121,16 @@ def fuselage(figure: dict, taper: float = 0.55) -> Surface:
     length = figure["body_length"]
     width = figure["body_width"]
     height = figure["body_height"]
-    stations = [(0.5, 0.62, -0.25, 0.28), (0.42, 0.85, -0.42, 0.42), (0.1, 1, -0.5, 0.5), (-0.3, 0.95, -0.5, 0.46),
-                (-0.5, taper, -0.3, 0.3)]  # fmt: skip
-    return hull(
-        [(y * length, w * width / 2, a * height, b * height) for y, w, a, b in stations],
-        exponent=3.2,
+    # Position to the front, half width, lower and upper edge, as shares of the body's measures.
+    shape = (
+        (0.5, 0.62, -0.25, 0.28),
+        (0.42, 0.85, -0.42, 0.42),
+        (0.1, 1, -0.5, 0.5),
+        (-0.3, 0.95, -0.5, 0.46),
+        (-0.5, taper, -0.3, 0.3),
     )
+    stations = [(y * length, w * width / 2, low * height, top * height) for y, w, low, top in shape]
+    return hull(stations, exponent=3.2)
 
 
 def camera(figure: dict, y: float, z: float) -> list[Surface]:
@@ -144,13 +151,9 @@ def skids(
     shells = []
     for side in (-1, 1):
         foot = side * half_track
-        shells.append(
-            tube(
-                [(foot, -length / 2, bottom + radius), (foot, length / 2, bottom + radius)],
-                radius,
-                8,
-            )
-        )
+        height = bottom + radius
+        runner = [(foot, -length / 2, height), (foot, length / 2, height)]
+        shells.append(tube(runner, radius, 8))
         for y in (-0.28 * length, 0.28 * length):
-            shells.append(tube([(0.4 * foot, 0.7 * y, top), (foot, y, bottom + radius)], radius, 8))
+            shells.append(tube([(0.4 * foot, 0.7 * y, top), (foot, y, height)], radius, 8))
     return shells

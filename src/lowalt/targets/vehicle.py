@@ -8,6 +8,8 @@ relative to the width. `rolling_diameter` is that of the tyre, used where the re
 `wheel_size: rolling`; by default the wheel has the published (rim) diameter.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from lowalt.numerics import portable
@@ -16,6 +18,8 @@ from lowalt.targets.surfaces import Surface, box, cylinder, hull, loft, ring, su
 
 SPOKES = 5
 MOVING_SHARE = 0.35
+HOOD_END = 0.18
+"""Where the hood's level section ends, as a share of the car's length from the nose."""
 
 
 def fault(record: dict) -> str | None:
@@ -24,7 +28,10 @@ def fault(record: dict) -> str | None:
     table = record["published"]
     axle = f["front_overhang"] + f["wheel_base"]
     if axle >= table["len_m"]:
-        return f"figures front_overhang + wheel_base are {axle:.4g} m, expected less than the {table['len_m']} m length"
+        return (
+            f"figures front_overhang + wheel_base are {axle:.4g} m, expected less than the "
+            f"{table['len_m']} m length"
+        )
     if f["track"] >= table["wid_m"]:
         return (
             f"figures.track is {f['track']:.4g} m, expected less than the {table['wid_m']} m width"
@@ -34,14 +41,22 @@ def fault(record: dict) -> str | None:
 
 def _profile_fault(f: dict, table: dict) -> str | None:
     """The fault in the figures of a car's side view, or None where they describe a car."""
-    stations = [
-        f[name] for name in ("windshield_base", "roof_front", "roof_rear", "rear_glass_base")
-    ]
-    if not 0.18 < stations[0] < stations[1] < stations[2] < stations[3] < 1:
-        return f"figures windshield_base to rear_glass_base are {stations}, expected rising from 0.18 to 1"
-    heights = [f["ground_clearance"] / table["hgt_m"], f["hood_height"], f["belt_height"]]
-    if not heights[0] < heights[1] <= heights[2] < 1 or not heights[0] < f["deck_height"] < 1:
-        return f"figures ground_clearance, hood and belt are {heights} of the height, expected rising and below 1"
+    names = ("windshield_base", "roof_front", "roof_rear", "rear_glass_base")
+    stations = [f[name] for name in names]
+    rising = [HOOD_END, *stations, 1]
+    if any(behind >= ahead for behind, ahead in pairwise(rising)):
+        return (
+            f"figures windshield_base to rear_glass_base are {stations}, expected rising from 0.18 "
+            "to 1"
+        )
+    clearance = f["ground_clearance"] / table["hgt_m"]
+    hood = f["hood_height"]
+    belt = f["belt_height"]
+    if not clearance < hood <= belt < 1 or not clearance < f["deck_height"] < 1:
+        return (
+            f"figures ground_clearance, hood and belt are {[clearance, hood, belt]} of the height, "
+            "expected rising and below 1"
+        )
     return None
 
 
@@ -60,7 +75,7 @@ def _lower(length: float, width: float, height: float, f: dict) -> Surface:
         (0.0, 0.72, floor + lift, nose),
         (0.02, 0.86, floor + 0.5 * lift, 0.3 * nose + 0.7 * hood),
         (0.08, 0.96, floor, hood),
-        (0.18, 1.0, floor, hood + 0.25 * (belt - hood)),
+        (HOOD_END, 1.0, floor, hood + 0.25 * (belt - hood)),
         (f["windshield_base"], 1.0, floor, belt),
         (min(f["rear_glass_base"], 0.94), 1.0, floor, max(belt, deck)),
         (0.97, 0.93, floor + 0.5 * lift, deck),

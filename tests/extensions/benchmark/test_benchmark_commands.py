@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import small_benchmark
+
 from lowalt.__main__ import main
 from lowalt.commands import workflow
 from lowalt.extensions import benchmark

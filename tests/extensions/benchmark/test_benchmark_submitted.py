@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import small_benchmark
 import yaml
 from sklearn.linear_model import LogisticRegression
 
-import small_benchmark
 from lowalt.__main__ import main
 from lowalt.extensions.benchmark import confirm, submitted_rows
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS

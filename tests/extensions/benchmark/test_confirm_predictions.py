@@ -7,8 +7,8 @@ import subprocess
 
 import numpy as np
 import pytest
-
 import small_benchmark
+
 from lowalt.__main__ import main
 from lowalt.extensions.benchmark import confirm, definition
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS

@@ -4,6 +4,7 @@ captures of SigMF.
 
 import json
 import re
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.io import savemat, wavfile
 
 from lowalt.extensions.recordings import read, read_record
 from lowalt.extensions.recordings.faults import clipped
-from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.record import Record, record
 from lowalt.files.errors import InputError
 
 RATE = 12000.0
@@ -202,6 +203,59 @@ def test_sigmf_opens_no_file_elsewhere(tmp_path):
         read(entry(tmp_path, "a.sigmf-meta"))
 
 
+@pytest.mark.parametrize("dataset", [False, True], ids=["its own file", "core:dataset"])
+@pytest.mark.parametrize("headers", [(16, 0), (0, 24), (5, 3)])
+@pytest.mark.parametrize("trailing", [0, 16, 7])
+def test_bytes_that_sigmf_declares_to_be_no_samples_are_not_read(
+    tmp_path, headers, trailing, dataset
+):
+    """Each capture begins behind its header, and the last sample stands before the trailing
+    bytes.
+    """
+    pytest.importorskip("sigmf")
+    values = wave().astype(np.complex64)
+    captures = [
+        {"sample_start": start, "header_bytes": count}
+        for start, count in zip((0, 2000), headers, strict=True)
+    ]
+    more = {"core:trailing_bytes": trailing} if trailing else {}
+    if dataset:
+        more |= {"core:dataset": "raw.bin"}
+    sigmf_file(tmp_path, values, captures, **more)
+    own = tmp_path / "a.sigmf-data"
+    held = (
+        b"\x7f" * headers[0]
+        + values[:2000].tobytes()
+        + b"\x7e" * headers[1]
+        + values[2000:].tobytes()
+        + b"\x7d" * trailing
+    )
+    own.write_bytes(held)
+    if dataset:
+        own.rename(tmp_path / "raw.bin")
+    np.testing.assert_array_equal(read(entry(tmp_path, "a.sigmf-meta")).values, values)
+    second = read(entry(tmp_path, "a.sigmf-meta", capture=1))
+    np.testing.assert_array_equal(second.values, values[2000:])
+
+
+@pytest.mark.parametrize(
+    "header, trailing, words",
+    [
+        (-8, 0, "core:header_bytes is -8, expected a whole number from 0"),
+        ("8", 0, "core:header_bytes is '8', expected a whole number from 0"),
+        (0, 1.5, "core:trailing_bytes is 1.5, expected a whole number from 0"),
+        (10, 10**6, "1000000 trailing bytes"),
+    ],
+)
+def test_impossible_counts_of_bytes_in_sigmf_are_refused(tmp_path, header, trailing, words):
+    pytest.importorskip("sigmf")
+    captures = [{"sample_start": 0, "header_bytes": header}]
+    sigmf_file(tmp_path, wave(), captures, **{"core:trailing_bytes": trailing})
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        read(entry(tmp_path, "a.sigmf-meta"))
+    assert "a.sigmf-meta" in str(caught.value)
+
+
 def test_the_record_overrules_a_wrong_header_only_where_it_says_so(tmp_path):
     wavfile.write(tmp_path / "a.wav", 8000, wave().real.astype(np.int16))
     with pytest.raises(InputError, match="wrong rate, record 12000 Hz, file 8000 Hz"):
@@ -258,3 +312,15 @@ def test_every_file_of_the_folder_of_faults_is_read_rightly_or_refused():
         else:
             with pytest.raises(InputError, match=words):
                 read(read_record(found[name]))
+
+
+@pytest.mark.parametrize(
+    "chunk", [b"", b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 800, 1600, 2, 16)]
+)
+def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
+    path = tmp_path / "a.wav"
+    path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
+    with pytest.raises(
+        InputError, match=r"a\.wav: a \.wav file without a format or without samples"
+    ):
+        read(Record(file=path, carrier_hz=24e9, channel="real"))

@@ -24,8 +24,8 @@ from lowalt.files.errors import InputError, InputWarning
 from lowalt.machine.progress import Reporter, announced
 from lowalt.recognition.dataset_samples import DatasetSamples, images_of
 from lowalt.recognition.intervals import Interval
+from lowalt.recognition.named_models import path_of
 from lowalt.recognition.samples import statement
-from lowalt.recognition.zoo_files import path_of
 from lowalt.shards.dataset import Dataset
 
 MODELS = {"clutter": 5}
@@ -211,7 +211,7 @@ def confirm(model: str | Path, track: Track, trusted: str = "") -> Confirmed:
     """
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
-    from lowalt.recognition.zoo import opened
+    from lowalt.recognition.runs import opened
 
     refuse_unconfirmable(track)
     path = path_of(model)

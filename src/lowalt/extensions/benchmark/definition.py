@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.config.layers import overlaid
-from lowalt.config.plan import Plan
-from lowalt.config.sample_list import SampleList
 from lowalt.recognition.samples import Facts
+from lowalt.shards.plan import Plan
+from lowalt.shards.sample_list import SampleList
 from lowalt.targets.records import records_of
 
 VERSION = "lowalt-40 v1"

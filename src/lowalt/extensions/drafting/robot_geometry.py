@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from lowalt.files.errors import InputError, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
-from lowalt.targets.mesh_files import SUFFIXES, selected
+from lowalt.targets.mesh_files import selected, suffixes
 
 LARGEST_BYTES = 16 << 20
 MOST_FILES = 200
@@ -207,8 +207,8 @@ class Files:
         counts.
         """
         path = self.find(name, base)
-        if path.suffix.lower() not in SUFFIXES:
-            raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
+        if path.suffix.lower() not in suffixes():
+            raise InputError(f"{name!r} is no mesh of a known format, expected one of {suffixes()}")
         unit = 1.0
         if path.suffix.lower() == ".dae":
             unit = stated_metres(path) or 1.0

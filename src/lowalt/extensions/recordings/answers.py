@@ -53,7 +53,7 @@ class Answers(NamedTuple):
 def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
     """Return what a network says of every window of a recording.
 
-    settings: how the network's images are made of signals (`zoo.opened`), with the block `radar`;
+    settings: how the network's images are made of signals (`runs.opened`), with the block `radar`;
     where: the record's path. Raises: InputError where the network knows no recordings, the
     recording's carrier or channel is not the radar's, or the file cannot be read.
     """

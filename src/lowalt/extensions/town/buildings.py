@@ -13,7 +13,7 @@ from lowalt.extensions.town.facets import Town, corner_numbers, sizes, town
 from lowalt.extensions.town.materials import MATERIALS
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
-from lowalt.targets.mesh_files import SUFFIXES
+from lowalt.targets.mesh_files import suffixes
 
 MOST_TRIANGLES = 500_000
 FLOOR_M = 0.05
@@ -56,13 +56,13 @@ def _surfaces(path: Path, settings: dict) -> Surfaces:
         from lowalt.extensions.town.mitsuba import read_mitsuba
 
         found = read_mitsuba(path, settings["unit"])
-    elif kind in SUFFIXES:
+    elif kind in suffixes():
         # glTF states its axes: y is up.
         up = "y" if kind == ".glb" else settings["up"]
         walls, unknown = mesh_parts(path, settings["unit"], up)
         found = joined(walls, {}, {}, unknown)
     else:
-        known = (".geojson", ".xml", *SUFFIXES)
+        known = (".geojson", ".xml", *suffixes())
         raise InputError(
             f"{path}: ends in {kind!r}, expected a file of buildings that ends in one of {known}"
         )

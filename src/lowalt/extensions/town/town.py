@@ -5,8 +5,8 @@ Every ray of every point is traced past all buildings: the direct one, where it 
 roofs and around edges, and those by one or two of all walls, roofs and the ground. Out by any path
 and back by any other add. The SNRs of the configuration refer to the echo on the direct path in
 free space, so a blocked target is weaker by the loss that buildings cause. Echoes of land and of
-the buildings themselves are those of `clutter` and `background_channel`, which know no shadows.
-`ground_reflection`, `walls` and `line_of_sight` would count the same waves twice and are refused.
+the buildings themselves are those of other effects, which know no shadows.
+Effects that reflect or block the same waves would count them twice and are refused.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo.radar import radar
 from lowalt.extensions.town import image_paths
-from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.buildings import files_of, read
 from lowalt.extensions.town.bundle_loops import blocked
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene, above_ground
@@ -47,21 +47,14 @@ PARTS = {
     "reflections": {"order": 0},
     "diffraction": {"diffraction": False},
 }
-TWICE = ("ground_reflection", "walls", "line_of_sight")
-"""Effects that reflect or block the same waves."""
+FILES = ("buildings",)
+WAVES = ("reflected by the ground", "reflected by walls", "blocked by buildings")
 NEAR_M = 2000.0
 """A town that is farther from every station is at the wrong place."""
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for effects that count waves twice, no file, a wrong place, or an unknown
-    material.
-    """
-    if twice := [name for name in TWICE if name in scene.effects]:
-        raise InputError(
-            f"effects: {twice} together with town, which holds the same waves; "
-            "expected one or the other"
-        )
+    """Raise InputError for no file, a town far from all stations, or an unknown material."""
     above_ground("town", scene.network)
     found = read(settings)
     refuse_place(settings, scene.network)
@@ -128,15 +121,24 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     return result
 
 
-def listed(settings: dict, network: Network, row: dict) -> dict:
-    """Return which paths lead to the origin of a target, a row of the motion table, at the first
-    symbol.
+def files(settings: dict) -> list[str]:
+    """Return the path of the file of buildings and those of the meshes that it names.
+
+    Raises: InputError where one of them is not there.
+    """
+    return [] if settings["buildings"] is None else files_of(settings["buildings"])
+
+
+def record(
+    settings: dict, network: Network, row: dict, rng: np.random.Generator
+) -> dict[str, dict]:
+    """Return the field `paths`: which paths lead to the origin of a target, a row of the motion
+    table, at the first symbol.
 
     `under_roof`: whether a roof is above it; `stations`: by name `direct`, whether the sight is
     free; `field_db`, the direct field over that in free space; and `reflected`, the surfaces of
     each reflected path, as ["wall", "ground"].
     """
-    settings = DEFAULTS | settings
     town = read(settings).town
     target = np.array([[[row["x_m"], row["y_m"], row["z_m"]]]], float)
     rays = image_paths.rays_to(target, 0.0)
@@ -163,4 +165,4 @@ def listed(settings: dict, network: Network, row: dict) -> dict:
         }
     far_above = target[0] + [0.0, 0.0, 1e4]
     roof = blocked(town.occluders, target[0], far_above)[0]
-    return {"under_roof": bool(roof), "stations": result}
+    return {"paths": {"under_roof": bool(roof), "stations": result}}

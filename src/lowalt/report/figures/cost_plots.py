@@ -131,7 +131,10 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
     panel.tick_params(axis="x", which="both", length=3.5, pad=3.5)
     panel.margins(x=0.15)
     panel.legend(loc="lower right", frameon=False)
-    words = "accuracy on unseen subtypes over the processor-seconds of data and training, with 95 % intervals"
+    words = (
+        "accuracy on unseen subtypes over the processor-seconds of data and training, with 95 % "
+        "intervals"
+    )
     return drawn("accuracy_cost", words, figure, data)
 
 

@@ -20,8 +20,8 @@ def network_words(block: dict) -> str:
     )
     seeds = len(block["seeds"])
     return (
-        f"{network['backbone']} at {block['size']} pixels, {weights}, at most {training['steps']} steps of "
-        f"{training['batch']} samples, {seeds} training seed{'s' if seeds > 1 else ''}"
+        f"{network['backbone']} at {block['size']} pixels, {weights}, at most {training['steps']} "
+        f"steps of {training['batch']} samples, {seeds} training seed{'s' if seeds > 1 else ''}"
     )
 
 

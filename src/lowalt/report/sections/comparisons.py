@@ -20,7 +20,10 @@ ORDERINGS = ("protocol", "scheme", "over", "claim", "paper_points", "difference_
 def ordering_words(rows: list[dict[str, str]]) -> str:
     """Return in one sentence how many of the paper's orderings hold, and which do not."""
     if all(row["ordering"] == "not ranked" for row in rows):
-        return "Whether the paper's orderings hold takes three training seeds (recognition.seeds: [0, 1, 2])."
+        return (
+            "Whether the paper's orderings hold takes three training seeds (recognition.seeds: "
+            "[0, 1, 2])."
+        )
     holding = [row for row in rows if row["ordering"] == "holds"]
     words = f"Of {len(rows)} orderings of the paper that this run can test, {len(holding)} hold"
     phrases = {

@@ -22,7 +22,8 @@ def verdict(paper: float | None, classes: int, seeds: int) -> str:
     words = [f"Chance level is {100 / classes:.0f} %."]
     if paper is not None:
         words.append(
-            f"The paper reports {paper:.1f} %; its data are not public, so the figures are not comparable."
+            f"The paper reports {paper:.1f} %; its data are not public, so the figures are not "
+            "comparable."
         )
     if seeds < 3:
         words.append("One training seed; another seed changes this by about one point.")

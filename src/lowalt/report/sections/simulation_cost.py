@@ -25,7 +25,10 @@ def sentence(rows: list[dict[str, str]]) -> str:
     usual = min(pairs, key=lambda points: abs(points - USUAL))
     most = max(pairs)
     exact, saved = pairs[usual]
-    words = f"Exact costs {exact:.2f} ms per signal of {usual} points, and tolerances save at most {saved:.2f} ms of it"
+    words = (
+        f"Exact costs {exact:.2f} ms per signal of {usual} points, and tolerances save at most "
+        f"{saved:.2f} ms of it"
+    )
     of_the_largest = (
         "" if most == usual else " ({1:.0f} of {0:.0f} ms at {2} points)".format(*pairs[most], most)
     )

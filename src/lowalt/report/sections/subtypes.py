@@ -67,7 +67,10 @@ def reasons(
         models = np.unique(of_subtype.motion).tolist()
         sometimes = set(of_subtype.take(of_subtype.correct).motion.tolist())
         always = [model for model in models if model not in sometimes]
-        words = f"called {called} in {np.mean(wrong.guesses == classes.index(called)):.0%} of its errors; "
+        words = (
+            f"called {called} in {np.mean(wrong.guesses == classes.index(called)):.0%} of its "
+            "errors; "
+        )
         words += f"{len(always)} of {len(models)} motion models are wrong at every SNR"
         sentences[str(subtype)] = words + _apart(always, sorted(sometimes), traits)
     return sentences

@@ -29,6 +29,7 @@ SOURCE = (
     "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
 DEFAULTS = {"power": 1.0, "blades": "facet"}
+ONE_SIDED = True
 
 
 def diffuse(cosine: np.ndarray, power: float) -> np.ndarray:

@@ -2,8 +2,7 @@
 without the target.
 
 It has the delay of the distance between the masts and no Doppler shift, and it enters through the
-side lobes of both arrays, whose beams point at the target. A station that receives its own signal
-has `transmit_leakage` instead.
+side lobes of both arrays, whose beams point at the target.
 """
 
 import numpy as np

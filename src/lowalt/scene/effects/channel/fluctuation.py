@@ -33,6 +33,7 @@ SOURCE = (
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
 DRAWN = "pair"
+ONE_SIDED = True
 IDLE = [{"pattern": False, "spread_db": 0}]
 
 CUT = 3.0

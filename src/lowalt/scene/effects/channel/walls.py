@@ -3,8 +3,7 @@
 A facade is an upright rectangle on the ground. The station sees every point's image behind it,
 weaker by the Fresnel coefficient of the wall, where the ray meets the rectangle. All pairs of an
 outward and a return path add. Rays that meet two facades, diffraction at edges and the shadows of
-buildings are left out (`line_of_sight` blocks paths at random). A facade reflects only where
-station and point are on the same side of it.
+buildings are left out. A facade reflects only where station and point are on the same side of it.
 """
 
 import numpy as np
@@ -33,6 +32,7 @@ DEFAULTS = {
     "conductivity_s_m": 0.16,
 }
 IDLE = [{"facades": []}, {"permittivity": 1, "conductivity_s_m": 0}]
+WAVES = ("reflected by walls",)
 
 
 def check(settings: dict, scene: CheckedScene) -> None:

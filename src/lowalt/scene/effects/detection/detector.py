@@ -47,6 +47,7 @@ DEFAULTS = {
     "gate_cells": 3,
     "gain": 0.05,
 }
+TRIED = True
 NAMES = {"cfar": ("cell_averaging", "ordered_statistic"), "range_window": ("none", "hann")}
 HANN_REACH = 2
 """Noise of range cells behind a Hann window is independent where they are more than this many cells

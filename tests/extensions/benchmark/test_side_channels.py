@@ -16,7 +16,7 @@ from lowalt.config.layers import SCHEMA, load, merge
 from lowalt.shards import ShardSet
 from lowalt.tiles.png import decode, encode
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 side_channels = import_module("side_channels")
 KEPT = list(csv.DictReader((ROOT / "results/benchmarks/side_channels.csv").open(newline="")))

@@ -1,6 +1,6 @@
 """The zoo: small trained models under 1 MB in `results/zoo`, which `lowalt predict` takes by name.
 
-`python -m lowalt.recognition.zoo --model MODEL.pt --views FILES --name NAME` makes an entry of a
+`python -m lowalt.extensions.formats.zoo --model MODEL.safetensors --views FILES --name NAME` makes an entry of a
 finished run: weights in 8 bits, their answers on the whole validation fold compared with those of
 the weights as trained, and a card.
 """
@@ -13,6 +13,7 @@ import numpy as np
 import torch
 
 from lowalt.config.command import name_backbone, run
+from lowalt.extensions.formats.zoo_files import ZOO
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.recognition import model_card, model_file
@@ -21,28 +22,14 @@ from lowalt.recognition.model_file import EIGHT, ModelFile, rounded
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import Trained, load, of_file
 from lowalt.recognition.samples import Samples
-from lowalt.recognition.zoo_files import ZOO, path_of
 
 LARGEST_BYTES = 1_000_000
 FEWER_POINTS = 0.5
 """An entry that loses more of the validation accuracy, in percentage points, is not written."""
 
 
-def opened(model: str | Path, zoo: Path = ZOO, trusted: str = "") -> tuple[Trained, dict]:
-    """Return a trained model and how its images are made of signals ({network, spectra, images}; {}
-    where unknown).
-
-    model: a model file (.safetensors) of a training or another, or the name of an entry of the zoo;
-    trusted: the user's FILE.py:FUNCTION for a model whose backbone is such code.
-    Raises: InputError naming the entries there are, or the fault of the file.
-    """
-    path = path_of(model, zoo)
-    content = model_file.read(path)
-    return of_file(content, path, trusted), content.input
-
-
 def small(content: ModelFile, trusted: str = "") -> ModelFile:
-    """Return a model with its trained matrices in 8 bits; trusted: as in `opened`."""
+    """Return a model with its trained matrices in 8 bits; trusted: as in `runs.opened`."""
     exact = of_file(content, "model", trusted)
     matrices = {
         name
@@ -81,7 +68,7 @@ def entry(
 ) -> dict:
     """Write NAME.safetensors and NAME.md into the zoo and return the measurements.
 
-    model: model.safetensors of a training; samples: its validation fold; trusted: as in `opened`.
+    model: model.safetensors of a training; samples: its validation fold; trusted: as in `runs.opened`.
     Raises: InputError for a name that is no plain file name, samples that are not the validation
     fold of the training, an entry of 1 MB or more, or one that loses accuracy.
     """
@@ -117,8 +104,9 @@ def kept(
     measured = held_against(exact, answering, samples)
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
-            f"--model: 8 bits fall from {measured['exact_percent']:.2f} to {measured['percent']:.2f} % of the "
-            f"validation fold, expected at most {FEWER_POINTS} points less"
+            f"--model: 8 bits fall from {measured['exact_percent']:.2f} to "
+            f"{measured['percent']:.2f} % of the validation fold, expected at most {FEWER_POINTS} "
+            "points less"
         )
     reduced = replace(reduced, measured=measured)
     out = zoo / f"{name}.safetensors"
@@ -134,7 +122,7 @@ def main(arguments: list[str]) -> None:
     fold, and a card.
     """
     line = argparse.ArgumentParser(
-        prog="python -m lowalt.recognition.zoo", description=main.__doc__
+        prog="python -m lowalt.extensions.formats.zoo", description=main.__doc__
     )
     line.add_argument("--model", required=True, help="model.safetensors of a training run")
     line.add_argument(
@@ -154,9 +142,10 @@ def main(arguments: list[str]) -> None:
     samples = Source(views=options.views).samples(trained.scheme.columns, pairs, trained.size)
     measured = entry(options.model, samples, options.name, options.out, options.backbone)
     print(
-        f"{options.name}: {(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, validation "
-        f"{measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in 8 bits, "
-        f"{measured['changed']} of {measured['samples']} answers differ"
+        f"{options.name}: "
+        f"{(options.out / options.name).with_suffix('.safetensors').stat().st_size} bytes, "
+        f"validation {measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in "
+        f"8 bits, {measured['changed']} of {measured['samples']} answers differ"
     )
 
 

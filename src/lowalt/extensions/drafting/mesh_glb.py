@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.extensions.drafting.mesh_ply import stripped
 from lowalt.files.errors import InputError
 from lowalt.files.json_objects import json_object
 from lowalt.numerics import portable
-from lowalt.targets.mesh_polygons import Piece, stripped
+from lowalt.targets.mesh_polygons import Piece
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -26,6 +27,10 @@ COMPRESSED = {
     "KHR_meshopt_compression": "meshopt",
 }
 MOST_VALUES = 200_000_000
+METRES = 1.0
+"""Metres of the unit of the format. Source: glTF 2.0, section 3.4."""
+UP = "y"
+"""The axis of the format that points up (the front is z). Source: glTF 2.0, section 3.4."""
 
 
 class _Glb:
@@ -93,33 +98,35 @@ class _Glb:
         return values
 
     def placed(self) -> dict[int, np.ndarray]:
-        """The place (4, 4) of each node of the scene shown, by its number."""
+        """The pose (4, 4) of each node of the scene shown, by its number."""
         nodes = self.list("nodes")
         scenes = self.list("scenes")
-        roots = (
-            scenes[_natural(self.json.get("scene", 0))].get("nodes", [])
-            if scenes
-            else range(len(nodes))
-        )
-        inner = set() if scenes else {child for node in nodes for child in node.get("children", [])}
-        places: dict[int, np.ndarray] = {}
-        waiting = [(root, np.eye(4)) for root in roots if root not in inner]
+        if scenes:
+            roots = scenes[_natural(self.json.get("scene", 0))].get("nodes", [])
+        else:
+            # A file without a scene shows every node that hangs on no other.
+            inner = set()
+            for node in nodes:
+                inner.update(node.get("children", []))
+            roots = [index for index in range(len(nodes)) if index not in inner]
+        poses: dict[int, np.ndarray] = {}
+        waiting = [(root, np.eye(4)) for root in roots]
         while waiting:
             index, above = waiting.pop()
-            if _natural(index) in places:
+            if _natural(index) in poses:
                 raise ValueError(f"node {index} hangs on two nodes")
-            places[index] = portable.product(above, _local(nodes[index]))
-            waiting += [(child, places[index]) for child in nodes[index].get("children", [])]
-        return dict(sorted(places.items()))
+            poses[index] = portable.product(above, _local(nodes[index]))
+            waiting += [(child, poses[index]) for child in nodes[index].get("children", [])]
+        return dict(sorted(poses.items()))
 
     def vertices(self, primitive: dict, node: dict, weights: list) -> np.ndarray:
-        """A primitive's vertices (V, 3) before they are placed, morphed by the node's or the mesh's
-        weights.
+        """A primitive's vertices (V, 3) before they are placed, with its morph targets applied.
+
+        The node's weights of the targets come before `weights`, those of the mesh.
         """
         points = self.array(primitive["attributes"]["POSITION"]).astype(float)
-        for target, weight in zip(
-            primitive.get("targets", []), node.get("weights", weights), strict=False
-        ):
+        targets = primitive.get("targets", [])
+        for target, weight in zip(targets, node.get("weights", weights), strict=False):
             if weight and "POSITION" in target:
                 points = points + float(weight) * self.array(target["POSITION"])
         if points.shape[1] != 3:
@@ -226,7 +233,7 @@ def _instances(glb: _Glb, node: dict) -> list[np.ndarray]:
     ]
 
 
-def read_glb(path: Path) -> list[Piece]:
+def pieces(path: Path) -> list[Piece]:
     """Return each surface of the scene shown, by the names of its node and its mesh.
 
     Raises: InputError where the file is compressed, or its data lies elsewhere; other exceptions
@@ -236,7 +243,8 @@ def read_glb(path: Path) -> list[Piece]:
     for name, word in COMPRESSED.items():
         if name in glb.list("extensionsRequired"):
             raise InputError(
-                f"{path}: is compressed by {word}, expected a plain GLB: export it without compression"
+                f"{path}: is compressed by {word}, expected a plain GLB: export it without "
+                "compression"
             )
     places = glb.placed()
     pieces = []

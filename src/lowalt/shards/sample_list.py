@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.config.classes import classes_of, label
-from lowalt.config.plan import GROUPS, Plan
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
+from lowalt.shards.plan import GROUPS, Plan
 
 
 class Place(NamedTuple):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from lowalt.config.layers import SCHEMA, load, merge
-from lowalt.config.plan import Plan
-from lowalt.config.sample_list import SampleList
 from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset
+from lowalt.shards.plan import Plan
+from lowalt.shards.sample_list import SampleList
 from lowalt.targets.records import records_of
 
 LESS = {"motion": {"models": 10}, "targets": {"select": ["Crow", "Owl"]}}

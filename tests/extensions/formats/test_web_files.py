@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from dataset import build
+from lowalt.extensions.formats import web_files
 from lowalt.files.errors import InputError
-from lowalt.shards import ShardSet, remote
+from lowalt.shards import ShardSet
 from lowalt.shards.index import _checksum
 from range_server import serving
 
@@ -117,7 +118,9 @@ def test_a_server_of_https_may_not_lead_to_one_of_http(monkeypatch):
         status_code = 206
 
     monkeypatch.setattr(
-        remote, "_session", lambda process: SimpleNamespace(get=lambda *_, **__: Answer(Answer()))
+        web_files,
+        "_session",
+        lambda process: SimpleNamespace(get=lambda *_, **__: Answer(Answer())),
     )
     with pytest.raises(
         InputError, match=r"^https://host/index\.json: the server leads to http://host/index\.json"
@@ -172,6 +175,6 @@ def test_an_index_leads_to_no_file_but_those_below_its_folder(folder, tmp_path, 
 def test_the_files_of_an_index_are_asked_for_with_its_query():
     """The query holds the signature of an address that a store has signed."""
     assert (
-        remote.beside("https://host/a/index.json?key=1", "b c.tar")
+        web_files.beside("https://host/a/index.json?key=1", "b c.tar")
         == "https://host/a/b%20c.tar?key=1"
     )

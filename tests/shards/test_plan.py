@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from configured import ROOT
+from lowalt.config.blocks import snrs_of
 from lowalt.config.layers import load_yaml, merge
 from lowalt.config.network import Network, as_far_as
-from lowalt.config.plan import Plan, snrs_of
 from lowalt.files.errors import InputError
 from lowalt.motion.drawing import masts_in_reach
 from lowalt.shards.dataset import Dataset
+from lowalt.shards.plan import Plan
 
 PUBLISHED = {
     name: {"unseen_protocol": group}

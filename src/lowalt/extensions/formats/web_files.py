@@ -14,12 +14,6 @@ from urllib.parse import quote, urlsplit, urlunsplit
 from lowalt.files.errors import InputError, in_one_line
 
 TIMEOUT_S = 60
-MOST_INDEX_BYTES = 64 << 20
-
-
-def is_address(path: str | Path) -> bool:
-    """Whether an index is on a web server: its path begins with http:// or https://."""
-    return str(path).startswith(("http://", "https://"))
 
 
 def beside(index: str, name: str) -> str:
