@@ -22,11 +22,10 @@ class EchoResult(NamedTuple):
     signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in
     0..M-1; near_ties: number of symbols whose two strongest cells differ by less than a relative
     1e-12, so that rounding decides; bound: proved bound of the error relative to max |signal|, inf
-    if none is proved; method: how it was computed, and why;
-    gap: (N,) float64, proved lower bound of |Y| at the strongest cell minus |Y| at any other, 0 if
-    there is none;
-    totals: (N,) float64, sum of all points' |amplitudes|, array gains included. With a tolerance it
-    is an upper bound that exceeds the sum by at most the tolerance times the largest value.
+    if none is proved; method: how it was computed, and why; gap: (N,) float64, proved lower bound
+    of |Y| at the strongest cell minus |Y| at any other, 0 if there is none; totals: (N,) float64,
+    sum of all points' |amplitudes|, array gains included. With a tolerance it is an upper bound
+    that exceeds the sum by at most the tolerance times the largest value.
     """
 
     signal: np.ndarray
@@ -47,14 +46,12 @@ def echo_signal(
     tolerance: float | None = None,
     sample: str = "",
 ) -> EchoResult:
-    """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M
-    range cells.
+    """Return the symbol-domain signal Y_bin of `station`, the strongest range cell of each symbol.
 
     motion: `Rigid`, positions (N, L, 3) in metres, or an already checked `echo_input.Target`, with
-    rcs_m2 None;
-    rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error
-    allowed, relative to the sample's max |Y_bin|, None for the exact closed form; sample: a name
-    for error messages.
+    rcs_m2 None; rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance:
+    largest error allowed, relative to the sample's max |Y_bin|, None for the exact closed form;
+    sample: a name for error messages.
     Raises: InputError naming the argument, its value and the sample; BelowFloor (a subclass) for a
     tolerance below the error bound that float64 can prove for this sample. Source: paper Eqs. 7 and
     22 to 25.
@@ -79,7 +76,9 @@ def echo_signal(
         method = method._replace(again=nearest.correct(seen, refs, found, method.pointwise_bound))
     largest = float(abs(found.values).max())
     worst = float(found.bounds.max())
-    bound = worst / largest if largest > 0 else np.inf if worst > 0 else 0.0
+    bound = np.inf if worst > 0 else 0.0
+    if largest > 0:
+        bound = worst / largest
     if tolerance is not None and not bound <= tolerance:
         raise BelowFloor(
             f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 "
@@ -98,18 +97,16 @@ def echo_signals(
     tolerance: float | None = None,
     sample: str = "",
 ) -> np.ndarray:
-    """Return the symbol-domain signals of all the network's stations, complex128 (stations,
-    symbols).
+    """Return the signals of all the network's stations, complex128 (stations, symbols).
 
     Arguments, errors and source as for `echo_signal`; the motion is checked once.
     """
     seen = target(motion, rcs_m2, sample)
-    return np.stack(
-        [
-            echo_signal(network, station, seen, None, aim_m, tolerance, sample=sample).signal
-            for station in network.stations
-        ]
-    )
+    signals = []
+    for station in network.stations:
+        result = echo_signal(network, station, seen, None, aim_m, tolerance, sample=sample)
+        signals.append(result.signal)
+    return np.stack(signals)
 
 
 def _named(sample: str) -> str:
@@ -127,8 +124,7 @@ def _check_tolerance(tolerance, sample: str) -> None:
 
 
 def prepared(network, station, motion, rcs_m2, aim_m, sample):
-    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams'
-    cosines).
+    """Return what the kernels take: checked scene, radar, reference ranges, beams' cosines.
 
     Arguments and errors as for `echo_signal`.
     """
@@ -145,7 +141,10 @@ def prepared(network, station, motion, rcs_m2, aim_m, sample):
 
 
 def check_fault(fault: int, scene: EchoInput, station: Station, sample: str) -> None:
-    """Raise InputError for a point in the station, which a kernel reports as `fault` = 1 + n L + l."""
+    """Raise InputError for a point l in the station at symbol n.
+
+    A kernel reports it as `fault` = 1 + n L + l, and none as 0.
+    """
     if fault:
         points = len(scene.part) or scene.translation.shape[1]
         n, l = divmod(fault - 1, points)  # noqa: E741

@@ -1,5 +1,4 @@
-"""The input of the echo kernels and its checks: a motion, as rigid parts with poses or as plain
-positions.
+"""The input of the echo kernels and its checks: rigid parts with poses, or plain positions.
 
 Rigid parts need less memory, because no array of symbols x points is made.
 """
@@ -14,9 +13,9 @@ from lowalt.files.errors import InputError
 
 
 class Rigid(NamedTuple):
-    """Points on rigid parts: point l of part p = part[l] stands at rotation[n, p] @ points[l] +
-    translation[n, p].
+    """Points on rigid parts with a pose of each part at each symbol.
 
+    Point l of part p = part[l] stands at rotation[n, p] @ points[l] + translation[n, p].
     rotation: (N, P, 3, 3); translation: (N, P, 3) m, global frame; points: (L, 3) m; part: (L,)
     int.
     """
@@ -28,8 +27,7 @@ class Rigid(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A checked motion with the points' cross sections and their square roots, for use by all
-    stations.
+    """A checked motion with the points' cross sections and their square roots, for all stations.
 
     For plain positions, `rotation` has shape (0, 0, 3, 3) and `translation` (N, L, 3) holds the
     positions.
@@ -44,8 +42,9 @@ class Target(NamedTuple):
 
 
 class EchoInput(NamedTuple):
-    """Checked input of the kernels: the fields of `Target`, repeated for type checkers, and the
-    beams' aim point.
+    """Checked input of the kernels: the fields of `Target`, and the beams' aim point.
+
+    The fields are repeated for type checkers.
     """
 
     rotation: np.ndarray
@@ -58,9 +57,7 @@ class EchoInput(NamedTuple):
 
 
 def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.ndarray:
-    """Return `value` as contiguous float64 of this shape; a letter in the shape stands for any size
-    >= 1.
-    """
+    """Return `value` as contiguous float64 of this shape, where a letter is any size >= 1."""
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -72,12 +69,11 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     if not fits:
         expected = str(shape).replace("'", "")
         raise InputError(f"{sample}{name} has shape {array.shape}, expected {expected}")
-    # Fast path: a finite sum means that all numbers are finite. Test each number only if the sum is
-    # not.
+    # Where the sum is finite all numbers are, so that each number is tested only where it is not.
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
-        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(
-            f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite "
+            f"{sample}{name}[{', '.join(map(str, index))}] is {array[index]}, expected a finite "
             "number"
         )
     # Copy a read-only array, because numba would compile the kernels a second time for it.
@@ -85,11 +81,11 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
 
 
 def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str = "") -> Target:
-    """Return the checked target of a motion, `Rigid` or positions (N, L, 3) m, and of its cross
-    sections, (L,) m2 or one number for all points.
+    """Return the checked target of a motion and its cross sections.
 
-    The check takes 5 % of the time of a signal, so a caller with several stations calls this once
-    and passes the result to each `echo_signal`.
+    motion: `Rigid` or positions (N, L, 3) m; rcs_m2: (L,) m2 or one number for all points. The
+    check takes 5 % of the time of a signal, so a caller with several stations calls this once and
+    passes the result to each `echo_signal`.
     Raises: InputError naming the argument, its value and the sample for NaN, infinite, empty or
     wrongly shaped input, and for a negative cross section.
     """
@@ -117,12 +113,9 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
         translation = _float("positions", motion, ("N", "L", 3), where)
         count = translation.shape[1]
         rotation, points, part = _no_rotation()
-    rcs = _float(
-        "rcs_m2",
-        np.broadcast_to(np.asarray(rcs_m2), (count,)) if np.ndim(rcs_m2) == 0 else rcs_m2,
-        (count,),
-        where,
-    )
+    if np.ndim(rcs_m2) == 0:
+        rcs_m2 = np.broadcast_to(np.asarray(rcs_m2), (count,))
+    rcs = _float("rcs_m2", rcs_m2, (count,), where)
     if rcs.min() < 0:
         raise InputError(
             f"{where}rcs_m2[{int(rcs.argmin())}] is {rcs.min()}, expected square metres >= 0"
@@ -131,9 +124,9 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
 
 
 def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoInput:
-    """Return the checked input for one motion and one station; rcs_m2 is None if `motion` is a
-    `Target`.
+    """Return the checked input for one motion and one station.
 
+    rcs_m2 is None if `motion` is a `Target`.
     Raises: as `target`, and InputError for cross sections given twice or an aim at the station
     itself.
     """
@@ -156,17 +149,14 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
 
 
 def check_station(network: Network, station: Station) -> None:
-    """Raise InputError where the station's numbers are not finite, or its frequency is not
-    positive.
-    """
+    """Raise InputError where a number of the station is not finite or its frequency <= 0."""
     if not (np.isfinite(station.frequency_hz) and station.frequency_hz > 0):
         raise InputError(
             f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive "
             "number"
         )
-    if np.shape(station.position_m) != (3,) or not all(
-        map(math.isfinite, (*station.position_m, station.normal_rad))
-    ):
+    numbers = (*station.position_m, station.normal_rad)
+    if np.shape(station.position_m) != (3,) or not all(map(math.isfinite, numbers)):
         raise InputError(
             f"station {station.name}: position_m {station.position_m} or normal_rad "
             f"{station.normal_rad} is not finite"

@@ -41,9 +41,15 @@ class Exact(NamedTuple):
 def constants(rows: np.ndarray) -> Exact:
     """Return the double-doubles of rows (8, 2) under their names."""
     return Exact(
-        (rows[0, 0], rows[0, 1]), (rows[1, 0], rows[1, 1]), (rows[2, 0], rows[2, 1]), (rows[3, 0], rows[3, 1]),
-        (rows[4, 0], rows[4, 1]), (rows[5, 0], rows[5, 1]), (rows[6, 0], rows[6, 1]), (rows[7, 0], rows[7, 1]),
-    )  # fmt: skip
+        sine=(rows[0, 0], rows[0, 1]),
+        cosine=(rows[1, 0], rows[1, 1]),
+        turns=(rows[2, 0], rows[2, 1]),
+        cells=(rows[3, 0], rows[3, 1]),
+        half_kappa=(rows[4, 0], rows[4, 1]),
+        phase_h=(rows[5, 0], rows[5, 1]),
+        phase_v=(rows[6, 0], rows[6, 1]),
+        scale=(rows[7, 0], rows[7, 1]),
+    )
 
 
 class Radar(NamedTuple):
@@ -84,10 +90,11 @@ def radar(network: Network, station: Station) -> Radar:
 
     Source: paper, Eqs. 4, 7 and 24.
     """
-    low, spacing, carrier = map(
-        Fraction, (station.frequency_hz, network.subcarrier_spacing_hz, network.carrier_hz)
-    )
-    (transmit_h, transmit_v), (receive_h, receive_v) = network.transmit, network.receive
+    low = Fraction(station.frequency_hz)
+    spacing = Fraction(network.subcarrier_spacing_hz)
+    carrier = Fraction(network.carrier_hz)
+    transmit_h, transmit_v = network.transmit
+    receive_h, receive_v = network.receive
     kappa = low / carrier
     centre = low + (network.subcarriers - 1) * spacing / 2
     bandwidth = network.subcarriers * spacing
@@ -95,11 +102,9 @@ def radar(network: Network, station: Station) -> Radar:
     with localcontext() as context:
         context.prec = DIGITS
         four_pi = 4 * PI
-        scale = (
-            (decimal_of(network.power) / elements).sqrt()
-            * decimal_of(LIGHT / carrier)
-            / (four_pi * four_pi.sqrt())
-        )
+        amplitude = (decimal_of(network.power) / elements).sqrt()
+        wavelength = decimal_of(LIGHT / carrier)
+        scale = amplitude * wavelength / (four_pi * four_pi.sqrt())
     numbers: tuple[Fraction | Decimal, ...] = (
         *sine_cosine(station.normal_rad),
         2 * centre / LIGHT,

@@ -59,9 +59,9 @@ def compute(
     aims: tuple[float, float],
     tolerance: float | None,
 ) -> tuple[Found, np.ndarray, Method, EchoSample]:
-    """Run the cheap plan, then the exact one; return (found, symbols left for the pointwise kernel,
-    method, sample).
+    """Run the cheap plan, then the exact one.
 
+    Returns what was found, the symbols left for the pointwise kernel, the method and the sample.
     The exact plan recomputes a symbol if its error bound exceeds the tolerance times the largest
     value, if the bound leaves its strongest cell undecided, or if far cells could not be excluded.
     """
@@ -76,9 +76,8 @@ def compute(
     if tolerance is not None and len(refs) > PROBES and run.saving(tolerance) > PROBE_COST:
         probes = np.arange(0, len(refs), -(-len(refs) // PROBES))
         run.compute(probes, exact, True, found)
-        share = abs(found.values[probes]).max() / (
-            found.totals[probes].max() + run.peaks(probes).max()
-        )
+        most = found.totals[probes].max() + run.peaks(probes).max()
+        share = abs(found.values[probes]).max() / most
         chosen = run.plan(0.5 * tolerance * share)
         if chosen.cosine.size < exact.cosine.size and run.cells(chosen) is not None:
             run.compute(symbols, chosen, False, found)
@@ -108,11 +107,9 @@ class _Run:
         peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
         first = int(scene.part[0]) if len(scene.part) else 0
         self.sample = EchoSample(scene, layout(scene, peak), radar, first, aims)
-        self.refs, self.points, self.extents = (
-            refs,
-            len(self.sample.lay.amplitude),
-            np.empty((len(refs), 5)),
-        )
+        self.refs = refs
+        self.points = len(self.sample.lay.amplitude)
+        self.extents = np.empty((len(refs), 5))
         self.spread = fill_extents(self.sample, refs, self.extents)
         self.size_m = float(self.extents[:, SIZE].max())
 
@@ -122,31 +119,26 @@ class _Run:
 
     def peaks(self, symbols: np.ndarray) -> np.ndarray:
         """Return for each symbol an upper bound: the sum of amplitudes at the arrays' peak gain."""
-        return (
-            self.sample.lay.total
-            / (self.refs[symbols, RANGE] * (1 - self.extents[symbols, SPREAD])) ** 2
-        )
+        nearest_m = self.refs[symbols, RANGE] * (1 - self.extents[symbols, SPREAD])
+        return self.sample.lay.total / nearest_m**2
 
     def saving(self, tolerance: float) -> float:
         """Return the cost that a tolerance may save, in points x symbols of the exact plan."""
-        return (
-            (SAVED_SINGLE if 0.5 * tolerance > error_model.SINGLE_ERROR else SAVED)
-            * len(self.refs)
-            * self.points
-        )
+        single = 0.5 * tolerance > error_model.SINGLE_ERROR
+        return (SAVED_SINGLE if single else SAVED) * len(self.refs) * self.points
 
     def cells(self, chosen: error_model.EchoPlan) -> CellPolynomials | None:
         """Return the cell kernels of a plan; None if the target extends over too many cells."""
         radar = self.sample.radar
-        return cell_polynomials(
-            radar.subcarriers, error_model.round_up(self.size_m * radar.cells, 6), chosen.fit
-        )
+        cells = error_model.round_up(self.size_m * radar.cells, 6)
+        return cell_polynomials(radar.subcarriers, cells, chosen.fit)
 
     def compute(
         self, symbols: np.ndarray, chosen: error_model.EchoPlan, final: bool, found: Found
     ) -> None:
-        """Compute `symbols` into `found` by the plan `chosen`; `final`: accept unproved strongest
-        cells.
+        """Compute `symbols` into `found` by the plan `chosen`.
+
+        final: whether strongest cells that are not proved are accepted.
         """
         refs = self.refs
         extents = self.extents
@@ -157,23 +149,18 @@ class _Run:
         cells = self.cells(chosen)
         assert cells is not None  # `compute` checked the plan's cell kernels before
         segments = np.empty((len(symbols), 6))
-        count = cut_segments(
-            extents, gains.horizontal.rates[0], gains.vertical.rates[0], LONGEST, segments
-        )
+        rates = (gains.horizontal.rates[0], gains.vertical.rates[0])
+        count = cut_segments(extents, *rates, LONGEST, segments)
         approximation = Approximation(chosen, gains, cells, folding())
-        driver.run(
-            self.sample,
-            Symbols(symbols, refs, extents, segments[:count]),
-            approximation,
-            final,
-            workspace(approximation, self.sample.lay.amplitude),
-            found,
-        )
+        chunk = Symbols(symbols, refs, extents, segments[:count])
+        work = workspace(approximation, self.sample.lay.amplitude)
+        driver.run(self.sample, chunk, approximation, final, work, found)
 
     def method(self, chosen: error_model.EchoPlan, cheap: int, exact: int, general: int) -> Method:
         """Return the record of how the sample was computed."""
         cells = self.cells(chosen)
         degree = len(chosen.cosine) - 1
-        orders = degree, degree, cells.kernels.shape[2] - 1 if cells else 0
+        cell_degree = cells.kernels.shape[2] - 1 if cells else 0
+        orders = (degree, degree, cell_degree)
         bound = error_model.pointwise_bound(self.sample.radar, self.size_m, self.points)
         return Method(chosen.single, orders, cheap, exact, general, bound)

@@ -13,8 +13,7 @@ from lowalt.targets.cloud import read
 
 
 def main(arguments: list[str]) -> None:
-    """Draw rows `--first` .. `--first + --count - 1` of every cloud's subtype, row-major, and write
-    the table.
+    """Draw rows `--first` .. `--first + --count - 1` of every cloud's subtype, and write the table.
 
     If the settings' block `motion` has `looks`, each motion model has that many rows, one per look.
     """
@@ -27,9 +26,8 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--count", type=int, required=True, help="rows of each subtype")
     options.add_argument("--out", required=True, help="motion table to write (.csv)")
     asked = options.parse_args(arguments)
-    seed, masts_m, motion, published = pick(
-        asked.settings, "seed", "masts_m", "motion", "published"
-    )
+    names = ("seed", "masts_m", "motion", "published")
+    seed, masts_m, motion, published = pick(asked.settings, *names)
     masts_m = np.array(masts_m, dtype=float).reshape(-1, 2)
     corners = region_polygon(masts_m, motion["region"]["polygon_m"])
     clouds = [read(path) for path in asked.clouds]
@@ -41,11 +39,9 @@ def main(arguments: list[str]) -> None:
             model_rows(seed, cloud, published[cloud.subtype], masts_m, corners, motion, model, path)
             for cloud in clouds
         ]
-        rows += [
-            {**row, "group": asked.group, "model": model * looks + look}
-            for look, of_subtypes in enumerate(zip(*drawn, strict=True))
-            for row in of_subtypes
-        ]
+        for look, of_subtypes in enumerate(zip(*drawn, strict=True)):
+            number = model * looks + look
+            rows += [{**row, "group": asked.group, "model": number} for row in of_subtypes]
     write_table(asked.out, rows)
     print(f"{asked.out}: {len(rows)} rows", file=sys.stderr)
 

@@ -23,8 +23,7 @@ _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 6
 
 
 def mean_cross_section(cloud: Cloud, wavelength_m: float) -> float:
-    """Return the mean over aspects and motion of |sum of sqrt(rcs) exp(-j 4 pi r / wavelength)|^2,
-    in m2.
+    """Return the mean (m2) over aspects and motion of |sum of sqrt(rcs) exp(-j 4 pi r / lambda)|^2.
 
     For plane waves of one frequency, without the losses of beams and range cells. Aspects are those
     of config/default.yaml: every yaw, `TILT_DEG`, `SEEN_FROM_DEG`; motion is every phase of rotors,
@@ -36,16 +35,17 @@ def mean_cross_section(cloud: Cloud, wavelength_m: float) -> float:
     turning = [*cloud.parts_of("rotor"), *cloud.parts_of("wheel")]
     even = np.arange(1, LOOKS + 1)[:, None] * np.sqrt(_PRIMES[: 5 + len(turning)]) % 1.0
     flies = cloud.like in AIRBORNE
+    of_yaw, of_elevation, of_time = even[:, 2:5].T
     tilt = np.radians(TILT_DEG) * flies * (2.0 * even[:, :2] - 1.0)
-    attitude = np.column_stack([2 * np.pi * even[:, 2], tilt])
+    attitude = np.column_stack([2 * np.pi * of_yaw, tilt])
     low, high = SEEN_FROM_DEG[flies]
-    sine, cosine = portable.sine_cosine(np.radians(low + (high - low) * even[:, 3]))
+    sine, cosine = portable.sine_cosine(np.radians(low + (high - low) * of_elevation))
     toward = np.column_stack([np.zeros(LOOKS), cosine, sine])
     lasts_s = len(cloud.track) / cloud.record["track_rate_hz"] if len(cloud.track) else 1.0
     row = {"model": 0, **dict.fromkeys(NUMBERS, 0.0), "rate_hz": 1.0, "playback": 1.0}
     turns = {part: 2 * np.pi * even[:, 5 + order] for order, part in enumerate(turning)}
     rotation, translation = poses(
-        cloud, row, lasts_s * even[:, 4], Perturbation(turns, None, attitude)
+        cloud, row, lasts_s * of_time, Perturbation(turns, None, attitude)
     )
     nearer = portable.dot(translation, toward[:, None])[:, cloud.part]
     axes = portable.applied(rotation.swapaxes(2, 3), toward[:, None])
@@ -53,5 +53,6 @@ def mean_cross_section(cloud: Cloud, wavelength_m: float) -> float:
         nearer += axes[:, cloud.part, axis] * cloud.points[:, axis]
     sines, cosines = portable.sine_cosine_turns(2.0 / wavelength_m * nearer)
     amplitude = np.sqrt(np.asarray(cloud.rcs_m2, float))
-    parts = [portable.total(amplitude * values) for values in (sines, cosines)]
-    return float(portable.mean(parts[0] * parts[0] + parts[1] * parts[1]))
+    imaginary = portable.total(amplitude * sines)
+    real = portable.total(amplitude * cosines)
+    return float(portable.mean(imaginary * imaginary + real * real))

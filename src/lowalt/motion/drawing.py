@@ -1,5 +1,4 @@
-"""Drawing motion models from the published ranges, and from our defaults where the paper gives
-none.
+"""Drawing motion models from the published ranges, or our defaults where the paper gives none.
 
 Each motion model has its own stream (seed, "motion", subtype, model) and a fixed order of draws, so
 it does not depend on the rest of the configuration.
@@ -17,9 +16,9 @@ from lowalt.targets.cloud import Cloud, extent
 
 
 def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
-    """Return the region's corners (K, 2) m, counter-clockwise: `polygon_m`, or the convex hull of
-    `masts_m` (S, 2).
+    """Return the region's corners (K, 2) m, counter-clockwise.
 
+    They are those of `polygon_m`, or of the convex hull of `masts_m` (S, 2).
     Raises: InputError where the polygon is degenerate.
     """
     # Imported late: the Snakefile imports this module and rarely needs a hull.
@@ -45,9 +44,7 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
 
 
 def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Return cross products (K,) of each edge and the vector to a point; all > 0 inside a
-    counter-clockwise polygon.
-    """
+    """Return cross products (K,) of each edge and the vector to a point, all > 0 inside."""
     step = np.roll(corners, -1, axis=0) - corners
     to_point = point - corners
     return step[:, 0] * to_point[:, 1] - step[:, 1] * to_point[:, 0]
@@ -101,16 +98,13 @@ def place(
 
 
 def heights(settings: dict, subtype: str, category: str, like: str) -> list[float]:
-    """Return the lowest and highest flight (m) that `height_m` gives for the subtype, its class or
-    its `like`.
-    """
+    """Return the lowest and highest flight (m): of the subtype, or its class, or its `like`."""
     block = settings["height_m"]
     return next(block[name] for name in (subtype, category, like) if name in block)
 
 
 def follow_speed(cloud: Cloud, row: dict, speed: float, cadence: str) -> None:
-    """Set the values that depend on the ground speed (m/s): the rate of wheels and the playback
-    rate of a recording.
+    """Set the rate of wheels and the playback rate of a recording, by the ground speed (m/s).
 
     cadence: "free", or "tied" to the speed.
     """
@@ -124,21 +118,17 @@ def follow_speed(cloud: Cloud, row: dict, speed: float, cadence: str) -> None:
 def draw_rates(
     rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str
 ) -> None:
-    """Fill in a row's rate, phases and place in a recording; speed: over ground (m/s); cadence:
-    "free", or "tied" to the speed.
+    """Fill in a row's rate, phases and start in a recording.
 
+    speed: over ground (m/s); cadence: "free", or "tied" to the speed.
     Raises: InputError for more moving parts than the motion table has phases.
     """
     follow_speed(cloud, row, speed, cadence)
-    if (
-        not cloud.parts_of("wheel")
-        and cloud.like in AIRBORNE
-        and published["freq_lo_hz"] is not None
-    ):
+    wheels = len(cloud.parts_of("wheel"))
+    if cloud.like in AIRBORNE and not wheels and published["freq_lo_hz"] is not None:
         row["rate_hz"] = rng.uniform(published["freq_lo_hz"], published["freq_hi_hz"])
-    moving = (
-        len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
-    )
+    # The wings beat together, with one phase.
+    moving = len(cloud.parts_of("rotor")) + wheels + bool(cloud.parts_of("wing"))
     if moving > PHASES:
         raise InputError(
             f"motion of {cloud.subtype}: {moving} moving parts, expected at most {PHASES}"
@@ -156,15 +146,15 @@ def draw_rates(
 
 
 def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float, row: dict) -> None:
-    """Draw the target's longest side from `low_m` to `high_m`, uniform in its logarithm, and scale
-    rate and height.
+    """Draw the target's longest side from `low_m` to `high_m` and scale rate and height.
 
-    A craft or bird `s` times as large turns or beats `s` times as slowly, so blade tips and wings
-    keep their speed; a wheel of `s` times the diameter turns `s` times as slowly at the same road
-    speed. A recording keeps its cadence.
+    It is uniform in its logarithm. A craft or bird `s` times as large turns or beats `s` times as
+    slowly, so blade tips and wings keep their speed; a wheel of `s` times the diameter turns `s`
+    times as slowly at the same road speed. A recording keeps its cadence.
     """
     low, high = map(float, portable.log(np.array([low_m, high_m])))
-    scale = row[SCALE] = float(portable.exp(rng.uniform(low, high))) / extent(cloud)
+    scale = float(portable.exp(rng.uniform(low, high))) / extent(cloud)
+    row[SCALE] = scale
     row["rate_hz"] /= scale
     if cloud.like not in AIRBORNE:
         row["z_m"] *= scale
@@ -187,17 +177,18 @@ def draw(
     Raises: InputError where no place satisfies the region or the target has too many parts.
     """
     row = dict.fromkeys(NUMBERS, math.nan)
-    row["x_m"], row["y_m"] = map(
-        float, place(rng, corners, masts_m, settings["region"]["mast_clearance_m"])
-    )
+    clearance_m = settings["region"]["mast_clearance_m"]
+    row["x_m"], row["y_m"] = map(float, place(rng, corners, masts_m, clearance_m))
     row["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
-    row["pitch_rad"] = row["roll_rad"] = 0.0
+    row["pitch_rad"] = 0.0
+    row["roll_rad"] = 0.0
     speed = 0.0
     if cloud.like in AIRBORNE:
         low, high = heights(settings, cloud.subtype, cloud.category, cloud.like)
         row["z_m"] = rng.uniform(low, high)
         tilt = math.radians(settings["tilt_deg"])
-        row["pitch_rad"], row["roll_rad"] = rng.uniform(-tilt, tilt), rng.uniform(-tilt, tilt)
+        row["pitch_rad"] = rng.uniform(-tilt, tilt)
+        row["roll_rad"] = rng.uniform(-tilt, tilt)
         for axis in "xyz":
             bound = published[f"v{axis}_abs_max"]
             row[f"v{axis}_mps"] = rng.uniform(-bound, bound)
@@ -205,7 +196,9 @@ def draw(
         row["z_m"] = cloud.record["origin_height_m"]
         speed = rng.uniform(published["speed_lo"], published["speed_hi"])
         sine, cosine = map(float, portable.sine_cosine(row["yaw_rad"]))
-        row["vx_mps"], row["vy_mps"], row["vz_mps"] = -speed * sine, speed * cosine, 0.0
+        row["vx_mps"] = -speed * sine
+        row["vy_mps"] = speed * cosine
+        row["vz_mps"] = 0.0
     draw_rates(rng, cloud, published, row, speed, settings["cadence"])
     sizes = settings.get("sizes_m", {})
     if cloud.category in sizes:

@@ -34,7 +34,7 @@ def sines_cosines(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @LEAN
 def _product(a, b, out):
-    """Fill `out` (N, C) with the matrix product of a (N, K) and b (K, C), summed in the order of K."""
+    """Fill `out` (N, C) with the product of a (N, K) and b (K, C), summed in the order of K."""
     for n in range(np.uint64(a.shape[0])):
         for c in range(np.uint64(b.shape[1])):
             out[n, c] = a[n, 0] * b[0, c]

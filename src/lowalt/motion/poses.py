@@ -12,14 +12,12 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.motion.rotations import attitude, compiled, rodrigues, turns
-from lowalt.motion.table import PATH
 from lowalt.numerics.portable import applied, product
 from lowalt.targets.cloud import Cloud
 
 
 class Poses(NamedTuple):
-    """Rigid transforms of every part: a point u of part p is at rotation[n, p] @ u + translation[n,
-    p].
+    """Rigid transforms: point u of part p is at rotation[n, p] @ u + translation[n, p].
 
     rotation: (N, P, 3, 3); translation: (N, P, 3) m, global frame.
     """
@@ -33,7 +31,7 @@ class Perturbation(NamedTuple):
     nothing.
 
     angle_rad: part -> (N,) rad, added to that part's turn; offset_m: (N, 3) m, added to the whole
-    target's place, global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.
+    target's position, global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.
     """
 
     angle_rad: dict[int, np.ndarray] | None = None
@@ -42,16 +40,20 @@ class Perturbation(NamedTuple):
 
 
 def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
-    """Matrices A (3, Q, 4, 4): A[0] + cos(angle) A[1] + sin(angle) A[2] turns about the hinged axes
-    (Q, 3).
+    """Matrices (3, Q, 4, 4) that turn about hinged axes (Q, 3).
+
+    The first plus cos(angle) times the second plus sin(angle) times the third is the turn.
     """
     result = np.zeros((3, len(axes), 4, 4))
     turn = result[..., :3, :3]
-    turn[0] = axes[:, :, None] * axes[:, None]
-    turn[1] = np.eye(3) - turn[0]
+    still, cosine, sine = turn  # Views, so that what is written stands in the result.
+    still[:] = axes[:, :, None] * axes[:, None]
+    cosine[:] = np.eye(3) - still
     x, y, z = axes.T
-    turn[2, :, 2, 1], turn[2, :, 0, 2], turn[2, :, 1, 0] = x, y, z
-    turn[2] -= turn[2].swapaxes(1, 2)
+    sine[:, 2, 1] = x
+    sine[:, 0, 2] = y
+    sine[:, 1, 0] = z
+    sine -= sine.swapaxes(1, 2)
     result[..., :3, 3] = -applied(turn, hinges)
     result[0, :, :3, 3] += hinges
     result[0, :, 3, 3] = 1.0
@@ -61,11 +63,11 @@ def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
 def _angles(
     cloud: Cloud, row: dict, times_s: np.ndarray
 ) -> tuple[dict[str, np.ndarray], dict[int, tuple[str, float]]]:
-    """Angles that change with time, (N,) rad by name, and the moving parts: part -> (name of its
-    angle, phase in rad).
+    """Angles that change with time, (N,) rad by name, and of each moving part (angle, phase).
 
-    A rotor or wheel turns at the row's rate times its own factor; those of one factor differ by a
-    constant angle only.
+    A moving part has the name of its angle and a phase (rad) that is added to it. A rotor or wheel
+    turns at the row's rate times its own factor; those of one factor differ by a constant angle
+    only.
     Raises: InputError naming the parts without a rate or phase.
     """
     angles = {"cycle": 2 * np.pi * turns(row["rate_hz"], times_s)}
@@ -88,11 +90,10 @@ def _angles(
         for part in wings:
             phases[part] = ("shoulder" if cloud.parents[part] < 0 else "fold", 0.0)
     known = {name: np.isfinite(angle).all() for name, angle in angles.items()}
-    bad = [
-        cloud.names[part]
-        for part, (name, phase) in phases.items()
-        if not (known[name] and np.isfinite(phase))
-    ]
+    bad = []
+    for part, (name, phase) in phases.items():
+        if not (known[name] and np.isfinite(phase)):
+            bad.append(cloud.names[part])
     if bad:
         raise InputError(
             f"motion of {cloud.subtype}, model {row['model']}: no finite rate or phase for parts "
@@ -126,8 +127,7 @@ def _perturbed(
 def _series(
     cloud: Cloud, row: dict, times_s: np.ndarray, added: dict[int, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return functions of time (N, K) and matrices (K, P, 4, 4); the sum of their products over K
-    is the parts' motion.
+    """Return functions of time (N, K) and matrices (K, P, 4, 4); their product is the motion.
 
     A turn by angle a about a hinge is A + cos(a) B + sin(a) C; the motion of a part on a moving
     part is a product of such sums. The cost is a few cosines per symbol and one matrix product, for
@@ -138,12 +138,13 @@ def _series(
     constant: tuple[str, ...] = ()
     columns = {constant: np.ones(len(times_s))}
     for name in dict.fromkeys(name for name, _ in phases.values()):
-        columns["sin " + name,], columns["cos " + name,] = compiled().sines_cosines(angles[name])
+        sine_of_time, cosine_of_time = compiled().sines_cosines(angles[name])
+        columns[("sin " + name,)] = sine_of_time
+        columns[("cos " + name,)] = cosine_of_time
     moving = list(phases)
     still, cosine, sine = _hinged(cloud.axes[moving], cloud.hinges[moving])
-    s, c = compiled().sines_cosines(
-        np.array([phase for _, phase in phases.values()], dtype=np.float64)
-    )
+    of_parts = np.array([phase for _, phase in phases.values()], dtype=np.float64)
+    s, c = compiled().sines_cosines(of_parts)
     s = s[:, None, None]
     c = c[:, None, None]
     turning = np.stack([still, c * cosine + s * sine, c * sine - s * cosine])
@@ -152,58 +153,61 @@ def _series(
         names = [constant]
         matrices = np.eye(4)[None]
         if part in phases:
-            names = [constant, ("cos " + phases[part][0],), ("sin " + phases[part][0],)]
+            name, _ = phases[part]
+            names = [constant, ("cos " + name,), ("sin " + name,)]
             matrices = turning[:, moving.index(part)]
         if parent >= 0:
             before, carrier = terms[parent]
+            products = []
             for outer in before:
                 for inner in names:
                     if outer + inner not in columns:
                         columns[outer + inner] = columns[outer] * columns[inner]
-            names = [outer + inner for outer in before for inner in names]
+                    products.append(outer + inner)
+            names = products
             matrices = product(carrier[:, None], matrices).reshape(-1, 4, 4)
         terms.append((names, matrices))
-    places = {name: index for index, name in enumerate(columns)}
+    indices = {name: index for index, name in enumerate(columns)}
     result = np.zeros((len(columns), len(terms), 4, 4))
     for part, (names, matrices) in enumerate(terms):
-        result[[places[name] for name in names], part] = matrices
+        result[[indices[name] for name in names], part] = matrices
     return np.stack(list(columns.values()), axis=1), result
 
 
 def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
-    """Attitudes (N, 3, 3) of the row's yaw, pitch and roll with `tilt_rad` (N, 3) added; order as
-    `attitude`.
-    """
-    yaw, pitch, roll = (
-        row[name] + added
-        for name, added in zip(("yaw_rad", "pitch_rad", "roll_rad"), tilt_rad.T, strict=True)
-    )
+    """Attitudes (N, 3, 3) of the row's yaw, pitch and roll plus `tilt_rad` (N, 3)."""
+    yaw = row["yaw_rad"] + tilt_rad[:, 0]
+    pitch = row["pitch_rad"] + tilt_rad[:, 1]
+    roll = row["roll_rad"] + tilt_rad[:, 2]
     right, front, up = np.eye(3)
     return product(product(rodrigues(up, yaw), rodrigues(right, pitch)), rodrigues(front, roll))
 
 
 def _curved(row: dict, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Deviation of a track's path from its tangent (N, 3) m, and change of yaw, pitch and roll (N,
-    3) rad.
-    """
-    bent, bending = (np.array([row[name] for name in PATH[start : start + 3]]) for start in (0, 3))
+    """Deviation (N, 3) m of a track's path from its tangent, and change (N, 3) rad of attitude."""
+    acceleration = np.array([row["ax_mps2"], row["ay_mps2"], row["az_mps2"]])
+    jerk = np.array([row["jx_mps3"], row["jy_mps3"], row["jz_mps3"]])
     turned_rad = np.zeros((len(times_s), 3))
-    turned_rad[:, 0] = row["turn_radps"] * times_s
-    return (times_s**2)[:, None] * (bent / 2 + times_s[:, None] * (bending / 6)), turned_rad
+    turned_rad[:, 0] = row["turn_radps"] * times_s  # Pitch and roll stay.
+    deviation_m = (times_s**2)[:, None] * (acceleration / 2 + times_s[:, None] * (jerk / 6))
+    return deviation_m, turned_rad
 
 
 def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Return the nodes' positions (N, L, 3) in a recording turned by `body`, linear between frames
-    (paper Eq. 22).
+    """Return the nodes' positions (N, L, 3) in a recording turned by `body`.
+
+    They are linear between frames.
+    Source: paper Eq. 22.
     """
     frames = len(cloud.track)
-    place = (row["start_s"] + row["playback"] * times_s) * cloud.record["track_rate_hz"] % frames
-    first = np.minimum(place.astype(np.int64), frames - 1)
+    recorded_s = row["start_s"] + row["playback"] * times_s
+    frame = recorded_s * cloud.record["track_rate_hz"] % frames
+    first = np.minimum(frame.astype(np.int64), frames - 1)
     turned = compiled().product(cloud.track.reshape(-1, 3), body.T).reshape(frames, -1)
     before = turned.take(first, axis=0)
     result = turned.take((first + 1) % frames, axis=0)
     result -= before
-    result *= (place - first)[:, None]
+    result *= (frame - first)[:, None]
     result += before
     return result.reshape(len(times_s), -1, 3)
 
@@ -211,8 +215,7 @@ def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np
 def poses(
     cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbation | None = None
 ) -> Poses:
-    """Return the poses of all parts of `cloud` under the motion of `row` (motion table) at
-    `times_s` (N,) s.
+    """Return the poses of all parts of `cloud` at `times_s` (N,) s; `row` is of a motion table.
 
     `perturbation` is added to that motion. A cloud of nodes gets rotations of zeros (read-only),
     and its translations are the positions of its nodes.
@@ -252,14 +255,10 @@ def poses(
     functions, matrices = _series(cloud, row, times_s, added or {})
     matrices = product(body, matrices[..., :3, :])
     terms = functions.shape[1]
-    rotation = (
-        compiled()
-        .product(functions, matrices[..., :3].reshape(terms, -1))
-        .reshape(count, parts, 3, 3)
-    )
-    translation = (
-        compiled().product(functions, matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
-    )
+    rotation = compiled().product(functions, matrices[..., :3].reshape(terms, -1))
+    rotation = rotation.reshape(count, parts, 3, 3)
+    translation = compiled().product(functions, matrices[..., 3].reshape(terms, -1))
+    translation = translation.reshape(count, parts, 3)
     if tilt is not None:
         rotation = product(turned[:, None], rotation)
         translation = applied(turned[:, None], translation)
@@ -268,9 +267,7 @@ def poses(
 
 
 def positions(cloud: Cloud, row: dict, times_s: np.ndarray) -> np.ndarray:
-    """Return every point's position (N, L, 3) in metres, global frame; arguments and errors as
-    `poses`.
-    """
+    """Return every point's position (N, L, 3) m, global frame; arguments and errors as `poses`."""
     rotation, translation = poses(cloud, row, times_s)
     if "node" in cloud.kinds:
         return translation

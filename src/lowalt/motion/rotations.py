@@ -11,8 +11,9 @@ from lowalt.numerics.portable import product
 
 
 def compiled():
-    """Return the module of compiled functions, imported at the first call: other stages start
-    without numba.
+    """Return the module of compiled functions.
+
+    It is imported at the first call, so that other stages start without numba.
     """
     from lowalt.motion import pose_kernels
 
@@ -20,8 +21,7 @@ def compiled():
 
 
 def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
-    """Return rate_hz * times_s minus the nearest integer number of turns, in [-1/2, 1/2]; shape of
-    `times_s`.
+    """Return rate_hz * times_s (N,) minus the nearest whole number of turns, in [-1/2, 1/2].
 
     The product is a double-double, so the fraction keeps full precision after 10^6 turns.
     """
@@ -30,27 +30,25 @@ def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
 
 
 def rodrigues(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Return the matrices that turn by `angle` (N,) rad about the unit vector `axis` (3,); shape
-    (N, 3, 3).
+    """Return the matrices (N, 3, 3) that turn by `angle` (N,) rad about the unit `axis` (3,).
 
     Source: Rodrigues' rotation formula, paper Eq. 17.
     """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = (
-        values[:, None, None]
-        for values in compiled().sines_cosines(np.ascontiguousarray(angle, float))
-    )
+    sine, cosine = compiled().sines_cosines(np.ascontiguousarray(angle, float))
+    sine = sine[:, None, None]
+    cosine = cosine[:, None, None]
     return cosine * np.eye(3) + sine * cross + (1.0 - cosine) * np.outer(axis, axis)
 
 
 def attitude(yaw_rad: float, pitch_rad: float, roll_rad: float) -> np.ndarray:
-    """Return R_Y(yaw) R_P(pitch) R_R(roll), turns about z, x and y; shape (3, 3). Source: paper Eq.
-    18.
+    """Return R_Y(yaw) R_P(pitch) R_R(roll) (3, 3), turns about z, x and y.
+
+    Source: paper Eq. 18.
     """
-    (d, e, f), (a, b, c) = compiled().sines_cosines(
-        np.array([yaw_rad, pitch_rad, roll_rad], dtype=np.float64)
-    )
+    angles = np.array([yaw_rad, pitch_rad, roll_rad], dtype=np.float64)
+    (d, e, f), (a, b, c) = compiled().sines_cosines(angles)
     yaw = np.array([[a, -d, 0.0], [d, a, 0.0], [0.0, 0.0, 1.0]])
     pitch = np.array([[1.0, 0.0, 0.0], [0.0, b, -e], [0.0, e, b]])
     roll = np.array([[c, 0.0, f], [0.0, 1.0, 0.0], [-f, 0.0, c]])

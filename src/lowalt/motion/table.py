@@ -1,4 +1,4 @@
-"""The motion table: one row per motion model, a CSV file that is readable and is read back exactly."""
+"""The motion table: one row per motion model, a CSV file that is read back exactly."""
 
 import csv
 import math
@@ -39,35 +39,43 @@ SCALE = "scale"
 
 
 def write_table(path: str | Path, rows: list[dict]) -> None:
-    """Write rows (one dict per motion model, NaN where a column does not apply) as CSV; equal rows
-    give equal bytes.
+    """Write rows (one dict per motion model, NaN where a column does not apply) as CSV.
 
-    Rows of targets with random sizes have the key SCALE, those of tracks the keys TRACK and PATH.
+    Equal rows give equal bytes. Rows of targets with random sizes have the key SCALE, those of
+    tracks the keys TRACK and PATH.
     """
     further = _further(rows[0] if rows else ())
-    write_csv(path, (*COLUMNS, *further), (_cells(row, (*NUMBERS, *further)) for row in rows))
+    numbers = (*NUMBERS, *further)
+    write_csv(path, (*COLUMNS, *further), (_cells(row, numbers) for row in rows))
 
 
 def _further(names: Collection[str]) -> tuple[str, ...]:
     """The columns after COLUMNS of a table that has these names."""
-    return (*(SCALE,) * (SCALE in names), *(*TRACK, *PATH) * (TRACK[0] in names))
+    columns: tuple[str, ...] = ()
+    if SCALE in names:
+        columns += (SCALE,)
+    if TRACK[0] in names:
+        columns += (*TRACK, *PATH)
+    return columns
 
 
 def _cells(row: dict, names: tuple[str, ...]) -> list:
-    """Return the cells of a row: texts, the model's number, then numbers in full precision, empty
-    where NaN.
-    """
-    numbers = (
-        int(row[name]) if name in TRACK else "" if math.isnan(row[name]) else repr(float(row[name]))
-        for name in names
-    )
-    return [*(row[name] for name in TEXTS), int(row["model"]), *numbers]
+    """Return the cells of a row: texts, the model's number, then numbers, empty where NaN."""
+    cells = [*(row[name] for name in TEXTS), int(row["model"])]
+    for name in names:
+        if name in TRACK:
+            cells.append(int(row[name]))
+        elif math.isnan(row[name]):
+            cells.append("")
+        else:
+            cells.append(repr(float(row[name])))  # Its shortest text that is read back exactly.
+    return cells
 
 
 def read_table(path: str | Path) -> list[dict]:
-    """Read a motion table: dicts with `model`, `track`, `look` as ints, numbers as floats, NaN
-    where a cell is empty.
+    """Read a motion table: dicts of floats, NaN where a cell is empty.
 
+    `model`, `track` and `look` are ints, the columns TEXTS are strings.
     Raises: InputError naming the file, line and column that is wrong.
     """
     with text_file(path, "motion table") as file:
@@ -89,9 +97,10 @@ def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str])
     for name in header[len(TEXTS) :]:
         text = row[name]
         try:
-            row[name] = (
-                int(text) if name in ("model", *TRACK) else float(text) if text else math.nan
-            )
+            if name in ("model", *TRACK):
+                row[name] = int(text)
+            else:
+                row[name] = float(text) if text else math.nan
             infinite = math.isinf(row[name])
         except (ValueError, OverflowError):
             raise InputError(

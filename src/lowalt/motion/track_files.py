@@ -25,12 +25,12 @@ SLOWEST_MPS = 0.5
 
 
 def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStarts | None:
-    """Return the path at the starts of looks of the flight log that the block `motion` names under
-    `track`, None where it names none.
+    """Return the path of a flight log at the starts of looks, None where `motion` names no log.
 
-    corners (K, 2), masts_m (S, 2): as of `Cell`. Velocities at the log's rows are differences of
-    its places (second order), and cubics join the rows. The heading is the course.
-    Raises: InputError naming the file, and the line, column or place that is wrong.
+    motion: the block of the configuration, whose key `track` names the log; corners (K, 2),
+    masts_m (S, 2): as of `Cell`. Velocities at the log's rows are differences of its positions
+    (second order), and cubics join the rows. The heading is the course.
+    Raises: InputError naming the file, and the line, column or position that is wrong.
     """
     if "track" not in motion:
         return None
@@ -38,13 +38,14 @@ def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStart
     looks = motion["looks"]
     look_s = motion["look_s"]
     cell = Cell(corners, masts_m, motion["region"]["mast_clearance_m"])
-    times_s, places = _numbers(path, cell)
+    times_s, positions_m = _numbers(path, cell)
     long_s = times_s[-1] - times_s[0]
     if long_s < looks * look_s * (1 - 1e-9):
         raise InputError(
             f"{path}: {long_s:g} s long, expected {looks * look_s:g} s for motion.looks {looks}"
         )
-    place_m, velocity_mps = _resampled(times_s, places, times_s[0] + look_s * np.arange(looks + 1))
+    starts_s = times_s[0] + look_s * np.arange(looks + 1)
+    place_m, velocity_mps = _resampled(times_s, positions_m, starts_s)
     outside = np.flatnonzero(cell.room_m(place_m[:, :2]) <= 0)
     if len(outside):
         x, y, _ = place_m[outside[0]]
@@ -57,20 +58,19 @@ def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStart
 
 
 def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
-    """Times (R,) s and places (R, 3) m of a log's rows."""
+    """Times (R,) s and positions (R, 3) m of a log's rows."""
     rows = read_csv(path, "time_s", what="track")
-    named = METRES if rows and set(METRES) <= set(rows[0]) else DEGREES
-    if len(rows) < 2 or not set(named) <= set(rows[0]):
+    columns = list(rows[0]) if rows else []
+    named = METRES if set(METRES) <= set(columns) else DEGREES
+    if len(rows) < 2 or not set(named) <= set(columns):
         raise InputError(
-            f"{path}: {len(rows)} rows of the columns {list(rows[0]) if rows else []}, expected "
-            f"two or more of {list(METRES)} or {list(DEGREES)}"
+            f"{path}: {len(rows)} rows of the columns {columns}, expected two or more of "
+            f"{list(METRES)} or {list(DEGREES)}"
         )
-    values = np.array(
-        [
-            [_number(path, line, name, row[name]) for name in named]
-            for line, row in enumerate(rows, 2)
-        ]
-    )
+    numbers = []
+    for line, row in enumerate(rows, start=2):  # Line 1 is the header.
+        numbers.append([_number(path, line, name, row[name]) for name in named])
+    values = np.array(numbers)
     back = np.flatnonzero(np.diff(values[:, 0]) <= 0)
     if len(back):
         line = int(back[0])
@@ -78,9 +78,10 @@ def _numbers(path: str | Path, cell: Cell) -> tuple[np.ndarray, np.ndarray]:
             f"{path}, line {line + 3}, column time_s: {values[line + 1, 0]:g} after "
             f"{values[line, 0]:g}, expected times that increase"
         )
-    return values[:, 0], values[:, 1:] if named == METRES else _flat(
-        values[:, 1:], cell.corners.mean(axis=0)
-    )
+    positions = values[:, 1:]
+    if named == DEGREES:
+        positions = _flat(positions, cell.corners.mean(axis=0))
+    return values[:, 0], positions
 
 
 def _number(path: str | Path, line: int, column: str, text: str) -> float:
@@ -95,22 +96,25 @@ def _number(path: str | Path, line: int, column: str, text: str) -> float:
 
 
 def _flat(degrees: np.ndarray, middle_m: np.ndarray) -> np.ndarray:
-    """Places (R, 3) m of latitudes, longitudes (degrees) and heights (R, 3): on the plane that
-    touches WGS 84 at the first row, which lies at `middle_m` (2,)."""
+    """Positions (R, 3) m of rows (R, 3) of latitude, longitude (degrees) and height (m).
+
+    They lie on the plane that touches WGS 84 at the first row, which is at `middle_m` (2,).
+    """
     latitude, longitude, height = degrees.T
     sine, cosine = portable.sine_cosine(math.radians(latitude[0]))
     square = 1.0 - ECCENTRICITY_2 * float(sine) ** 2
     across_m = SEMI_MAJOR_M / math.sqrt(square)
     along_m = across_m * (1.0 - ECCENTRICITY_2) / square
     east = (longitude - longitude[0] + 180.0) % 360.0 - 180.0
-    x, y = np.radians(east) * across_m * cosine, np.radians(latitude - latitude[0]) * along_m
+    x = np.radians(east) * across_m * cosine
+    y = np.radians(latitude - latitude[0]) * along_m
     return np.stack([middle_m[0] + x, middle_m[1] + y, height], axis=1)
 
 
 def _resampled(
     times_s: np.ndarray, places_m: np.ndarray, wanted_s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Places and velocities (N, 3) at the times wanted, on cubics between the rows."""
+    """Positions and velocities (N, 3) at the times wanted, on cubics between the rows."""
     order: Literal[1, 2] = 2 if len(times_s) > 2 else 1
     velocities = np.gradient(places_m, times_s, axis=0, edge_order=order)
     first = np.clip(np.searchsorted(times_s, wanted_s, side="right") - 1, 0, len(times_s) - 2)
@@ -122,12 +126,14 @@ def _resampled(
     n = step * velocities[first + 1]
     second = 3 * (b - a) - 2 * m - n
     third = m + n - 2 * (b - a)
-    return a + u * (m + u * (second + u * third)), (m + u * (2 * second + 3 * u * third)) / step
+    wanted_m = a + u * (m + u * (second + u * third))
+    return wanted_m, (m + u * (2 * second + 3 * u * third)) / step
 
 
 def _headings(velocity_mps: np.ndarray) -> np.ndarray:
-    """Yaw (N,) rad along the course; where the target is slow, that before, at first the next one,
-    or 0.
+    """Yaw (N,) rad along the course.
+
+    Where the target is slow, it is that before, at first the next one, and 0 if it is never fast.
     """
     x, y, _ = velocity_mps.T
     heading = portable.arctan2(-x, y)

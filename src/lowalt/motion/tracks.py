@@ -1,8 +1,7 @@
-"""Tracks: motion models that are looked at again and again, on a drawn path that turns or on that
-of a flight log.
+"""Tracks: motion models that are looked at again and again, on a drawn path or a flight log's.
 
-The path of a look is the cubic with the places and velocities of both its ends, and its heading
-turns at a constant rate. Place, velocity, heading, rotors, wheels, wings and gait therefore
+The path of a look is the cubic with the positions and velocities of both its ends, and its heading
+turns at a constant rate. Position, velocity, heading, rotors, wheels, wings and gait therefore
 continue from look to look without a jump.
 """
 
@@ -22,6 +21,8 @@ from lowalt.targets.cloud import Cloud
 
 TURN_RADPS = math.radians(20.0)
 """Largest heading rate of a drawn path, to either side."""
+DRAWS = 20
+"""A look whose heading rate was drawn this often in vain turns back."""
 
 
 class LookStarts(NamedTuple):
@@ -36,8 +37,11 @@ class LookStarts(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Where targets may be: inside the convex region of `corners` (K, 2) m, counter-clockwise, and
-    at least `clearance_m` from each of `masts_m` (S, 2) m."""
+    """Where targets may be: inside a convex region and away from masts.
+
+    corners: (K, 2) m of the region, counter-clockwise; clearance_m: least distance from each of
+    masts_m, (S, 2) m.
+    """
 
     corners: np.ndarray
     masts_m: np.ndarray
@@ -55,27 +59,28 @@ class Cell(NamedTuple):
 def turned(
     place_m: np.ndarray, velocity_mps: np.ndarray, rate: float, times_s: np.ndarray
 ) -> tuple:
-    """Return place and velocity (N, 2) in a coordinated turn: constant speed, heading rate `rate`
-    (rad/s), not 0.
+    """Return position and velocity (N, 2) in a coordinated turn at the `times_s` (N,).
 
+    Speed and heading rate `rate` (rad/s, not 0) are constant.
     Source: Li and Jilkov, Survey of maneuvering target tracking, part I, IEEE Trans. AES 39, 2003,
     section V-A.
     """
-    sine, cosine = (value[:, None] for value in portable.sine_cosine(rate * times_s))
+    sine, cosine = portable.sine_cosine(rate * times_s)
+    sine = sine[:, None]
+    cosine = cosine[:, None]
     left = np.array([-velocity_mps[1], velocity_mps[0]])
-    return (
-        place_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left,
-        cosine * velocity_mps + sine * left,
-    )
+    moved_m = place_m + sine / rate * velocity_mps + (1.0 - cosine) / rate * left
+    return moved_m, cosine * velocity_mps + sine * left
 
 
 def _way_back(cell: Cell, place_m: np.ndarray, velocity_mps: np.ndarray) -> float:
-    """The heading rate, TURN_RADPS to a side, whose full circle stays in the cell; 0 where neither
-    does.
-    """
+    """The heading rate, TURN_RADPS to a side, whose full circle stays in the cell, or else 0."""
     left = np.array([-velocity_mps[1], velocity_mps[0]]) / TURN_RADPS
-    room = cell.room_m(place_m + np.stack([left, -left])) >= portable.norm(left)
-    return TURN_RADPS if room[0] else -TURN_RADPS if room[1] else 0.0
+    centres = place_m + np.stack([left, -left])
+    left_fits, right_fits = cell.room_m(centres) >= portable.norm(left)
+    if left_fits:
+        return TURN_RADPS
+    return -TURN_RADPS if right_fits else 0.0
 
 
 def _begun(rng: np.random.Generator, row: dict, cell: Cell) -> None:
@@ -90,10 +95,8 @@ def _begun(rng: np.random.Generator, row: dict, cell: Cell) -> None:
         row["x_m"], row["y_m"] = map(float, place(rng, *cell))
         angle = rng.uniform(0.0, 2 * math.pi)
         sine, cosine = map(float, portable.sine_cosine(angle))
-        row["vx_mps"], row["vy_mps"] = (
-            cosine * velocity[0] - sine * velocity[1],
-            sine * velocity[0] + cosine * velocity[1],
-        )
+        row["vx_mps"] = cosine * velocity[0] - sine * velocity[1]
+        row["vy_mps"] = sine * velocity[0] + cosine * velocity[1]
         row["yaw_rad"] = (row["yaw_rad"] + angle) % (2 * math.pi)
     raise InputError(
         f"motion of {row['subtype']}: the region is too small for a turn of "
@@ -113,28 +116,27 @@ def drawn_path(
     """Return a path of `looks` looks of `look_s` seconds from the place and velocity of `row`.
 
     The heading rate of each look is uniform within TURN_RADPS, drawn again where the target would
-    leave the cell or could not turn back; after 20 draws it turns back. It climbs the other way at
-    the ends of `heights_m` (lowest and highest, m). The speed over ground is constant.
+    leave the cell or could not turn back; after DRAWS draws it turns back. It climbs the other way
+    at the ends of `heights_m` (lowest and highest, m). The speed over ground is constant.
     """
     step = look_s / 8 * np.arange(1, 9)
     here = np.array([row["x_m"], row["y_m"]])
     velocity = np.array([row["vx_mps"], row["vy_mps"]])
     height = row["z_m"]
-    climb = 0.0
     heading = row["yaw_rad"]
     climb = _climb(height, row["vz_mps"], row["vz_mps"], heights_m, 0.0, look_s)
     starts = [(*here, height, *velocity, climb, heading)]
     for _ in range(looks):
-        for attempt in range(21):
-            rate = (
-                rng.uniform(-TURN_RADPS, TURN_RADPS)
-                if attempt < 20
-                else _way_back(cell, here, velocity)
-            )
-            places, velocities = turned(here, velocity, rate, step)
-            if (cell.room_m(places) > 0).all() and _way_back(cell, places[-1], velocities[-1]):
+        for attempt in range(DRAWS + 1):
+            if attempt < DRAWS:
+                rate = rng.uniform(-TURN_RADPS, TURN_RADPS)
+            else:
+                rate = _way_back(cell, here, velocity)
+            positions, velocities = turned(here, velocity, rate, step)
+            inside = (cell.room_m(positions) > 0).all()
+            if inside and _way_back(cell, positions[-1], velocities[-1]):
                 break
-        here = places[-1]
+        here = positions[-1]
         velocity = velocities[-1]
         heading = heading + rate * look_s
         later = _climb(height, climb, climb, heights_m, look_s, look_s)

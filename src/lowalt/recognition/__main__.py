@@ -187,7 +187,8 @@ def _transfer(arguments: list[str]) -> None:
     first, *others = map(load_yaml, options.configs)
     for other in others:
         transfer.check_folds(first, other)
-    own, other = ([Evaluated(path) for path in paths] for paths in (options.own, options.other))
+    own = [Evaluated(path) for path in options.own]
+    other = [Evaluated(path) for path in options.other]
     transfer.write(own, other, names(options.schemes), options.out, seed)
 
 
@@ -205,10 +206,11 @@ def _distances(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, help="table to write (.csv)")
     options = line.parse_args(arguments)
     pick(options.settings)
-    motion = [row for path in options.motion for row in read_table(path)]
-    distances.write(
-        options.out, distances.rows([read_cloud(path) for path in options.clouds], motion)
-    )
+    motion = []
+    for path in options.motion:
+        motion += read_table(path)
+    clouds = [read_cloud(path) for path in options.clouds]
+    distances.write(options.out, distances.rows(clouds, motion))
 
 
 def _score(arguments: list[str]) -> None:

@@ -67,11 +67,11 @@ def augment(
             )
             image[:] = np.frombuffer(changed, np.uint8).reshape(image.shape)
     for number, image in enumerate(result):
-        draw = draws[number]
-        band = int(draw[4] * block["mask_doppler"] * rows)
-        strip = int(draw[6] * block["mask_time"] * width)
-        top = int(draw[5] * (rows - band + 1))
-        left = int(draw[7] * (width - strip + 1))
+        of_band, of_top, of_strip, of_left = draws[number][4:8]
+        band = int(of_band * block["mask_doppler"] * rows)
+        strip = int(of_strip * block["mask_time"] * width)
+        top = int(of_top * (rows - band + 1))
+        left = int(of_left * (width - strip + 1))
         drop = drops[number] if not drops[number].all() else np.zeros(views, dtype=bool)
         if not (band or strip or drop.any()):
             continue

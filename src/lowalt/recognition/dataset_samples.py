@@ -52,14 +52,12 @@ def opened(config: str | Path) -> Dataset:
 
 def cloud_sha256(cloud: Cloud) -> str:
     """SHA-256 of all arrays of a cloud, in the order of its fields."""
-    arrays = [
-        value
-        for value in (getattr(cloud, field.name) for field in fields(cloud))
-        if isinstance(value, np.ndarray)
-    ]
-    return hashlib.sha256(
-        b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
-    ).hexdigest()
+    digest = hashlib.sha256()
+    for field in fields(cloud):
+        value = getattr(cloud, field.name)
+        if isinstance(value, np.ndarray):
+            digest.update(np.ascontiguousarray(value).tobytes())
+    return digest.hexdigest()
 
 
 def stations_of(maker: Maker, columns: list[int]) -> list[int] | None:
@@ -79,10 +77,10 @@ def views_of(
     size: int,
     stations: list[int] | None = None,
 ) -> np.ndarray:
-    """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row
-    at an SNR (dB).
+    """Return a sample's index images (len(columns), size, size) uint8.
 
-    stations: the stations to compute, as `stations_of` returns them; all by default.
+    row: of a motion table, at the SNR snr_db (dB); stations: the stations to compute, as
+    `stations_of` returns them; all by default.
     """
     return images_of(maker, row, snr_db, maker.signal(row, snr_db, stations), columns, size)
 
@@ -133,7 +131,8 @@ class DatasetSamples(samples.Samples):
         """Note the samples of one shard in its order; return their facts."""
         plan = self.dataset.plan
         network = self.dataset.maker.network
-        rows, first = rows_of(self.dataset, chunk), len(self.rows)
+        rows = rows_of(self.dataset, chunk)
+        first = len(self.rows)
         levels = plan.chunk(chunk).snrs
         chosen = select(rows, list(levels), plan.split, plan.seed, fold)
         self.rows += rows
@@ -179,10 +178,8 @@ class DatasetSamples(samples.Samples):
 
     def keep(self, numbers: np.ndarray) -> None:
         """Drop all samples but those at `numbers`."""
-        self.chosen, self.facts = (
-            [self.chosen[number] for number in numbers],
-            self.facts.take(numbers),
-        )
+        self.chosen = [self.chosen[number] for number in numbers]
+        self.facts = self.facts.take(numbers)
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""

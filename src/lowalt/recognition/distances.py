@@ -18,6 +18,7 @@ distances.csv, one row per subtype:
                                                  another one
 """
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -110,17 +111,15 @@ def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
     lines = []
     for category in dict.fromkeys(cloud.category for cloud in clouds):
         names = sorted(cloud.subtype for cloud in clouds if cloud.category == category)
-        apart = {
-            (a, b): energy_distance(forms[a][0], forms[b][0]) for a in names for b in names if a < b
-        }
+        apart = {}
+        for a, b in combinations(names, 2):  # Names are sorted, so that a < b.
+            apart[a, b] = energy_distance(forms[a][0], forms[b][0])
         for name in names:
             line = [category, name, first[name]["group"]]
             for trained in (False, True):
-                others = [
-                    other
-                    for other in names
-                    if other != name and (not trained or first[other]["group"] == "seen")
-                ]
+                others = [other for other in names if other != name]
+                if trained:
+                    others = [other for other in others if first[other]["group"] == "seen"]
                 near = min(
                     others,
                     key=lambda other: (apart[min(name, other), max(name, other)], other),

@@ -53,12 +53,11 @@ def difference(
     generator: np.random.Generator,
     snr_db: float | None = None,
 ) -> Interval:
-    """Return the mean over seeds of first - second, with its 95 % interval; all in shares of
-    correct samples.
+    """Return the mean over seeds of first - second, in shares of correct samples.
 
-    first, second: trainings of the two schemes, one per seed; snr_db: the SNR whose samples count,
-    None for all. The interval resamples seeds, subtypes (unseen protocol) and motion models. The
-    difference of a scheme to itself is 0.
+    Its interval is that of 95 %. first, second: trainings of the two schemes, one per seed; snr_db:
+    the SNR whose samples count, None for all. The interval resamples seeds, subtypes (unseen
+    protocol) and motion models. The difference of a scheme to itself is 0.
     Raises: InputError where the trainings were tested on different samples. Source:
     `intervals.strict_difference`.
     """
@@ -69,31 +68,26 @@ def difference(
     if first is second:
         return Interval(0.0, 0.0, 0.0)
     rows = slice(None) if snr_db is None else test.snr_db == snr_db
-    shares = [
-        model_shares(test.motion[rows], [run.test.correct[rows] for run in runs])
-        for runs in (first, second)
-    ]
-    (place, count, ours), (*_, theirs) = shares
-    return strict_difference(
-        ours, theirs, count, test.subtype[rows][place], whole_subtypes(first), generator
-    )
+    motion = test.motion[rows]
+    sample, count, ours = model_shares(motion, [run.test.correct[rows] for run in first])
+    _, _, theirs = model_shares(motion, [run.test.correct[rows] for run in second])
+    subtypes = test.subtype[rows][sample]
+    return strict_difference(ours, theirs, count, subtypes, whole_subtypes(first), generator)
 
 
 def whole_subtypes(runs: list[Evaluated]) -> bool:
-    """Return whether intervals resample whole subtypes, because the results should generalise to
-    other subtypes.
-    """
+    """Return whether intervals resample whole subtypes, as where results speak of other ones."""
     return runs[0].protocol == "unseen"
 
 
 def spread_points(*groups: list[float]) -> float | None:
-    """Return the standard deviation between seeds, pooled over groups of accuracies in percent;
-    None for one seed.
+    """Return the standard deviation between seeds, pooled over groups; None for one seed.
+
+    groups: accuracies in percent, one a seed.
     """
     several = [np.array(group) for group in groups if len(group) > 1]
     freedom = sum(len(group) - 1 for group in several)
-    return (
-        float(np.sqrt(sum(((group - group.mean()) ** 2).sum() for group in several) / freedom))
-        if freedom
-        else None
-    )
+    if not freedom:
+        return None
+    squares = sum(((group - group.mean()) ** 2).sum() for group in several)
+    return float(np.sqrt(squares / freedom))

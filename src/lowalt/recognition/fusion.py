@@ -83,7 +83,10 @@ class AttentionFusion(Fusion):
         self.inter = encoder(width, block["inter_depth"], *shape)
 
     def forward(self, tokens: torch.Tensor) -> torch.Tensor:
-        """Tokens (B, K, V, features) -> fused feature (B, features). Source: paper, section IV-F."""
+        """Tokens (B, K, V, features) -> fused feature (B, features).
+
+        Source: paper, section IV-F.
+        """
         return self.inter(self.stations(tokens)).amax(dim=1)
 
     def stations(self, tokens: torch.Tensor) -> torch.Tensor:

@@ -62,7 +62,10 @@ class _OnePixel(torch.autograd.Function):
 
 
 class MatrixProduct(nn.Conv2d):
-    """`nn.Conv2d`, as a matrix product where it is one. Results differ by the order of sums only."""
+    """`nn.Conv2d`, as a matrix product where it is one.
+
+    Results differ by the order of sums only.
+    """
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
         """Images (B, C, rows, columns) -> (B, O, rows, columns), channels last where it is a matrix

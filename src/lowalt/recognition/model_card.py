@@ -80,8 +80,10 @@ def accuracy_rows(model: str | Path, protocol: str, scheme: str) -> list[dict[st
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
     """A Markdown table."""
-    lines = [header, tuple("---" for _ in header), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+    text = ""
+    for line in (header, ("---",) * len(header), *rows):
+        text += "| " + " | ".join(map(str, line)) + " |\n"
+    return text
 
 
 def _shown(value: object) -> str:

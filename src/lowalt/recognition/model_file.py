@@ -64,11 +64,11 @@ class ModelFile:
 
 
 def run_folder(model: str | Path) -> Path | None:
-    """Return the folder of the run that a model lies in, RUN/models/PROTOCOL/SCHEME/SEED/; None
-    elsewhere.
-    """
-    parents = Path(model).resolve().parents
-    return parents[4] if len(parents) > 4 and parents[3].name == "models" else None
+    """Return the folder of the run that a model lies in, None where it lies in none."""
+    # RUN/models/PROTOCOL/SCHEME/SEED/
+    scheme_folder = Path(model).resolve().parent.parent
+    models = scheme_folder.parent.parent
+    return models.parent if models.name == "models" else None
 
 
 def of_run(path: str | Path) -> ModelFile:

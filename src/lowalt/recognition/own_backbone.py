@@ -22,9 +22,9 @@ MIDDLE = {"mean": (0.5, 0.5, 0.5), "std": (0.5, 0.5, 0.5)}
 
 
 def backbone(name: str, size: int) -> nn.Module:
-    """Return the module that FILE.py:FUNCTION makes for size x size images, with its number of
-    features noted.
+    """Return the module that FILE.py:FUNCTION makes for size x size images.
 
+    Its number of features is noted in it.
     Raises: InputError where the file is missing, has no such function or ends in an error, or where
     the module gives no features (B, features).
     """
@@ -34,7 +34,7 @@ def backbone(name: str, size: int) -> nn.Module:
             f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that "
             "exists"
         )
-    function = name.rpartition(":")[2]
+    _, _, function = name.rpartition(":")
     specification = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module
@@ -50,9 +50,10 @@ def backbone(name: str, size: int) -> nn.Module:
     except Exception as error:
         raise InputError(f"network: backbone {name!r}: {type(error).__name__}: {error}") from error
     if not isinstance(features, torch.Tensor) or features.ndim != 2 or len(features) != 2:
-        shape = (
-            tuple(features.shape) if isinstance(features, torch.Tensor) else type(features).__name__
-        )
+        if isinstance(features, torch.Tensor):
+            shape = tuple(features.shape)
+        else:
+            shape = type(features).__name__
         raise InputError(
             f"network: backbone {name!r} gives {shape} for two images, expected (2, features)"
         )

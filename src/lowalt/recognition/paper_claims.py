@@ -40,12 +40,15 @@ def read_published(path: str | Path) -> dict[tuple[str, str], float]:
 
 
 def verdict(low: float, high: float, seeds: int) -> str:
-    """Return whether an ordering holds by the bounds of its interval, or that too few trainings
-    were made to say.
+    """Return whether an ordering holds by the bounds of its interval.
+
+    Too few trainings do not rank the schemes.
     """
     if seeds < SEEDS:
         return "not ranked"
-    return "holds" if low > 0 else "reversed" if high < 0 else "undecided"
+    if low > 0:
+        return "holds"
+    return "reversed" if high < 0 else "undecided"
 
 
 def ordering_rows(compared: list[list], published: dict[tuple[str, str], float]) -> Iterable[list]:

@@ -57,7 +57,7 @@ def shares_of(row: dict, columns: tuple[str, ...], where: str) -> list[float]:
 
 @dataclass(frozen=True)
 class Predictions:
-    """Columns of a prediction file; `probabilities` (samples, classes), everything else (samples,)."""
+    """Columns of a prediction file: `probabilities` (samples, classes), all others (samples,)."""
 
     key: np.ndarray
     subtype: np.ndarray
@@ -136,28 +136,36 @@ def write(
     classes: tuple[str, ...] = CATEGORIES,
     protocol: str | None = None,
 ) -> None:
-    """Write a prediction file, with the column `part` for one of the protocols; equal predictions
-    give equal bytes.
+    """Write a prediction file, with the column `part` for one of the protocols.
+
+    Equal predictions give equal bytes.
     """
-    parts = {pair: part for part, pairs in FOLDS.get(protocol or "", {}).items() for pair in pairs}
-    part_column = ("part",) if parts else ()
-    rows = (
-        [
-            table.key[row],
-            table.subtype[row],
-            table.group[row],
-            table.fold[row],
-            int(table.model[row]),
-            _number(table.snr_db[row]),
-            int(table.label[row]),
-            _number(table.range_m[row]),
-            _number(table.aspect_deg[row]),
-            *(repr(float(value)) for value in table.probabilities[row]),
-            *(parts[table.group[row], table.fold[row]] for _ in part_column),
-        ]
-        for row in range(len(table))
-    )
-    write_csv(path, (*COLUMNS, *probability_columns(classes), *part_column), rows)
+    part_of_fold = {}
+    for part, pairs in FOLDS.get(protocol or "", {}).items():
+        part_of_fold |= dict.fromkeys(pairs, part)
+    columns = (*COLUMNS, *probability_columns(classes))
+    if part_of_fold:
+        columns += ("part",)
+    write_csv(path, columns, (_cells(table, row, part_of_fold) for row in range(len(table))))
+
+
+def _cells(table: Predictions, row: int, part_of_fold: dict[tuple[str, str], str]) -> list:
+    """The cells of a row; part_of_fold: the protocol's part by (group, fold), empty for none."""
+    cells = [
+        table.key[row],
+        table.subtype[row],
+        table.group[row],
+        table.fold[row],
+        int(table.model[row]),
+        _number(table.snr_db[row]),
+        int(table.label[row]),
+        _number(table.range_m[row]),
+        _number(table.aspect_deg[row]),
+    ]
+    cells += [repr(float(value)) for value in table.probabilities[row]]
+    if part_of_fold:
+        cells.append(part_of_fold[table.group[row], table.fold[row]])
+    return cells
 
 
 def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions:

@@ -85,7 +85,7 @@ class Palettes(nn.Module):
     def __init__(
         self, palettes: np.ndarray, spectra: tuple[int, ...], mean: tuple, std: tuple
     ) -> None:
-        """palettes (spectra, 256, 3) uint8 by SPECTRA; mean, std: per channel, on colours in 0..1."""
+        """palettes: (spectra, 256, 3) uint8 by SPECTRA; mean, std: of each channel, in 0..1."""
         super().__init__()
         shape = np.shape(palettes)
         # The palettes of the first spectra are enough where the scheme sees no later one.

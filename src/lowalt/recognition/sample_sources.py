@@ -55,7 +55,7 @@ class Source:
         return cached
 
     def for_training(self, scheme: Scheme, protocol: str, size: int) -> dict[str, Samples]:
-        """Return the samples of a protocol's parts "train" and "validation" as a scheme sees them."""
+        """Return a protocol's samples of "train" and of "validation" as a scheme sees them."""
         return {
             part: self.samples(scheme.columns, folds(protocol, part), size)
             for part in ("train", "validation")

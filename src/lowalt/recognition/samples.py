@@ -29,7 +29,7 @@ from lowalt.spectra.catalogue import LISTED
 
 @dataclass(frozen=True)
 class Facts:
-    """Metadata of samples, one entry per sample; range_m and aspect_rad have a column per station."""
+    """Metadata of samples, one entry each; range_m and aspect_rad have a column per station."""
 
     key: np.ndarray
     subtype: np.ndarray
@@ -63,12 +63,14 @@ KINDS = dict(zip(FACTS, ("U", "U", "iu", "fiu", "U", "U", "iu", "f", "f"), stric
 
 def joined(parts: list[Facts]) -> Facts:
     """Return the facts of several sources one after the other."""
-    return Facts(*(np.concatenate([getattr(part, name) for part in parts]) for name in FACTS))
+    columns = {}
+    for name in FACTS:
+        columns[name] = np.concatenate([getattr(part, name) for part in parts])
+    return Facts(**columns)
 
 
 def first_models(facts: Facts, share: float) -> np.ndarray:
-    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one per
-    subtype.
+    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one.
 
     Models are drawn independently, so the first ones are a random sample. The models of a smaller
     share are a subset of those of a larger one.
@@ -181,16 +183,15 @@ class ViewSamples(Samples):
 
     def keep(self, numbers: np.ndarray) -> None:
         """Drop all samples but those at `numbers`."""
-        self.images, self.facts = self.images[numbers], self.facts.take(numbers)
+        self.images = self.images[numbers]
+        self.facts = self.facts.take(numbers)
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
         return self.images[numbers]
 
     def sha256(self) -> str:
-        """Return the SHA-256 of all that a training sees of these samples: images, labels, keys and
-        their order.
-        """
+        """Return the SHA-256 of what a training sees: images, labels, keys and their order."""
         return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
 
 
@@ -245,7 +246,10 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
 def write(
     path: str | Path, views: np.ndarray, facts: Facts, spectra: Sequence[str] = LISTED
 ) -> None:
-    """Write a cache file; equal samples give equal bytes. spectra: names in the order of the tiles."""
+    """Write a cache file; equal samples give equal bytes.
+
+    spectra: names in the order of the tiles.
+    """
     with replacing(path, views.nbytes) as temporary:
         np.savez(
             temporary,

@@ -61,7 +61,9 @@ class Scheme:
 
     def settled(self, settings: dict) -> dict:
         """Return the settings of a training with this row's own size and steps in them."""
-        training = {**settings["training"], **({"steps": self.steps} if self.steps else {})}
+        training = dict(settings["training"])
+        if self.steps:
+            training["steps"] = self.steps
         return {**settings, "size": self.size or settings["size"], "training": training}
 
     @property
@@ -75,18 +77,19 @@ class Scheme:
 
         `columns_in` converts them to indices in a data set, which may have fewer spectra.
         """
-        return [
-            len(SPECTRA) * station + spectrum
-            for station in self.stations
-            for spectrum in self.spectra
-        ]
+        result = []
+        for station in self.stations:
+            result += [len(SPECTRA) * station + spectrum for spectrum in self.spectra]
+        return result
 
 
 def of_record(record: dict) -> Scheme:
     """Return the scheme of a checked record in a trained model."""
-    return Scheme(
-        **{key: tuple(value) if isinstance(value, list) else value for key, value in record.items()}
-    )
+    values = dict(record)
+    for key, value in record.items():
+        if isinstance(value, list):
+            values[key] = tuple(value)
+    return Scheme(**values)
 
 
 def with_scheme(settings: dict) -> tuple[Scheme, dict]:

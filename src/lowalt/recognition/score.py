@@ -52,8 +52,7 @@ def score(path: str | Path, index: str | Path, protocol: str) -> dict:
 
 
 def scores(facts: Facts, probabilities: np.ndarray) -> dict:
-    """Return accuracies (the mean over the SNRs, and by SNR and subtype), confusion and calibration
-    of predictions.
+    """Return accuracies (mean over the SNRs, by SNR, by subtype), confusion and calibration.
 
     probabilities: (samples, classes), in the order of `facts`.
     """
@@ -61,18 +60,18 @@ def scores(facts: Facts, probabilities: np.ndarray) -> dict:
     classes = probabilities.shape[1]
     correct = guesses == facts.label
     by_snr = accuracy_by(facts.snr_db, correct)
+    by_subtype = accuracy_by(facts.subtype, correct)
+    confusion_by_snr = {}
+    for snr in by_snr:
+        some = facts.snr_db == snr
+        matrix = confusion(facts.label[some], guesses[some], classes)
+        confusion_by_snr[f"{snr:g}"] = matrix.tolist()
     return {
         "samples": len(facts),
         "accuracy_percent": 100 * float(np.mean([share for share, _ in by_snr.values()])),
         "by_snr_percent": {f"{snr:g}": 100 * share for snr, (share, _) in by_snr.items()},
-        "by_subtype_percent": {
-            name: 100 * share for name, (share, _) in accuracy_by(facts.subtype, correct).items()
-        },
+        "by_subtype_percent": {name: 100 * share for name, (share, _) in by_subtype.items()},
         "confusion": confusion(facts.label, guesses, classes).tolist(),
-        "confusion_by_snr": {
-            f"{snr:g}": confusion(facts.label[some], guesses[some], classes).tolist()
-            for snr in by_snr
-            for some in [facts.snr_db == snr]
-        },
+        "confusion_by_snr": confusion_by_snr,
         **calibration(probabilities, facts.label),
     }

@@ -156,7 +156,7 @@ def alarm_intervals(
 def alarm_rates(
     scores: np.ndarray, labels: np.ndarray, level: float, classes: int
 ) -> tuple[float, np.ndarray]:
-    """Detection rate at a threshold, and the false alarm rates (classes - 1,) of the other classes."""
+    """Detection rate at a threshold, and false alarm rates (classes - 1,) of the other classes."""
     called = scores >= level
     return float(called[labels == LOOKED_FOR].mean()), np.array(
         [
@@ -234,9 +234,7 @@ def f1_by_snr(
         values[snr] = float(np.mean([macro_f1(seed.sum(0)) for seed in counts]))
         of_seed = np.stack([macro_f1(np.tensordot(weights, seed, 1)) for seed in counts], axis=1)
         resampled[snr] = np.take_along_axis(of_seed, drawn, axis=1).mean(1)
-    values["avg"], resampled["avg"] = (
-        np.mean(list(values.values())),
-        np.mean(list(resampled.values()), axis=0),
-    )
+    values["avg"] = np.mean(list(values.values()))
+    resampled["avg"] = np.mean(list(resampled.values()), axis=0)
     bounds = {snr: np.quantile(means, [0.025, 0.975]) for snr, means in resampled.items()}
     return {snr: Interval(float(value), *map(float, bounds[snr])) for snr, value in values.items()}

@@ -83,41 +83,30 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
     name = runs[0].scheme
     generator = stream(seed, "macro-f1", protocol, name, part)
     whole = (protocol, part) == ("unseen", "test")
-    scores = {
-        snr if snr == "avg" else snr_text(snr): interval
-        for snr, interval in statistics.f1_by_snr(
-            parts, len(runs[0].classes), whole, generator
-        ).items()
-    }
-    by_snr = [
-        statistics.accuracy_by(predictions.snr_db, predictions.correct) for predictions in parts
-    ]
-    shares = {snr_text(snr): [table[snr][0] for table in by_snr] for snr in by_snr[0]}
-    counts = {snr_text(snr): count for snr, (_, count) in by_snr[0].items()}
+    scores = {}
+    f1_by_snr = statistics.f1_by_snr(parts, len(runs[0].classes), whole, generator)
+    for snr, interval in f1_by_snr.items():
+        scores[snr if snr == "avg" else snr_text(snr)] = interval
+    of_runs = [statistics.accuracy_by(run.snr_db, run.correct) for run in parts]
+    shares = {}
+    counts = {}
+    for snr, (_, count) in of_runs[0].items():
+        shares[snr_text(snr)] = [of_run[snr][0] for of_run in of_runs]
+        counts[snr_text(snr)] = count
     shares["avg"] = np.mean(list(shares.values()), axis=0).tolist()
     counts["avg"] = len(parts[0])
     for snr, values in shares.items():
         spread = percent(np.std(values, ddof=1)) if len(values) > 1 else ""
         f1 = map(percent, scores[snr])
-        yield [
-            snr,
-            percent(np.mean(values)),
-            *f1,
-            counts[snr],
-            runs[0].hardware,
-            len(values),
-            spread,
-        ]
+        seeds = len(values)
+        yield [snr, percent(np.mean(values)), *f1, counts[snr], runs[0].hardware, seeds, spread]
 
 
 def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
-    """Yield rows [seed, accuracy_percent, *TRAINING, hardware], the accuracy on average over the
-    SNRs.
-    """
+    """Yield rows [seed, accuracy_percent, *TRAINING, hardware], of the mean over the SNRs."""
     for run in runs:
-        shares = [
-            share for share, _ in statistics.accuracy_by(run.test.snr_db, run.test.correct).values()
-        ]
+        by_snr = statistics.accuracy_by(run.test.snr_db, run.test.correct)
+        shares = [share for share, _ in by_snr.values()]
         known = [run.about.get(name, "") for name in TRAINING]
         took = [f"{value:.6g}" if isinstance(value, float) else value for value in known]
         yield [run.seed, percent(np.mean(shares)), *took, run.hardware]
@@ -144,7 +133,7 @@ def confusion_by_snr_rows(runs: list[Evaluated]) -> Iterable[list]:
 
 
 def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
-    """Yield rows [category, subtype, accuracy_percent, samples], the worst of each category first."""
+    """Yield rows [category, subtype, accuracy_percent, samples], each category's worst first."""
     test = runs[0].test
     classes = runs[0].classes
     category = {
@@ -211,15 +200,10 @@ def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
         bounds = statistics.alarm_intervals(
             validations, tests, asked, whole_subtypes(runs), generator, classes
         )
-        cells = [
-            [percent(rate), *map(percent, pair)]
-            for rate, pair in zip(np.mean(rates, 0), bounds, strict=True)
-        ]
-        yield [
-            percent(asked),
-            repr(float(np.mean(levels))),
-            *(cell for three in cells for cell in three),
-        ]
+        cells = []
+        for rate, pair in zip(np.mean(rates, 0), bounds, strict=True):
+            cells += [percent(rate), *map(percent, pair)]
+        yield [percent(asked), repr(float(np.mean(levels))), *cells]
 
 
 def calibration_rows(runs: list[Evaluated]) -> Iterable[list]:
@@ -261,11 +245,23 @@ def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
     return sets[0]
 
 
+def _compared(groups: dict[tuple[str, str], list[Evaluated]], seed: int) -> list[list]:
+    """The rows of comparisons.csv: each of CLAIMS in each protocol that has both of its schemes."""
+    lines = []
+    for protocol in ("seen", "unseen"):
+        for better, other, claim in CLAIMS:
+            first = groups.get((protocol, better))
+            second = groups.get((protocol, other))
+            if first and second:
+                rows = comparison_rows(first, second, seed)
+                lines += [[protocol, better, other, claim, *row] for row in rows]
+    return lines
+
+
 def write(
     runs: list[Evaluated], order: list[str], published: dict, folder: str | Path, seed: int
 ) -> None:
-    """Write all tables into `folder`, sorted by protocol (seen first), then by scheme as in
-    `order`.
+    """Write all tables into `folder`, by protocol (seen first), then by scheme as in `order`.
 
     published: as `paper_claims.read_published` gives it; seed: of the bootstrap.
     Raises: InputError for a scheme outside `order`, the same run twice, or runs with different
@@ -288,11 +284,9 @@ def write(
     measured = ["snr_db", "accuracy_percent", *F1, "samples", "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
     rates = ("detected", *map(word, _one_set(runs)[1:]))
-    alarm = [
-        "asked_percent",
-        "threshold",
-        *(f"{rate}_{end}" for rate in rates for end in ("percent", "low", "high")),
-    ]
+    alarm = ["asked_percent", "threshold"]
+    for rate in rates:
+        alarm += [f"{rate}_percent", f"{rate}_low", f"{rate}_high"]
     tables = {
         "accuracy": (measured, lambda group: accuracy_rows(group, "test", seed)),
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
@@ -304,26 +298,19 @@ def write(
         "alarms": (alarm, lambda group: alarm_rows(group, seed)),
         "calibration": (["calibration_error", "brier", "cross_entropy"], calibration_rows),
     }
-    for name, (columns, rows) in tables.items():
-        _write(
-            Path(folder) / f"{name}.csv",
-            columns,
-            [[*key, *row] for key in keys for row in rows(groups[key])],
-        )
-    seen = [
-        [*key, *row]
-        for key in keys
-        if key[0] == "unseen" and len(groups[key][0].part("seen_test"))
-        for row in accuracy_rows(groups[key], "seen_test", seed)
-    ]
+    for name, (columns, rows_of) in tables.items():
+        lines = []
+        for key in keys:
+            lines += [[*key, *row] for row in rows_of(groups[key])]
+        _write(Path(folder) / f"{name}.csv", columns, lines)
+    seen = []
+    for protocol, scheme in keys:
+        group = groups[protocol, scheme]
+        if protocol == "unseen" and len(group[0].part("seen_test")):
+            rows = accuracy_rows(group, "seen_test", seed)
+            seen += [[protocol, scheme, *row] for row in rows]
     _write(Path(folder) / "seen_test.csv", measured, seen)
-    compared = [
-        [protocol, better, other, claim, *row]
-        for protocol in ("seen", "unseen")
-        for better, other, claim in CLAIMS
-        if (protocol, better) in groups and (protocol, other) in groups
-        for row in comparison_rows(groups[protocol, better], groups[protocol, other], seed)
-    ]
+    compared = _compared(groups, seed)
     columns = ["over", "claim", "resampled", "seeds", "difference_points", "low", "high"]
     _write(Path(folder) / "comparisons.csv", columns, compared)
     columns = [

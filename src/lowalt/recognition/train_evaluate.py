@@ -66,15 +66,13 @@ def train(
 
 
 def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = "") -> dict:
-    """Return how a trained model does on the test samples of its protocol in the data set of a
-    finished run.
+    """Return how a trained model does on its protocol's test samples in a finished run's data set.
 
     model: of `train`, a file (.safetensors), or a name of the zoo; run: a folder such as
-    results/default;
-    backbone: the FILE.py:FUNCTION of a model file that names code.
-    The result has `accuracy_percent`, the mean over the SNRs, `by_snr_percent`,
-    `by_subtype_percent`, `confusion` (samples by true class and answer, in the order of the
-    classes), `confusion_by_snr` and the calibration.
+    results/default; backbone: the FILE.py:FUNCTION of a model file that names code. The result has
+    `accuracy_percent`, the mean over the SNRs, `by_snr_percent`, `by_subtype_percent`, `confusion`
+    (samples by true class and answer, in the order of the classes), `confusion_by_snr` and the
+    calibration.
     Raises: InputError for a run that is not finished, or a model that does not fit its images.
     """
     trained = model if isinstance(model, runs.Trained) else runs.opened(model, backbone)[0]
@@ -82,13 +80,10 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = 
     settings = config["recognition"]["evaluation"]
     machine = Machine.here(inference.evaluation(settings)[2])
     pairs = folds(trained.protocol, "test")
-    samples = Source.of_run(index, trained.size).samples(
-        trained.scheme.columns, pairs, trained.size
-    )
-    return {
-        "protocol": trained.protocol,
-        **scores(samples.facts, runs.answers(trained, samples, settings, machine)),
-    }
+    source = Source.of_run(index, trained.size)
+    samples = source.samples(trained.scheme.columns, pairs, trained.size)
+    answers = runs.answers(trained, samples, settings, machine)
+    return {"protocol": trained.protocol, **scores(samples.facts, answers)}
 
 
 class Confusion(NamedTuple):

@@ -173,7 +173,7 @@ class Trainer:
         }
 
     def resume(self) -> bool:
-        """Continue from the checkpoint of this run, if there is one; return whether there was one."""
+        """Continue from the checkpoint of this run; return whether there was one."""
         path = self.run.folder / "checkpoint.pt"
         if not path.exists():
             return False

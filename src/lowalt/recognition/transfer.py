@@ -45,12 +45,11 @@ COLUMNS = (
 
 
 def check_folds(own: dict, other: dict) -> None:
-    """Refuse a pair of configurations in which a motion model may train in the other run and test
-    in this one.
+    """Refuse two runs of which the other may have trained with a motion model that this one tests.
 
-    Folds follow from (seed, subtype, number of the motion model) and the split: with equal seeds,
-    only equal splits test the same motion models; with other seeds, all motion models are
-    different.
+    own, other: the configurations of this run and of the other. Folds follow from (seed, subtype,
+    number of the motion model) and the split: with equal seeds, only equal splits test the same
+    motion models; with other seeds, all motion models are different.
     Raises: InputError naming both splits.
     """
     if own["seed"] == other["seed"] and own["split"] != other["split"]:
@@ -81,7 +80,8 @@ def comparison(
             raise InputError(
                 f"transfer: {run.scheme} of {name} was tested on other samples than this run's own"
             )
-    mine, theirs = (np.mean([run.test.correct for run in runs], axis=0) for runs in (own, other))
+    mine = np.mean([run.test.correct for run in own], axis=0)
+    theirs = np.mean([run.test.correct for run in other], axis=0)
     snrs = np.unique(test.snr_db).tolist()
     # The mean over all samples is the mean over the SNRs, since every SNR has as many samples.
     for snr in (*snrs, None):
@@ -89,12 +89,11 @@ def comparison(
         word = "avg" if snr is None else snr_text(snr)
         generator = stream(seed, "transfer-bootstrap", own[0].protocol, own[0].scheme, name, word)
         interval = difference(other, own, generator, snr)
-        numbers = [
-            f"{100 * value:.4f}" for value in (theirs[rows].mean(), mine[rows].mean(), *interval)
-        ]
-        spread = spread_points(
-            *([100 * run.test.correct[rows].mean() for run in runs] for runs in (own, other))
-        )
+        shares = (theirs[rows].mean(), mine[rows].mean(), *interval)
+        numbers = [f"{100 * value:.4f}" for value in shares]
+        of_own = [100 * run.test.correct[rows].mean() for run in own]
+        of_other = [100 * run.test.correct[rows].mean() for run in other]
+        spread = spread_points(of_own, of_other)
         yield [
             word,
             *numbers,
@@ -108,9 +107,9 @@ def comparison(
 def write(
     own: list[Evaluated], other: list[Evaluated], order: list[str], out: str | Path, seed: int
 ) -> None:
-    """Write transfer.csv; schemes stand in `order`, protocols seen first. `other` runs say which
-    run trained them.
+    """Write transfer.csv; schemes stand in `order`, protocols seen first.
 
+    Each of `other` says which run trained it.
     Raises: InputError where a model has no counterpart in this run.
     """
     mine = {}
@@ -121,9 +120,11 @@ def write(
         theirs.setdefault((run.protocol, run.scheme, run.trained_on), []).append(run)
     lines = []
     for key in sorted(theirs, key=lambda key: (key[0], order.index(key[1]))):
-        if key[:2] not in mine:
+        protocol, scheme, trained_on = key
+        if (protocol, scheme) not in mine:
             raise InputError(
-                f"transfer: {key[2]} has {key[1]} in the {key[0]} protocol, this run has not"
+                f"transfer: {trained_on} has {scheme} in the {protocol} protocol, this run has not"
             )
-        lines += [[*key, *row] for row in comparison(mine[key[:2]], theirs[key], key[2], seed)]
+        rows = comparison(mine[protocol, scheme], theirs[key], trained_on, seed)
+        lines += [[*key, *row] for row in rows]
     write_csv(out, COLUMNS, lines)

@@ -164,10 +164,10 @@ class ShardSamples(samples.Samples):
     def __init__(
         self, index: str | Path, columns: list[int], folds: set, size: int, placed: bool
     ) -> None:
-        """index: index file of the shards; columns: views to keep, some spectra of some stations;
-        folds: (group, fold) pairs; size: pixels.
+        """Read the facts of the samples in `folds`, which are (group, fold) pairs.
 
-        placed: whether facts carry ranges and aspects (reads every record).
+        index: index file of the shards; columns: views to keep, some spectra of some stations;
+        size: pixels; placed: whether facts carry ranges and aspects (reads every record).
         Raises: InputError where nothing is left.
         """
         groups = sorted({group for group, _ in folds})
@@ -176,27 +176,24 @@ class ShardSamples(samples.Samples):
         self.size = size
         known = station_names(self.shards.index["render"]["network"])
         names = self.shards.spectra
-        places = columns_in(columns, names, len(known), str(index))
-        self.stations = [
-            known[number] for number in sorted({place // len(names) for place in places})
-        ]
-        self.spectra = [
-            names[number] for number in sorted({place % len(names) for place in places})
-        ]
-        flags = [
-            [(shard["group"], shard["fold"]) in folds] * shard["samples"]
-            for shard in self.shards.shards
-        ]
-        self.numbers = (
-            np.flatnonzero(np.concatenate(flags)) if flags else np.zeros(0, dtype=np.int64)
-        )
+        # Images of a tile are counted station by station.
+        images = columns_in(columns, names, len(known), str(index))
+        stations = sorted({image // len(names) for image in images})
+        spectra = sorted({image % len(names) for image in images})
+        self.stations = [known[number] for number in stations]
+        self.spectra = [names[number] for number in spectra]
+        shards = self.shards.shards
+        wanted = np.array([(shard["group"], shard["fold"]) in folds for shard in shards], bool)
+        counts = np.array([shard["samples"] for shard in shards], np.int64)
+        self.numbers = np.flatnonzero(np.repeat(wanted, counts))
         if not len(self.numbers):
             raise InputError(f"{index}: no samples of {sorted(folds)}")
         self.facts = facts_of(self.shards, self.numbers, placed)
 
     def keep(self, numbers: np.ndarray) -> None:
         """Drop all samples but those at `numbers`."""
-        self.numbers, self.facts = self.numbers[numbers], self.facts.take(numbers)
+        self.numbers = self.numbers[numbers]
+        self.facts = self.facts.take(numbers)
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""

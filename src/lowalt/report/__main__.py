@@ -1,6 +1,4 @@
-"""Command line of the report: the run's tables, pictures and measurements -> one self-contained
-HTML page.
-"""
+"""Command line of the report: a run's tables, pictures and measurements -> one HTML page."""
 
 import json
 import sys
@@ -33,12 +31,14 @@ def main(arguments: list[str]) -> None:
         "--jobs", type=int, default=1, help="sections made at a time, each in a process of its own"
     )
     options = line.parse_args(arguments)
-    reported = ReportedRun(
-        Inputs.read(options.manifest), *pick(options.settings, "config", "published")
-    )
+    config, published = pick(options.settings, "config", "published")
+    reported = ReportedRun(Inputs.read(options.manifest), config, published)
     write_stages(options.stages, reported)
     sections = together([partial(section, reported, name) for name in SECTIONS], options.jobs)
-    write_plots(options.figures, [plot for made in sections for plot in made.plots])
+    plots = []
+    for made in sections:
+        plots += made.plots
+    write_plots(options.figures, plots)
     text = page(reported, dict(zip(SECTIONS, sections, strict=True)))
     write_file(options.out, text)
     print(json.dumps({"report": options.out, "samples": len(reported.shards)}), file=sys.stderr)

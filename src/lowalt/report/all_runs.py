@@ -6,9 +6,7 @@ from lowalt.report.page import assembled, templates
 
 
 def _text(value: object) -> str:
-    """A configuration value as text, equal for equal values; numbers too, because JSON has no
-    infinity.
-    """
+    """A configuration value as text, equal for equal values; JSON has no number for infinity."""
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     return value if isinstance(value, str) else json.dumps(value, sort_keys=True)
@@ -43,13 +41,10 @@ def all_runs(runs: dict[str, dict[str, dict]], pages: dict[str, str]) -> str:
     reports.
     """
     rows = [overview(name, facts, pages.get(name)) for name, facts in runs.items()]
-    data = {
-        name: {
-            **facts,
-            "configuration": {key: _text(value) for key, value in facts["configuration"].items()},
-        }
-        for name, facts in runs.items()
-    }
+    data = {}
+    for name, facts in runs.items():
+        configuration = {key: _text(value) for key, value in facts["configuration"].items()}
+        data[name] = {**facts, "configuration": configuration}
     html = templates().get_template("all_runs.html").render(rows=rows, data=data)
     runs_html, _, compare_html = html.partition("<!-- compare -->")
     parts = [

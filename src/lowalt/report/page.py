@@ -1,5 +1,6 @@
-"""Assembles the page, one self-contained HTML file, from its sections; each is a module with its
-own template.
+"""Assembles the page, one self-contained HTML file, from its sections.
+
+Each section is a module with its own template.
 """
 
 from pathlib import Path
@@ -72,9 +73,7 @@ ADDED_TO = "results"
 
 
 def templates(folder: Path = TEMPLATES) -> jinja2.Environment:
-    """Return the template environment, which refuses undefined names and data that a browser cannot
-    read.
-    """
+    """Return the template environment, which refuses undefined names, infinity and NaN."""
     loader = jinja2.FileSystemLoader([folder, TEMPLATES])
     environment = jinja2.Environment(
         loader=loader, autoescape=True, undefined=jinja2.StrictUndefined
@@ -87,9 +86,9 @@ def templates(folder: Path = TEMPLATES) -> jinja2.Environment:
 
 def rendered(name: str, values: dict | None) -> str:
     """Return the HTML of the section `name` with these values; None gives an empty text."""
-    return (
-        "" if values is None else templates().get_template(f"sections/{name}.html").render(values)
-    )
+    if values is None:
+        return ""
+    return templates().get_template(f"sections/{name}.html").render(values)
 
 
 def assembled(title: str, parts: list[dict[str, str]]) -> str:
@@ -103,10 +102,8 @@ def section(run: ReportedRun, name: str) -> Section:
     Raises: InputError for a table that is missing or lacks a column.
     """
     values = _MODULES[name].values(run)
-    return Section(
-        rendered(name, values),
-        [value for value in (values or {}).values() if isinstance(value, Plot)],
-    )
+    plots = [value for value in (values or {}).values() if isinstance(value, Plot)]
+    return Section(rendered(name, values), plots)
 
 
 def added_sections(run: ReportedRun) -> str:
@@ -119,9 +116,8 @@ def added_sections(run: ReportedRun) -> str:
     for name, module in offered("sections").items():
         if name in run.inputs:
             values = function_offered("sections", name, module, "values")(run)
-            file = Path(module_offered("sections", name, module).__file__ or "").with_suffix(
-                ".html"
-            )
+            code = Path(module_offered("sections", name, module).__file__ or "")
+            file = code.with_suffix(".html")
             pieces.append(templates(file.parent).get_template(file.name).render(values))
     return "\n".join(pieces)
 

@@ -23,7 +23,7 @@ class Plot(NamedTuple):
 
 
 def drawn(name: str, description: str, figure: Figure, rows: list[dict]) -> Plot:
-    """Return a figure as a plot. Ids in its SVG begin with the plot's name, to be unique in a page."""
+    """Return a figure as a plot, whose SVG's ids begin with its name, to be unique in a page."""
     text = re.sub(r'(id="|href="#|url\(#)', rf"\1{name}-", svg(figure))
     return Plot(name, description, text, rows)
 

@@ -90,17 +90,15 @@ def _differing(base: dict, config: dict) -> dict:
 
 
 def checksums(files: dict[str, str | list[str]]) -> list[dict]:
-    """Return path, bytes and SHA-256 of every file of a manifest except those of benchmarks and of
-    the kept reference.
+    """Return path, bytes and SHA-256 of every file of a manifest.
 
-    files: path or list of paths by name. Files with several names are listed once.
+    files: path or list of paths by name; those of benchmarks and of the kept reference are left
+    out. Files with several names are listed once.
     """
-    named = [name for name in files if name != "benchmarks" and not name.startswith("kept_")]
-    paths = [
-        path
-        for name in named
-        for path in ([files[name]] if isinstance(files[name], str) else files[name])
-    ]
+    paths: list[str] = []
+    for name, of_name in files.items():
+        if name != "benchmarks" and not name.startswith("kept_"):
+            paths += [of_name] if isinstance(of_name, str) else of_name
     return [
         {"path": path, "bytes": Path(path).stat().st_size, "sha256": sha256(path)}
         for path in dict.fromkeys(paths)
@@ -112,12 +110,10 @@ def commands(commit: str, overlay: dict) -> tuple[str, str]:
 
     commit: as `revision` gives it; overlay: as `changes` gives it.
     """
-    lines = [] if commit == "no checkout" else [f"git checkout {commit.partition(',')[0]}"]
-    text = yaml.safe_dump(overlay, sort_keys=False, allow_unicode=True) if overlay else ""
-    return "\n".join(
-        [
-            *lines,
-            "make .venv/set-up" if overlay else "make",
-            *([".venv/bin/lowalt run again.yaml"] if overlay else []),
-        ]
-    ), text
+    lines = []
+    if commit != "no checkout":
+        lines.append(f"git checkout {commit.partition(',')[0]}")
+    if not overlay:
+        return "\n".join([*lines, "make"]), ""
+    lines += ["make .venv/set-up", ".venv/bin/lowalt run again.yaml"]
+    return "\n".join(lines), yaml.safe_dump(overlay, sort_keys=False, allow_unicode=True)

@@ -43,12 +43,11 @@ KEY = re.compile(r"(.+)-(\d{6,})-snr.+")
 
 
 def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]:
-    """Return numbers of samples: of each class a seen and an unseen subtype, MODELS models each,
-    SNRS SNRs each.
+    """Return numbers of samples: of each class a seen and an unseen subtype.
 
-    predicted: keys of samples with predictions, which go before others; unseen: slugs of subtypes
-    held out. The order is by rounds, a sample of every subtype in each, so that leaving out the
-    last ones leaves out no subtype.
+    Each subtype has MODELS models and each model SNRS SNRs. predicted: keys of samples with
+    predictions, which go before others; unseen: slugs of subtypes held out. The order is by rounds,
+    a sample of every subtype in each, so that leaving out the last ones leaves out no subtype.
     """
     keys = [key.decode() for key in shards.keys.tolist()]
     models: dict[tuple, dict[str, list[int]]] = {}
@@ -58,19 +57,20 @@ def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]
         group.setdefault(name, []).append(number)
     picks: list[tuple[int, int]] = []
     for _, subtypes in sorted(models.items()):
-        known = [
-            name for name in sorted(subtypes) if any(keys[n] in predicted for n in subtypes[name])
-        ]
+        # The first subtype with predictions, or the first one where none has any.
+        shown = min(
+            subtypes, key=lambda name: (predicted.isdisjoint(keys[n] for n in subtypes[name]), name)
+        )
         of_model: dict[tuple, list[int]] = {}
-        for number in subtypes[(known or sorted(subtypes))[0]]:
+        for number in subtypes[shown]:
             model = int(KEY.fullmatch(keys[number])[2])
             of_model.setdefault((keys[number] not in predicted, model), []).append(number)
-        for place, (_, numbers) in enumerate(sorted(of_model.items())[:MODELS]):
+        for order, (_, numbers) in enumerate(sorted(of_model.items())[:MODELS]):
             levels = sorted(numbers, key=lambda number: shards.snrs_db[number])
+            # The clearest, the noisiest, then the one between them.
             steps_shown = dict.fromkeys([len(levels) - 1, 0, len(levels) // 2][:SNRS])
-            picks += [
-                (step * MODELS + place, levels[level]) for step, level in enumerate(steps_shown)
-            ]
+            for step, level in enumerate(steps_shown):
+                picks.append((step * MODELS + order, levels[level]))
     return [number for _, number in sorted(picks, key=lambda pick: pick[0])]
 
 
@@ -86,8 +86,9 @@ def predicted_keys(paths: Iterable[str | Path]) -> set[str]:
 def probabilities(
     paths: Iterable[str | Path], keys: set[str], classes: tuple[str, ...]
 ) -> dict[str, dict]:
-    """Return class probabilities as key -> "protocol scheme" -> list; the first file per protocol
-    and scheme.
+    """Return class probabilities as key -> "protocol scheme" -> list.
+
+    They are those of the first file per protocol and scheme.
     """
     columns = predictions.probability_columns(classes)
     first = {}
@@ -106,8 +107,9 @@ def probabilities(
 
 
 def motion(cloud: Cloud, row: dict) -> dict:
-    """Return one cycle of a target's own motion for the page: seconds, shape, parts, points in mm
-    (base64, int16).
+    """Return one cycle of a target's own motion for the page.
+
+    `points` are int16 in base64, of which 32767 is `scale_m`.
     """
     moves = len(cloud.track) or row["rate_hz"] > 0
     seconds = cycle_s(cloud, row) if moves else 1.0
@@ -128,6 +130,12 @@ def motion(cloud: Cloud, row: dict) -> dict:
     }
 
 
+def _ticks(low: float, high: float) -> list[float]:
+    """Return up to five round numbers from `low` to `high`."""
+    values = MaxNLocator(4).tick_values(low, high)
+    return [float(f"{value:g}") for value in values if low <= value <= high]
+
+
 def panels(renderer: Renderer) -> list[dict]:
     """Return what the images of a tile show, station by station: names, axes, ticks."""
     entries = []
@@ -137,14 +145,6 @@ def panels(renderer: Renderer) -> list[dict]:
             low, high = sorted(axes.upwards[1:])
             (across, left, right), (upwards, first, last) = axes
             folds = renderer.network.largest_mps(station)
-            ticks = {
-                key: [
-                    float(f"{t:g}")
-                    for t in MaxNLocator(4).tick_values(*ends)
-                    if ends[0] <= t <= ends[1]
-                ]
-                for key, ends in (("x", (left, right)), ("y", (low, high)))
-            }
             entries.append(
                 {
                     "row": row,
@@ -159,7 +159,8 @@ def panels(renderer: Renderer) -> list[dict]:
                     "upwards": upwards.partition("\n")[0],
                     "turned": first > last,
                     "folds": folds,
-                    **ticks,
+                    "x": _ticks(left, right),
+                    "y": _ticks(low, high),
                 }
             )
     return entries
@@ -190,9 +191,8 @@ def samples(
     """
     unseen = {slug(name) for name, group in groups.items() if group == "unseen"}
     numbers = chosen(shards, predicted_keys(files), unseen)
-    shares = probabilities(
-        files, {shards.keys[number].decode() for number in numbers}, shards.classes
-    )
+    keys = {shards.keys[number].decode() for number in numbers}
+    shares = probabilities(files, keys, shards.classes)
     names = [station.name for station in shards.renderer.network.stations]
     spectra = len(shards.spectra)
     motions = {}
@@ -205,33 +205,26 @@ def samples(
         total += len(tile)
         if kept and total > BUDGET:
             break
-        name = f"{record['subtype']} {record['model']}"
-        if (
-            name not in motions
-            and record["subtype"] in clouds
-            and record["motion"].get("x_m") is not None
-        ):
-            motions[name] = motion(clouds[record["subtype"]], row_of(record)[0])
-        heard = (
-            echoes(remaker.signal(record), record["geometry"], remaker.network) if remaker else []
-        )
-        snr = f"{record['snr_db']:g} dB" if record["noise"] else "no noise"
-        kept.append(
-            (
-                record["snr_db"],
-                {
-                    "subtype": record["subtype"],
-                    "category": record["category"],
-                    "model": record["model"],
-                    "group": groups.get(record["subtype"], ""),
-                    "snr": snr,
-                    "tile": tile,
-                    "network": reduced(whole, spectra, pixels, shards.palette),
-                    "echoes": heard,
-                    "probabilities": shares.get(record["key"], {}),
-                },
-            )
-        )
+        subtype = record["subtype"]
+        name = f"{subtype} {record['model']}"
+        moves = record["motion"].get("x_m") is not None
+        if name not in motions and subtype in clouds and moves:
+            motions[name] = motion(clouds[subtype], row_of(record)[0])
+        heard = []
+        if remaker:
+            heard = echoes(remaker.signal(record), record["geometry"], remaker.network)
+        sample = {
+            "subtype": subtype,
+            "category": record["category"],
+            "model": record["model"],
+            "group": groups.get(subtype, ""),
+            "snr": f"{record['snr_db']:g} dB" if record["noise"] else "no noise",
+            "tile": tile,
+            "network": reduced(whole, spectra, pixels, shards.palette),
+            "echoes": heard,
+            "probabilities": shares.get(record["key"], {}),
+        }
+        kept.append((record["snr_db"], sample))
     # The clearest sample of a motion model first, as the page lists them.
     clearest = [sample for _, sample in sorted(kept, key=lambda pair: -pair[0])]
     return {

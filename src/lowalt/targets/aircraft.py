@@ -1,5 +1,4 @@
-"""Built-in aircraft beyond multirotors: planes, planes with lift propellers, helicopters and
-balloons.
+"""Built-in aircraft beyond multirotors: planes with or without lift, helicopters and balloons.
 
 Axes: front +y, right +x, up +z, metres. The origin lies at the wing's quarter chord, under the
 rotor's hub at mid cabin, or in the middle of the envelope. A plane's wing span, a helicopter's
@@ -60,9 +59,9 @@ def _propeller(
     facing: np.ndarray,
     sense: int = 1,
 ) -> Part:
-    """A turning propeller of a `size` (diameter m, blade's chord m, blades) whose axis is facing @
-    (0, 0, 1).
+    """A turning propeller of a `size` (diameter m, blade's chord m, blades).
 
+    Its axis is facing @ (0, 0, 1).
     Rotors share their points by the area of their blades.
     """
     diameter, chord, count = size
@@ -79,8 +78,9 @@ def _main_size(f: dict) -> tuple[float, float, float]:
 
 
 def _airframe(span: float, f: dict, booms: float = 0.0) -> list[Surface]:
-    """Fuselage, wing, tail plane and fin; with `booms` (m) the tail stands between two booms that
-    far apart.
+    """Fuselage, wing, tail plane and fin.
+
+    With `booms` (m) the tail stands between two booms that far apart.
     """
     nose = f["wing_station"] * f["body_length"]
     middle = nose - f["body_length"] / 2

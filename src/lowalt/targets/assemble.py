@@ -43,8 +43,9 @@ class Part:
 
 
 def allot(parts: list[Part], count: int, moving_share: float, where: str) -> list[int]:
-    """Return the number of points of each part, whole copies each, `count` in total; the rule is
-    the module's.
+    """Return the number of points of each part, whole copies each, `count` in total.
+
+    The rule is the module's.
 
     Raises: InputError naming `where` if `count` leaves the body without a point.
     """
@@ -64,8 +65,9 @@ def allot(parts: list[Part], count: int, moving_share: float, where: str) -> lis
 
 
 def _tips(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """The outermost points along each axis (up to 6, 3) and their normals, each just inside its
-    largest face.
+    """The outermost points along each axis (up to 6, 3) and their normals.
+
+    Each lies just inside its largest face.
     """
     unit, areas = face_normals(surface.vertices, surface.faces)
     points = []
@@ -112,8 +114,9 @@ def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.nd
 
 
 def turn(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Return the rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (3,),
-    Rodrigues' formula.
+    """Return the rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (3,).
+
+    Source: Rodrigues' formula.
     """
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -124,8 +127,9 @@ def turn(axis: np.ndarray, angle: float) -> np.ndarray:
 def cloud_of_parts(
     parts: list[Part], samples: list[tuple[np.ndarray, np.ndarray]], record: dict
 ) -> Cloud:
-    """Return the cloud of parts from the points and normals (N, 3) of each; the record gets counts
-    and extents.
+    """Return the cloud of parts from the points and normals (N, 3) of each.
+
+    The record gets counts and extents.
     """
     counts = [len(points) for points, _ in samples]
     points = np.concatenate([points for points, _ in samples])

@@ -207,17 +207,13 @@ def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 
 
 def extent(cloud: Cloud) -> float:
-    """Return the longest side (m) of the box around a cloud's points, or around all places of a
-    recording's points.
-    """
+    """Return the longest side (m) of the box around a cloud's points in all frames."""
     places = cloud.track.reshape(-1, 3) if len(cloud.track) else cloud.points
     return float((places.max(axis=0) - places.min(axis=0)).max())
 
 
 def scaled(cloud: Cloud, factor: float) -> Cloud:
-    """Return a cloud `factor` times as large in every direction; cross sections and turning rates
-    stay.
-    """
+    """Return a cloud `factor` times as large; cross sections and turning rates stay."""
     return replace(
         cloud,
         points=factor * cloud.points,

@@ -61,9 +61,7 @@ _TRUNK_SHARE = {
 
 
 def bones_m(stature_m: float) -> np.ndarray:
-    """Return the bones (31, 3) of an average adult in metres, standing, arms down; `stature_m` in
-    metres.
-    """
+    """Return the bones (31, 3) m of an average adult of `stature_m`, standing, arms down."""
     result = np.zeros((len(NODES), 3))
     for index, name in enumerate(NODES[1:], start=1):
         if name in _MIDDLE:

@@ -41,8 +41,9 @@ FAINT = 0.3
 
 
 def axes_of(kind: str) -> np.ndarray:
-    """Return the rotation (3, 3) from body axes to right, up and toward the viewer, for targets
-    like `kind`.
+    """Return the rotation (3, 3) from body axes to right, up and toward the viewer.
+
+    kind: the published class that the target is like.
     """
     azimuth, elevation = np.radians(DIRECTIONS[kind])
     toward = np.array(

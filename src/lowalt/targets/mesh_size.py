@@ -1,5 +1,4 @@
-"""The shape and size of a user's mesh: whether its parts fit their kinds and its unit the published
-size, and scaling.
+"""The shape and size of a user's mesh: whether its parts and its unit are right, and scaling.
 
 A wrong direction, unit or hinge still gives a cloud, but the geometry of the parts shows the
 mistake: wheels lie below a car, and a hub lies in the middle of its blades. Body axes: x right, y
@@ -19,20 +18,14 @@ from lowalt.targets.mesh_parts import Pool
 from lowalt.targets.mesh_record import ALL_AXES
 
 SMALLEST_PART = 25
-"""A moving part that is smaller than the whole mesh by more than this factor is refused; its unit
-must be wrong.
-"""
+"""A part that is smaller than the whole mesh by more than this factor has a wrong unit."""
 
 SMALLEST_ROTOR_M = 0.01
-"""Least diameter (m) of a rotor at the final size of the target. The smallest craft sold have
-propellers of 25 mm.
-"""
+"""Least diameter (m) of a rotor at its final size; the smallest craft sold have 25 mm."""
 
 
 ACROSS = np.cos(np.radians(20.0))
-"""Least cosine of the angle between a wheel's axle and the car's width. Models have their front
-wheels straight.
-"""
+"""Least cosine of the angle between an axle and the car's width; models have straight wheels."""
 ROUND = 1.1
 """Largest ratio of a wheel's width to the smaller of its two extents across the axis."""
 OFF_HUB = 1.0
@@ -44,9 +37,7 @@ OFF_MIDDLE = 0.1
 LISTED = 4
 """A message names this many parts of one fault."""
 SPANS = (0.7, 6.0)
-"""Least and largest wing span of a bird in parts of its published length, which measures 1.2 to 5.5
-in the table.
-"""
+"""Least and largest wing span of a bird over its published length; the table has 1.2 to 5.5."""
 
 
 def _fault(kind: str, pool: Pool, body: np.ndarray) -> str:

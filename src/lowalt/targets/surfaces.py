@@ -83,8 +83,7 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
 
 
 def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
-    """Return the closed skin over a row of sections (K, S, 3), each a loop of S points in the same
-    sense.
+    """Return the closed skin over sections (K, S, 3), each a loop of S points in the same sense.
 
     Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The
     normals point outward for either sense of the loops.
@@ -115,8 +114,9 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
 def superellipse(
     half_a: float, half_b: float, exponent: float = 2.0, sides: int = 24
 ) -> np.ndarray:
-    """Return the loop |a/A|^n + |b/B|^n = 1, shape (sides, 2): n = 2 an ellipse, larger n a rounded
-    rectangle.
+    """Return the loop |a/A|^n + |b/B|^n = 1, shape (sides, 2).
+
+    n = 2 is an ellipse, a larger n a rounded rectangle.
     """
     s, c = portable.sine_cosine_turns(np.arange(sides) / sides)
     along, across = (np.sign(part) * portable.power(abs(part), 2 / exponent) for part in (c, s))
@@ -137,9 +137,7 @@ def ellipsoid(
 
 
 def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surface:
-    """Return a round tube along `path` (K, 3) with a radius at each of its points, closed by flat
-    ends.
-    """
+    """Return a round tube along `path` (K, 3), a radius at each point, closed by flat ends."""
     path = np.asarray(path, float)
     radii = np.broadcast_to(np.asarray(radii, float), len(path))
     tangents = np.gradient(path, axis=0)
@@ -165,10 +163,10 @@ def cylinder(
 def hull(
     stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow: float = 0.0
 ) -> Surface:
-    """Return a body along y from stations (y, half_width, z_low, z_high): superellipse sections,
-    closed ends.
+    """Return a body along y from stations (y, half_width, z_low, z_high), its ends closed.
 
-    `bow` shifts both tips outward along y by that length, which rounds the ends.
+    Sections are superellipses. `bow` shifts both tips outward along y by that length, which rounds
+    the ends.
     """
     table = np.array(list(stations), float)
     sections = []
@@ -184,17 +182,16 @@ def hull(
 def box(
     size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0
 ) -> Surface:
-    """Return a box with the edge lengths `size` (x, y, z); the superellipse's exponent rounds its
-    edges along y.
+    """Return a box with the edge lengths `size` (x, y, z).
+
+    The superellipse's exponent rounds its edges along y.
     """
     x, y, z = (float(value) / 2 for value in size)
     return hull([(-y, x, -z, z), (y, x, -z, z)], exponent).moved(centre)
 
 
 def ring(profile: np.ndarray, sides: int = 32) -> Surface:
-    """Return a closed profile (S, 2) of (radius, height) turned about the z axis: a tyre, a duct, a
-    torus.
-    """
+    """Return a closed profile (S, 2) of (radius, height) turned about z, such as a tyre or duct."""
     profile = np.asarray(profile, float)
     sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
     x = cosine[:, None] * profile[:, 0]

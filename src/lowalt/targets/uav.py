@@ -66,9 +66,7 @@ def folding(record: dict, f: dict) -> list[Part]:
 
 
 def ducted(record: dict, f: dict) -> list[Part]:
-    """Return a ducted quadrotor: four rings around the propellers, a narrow pod, a battery and a
-    nose camera.
-    """
+    """Return a ducted quadrotor: rings around the propellers, a pod, a battery, a nose camera."""
     places = hubs(record, f)
     outer = (record["published"]["size_m"] - motor_diagonal(record)) / 2
     inner = f["propeller_diameter"] / 2 * 1.04
@@ -99,9 +97,7 @@ def ducted(record: dict, f: dict) -> list[Part]:
 
 
 def raised(record: dict, f: dict) -> list[Part]:
-    """Return an H-frame craft in flight: side booms raised above the pod, cross tubes, a big gimbal
-    below the nose.
-    """
+    """Return an H-frame craft in flight: raised side booms, a pod, cross tubes, a big gimbal."""
     places = hubs(record, f)
     boom = f["frame_rise"]
     arm = f["arm_diameter"] / 2
@@ -225,9 +221,7 @@ def cabin(record: dict, f: dict) -> list[Part]:
 
 
 def tanker(record: dict, f: dict) -> list[Part]:
-    """Return a firefighting quadrotor: box frame, straight arms, a tank under it, wide skids and a
-    nozzle lance.
-    """
+    """Return a firefighting quadrotor: box frame, straight arms, a tank, wide skids, a lance."""
     places = hubs(record, f)
     arm = f["arm_diameter"] / 2
     length = f["body_length"]

@@ -1,10 +1,9 @@
-"""Correct rounding to complex64 (Ziv's strategy): recompute values whose error bound does not
-decide the rounding.
+"""Correct rounding to complex64: recompute values whose error bound does not decide it.
 
-The second computation uses double-double arithmetic. The complex64 signal is then the correctly
-rounded true value and depends neither on the processor nor on the kernel that computed it. Source:
-Ziv 1991, "Fast evaluation of elementary mathematical functions with correctly rounded last bit",
-ACM TOMS 17.
+This is Ziv's strategy. The second computation uses double-double arithmetic. The complex64 signal
+is then the correctly rounded true value and depends neither on the processor nor on the kernel that
+computed it. Source: Ziv 1991, "Fast evaluation of elementary mathematical functions with correctly
+rounded last bit", ACM TOMS 17.
 """
 
 from fractions import Fraction
@@ -94,8 +93,7 @@ def same_double(x, error, bits):
 def correct(
     sample: EchoSample, refs: np.ndarray, found: Found, pointwise_bound: tuple[float, float]
 ) -> tuple[int, int]:
-    """Make every value of `found` round to the complex64 nearest to the true value, in the truly
-    strongest cell.
+    """Make every value of `found` round to the complex64 nearest to that of the strongest cell.
 
     Returns the number of recomputed symbols and how many of them remain undecided. Cells whose
     strengths differ by less than the error count as equal, and the lowest index wins.
@@ -107,21 +105,23 @@ def correct(
     open_ones = open_ones[:count]
     work = np.empty((ROWS, len(sample.lay.root) + 4))
     bits = np.empty(1, np.int64)
-    for n in open_ones[found.gaps[open_ones] <= 0.0] if unproved else ():
+    unproved_ones = open_ones[found.gaps[open_ones] <= 0.0] if unproved else ()
+    for n in unproved_ones:
         cells = _contenders(sample, refs, int(n), pointwise_bound)
         if len(cells) > 1:
-            pairs = [cell_value(sample, n, cell, work) for cell in cells]
-            strengths = [
-                sum((Fraction(high) + Fraction(low)) ** 2 for high, low in pair) for pair in pairs
-            ]
-            least = max(strengths) - 4 * Fraction(ERROR * found.totals[n]) * Fraction(
-                abs(found.values[n])
-            )
-            cells = [
-                cell for cell, strength in zip(cells, strengths, strict=True) if strength >= least
-            ]
+            strengths = {cell: _strength(cell_value(sample, n, cell, work)) for cell in cells}
+            error = Fraction(ERROR * found.totals[n])
+            least = max(strengths.values()) - 4 * error * Fraction(abs(found.values[n]))
+            cells = [cell for cell, strength in strengths.items() if strength >= least]
         found.cells[n] = min(cells)
     return len(open_ones), compute_again(sample, open_ones, found, work, bits)
+
+
+def _strength(value: tuple[tuple[float, float], tuple[float, float]]) -> Fraction:
+    """Return |value|^2, without rounding, of a complex number whose halves are double-doubles."""
+    (real, real_low), (imaginary, imaginary_low) = value
+    real_square = (Fraction(real) + Fraction(real_low)) ** 2
+    return real_square + (Fraction(imaginary) + Fraction(imaginary_low)) ** 2
 
 
 def _contenders(
@@ -131,13 +131,13 @@ def _contenders(
     scene = sample.scene
     radar = sample.radar
     aims = sample.aims
-    part = slice(n, n + 1)
-    here = scene._replace(translation=scene.translation[part], rotation=scene.rotation[part])
+    only = slice(n, n + 1)
+    here = scene._replace(translation=scene.translation[only], rotation=scene.rotation[only])
     one = Found.empty(1)
     risks = np.zeros(1)
     cells = np.empty((1, radar.subcarriers), np.complex128)
-    pointwise.signal(here, radar, refs[part], np.arange(1), aims, one, risks)
-    pointwise.matrix(here, radar, refs[part], aims, cells)
+    pointwise.signal(here, radar, refs[only], np.arange(1), aims, one, risks)
+    pointwise.matrix(here, radar, refs[only], aims, cells)
     strengths = abs(cells[0])
     bound = one.totals[0] * pointwise_bound[0] + risks[0] * pointwise_bound[1]
     return np.flatnonzero(strengths >= strengths.max() - 2 * bound).tolist()

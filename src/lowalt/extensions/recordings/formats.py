@@ -1,4 +1,5 @@
-"""Tables of samples out of WAV, MAT, CSV, NPY, SigMF and raw files, as they stand in the file.
+"""Tables of samples out of WAV, MAT, HDF5, CSV, NPY, SigMF and raw files, as they stand in the
+file.
 
 This module only reads. `lowalt.extensions.recordings.files` picks the channel,
 `lowalt.extensions.recordings.faults` judges it.
@@ -16,7 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.recordings.chirps import in_chirps
+from lowalt.extensions.recordings.chirps import chirp_rows, in_chirps
+from lowalt.extensions.recordings.faults import agreed_rate
 from lowalt.extensions.recordings.layouts import number_type
 from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
@@ -44,6 +46,23 @@ RAW = {
 """Endings of numbers without a header, and the type and layout that an ending stands for where the
 record has none.
 """
+
+COMPRESSED = (".mp3", ".m4a", ".aac", ".ogg", ".opus", ".wma")
+"""Endings of sound without what ears do not hear."""
+
+
+def refuse_kind(path: Path) -> None:
+    """Raise InputError where no reader knows a file's ending, with what to do."""
+    kind = path.suffix.lower()
+    if kind in COMPRESSED:
+        raise InputError(
+            f"{path}: {kind} keeps what ears hear and drops faint lines of a radar, expected the "
+            "recording as it was made, saved as .wav"
+        )
+    if kind not in READERS:
+        raise InputError(
+            f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}"
+        )
 
 
 class Table(NamedTuple):
@@ -83,11 +102,12 @@ def _wav(path: Path, record: Record) -> Table:
 
 
 def _mat(path: Path, record: Record) -> Table:
-    """Read the record's variable of a MATLAB file, or its only one; `rec.iq` is a field of a
-    struct.
+    """Read the record's variable of a MATLAB or HDF5 file, or its only one.
+
+    `rec.iq` is a field of a struct, `rec/iq` or `rec.iq` an array in a group.
     """
     variables = read_mat(path)
-    name = record.variable
+    name = record.variable and record.variable.strip("/").replace("/", ".")
     if name is None:
         arrays = [key for key, value in variables.items() if value.size > 1]
         if len(arrays) != 1:
@@ -148,6 +168,11 @@ def _csv(path: Path, record: Record) -> Table:
     values = np.loadtxt(
         rows, complex if any("j" in row for row in rows) else float, delimiter=delimiter, ndmin=2
     )
+    if record.chirps:
+        stream, times = chirp_rows(values, record.chirps["samples"], str(path))
+        return Table(
+            [stream], rate_hz=None if times is None else agreed_rate(path, None, None, times)
+        )
     columns = [
         column if np.iscomplexobj(column) and column.imag.any() else column.real
         for column in values.T
@@ -330,6 +355,8 @@ def _sigmf(path: Path, record: Record) -> Table:
 READERS: dict[str, Callable[[Path, Record], Table]] = {
     ".wav": _wav,
     ".mat": _mat,
+    ".h5": _mat,
+    ".hdf5": _mat,
     ".csv": _csv,
     ".txt": _csv,
     ".npy": _npy,

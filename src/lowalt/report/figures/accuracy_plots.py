@@ -1,6 +1,7 @@
 """Plots of accuracy over SNR, and confusion matrices."""
 
 import math
+from collections.abc import Iterator
 from itertools import cycle
 
 import numpy as np
@@ -17,28 +18,31 @@ SOURCES = {"this run": "-", "paper": "--"}
 """Style of the lines of each source."""
 
 
-def over_snr(ours: dict, published: dict) -> Plot:
-    """Return accuracy over SNR, one panel per protocol; dashed: the published values on the paper's
-    data.
+def _rows_over_snr(ours: dict, published: dict) -> Iterator[dict]:
+    """Yield the rows of `over_snr`: of both sources, what protocols and schemes `ours` has."""
+    for source, table in zip(SOURCES, (ours, published), strict=True):
+        for protocol, schemes in table.items():
+            for scheme, values in schemes.items():
+                if scheme not in ours.get(protocol, {}):
+                    continue
+                for label, value in values.items():
+                    if label != "avg":
+                        yield {
+                            "protocol": f"{protocol} subtypes",
+                            "scheme": scheme,
+                            "snr_db": SNR_LABELS.get(label, label),
+                            "accuracy_percent": round(value, 3),
+                            "source": source,
+                        }
 
-    ours, published: protocol -> scheme -> SNR label -> percent.
+
+def over_snr(ours: dict, published: dict) -> Plot:
+    """Return accuracy over SNR, one panel per protocol, with the paper's values dashed.
+
+    ours, published: protocol -> scheme -> SNR label -> percent; the published ones are those on the
+    paper's data.
     """
-    rows = [
-        {
-            "protocol": f"{protocol} subtypes",
-            "scheme": scheme,
-            "snr_db": SNR_LABELS.get(label, label),
-            "accuracy_percent": round(value, 3),
-            "source": source,
-        }
-        for source, table in zip(SOURCES, (ours, published), strict=True)
-        for protocol, schemes in table.items()
-        if protocol in ours
-        for scheme, values in schemes.items()
-        if scheme in ours[protocol]
-        for label, value in values.items()
-        if label != "avg"
-    ]
+    rows = list(_rows_over_snr(ours, published))
     infinite = set(SNR_LABELS.values())
     levels = sorted(
         {row["snr_db"] for row in rows}, key=lambda snr: float("inf" if snr in infinite else snr)
@@ -46,12 +50,10 @@ def over_snr(ours: dict, published: dict) -> Plot:
     schemes = list(dict.fromkeys(row["scheme"] for row in rows))
     colours = {scheme: COLOURS[number % len(COLOURS)] for number, scheme in enumerate(schemes)}
     names = [f"{protocol} subtypes" for protocol in ours]
-    figure = Figure(
-        figsize=(6.5 * len(names), 4 + 0.2 * math.ceil(len(schemes) / 4)), layout="constrained"
-    )
-    for panel, name in zip(
-        plain(figure.subplots(1, len(names), sharey=True, squeeze=False)), names, strict=True
-    ):
+    height = 4 + 0.2 * math.ceil(len(schemes) / 4)
+    figure = Figure(figsize=(6.5 * len(names), height), layout="constrained")
+    panels = plain(figure.subplots(1, len(names), sharey=True, squeeze=False))
+    for panel, name in zip(panels, names, strict=True):
         for scheme, source in dict.fromkeys((row["scheme"], row["source"]) for row in rows):
             line = [
                 (levels.index(row["snr_db"]), row["accuracy_percent"])
@@ -79,11 +81,10 @@ def over_snr(ours: dict, published: dict) -> Plot:
 
 
 def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
-    """Return row-normalised confusion matrices, one per (protocol, scheme); counts as returned by
-    `pivots.confusion`.
+    """Return row-normalised confusion matrices, one per (protocol, scheme).
 
-    A class without samples has dashes in its row. With more classes, fewer matrices are placed side
-    by side.
+    counts: as returned by `pivots.confusion`. A class without samples has dashes in its row. With
+    more classes, fewer matrices are placed side by side.
     """
     count = len(categories)
     columns = max(1, min(len(counts), PAGE_WIDTH // (CELL * count + 40)))
@@ -95,11 +96,13 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
     panels = plain(figure.subplots(math.ceil(len(counts) / columns), columns, squeeze=False))
     rows: list[dict] = []
     for panel, ((protocol, scheme), cells) in zip(panels, counts.items(), strict=False):
-        totals = [sum(cells.get((true, guess), 0) for guess in categories) for true in categories]
-        shares = [
-            [100 * cells.get((true, guess), 0) / total if total else 0.0 for guess in categories]
-            for true, total in zip(categories, totals, strict=True)
-        ]
+        totals = []
+        shares = []
+        for true in categories:
+            answers = [cells.get((true, guess), 0) for guess in categories]
+            total = sum(answers)
+            totals.append(total)
+            shares.append([100 * answer / total if total else 0.0 for answer in answers])
         panel.pcolormesh(shares, cmap="Blues", vmin=0, vmax=100, edgecolors="white")
         for line, (true, total) in enumerate(zip(categories, totals, strict=True)):
             for column, guess in enumerate(categories):
@@ -147,30 +150,28 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
     panels = plain(figure.subplots(height, columns, sharex=True, sharey=True, squeeze=False))
     shown: list[dict] = []
     for panel, (protocol, true) in zip(panels, places, strict=False):
-        samples = np.array(
-            [
-                [counts.get((protocol, snr, true, answer), 0) for snr in levels]
-                for answer in categories
-            ]
-        )
+        by_answer = []
+        for answer in categories:
+            by_answer.append([counts.get((protocol, snr, true, answer), 0) for snr in levels])
+        samples = np.array(by_answer)
         shares = 100 * samples / np.maximum(samples.sum(axis=0), 1)
-        for answer, colour, part, below in zip(
-            categories, cycle(COLOURS), shares, shares.cumsum(axis=0) - shares
-        ):
-            panel.bar(range(len(levels)), part, bottom=below, color=colour, label=answer)
-        shown += [
-            {
-                "protocol": protocol,
-                "scheme": schemes[protocol],
-                "snr_db": snr,
-                "true": true,
-                "recognised_as": answer,
-                "samples": samples[line, column],
-                "percent": shares[line, column].round(2),
-            }
-            for line, answer in enumerate(categories)
-            for column, snr in enumerate(levels)
-        ]
+        below = shares.cumsum(axis=0) - shares
+        for line, (answer, colour) in enumerate(zip(categories, cycle(COLOURS))):
+            panel.bar(
+                range(len(levels)), shares[line], bottom=below[line], color=colour, label=answer
+            )
+            for column, snr in enumerate(levels):
+                shown.append(
+                    {
+                        "protocol": protocol,
+                        "scheme": schemes[protocol],
+                        "snr_db": snr,
+                        "true": true,
+                        "recognised_as": answer,
+                        "samples": samples[line, column],
+                        "percent": shares[line, column].round(2),
+                    }
+                )
         panel.set(title=f"{true}, {protocol} subtypes", ylim=(0, 100))
         panel.set_xticks(range(len(levels)), [SNR_LABELS.get(snr, snr) for snr in levels])
         panel.grid(visible=False)

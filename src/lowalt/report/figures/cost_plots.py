@@ -58,10 +58,10 @@ def _rows(rows: list[dict[str, str]]) -> list[dict]:
 
 
 def recognition(rows: list[dict[str, str]]) -> Plot:
-    """Plot unseen accuracy against the time for data and training, with Pareto front and a ring on
-    the first scheme.
+    """Plot unseen accuracy against the time for data and training, with its Pareto front.
 
-    rows: of accuracy_cost.csv (keys RECOGNITION); trained ones are drawn. Bars are 95 % intervals
+    rows: of accuracy_cost.csv (keys RECOGNITION); trained ones are drawn, the first scheme with a
+    ring. Bars are 95 % intervals
     of the difference to the first scheme; if they contain zero the point is grey. The band spans
     all points not significantly different.
     """
@@ -76,10 +76,11 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
         (True, COLOURS[1], "differs"),
     ):
         some = [row for row in data if row["same"] != apart]
-        times, values = ([row[name] for row in some] for name in ("core_s", "accuracy_percent"))
-        panel.vlines(
-            times, *([row[end] for row in some] for end in ("low", "high")), color=colour, alpha=0.5
-        )
+        times = [row["core_s"] for row in some]
+        low = [row["low"] for row in some]
+        high = [row["high"] for row in some]
+        panel.vlines(times, low, high, color=colour, alpha=0.5)
+        values = [row["accuracy_percent"] for row in some]
         panel.plot(times, values, "o", color=colour, label=label)
     panel.plot(
         base["core_s"],
@@ -102,11 +103,10 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
     level = 0.0
     for row in front:
         level = max(row["accuracy_percent"], level) + (100 - least) / 18
-        place = row["core_s"], level
         panel.annotate(
             row["name"],
             (row["core_s"], row["accuracy_percent"]),
-            place,
+            (row["core_s"], level),
             ha="right",
             arrowprops={"arrowstyle": "-", "color": "0.5", "linewidth": 0.5},
         )
@@ -144,10 +144,9 @@ def seconds(row: dict[str, str]) -> float:
 
 
 def echo(measured: list[dict[str, str]]) -> Plot:
-    """Plot the error of a signal against its time, one line per method and tolerance through the
-    numbers of points.
+    """Plot the error of a signal against its time, one line per method and tolerance.
 
-    measured: rows of cost.csv (keys ECHO).
+    A line joins the numbers of points. measured: rows of cost.csv (keys ECHO).
     """
     rows = [
         {
@@ -172,14 +171,14 @@ def echo(measured: list[dict[str, str]]) -> Plot:
         color="0.5",
         fontsize=8,
     )
-    sizes = {
-        points: 16 + 28 * place
-        for place, points in enumerate(sorted({row["points"] for row in rows}))
-    }
+    sizes = {}
+    for order, points in enumerate(sorted({row["points"] for row in rows})):
+        sizes[points] = 16 + 28 * order
     for name in dict.fromkeys(row["name"] for row in rows):
         line = sorted((row for row in rows if row["name"] == name), key=lambda row: row["points"])
         colour = COLOURS[methods.index(line[0]["method"])]
-        times, errors = ([row[key] for row in line] for key in ("ms", "error"))
+        times = [row["ms"] for row in line]
+        errors = [row["error"] for row in line]
         panel.plot(times, errors, color=colour, linewidth=1)
         panel.scatter(times, errors, [sizes[row["points"]] for row in line], color=colour)
         panel.annotate(
@@ -196,8 +195,8 @@ def echo(measured: list[dict[str, str]]) -> Plot:
         xlabel="ms per signal, 1 core",
         ylabel="error / largest value of the signal",
     )
-    for size in sizes.items():
-        panel.scatter([], [], size[1], color="0.5", label=f"{size[0]} points")
+    for points, size in sizes.items():
+        panel.scatter([], [], size, color="0.5", label=f"{points} points")
     panel.legend(frameon=False)
     words = "error of an echo signal over its time, by method, tolerance and number of points"
     return drawn("echo_cost", words, figure, rows)
@@ -213,11 +212,9 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--figure", required=True, help="picture to write (.svg)")
     options = line.parse_args(arguments)
     draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[options.plot]
+    svg = draw(read_csv(options.table, *columns)).svg
     # A document may have any background colour.
-    text = draw(read_csv(options.table, *columns)).svg.replace(
-        "<svg", '<svg style="background: white"', 1
-    )
-    write_file(options.figure, text)
+    write_file(options.figure, svg.replace("<svg", '<svg style="background: white"', 1))
 
 
 if __name__ == "__main__":

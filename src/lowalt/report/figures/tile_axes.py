@@ -25,7 +25,7 @@ class Axes(NamedTuple):
 
 
 def times_s(settings: Fourier | Transfer, network: Network) -> tuple[float, float]:
-    """Return the times (s) of a spectrum's first and last column, each at the middle of its window."""
+    """Return the times (s) of a spectrum's first and last column, at their windows' middles."""
     middle = (settings.window - 1) / 2
     return network.symbol_interval_s * middle, network.symbol_interval_s * (
         network.symbols - 1 - middle

@@ -11,7 +11,7 @@ COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
 
 
 def network_words(block: dict) -> str:
-    """Return the network and its training in words, from the configuration's `recognition` block."""
+    """Return the network and its training in words, from the block `recognition`."""
     network = block["network"]
     training = block["training"]
     start = {"none": "random initial weights", "hub": "ImageNet weights from the hub"}

@@ -1,4 +1,4 @@
-"""Section: whether the receiver of the run's scene finds its targets, as `lowalt explain` says it."""
+"""Section: whether the receiver of the run's scene finds its targets, as `lowalt explain` says."""
 
 import os
 from pathlib import Path
@@ -22,9 +22,8 @@ def values(run: ReportedRun) -> dict:
         # Show the page without the verdict where, for example, the recordings have been moved.
         return {"lines": [f"not explained: {error}"]}
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
-    findings = [
-        explanation.finding(scene, end, sample, clouds)
-        for sample in chosen
-        for end in scene.network.stations
-    ]
+    findings = []
+    for sample in chosen:
+        for end in scene.network.stations:
+            findings.append(explanation.finding(scene, end, sample, clouds))
     return {"lines": explanation.verdict(findings)}

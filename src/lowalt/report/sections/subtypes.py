@@ -36,7 +36,9 @@ CHANCE = 0.05
 def subtype_table(
     rows: list[dict[str, str]],
 ) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
-    """Return (columns, rows) of accuracy by subtype: one column per protocol and scheme, one row
+    """Return the columns and rows of accuracy by subtype.
+
+    There is one column per protocol and scheme, and one row (subtype, category, cells by column)
     per subtype.
     """
     columns: dict[str, None] = {}
@@ -77,36 +79,37 @@ def reasons(
 
 
 def _apart(always: list[str], sometimes: list[str], traits: Mapping[str, dict[str, float]]) -> str:
-    """Words for the trait that tells motion models that are always wrong from those that are
-    sometimes right.
+    """Words for the trait that tells models that are `always` wrong from those `sometimes` right.
 
     "" where there are too few of either, or where chance may well be the cause.
     """
-    wrong, right = (
-        [traits[model] for model in models if model in traits] for models in (always, sometimes)
-    )
+    wrong = [traits[model] for model in always if model in traits]
+    right = [traits[model] for model in sometimes if model in traits]
     if min(len(wrong), len(right)) < FEWEST:
         return ""
-    values = {name: ([of[name] for of in wrong], [of[name] for of in right]) for name in TRAITS}
-    chances = {name: mannwhitneyu(*both).pvalue for name, both in values.items()}
+    chances = {}
+    for name in TRAITS:
+        test = mannwhitneyu([of[name] for of in wrong], [of[name] for of in right])
+        chances[name] = test.pvalue
     name = min(chances, key=chances.__getitem__)
     if not chances[name] < CHANCE / len(TRAITS):
         return ""
-    of_wrong, of_right = map(np.median, values[name])
+    of_wrong = np.median([of[name] for of in wrong])
+    of_right = np.median([of[name] for of in right])
     larger, smaller, unit = TRAITS[name]
     words = larger if of_wrong > of_right else smaller
     return f", most of them {words} (median {of_wrong:.3g} against {of_right:.3g}{unit})"
 
 
 def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str, float]]:
-    """Return the numbers of TRAITS by motion model, seen from the first station; none where nothing
-    says the motion.
+    """Return the numbers of TRAITS by motion model, seen from the first station.
+
+    A model is left out where nothing says its motion.
     """
     numbers = {key.decode(): number for number, key in enumerate(shards.keys.tolist())}
     result = {}
-    for name, first in zip(
-        *(part.tolist() for part in np.unique(predictions.motion, return_index=True)), strict=True
-    ):
+    names, rows = np.unique(predictions.motion, return_index=True)
+    for name, first in zip(names.tolist(), rows.tolist(), strict=True):
         motion = shards.record(numbers[str(predictions.key[first])])["motion"]
         if motion.get("x_m") is not None:
             result[name] = {
@@ -120,12 +123,19 @@ def traits_of(shards: ShardSet, predictions: Predictions) -> dict[str, dict[str,
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the pivoted table, the worst subtype of the last column first, distances and reasons;
-    None without any.
+    """Return the pivoted table, the worst subtype of the last column first; None without any.
+
+    Distances and reasons stand beside it.
     """
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}
-    rows.sort(key=lambda row: float([*row[2].values()][-1]))
+
+    def last_accuracy(row: tuple[str, str, dict[str, str]]) -> float:
+        """The accuracy in a row's last column."""
+        _, _, cells = row
+        return float(list(cells.values())[-1])
+
+    rows.sort(key=last_accuracy)
     files = run.inputs.paths("predictions")
     # The last training is of the protocol and the scheme that the configuration names last.
     in_common = {}
@@ -133,14 +143,12 @@ def values(run: ReportedRun) -> dict | None:
         tested = folds(record(files[-1])["protocol"], "test")
         predictions = read(files[-1], run.shards.classes).of(tested)
         in_common = reasons(predictions, run.shards.classes, traits_of(run.shards, predictions))
-    return (
-        {
-            "columns": columns,
-            "rows": rows,
-            "distances": distances,
-            "reasons": in_common,
-            "worst": WORST,
-        }
-        if rows
-        else None
-    )
+    if not rows:
+        return None
+    return {
+        "columns": columns,
+        "rows": rows,
+        "distances": distances,
+        "reasons": in_common,
+        "worst": WORST,
+    }
