@@ -125,9 +125,8 @@ def parts_of(
         raise InputError("no surface is left for the body, expected links that do not turn")
     parts = {}
     for name, surfaces in triangles.items():
-        corners = np.concatenate(surfaces)
-        if len(corners):
-            parts[name] = corners
+        if sum(map(len, surfaces)):
+            parts[name] = np.concatenate(surfaces)
     return {name: joint for name, joint in joints.items() if name in parts}, parts
 
 
