@@ -104,7 +104,7 @@ test-slow: $(TESTING)  ## the slow checks
 
 # One process per reader; about ten minutes.
 fuzz: $(TESTING)  ## 2000 damaged files for every reader of files, 200 for one that starts a process each: results/benchmarks/fuzz.csv
-	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
+	PYTHONPATH=tests/support:tests/extensions/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
 lint:  ## ruff, snakefmt, mypy, snakemake --lint, no marks of an unfinished merge
 	@$(MAKE) --no-print-directory -j 2 ready

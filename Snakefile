@@ -1,4 +1,5 @@
-# lowalt: from records of targets to a benchmark and its report. One rule file per stage, in pipeline order.
+# lowalt: from records of targets to a benchmark and its report. One rule file per stage, in
+# pipeline order.
 import sys
 
 from snakemake.utils import min_version
@@ -55,22 +56,38 @@ rule signals:
 
 rule data:
     input:
-        products.data,
+        expand("results/{run}/shards/{file}", run=RUN.name, file=["index.json", "README.md"]),
+        expand(
+            "results/{run}/shards/{shard}.{ending}",
+            run=RUN.name,
+            shard=RUN.plan.shards,
+            ending=["tar", "npz"],
+        ),
     localrule: True
 
 
 rule training_samples:
     input:
-        products.own_views,
+        OWN_VIEWS,
         f"results/{RUN.name}/SHA256SUMS",
         f"results/{RUN.name}/config.yaml",
     localrule: True
 
 
-# Everything before the first training that needs no torch: `make` makes it while torch is being downloaded.
+# Everything before the first training that needs no torch: `make` makes it while torch is being
+# downloaded.
 rule prepared:
     input:
-        products.prepared,
+        branch(
+            RUN.data == RUN.name,
+            then=[
+                f"{DATA}/SHA256SUMS",
+                f"{DATA}/distances.csv",
+                f"{DATA}/clouds.png",
+                f"{DATA}/shards/README.md",
+            ],
+        ),
+        branch(RUN.data == RUN.name and config["recognition"]["cache"], then=OWN_VIEWS),
     localrule: True
 
 

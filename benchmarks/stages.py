@@ -16,12 +16,12 @@ import json
 from collections import defaultdict
 from pathlib import Path
 
-from lowalt.config.plan import sample_bytes
 from lowalt.files.atomic import existing
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.machine.hardware import describe
 from lowalt.shards.index import load
+from lowalt.shards.sizes import sample_bytes
 
 WHOLE = 1_440_000
 STAGES = ("cloud", "motion", "echo", "noise", "tiles", "shard", "index")

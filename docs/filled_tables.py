@@ -11,7 +11,6 @@ accuracy-cost`, their time and accuracy; or `benchmark`: the baselines of the be
 from pathlib import Path
 
 from lowalt.config.command import run
-from lowalt.extensions.benchmark import baseline_table
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
@@ -105,6 +104,9 @@ def presets(prefix: str) -> str:
 
 def benchmark(prefix: str) -> str:
     """Return the tables of the benchmark's baselines from {prefix}table.csv."""
+    # The other tables need no extension.
+    from lowalt.extensions.benchmark import baseline_table
+
     rows = baseline_table.read(prefix)
     tables = [
         _head(list(head)) + "".join(map(_line, lines))

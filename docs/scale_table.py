@@ -14,10 +14,10 @@ from pathlib import Path
 from lowalt.config.command import run
 from lowalt.config.layers import load
 from lowalt.config.network import station_names
-from lowalt.config.plan import Plan
 from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import named
+from lowalt.shards.plan import Plan
 from lowalt.targets.records import records_of
 
 DATA_RULES = ("motion", "echo", "noise", "tiles", "shard", "index")

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-from lowalt import benchmark
+from lowalt.extensions import benchmark
 
 
 def features(signals: np.ndarray) -> np.ndarray:
@@ -22,9 +22,13 @@ def features(signals: np.ndarray) -> np.ndarray:
 
 
 track = sys.argv[1] if len(sys.argv) > 1 else "unseen"
+print(f"{track}: reading the data")
 train = benchmark.load(track, "train")
 test = benchmark.load(track, "test")
-model = HistGradientBoostingClassifier(max_iter=50, random_state=0).fit(
-    features(train.signals), train.labels
-)
+model = HistGradientBoostingClassifier(max_iter=50, random_state=0, verbose=1)
+model.fit(features(train.signals), train.labels)
 benchmark.write("predictions.csv", test, model.predict_proba(features(test.signals)))
+print(
+    "predictions.csv: written; score it with `lowalt benchmark score predictions.csv --track",
+    track + "`",
+)

@@ -6,9 +6,10 @@ import sys
 
 import numpy as np
 
-from lowalt import benchmark
+from lowalt.extensions import benchmark
 
 track = sys.argv[1] if len(sys.argv) > 1 else "unseen"
+print(f"{track}: reading the data")
 train = benchmark.load(track, "train")
 means = [train.images[train.labels == label].mean(0) for label in range(len(train.classes))]
 
@@ -25,4 +26,6 @@ def predict(signals: np.ndarray, images: np.ndarray) -> np.ndarray:
 
 
 test = benchmark.load(track, "test")
+print(f"answering {len(test)} samples")
 benchmark.write("predictions.csv", test, predict(test.signals, test.images))
+print("predictions.csv: written")

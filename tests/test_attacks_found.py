@@ -2,7 +2,6 @@
 refused by name.
 """
 
-import struct
 import zipfile
 
 import numpy as np
@@ -11,8 +10,6 @@ import torch
 
 from craft import craft
 from fuzzed_seals import ARCHIVE, PNG
-from lowalt.extensions.recordings.files import read
-from lowalt.extensions.recordings.record import Record
 from lowalt.files.atomic import existing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
@@ -87,18 +84,6 @@ def test_a_checkpoint_whose_pickle_ends_early_is_refused(tmp_path):
             new.writestr(name, b"\x80\x02." if name.endswith("data.pkl") else old.read(name))
     with pytest.raises(InputError, match=r"cut\.pt: not a checkpoint"):
         checkpoint.load(path)
-
-
-@pytest.mark.parametrize(
-    "chunk", [b"", b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 800, 1600, 2, 16)]
-)
-def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
-    path = tmp_path / "a.wav"
-    path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
-    with pytest.raises(
-        InputError, match=r"a\.wav: a \.wav file without a format or without samples"
-    ):
-        read(Record(file=path, carrier_hz=24e9, channel="real"))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ import pytest
 
 from emulation import EMULATED, able, run
 from lowalt.config.layers import load
-from lowalt.extensions.benchmark import frozen_bytes
 from lowalt.shards import build, manifest
 from lowalt.shards.dataset import Dataset
 
@@ -102,21 +101,3 @@ def test_the_tiny_data_set_has_the_bytes_of_its_manifest(name, threads, tmp_path
     )
     # Echoes and noisy signals stay in memory here; the shards follow from them.
     assert manifest.faults(REFERENCE, tmp_path / "run", ("echo", "noise", "tiles")) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-def test_samples_of_the_benchmark_have_their_kept_checksums_on_another_processor(name, tmp_path):
-    """One sample of each subtype and some of every other part; natively `tests/benchmark` makes
-    them again.
-    """
-    run(name, "-m", "lowalt.extensions.benchmark", "results", "--samples", "--out", str(tmp_path))
-    made, kept = (
-        (folder / frozen_bytes.SAMPLES).read_text().splitlines()
-        for folder in (tmp_path, ROOT / frozen_bytes.REFERENCE)
-    )
-    assert len(made) == len(kept) == 64
-    # The town has effects, whose last bits follow the processor: `test_bytes_effects.py` says how
-    # far apart they are.
-    exact = [line for line in kept if "  town/" not in line]
-    assert len(exact) == 56 and set(exact) <= set(made)

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from lowalt.files.package_plan import EXTENSIONS, ROOMS
+
 ROOT = Path(__file__).parent.parent
 EFFECT = '''"""DC offset: the mixer's own oscillator leaks into its output and adds a constant to every sample."""
 
@@ -238,41 +240,38 @@ def test_every_name_in_the_list_of_words_stands_in_the_code():
     assert not named - known - {"py", "RUN"}
 
 
-def test_each_of_the_twenty_questions_is_answered_by_a_file_that_holds_its_word():
-    text = (ROOT / "CONTRIBUTING.md").read_text().partition("## Twenty questions")[2]
-    rows = re.findall(r"^\| (.+\?) \| `([^`]+)`[^|]* \| `([^`]+)` \|$", text, re.MULTILINE)
-    assert len(rows) == len({question for question, _, _ in rows}) == 20
-    found = {
-        file: next(
-            (base / file for base in (ROOT, ROOT / "src/lowalt") if (base / file).is_file()), None
-        )
-        for _, file, _ in rows
-    }
-    wrong = [
-        row
-        for row in rows
-        if not found[row[1]] or not re.search(rf"\b{row[2]}\b", found[row[1]].read_text())
+PACKAGE = ROOT / "src/lowalt"
+
+
+def test_every_folder_is_described_once_with_files_to_begin_with():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    rows = re.findall(r"^\| `([\w/]+)/` \| .+ \| (`.+`) \|$", text, re.MULTILINE)
+    assert [folder for folder, _ in rows] == [*ROOMS, *(sorted(EXTENSIONS, key=text.index))]
+    missing = [
+        f"{folder}/{name}"
+        for folder, names in rows
+        for name in re.findall(r"`([^`]+)`", names)
+        if not (PACKAGE / folder / name).is_file()
     ]
-    assert not wrong
+    assert not missing
+    tracked = {path.name for path in ROOT.iterdir() if path.is_dir() and path.name[0] != "."}
+    described = set(re.findall(r"^\| (`\w+/`.*?) \|", text, re.MULTILINE))
+    named = {name for cell in described for name in re.findall(r"`(\w+)/`", cell)}
+    assert named >= tracked - {"src", "build", "site", "wheels", "notebooks", "logs"}
 
 
 def test_names_in_brackets_after_a_path_stand_in_that_file():
-    text = (
-        (ROOT / "CONTRIBUTING.md")
-        .read_text()
-        .partition("## Where does it live?")[2]
-        .partition("\n## ")[0]
-    )
     named = [
         (path, word)
-        for path, words in re.findall(r"`([\w./-]+\.py)` \(((?:`\w+`(?:, )?)+)", text)
+        for path, words in re.findall(
+            r"`([\w./-]+\.py)` \(((?:`\w+`(?:, )?)+)\)", (ROOT / "CONTRIBUTING.md").read_text()
+        )
         for word in re.findall(r"`(\w+)`", words)
     ]
-    assert len(named) >= 3
-    rooms = ROOT / "src/lowalt"
-    wrong = [
-        pair
-        for pair in named
-        if not re.search(rf"\b(def|class) {pair[1]}\b", (rooms / pair[0]).read_text())
-    ]
+    assert len(named) >= 5
+    wrong = []
+    for path, word in named:
+        file = next(base / path for base in (PACKAGE, ROOT) if (base / path).is_file())
+        if not re.search(rf"^(def|class)? ?{word}\b", file.read_text(), re.MULTILINE):
+            wrong.append((path, word))
     assert not wrong

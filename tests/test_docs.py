@@ -48,10 +48,13 @@ def commands(page: Path) -> list[str]:
     ]
 
 
+# `tests/config/test_strangers_package.py` runs these, where the tutorial's package is installed.
+OF_A_STRANGER = r"-m pip install .*\./mist|lowalt mist"
 NAMED = [
     (page.relative_to(ROOT).as_posix(), command)
     for page in [*PAGES, *OTHERS]
     for command in commands(page)
+    if not re.search(OF_A_STRANGER, command)
 ]
 
 
@@ -216,6 +219,8 @@ def test_a_page_that_imports_a_package_beyond_the_set_up_says_how_to_install_it(
     known += re.findall(r"pip install[^`\n]* (\w+)`", text)
     have = {re.match(r"[\w-]+", need)[0].lower() for need in known} | {"lowalt"}
     offers = packages_distributions()
+    # A package that the page itself makes.
+    have |= set(re.findall(r'title="[^"]*?(\w+)/__init__\.py"', text))
     sources = {
         module: {name.lower() for name in offers.get(module, [module])} for module in modules
     }
@@ -387,3 +392,28 @@ def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():
         "README.md"
     }
     assert every <= named
+
+
+FOLLOWED = {
+    "tests/test_tutorials.py": (
+        "first_data_set",
+        "trajectory",
+        "effect",
+        "backbone",
+        "pytorch",
+        "hugging_face",
+    ),
+    "tests/config/test_strangers_package.py": ("extension",),
+    "tests/extensions/benchmark/test_benchmark_tutorial.py": ("benchmark",),
+    "tests/extensions/drafting/test_drafting_tutorial.py": ("target",),
+    "tests/extensions/recordings/test_recordings_tutorial.py": ("recording",),
+}
+"""The tutorials that each file of tests follows, block by block."""
+
+
+def test_every_tutorial_is_followed_by_a_test():
+    tutorials = sorted(path.stem for path in (ROOT / "docs/tutorials").glob("*.md"))
+    assert sorted(page for pages in FOLLOWED.values() for page in pages) == tutorials
+    for test, pages in FOLLOWED.items():
+        text = (ROOT / test).read_text()
+        assert not [page for page in pages if f'"{page}"' not in text and f"{page}.md" not in text]

@@ -117,7 +117,7 @@ def scale(kept, tmp_path):
 
 def fuzzed(kept, tmp_path):
     (reader,) = [
-        each for each in import_module("fuzzed_readers").readers() if each.name == kept["reader"]
+        each for each in import_module("fuzzing").all_readers() if each.name == kept["reader"]
     ]
     found = import_module("fuzzing").attack(reader, int(kept["inputs"]), 1, tmp_path)
     return {key: found[key] for key in ("reader", "inputs", "accepted", "refused", "faults")}

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from test_tutorials import FENCE, FOLDER, ROOT
+from followed_pages import FENCE, FOLDER, ROOT
 
 PAGES = sorted(path.stem for path in FOLDER.glob("*.md"))
 

@@ -1,41 +1,26 @@
 """Each tutorial runs as it is printed, block by block, in a folder that looks like a checkout."""
 
-import contextlib
-import importlib
-import io
 import os
 import re
 import runpy
-import shlex
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
+import torch
 
-import lowalt
-import lowalt.extensions.benchmark
-import small_benchmark
 from dataset import build, publish
-from lowalt.__main__ import main
-from lowalt.commands import workflow
+from followed_pages import FENCE, FOLDER, ROOT, SCHEMA, followed, linked_checkout
 from lowalt.config.layers import load
-from lowalt.extensions.benchmark import definition, frozen_bytes
-from lowalt.extensions.benchmark.submission import read as read_submission
-from lowalt.files.yaml_files import load_yaml
-from lowalt.shards.build import write_run
+from lowalt.recognition.recogniser import Recogniser
+from lowalt.recognition.schemes import Scheme
 
-ROOT = Path(__file__).parent.parent
-FOLDER = ROOT / "docs/tutorials"
-FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 NEEDS = {"pytorch": "timm", "hugging_face": "datasets"}
 SHARDS = ("pytorch", "hugging_face")
 LOOP = "torch.Size([2, 9, 64, 64]) ('UAV', 'Bird', 'Vehicle', 'Pedestrian') 8\n"
 """What `loop.py` of the tutorial on PyTorch prints on the small data set of these tests."""
-SCHEMA = "workflow/schemas/config.schema.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -48,63 +33,7 @@ def shards(tmp_path_factory):
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
     """A folder with links to what a checkout holds, and the current folder of the test."""
-    for name in ("config", "design", "examples", "workflow"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("HF_HOME", str(tmp_path / "hub"))
-    monkeypatch.setenv("HF_DATASETS_OFFLINE", "1")
-    return tmp_path
-
-
-def in_this_process(line, monkeypatch):
-    """Run a command here, where the libraries are loaded already; returns what it prints."""
-    words = shlex.split(line)
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
-        if words[0] == ".venv/bin/lowalt":
-            assert main(words[1:]) == 0
-        elif words[1] == "-m":
-            importlib.import_module(f"{words[2]}.__main__").main(words[3:])
-        else:
-            monkeypatch.setattr(sys, "argv", words[1:])
-            runpy.run_path(words[1], run_name="__main__")
-    return printed.getvalue()
-
-
-def followed(page, folder, monkeypatch, more=None):
-    """Do what a page says: write the files it names, run its commands and its Python; returns
-    (printed, names).
-
-    more: options by the line that gets them besides its own.
-    """
-    printed = ""
-    names = {"__name__": page}
-    for language, title, block in FENCE.findall((FOLDER / f"{page}.md").read_text()):
-        if title:
-            (folder / title).write_text(block)
-        elif language == "sh":
-            for line in block.splitlines():
-                if line.startswith(".venv/bin/lowalt run "):
-                    continue  # a whole run: tests/test_notebooks.py has the slow ones
-                printed += in_this_process(f"{line} {(more or {}).get(line, '')}", monkeypatch)
-        elif language == "python":
-            exec(compile(block, f"{page}.md", "exec"), names)
-    return printed, names
-
-
-def test_every_tutorial_is_followed_here():
-    pages = {path.stem for path in FOLDER.glob("*.md")}
-    assert pages == {
-        "first_data_set",
-        "trajectory",
-        "target",
-        "effect",
-        "backbone",
-        "pytorch",
-        "hugging_face",
-        "recording",
-        "benchmark",
-        "extension",
-    }
+    return linked_checkout(tmp_path, monkeypatch)
 
 
 def test_a_first_data_set(checkout, capsys, monkeypatch):
@@ -115,25 +44,23 @@ def test_a_first_data_set(checkout, capsys, monkeypatch):
     names["load"](["config/default.yaml", "first.yaml"], SCHEMA)
 
 
-def test_a_submission_to_the_benchmark(checkout, monkeypatch):
-    """On a small copy of the benchmark; its data come from the test, so that no workflow starts and
-    no byte is kept.
-    """
-    small_benchmark.shrink(monkeypatch)
-    monkeypatch.setattr(
-        workflow,
-        "ended",
-        lambda options: {"status": small_benchmark.write(Path("results")) is None},
-    )
-    monkeypatch.setattr(frozen_bytes, "compared", lambda part, folder: [])
-    printed, _ = followed("benchmark", checkout, monkeypatch)
-    assert (
-        "are equal to the kept checksums" in printed and "16 samples, training seeds: 1" in printed
-    )
-    test = lowalt.extensions.benchmark.load("unseen", "test")
-    right = read_submission("mine.csv", test.track).argmax(1) == test.labels
-    assert f"accuracy {100 * right.mean():.1f} (" in printed
-    definition.truth.cache_clear()
+def test_a_backbone(checkout):
+    """Its commands are whole runs; here both networks are built from the page's overlays."""
+    text = (FOLDER / "backbone.md").read_text()
+    for _, title, block in FENCE.findall(text):
+        if title:
+            (checkout / title).write_text(block)
+    images = torch.zeros((2, 9, 32, 32), dtype=torch.uint8)
+    palettes = np.zeros((3, 256, 3), np.uint8)
+    whole = Scheme("whole", (0, 1, 2), (0, 1, 2), "attention", "")
+    named = {"of_timm.yaml": "test_vit", "my_network.yaml": "my_network.py:small"}
+    for overlay, backbone in named.items():
+        config = load(["config/default.yaml", "config/tiny.yaml", overlay], SCHEMA)
+        network = config["recognition"]["network"]
+        assert network["backbone"] == backbone and config["data"] == "tiny"
+        with torch.inference_mode():
+            model = Recogniser(whole, network | {"weights": "none"}, 32, palettes, 4).eval()
+            assert model(images).shape == (2, 4)
 
 
 def test_a_trajectory(checkout, monkeypatch):
@@ -152,17 +79,6 @@ def test_a_trajectory(checkout, monkeypatch):
     assert [(record["subtype"], record["track"], record["look"]) for record in names["flown"]] == [
         ("DJI Mini 2", 0, look) for look in range(8)
     ]
-
-
-def test_a_target(checkout, monkeypatch):
-    printed, names = followed("target", checkout, monkeypatch)
-    assert "4 moving parts drafted" in printed and "5 parts" in printed
-    assert (checkout / "mydrone.png").is_file()
-    assert len(names["samples"].clouds["DJI Mini 2"].kinds) == 5
-    config = load(["config/default.yaml", "config/tiny.yaml", "with_mine.yaml"], SCHEMA)
-    assert (
-        "My drone" in names["lowalt"].Dataset(config, inputs=config["inputs"]).plan.groups["unseen"]
-    )
 
 
 # The quick suite adds an effect to a copy of the tree in tests/test_contributing.py.
@@ -241,71 +157,3 @@ def test_the_loop_works_with_spawned_workers(checkout, shards):
 def test_the_first_hour_has_no_block_beyond_ten_lines():
     blocks = [block for _, _, block in FENCE.findall((ROOT / "docs/first_hour.md").read_text())]
     assert len(blocks) > 10 and max(len(block.splitlines()) for block in blocks) <= 10
-
-
-# A town at two bands, a target from its data sheet, two seconds of a walker, a network of its radar
-# and of one station.
-@pytest.mark.slow
-def test_the_first_hour(checkout, capsys, monkeypatch):
-    (checkout / "results/tiny").mkdir(parents=True)
-    (checkout / "results/zoo").symlink_to(ROOT / "results/zoo")
-    # The run itself: tests/test_notebooks.py. Here its data set, and one row of its table.
-    config = load(["config/default.yaml", "config/tiny.yaml"], SCHEMA)
-    (checkout / "results/tiny/config.yaml").write_text(yaml.safe_dump(config))
-    write_run(lowalt.Dataset(config), checkout / "results/tiny", "image")
-    (checkout / "results/tiny/confusion_by_snr.csv").write_text(
-        "protocol,scheme,snr_db,category,predicted,samples\nunseen,ABC:VRP+TRP+VT,3,Bird,Bird,8\n"
-    )
-    block = load_yaml("config/measured/recognition.yaml") | {
-        "size": 24,
-        "echoes": {"train": 1, "validation": 1},
-    }
-    block["training"] |= {"steps": 1, "batch": 4, "validate_every": 1}
-    (checkout / "quick.yaml").write_text(yaml.safe_dump(block))
-    quick = {
-        ".venv/bin/lowalt recording train walk.yaml --out my_radar": "--recognition quick.yaml"
-    }
-    printed, names = followed("../first_hour", checkout, monkeypatch, quick)
-    said = capsys.readouterr().out
-    assert (
-        "(400, 256) sqrt(W) ('body', 'right inner wing'" in said and "('Bird',)\n[[100.]]" in said
-    )
-    assert names["alone"].scheme.record["name"] == "A:VRP+TRP+VT" and list(
-        names["scores"]["by_snr_percent"]
-    ) == [
-        "3",
-        "inf",
-    ]
-    assert "windows right" in printed and printed.count("windows hold a target") == 2
-    for name, echo in {
-        "town": names["echo"],
-        "fourth": names["fourth"],
-        "hexacopter": names["hexacopter"],
-    }.items():
-        assert (checkout / f"{name}.png").is_file()
-        # In the cells around the target, the strongest line of the map is at the folded speed of
-        # the target.
-        spectrum = abs(
-            np.fft.fftshift(np.fft.fft(np.hanning(400)[:, None] * echo.values, axis=0), axes=0)[
-                ::-1
-            ]
-        )
-        cell = int(echo.truth["observed_cell"].mean())
-        line = spectrum[:, cell - 1 : cell + 3].max(axis=1)
-        place = np.interp(echo.truth["observed_mps"].mean(), echo.speeds_mps, np.arange(400))
-        assert line[max(0, int(place) - 25) : int(place) + 25].max() == line.max()
-    # 12 dB/km, there and back.
-    assert names["lost_db"] == pytest.approx(
-        0.012 * 2 * names["dry"].truth["range_m"].mean(), rel=1e-3
-    )
-    assert names["fourth"].station == "D" and len(names["hexacopter"].parts) == 7
-    assert "m600.yaml: 'm600'" in printed and "reading 1; another" in printed
-
-
-def test_a_recording(checkout, monkeypatch):
-    (checkout / "results").mkdir()
-    (checkout / "results/zoo").symlink_to(ROOT / "results/zoo")
-    printed, names = followed("recording", checkout, monkeypatch)
-    assert names["signals"].ndim >= 2
-    assert len(list((checkout / "mine/tiles").glob("*.png"))) > 2
-    assert "5 of 5 windows hold a target: UAV 0, Bird 0, Vehicle 0, Pedestrian 5" in printed

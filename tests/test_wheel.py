@@ -2,6 +2,7 @@
 with no checkout.
 """
 
+import configparser
 import hashlib
 import os
 import shutil
@@ -16,6 +17,7 @@ import pytest
 from lowalt.files.shipped import SHIPPED, located, shipped
 
 ROOT = Path(__file__).parents[1]
+EXTENSIONS = ROOT / "src/lowalt/extensions"
 BUILD = "from setuptools import build_meta; print(build_meta.build_{kind}({out!r}))"
 
 
@@ -69,6 +71,19 @@ def test_the_wheel_holds_the_workflow_and_says_that_it_is_typed(installed):
         )
     assert (package / "py.typed").is_file()
     assert (installed / "snakemake_logger_plugin_lowalt/__init__.py").is_file()
+
+
+def test_the_wheel_holds_the_extensions_with_their_files_and_entry_points(installed):
+    files = [path for path in EXTENSIONS.rglob("*") if path.suffix in (".py", ".html")]
+    assert {"town.py", "benchmark_results.html"} <= {path.name for path in files}
+    for path in files:
+        there = installed / "lowalt/extensions" / path.relative_to(EXTENSIONS)
+        assert there.read_bytes() == path.read_bytes()
+    (points,) = installed.glob("lowalt-*.dist-info/entry_points.txt")
+    found = configparser.ConfigParser()
+    found.read(points)
+    names = {path.name for path in EXTENSIONS.iterdir() if (path / "__init__.py").is_file()}
+    assert set(found["lowalt.extensions"]) == names
 
 
 def said(command, folder):

@@ -15,9 +15,7 @@ _HOMES = {
     "Endless": "shards.dataset",
     "RawEcho": "shards.receive",
     "confusion": "recognition.train_evaluate",
-    "draft_target": "drafting.scaled",
     "evaluate": "recognition.train_evaluate",
-    "inspect_recording": "recordings.file_inspection",
     "receive": "shards.receive",
     "train": "recognition.train_evaluate",
 }
@@ -25,13 +23,26 @@ __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str):
-    """Import a name of `__all__` when it is first asked for."""
+    """Import a function of the core or of an extension when it is first asked for."""
     # A stage's command line must not wait for the import of all other stages.
     if name in _HOMES:
         return getattr(importlib.import_module(f"lowalt.{_HOMES[name]}"), name)
+    # Python asks for names with underscores while it imports; no extension is looked for then.
+    added = {} if name.startswith("_") else _of_extensions()
+    if name in added:
+        from lowalt.config.extensions import function_offered
+
+        return function_offered("functions", name, added[name], name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def _of_extensions() -> dict[str, str]:
+    """The modules of the functions that extensions offer, by name."""
+    from lowalt.config.extensions import offered
+
+    return offered("functions")
 
 
 def __dir__() -> list[str]:
     """The names that programs use, for completion."""
-    return sorted([*globals(), *__all__])
+    return sorted([*globals(), *__all__, *_of_extensions()])

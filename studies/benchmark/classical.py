@@ -12,7 +12,9 @@ Sources: Cortes and Vapnik, Mach. Learn. 20, 1995; Rifkin and Klautau, J. Mach. 
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import islice
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve
@@ -37,6 +39,70 @@ MANY = 10
 Scores = Callable[[np.ndarray], np.ndarray]
 
 
+def constant(shares: np.ndarray, count: int) -> np.ndarray:
+    """Return the same probabilities (classes,) for a number of samples."""
+    return np.tile(shares, (count, 1))
+
+
+def centroids(features: np.ndarray, labels: np.ndarray, classes: int) -> Scores:
+    """Return the function to class probabilities that fall off with the squared distance to each
+    class's mean.
+    """
+    mean = features.mean(0)
+    scale = np.maximum(features.std(0), 1e-9)
+    scaled = (features - mean) / scale
+    centres = np.array([scaled[labels == label].mean(0) for label in range(classes)])
+    return partial(_near, mean, scale, centres)
+
+
+def _near(
+    mean: np.ndarray, scale: np.ndarray, centres: np.ndarray, asked: np.ndarray
+) -> np.ndarray:
+    """Probabilities (B, classes) by the squared distance to each centre, in units of the
+    deviations.
+    """
+    away = ((asked - mean) / scale)[:, None] - centres
+    logits = -0.5 * (away**2).sum(-1)
+    shares = np.exp(logits - logits.max(1, keepdims=True))
+    return shares / shares.sum(1, keepdims=True)
+
+
+def _standardised(
+    decide: Scores, mean: np.ndarray, scale: np.ndarray, asked: np.ndarray
+) -> np.ndarray:
+    """Scores of features that are standardised first."""
+    return decide((asked - mean) / scale)
+
+
+def _staged(model: Any, rounds: int, asked: np.ndarray) -> np.ndarray:
+    """Scores of scikit-learn's boosted trees after some rounds."""
+    return next(islice(model.staged_decision_function(asked), rounds - 1, None))
+
+
+def _margins(model: Any, rounds: int, asked: np.ndarray) -> np.ndarray:
+    """Scores of XGBoost's trees after some rounds."""
+    import xgboost
+
+    return model.predict(xgboost.DMatrix(asked), output_margin=True, iteration_range=(0, rounds))
+
+
+def _votes(model: Any, asked: np.ndarray) -> np.ndarray:
+    """Scores of a random forest of 300 trees: logarithms of its smoothed votes."""
+    return np.log(model.predict_proba(asked) + 1 / 300)
+
+
+def _linear(
+    mean: np.ndarray, scale: np.ndarray, weights: np.ndarray, share: np.ndarray, asked: np.ndarray
+) -> np.ndarray:
+    """Scores of least squares on standardised features."""
+    return (asked - mean) / scale @ weights + share
+
+
+def _probabilities(scores: Scores, temperature: float, asked: np.ndarray) -> np.ndarray:
+    """Class probabilities (B, classes) of scores."""
+    return softmax(temperature * scores(asked), 1)
+
+
 def _svm(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
     """Yield the decision functions of one candidate's machines: one class against the rest, or of
     MANY classes each against each, which needs smaller machines."""
@@ -50,7 +116,7 @@ def _svm(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -
     model = (machine if many else OneVsRestClassifier(machine)).fit(
         (features - mean) / scale, labels
     )
-    yield lambda asked: model.decision_function((asked - mean) / scale)
+    yield partial(_standardised, model.decision_function, mean, scale)
 
 
 def _boosting(
@@ -67,9 +133,7 @@ def _boosting(
         random_state=seed,
     ).fit(features, labels)
     for count in range(EVERY, ROUNDS + 1, EVERY):
-        yield lambda asked, last=count: next(
-            islice(model.staged_decision_function(asked), last - 1, None)
-        )
+        yield partial(_staged, model, count)
 
 
 def _xgboost(
@@ -90,9 +154,7 @@ def _xgboost(
     }
     model = xgboost.train(given, xgboost.DMatrix(features, labels), ROUNDS)
     for count in range(EVERY, ROUNDS + 1, EVERY):
-        yield lambda asked, last=count: model.predict(
-            xgboost.DMatrix(asked), output_margin=True, iteration_range=(0, last)
-        )
+        yield partial(_margins, model, count)
 
 
 def _forest(
@@ -104,7 +166,7 @@ def _forest(
     model = RandomForestClassifier(300, min_samples_leaf=candidate["leaf"], random_state=seed).fit(
         features, labels
     )
-    yield lambda asked: np.log(model.predict_proba(asked) + 1 / 300)
+    yield partial(_votes, model)
 
 
 def _logistic(
@@ -118,7 +180,7 @@ def _logistic(
     model = LogisticRegression(C=candidate["c"], max_iter=300).fit(
         (features - mean) / scale, labels
     )
-    yield lambda asked: model.decision_function((asked - mean) / scale)
+    yield partial(_standardised, model.decision_function, mean, scale)
 
 
 def _ridge(
@@ -140,7 +202,7 @@ def _ridge(
             answers,
             assume_a="pos",
         )
-        yield lambda asked, weights=weights: (asked - mean) / scale @ weights + share
+        yield partial(_linear, mean, scale, weights, share)
 
 
 MAKERS = {
@@ -158,7 +220,7 @@ def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
     cross entropy.
 
     train, validation: features (B, D) and labels (B,) of both parts; every class has training
-    samples.
+    samples. The function can be pickled.
     """
     asked, labels = validation
     least = np.inf
@@ -175,4 +237,4 @@ def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
                 least = chosen.fun
                 best = (scores, float(np.exp(chosen.x)))
     scores, temperature = best
-    return lambda features: softmax(temperature * scores(features), 1)
+    return partial(_probabilities, scores, temperature)

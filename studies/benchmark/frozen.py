@@ -80,7 +80,10 @@ def embedded_of(samples: TrackSamples, folder: Path) -> np.ndarray:
     """Return the features (samples, stations * F) float32 of a track's part, station by station."""
     wanted = {key: number for number, key in enumerate(samples.key.tolist())}
     result: np.ndarray | None = None
+    pairs = set(zip(samples.facts.group.tolist(), samples.facts.fold.tolist(), strict=True))
     for path in sorted((samples.run / f"views/{samples.size}").glob("*.npz")):
+        if tuple(path.stem.split("-")[:2]) not in pairs:
+            continue
         with np.load(embedded_chunk(path, folder)) as data:
             keys = data["key"]
             features = data["features"]

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import kendalltau
 
-from lowalt.extensions.benchmark.baseline_table import COLUMNS, TABLE
+from lowalt.extensions.benchmark.baseline_table import COLUMNS, TABLE, read
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track
 from lowalt.extensions.benchmark.scoring import Values, difference, values_of
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
 from lowalt.recognition.predictions import Predictions
 
 
@@ -54,7 +55,7 @@ def alike(rows: list[dict], count: int = 5) -> list[str]:
     """
     percent: dict[str, dict[str, float]] = {}
     for row in rows:
-        percent.setdefault(row["track"], {})[row["method"]] = row["percent"]
+        percent.setdefault(row["track"], {})[row["method"]] = float(row["percent"])
     pairs = [
         (
             float(
@@ -76,8 +77,17 @@ def alike(rows: list[dict], count: int = 5) -> list[str]:
 
 
 def write_table(rows: list[dict], folder: str | Path) -> None:
-    """Write the table, rows as dicts of COLUMNS, sorted by track and then by percent."""
+    """Write the table, rows as dicts of COLUMNS, sorted by track and then by percent.
+
+    Raises: InputError where a row of the table that is already there is not among them.
+    """
     order = list(TRACKS)
+    path = Path(folder) / TABLE
+    there = {(row["track"], row["method"]) for row in read(folder)} if path.is_file() else set()
+    if lost := sorted(there - {(row["track"], row["method"]) for row in rows}):
+        raise InputError(
+            f"{path}: would lose the rows of {lost[:3]}, {len(lost)} in all; expected a table with them"
+        )
     rows = sorted(rows, key=lambda row: (order.index(row["track"]), -row["percent"], row["method"]))
     plain = [
         {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()}
@@ -94,6 +104,22 @@ def packed(track: Track, parts: list[Predictions], classes: tuple[str, ...]) -> 
     if track.headline != "accuracy":
         return found.values.astype(np.float16)
     return np.rint(found.values * found.weight).astype(np.uint8)
+
+
+def unpacked(array: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the values (seeds, models) of what is kept of a method, as `packed` returns it."""
+    return array / weight if array.dtype == np.uint8 else array.astype(float)
+
+
+def read_values(track: Track, folder: str | Path) -> dict[str, np.ndarray]:
+    """Return what is kept of a track's baselines by their names, as `write_values` wrote it; {}
+    without a file.
+    """
+    path = Path(folder) / f"{track.name}.npz"
+    if not path.is_file():
+        return {}
+    with np.load(path, allow_pickle=False) as data:
+        return {name: data[name] for name in data.files}
 
 
 def write_values(track: Track, arrays: dict[str, np.ndarray], folder: str | Path) -> None:

@@ -1,5 +1,5 @@
-"""The baselines by name: each trains on a track's samples and returns a function from samples to
-probabilities.
+"""The baselines by name: each trains on a track's samples and returns what it sees and how it
+answers.
 
 majority class                  the class with the most training samples, always
 nearest centroid on moments     distance to each class's mean of the power spectrum's moments
@@ -12,7 +12,7 @@ audio-spectrogram transformer   on images (`backbones.py`)
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,8 +27,33 @@ from lowalt.extensions.benchmark.part_samples import TrackSamples
 from lowalt.recognition.batches import epoch_order
 from lowalt.recognition.schemes import Scheme
 
-Answer = Callable[[TrackSamples], np.ndarray]
-"""Class probabilities (samples, classes) of samples."""
+
+class Trained(NamedTuple):
+    """A trained method: `answer` returns class probabilities (samples, classes) of what it `sees`,
+    a name of SEEN.
+
+    It can be pickled, unless `answer` is that of a network, which its model.safetensors keeps.
+    """
+
+    sees: str
+    answer: Callable[[Any], np.ndarray]
+
+    def of(self, samples: TrackSamples, kept: Path) -> np.ndarray:
+        """Return the answers to samples of a track; kept: folder of what methods see, computed
+        once.
+        """
+        return self.answer(SEEN[self.sees](samples, kept))
+
+
+SEEN: dict[str, Callable[[TrackSamples, Path], Any]] = {
+    "nothing": lambda samples, kept: len(samples),
+    "moments": lambda samples, kept: features_of(samples, kept, spectral_moments),
+    "features": features_of,
+    "embedded": embedded_of,
+    "images": lambda samples, kept: samples,
+    "signals": lambda samples, kept: Signals(samples),
+}
+"""What methods see of samples."""
 LEVELS = 2
 """SNRs of each motion model that a classical method trains on, drawn by the training seed."""
 
@@ -56,64 +81,49 @@ class Kept(NamedTuple):
     make: Callable[..., Any]
 
 
-def majority(given: Given) -> Answer:
+def majority(given: Given) -> Trained:
     """Answer with the share of each class among the training samples."""
     shares = np.bincount(given.train.labels, minlength=len(given.classes)) / len(given.train)
-    return lambda samples: np.tile(shares, (len(samples), 1))
+    return Trained("nothing", partial(classical.constant, shares))
 
 
-def centroid(given: Given) -> Answer:
+def centroid(given: Given) -> Trained:
     """Answer by the distance to the mean of each class's moments, in units of their deviations."""
-    told = features_of(given.train, given.features, spectral_moments)
-    mean = told.mean(0)
-    scale = np.maximum(told.std(0), 1e-9)
-    told = (told - mean) / scale
-    centres = np.array(
-        [told[given.train.labels == label].mean(0) for label in range(len(given.classes))]
-    )
-
-    def answer(samples: TrackSamples) -> np.ndarray:
-        """Probabilities that fall off with the squared distance."""
-        asked = (features_of(samples, given.features, spectral_moments) - mean) / scale
-        away = (asked[:, None] - centres) ** 2
-        logits = -0.5 * away.sum(-1)
-        shares = np.exp(logits - logits.max(1, keepdims=True))
-        return shares / shares.sum(1, keepdims=True)
-
-    return answer
+    told = SEEN["moments"](given.train, given.features)
+    return Trained("moments", classical.centroids(told, given.train.labels, len(given.classes)))
 
 
-def on_features(method: str, given: Given) -> Answer:
+def on_features(method: str, given: Given) -> Trained:
     """Train a classical method on physical features."""
     picked = epoch_order(given.train.facts, given.seed, ("benchmark", method), 0, LEVELS)
     told = features_of(given.train, given.features)[picked], given.train.labels[picked]
     held = features_of(given.validation, given.features), given.validation.labels
-    answer = classical.fit(method, told, held, given.seed)
-    return lambda samples: answer(features_of(samples, given.features))
+    return Trained("features", classical.fit(method, told, held, given.seed))
 
 
-def on_frozen(given: Given) -> Answer:
+def on_frozen(given: Given) -> Trained:
     """Train a linear classifier on the features of a frozen backbone with ImageNet's weights."""
     told, held = (embedded_of(part, given.features) for part in (given.train, given.validation))
-    answer = classical.fit(
-        "ridge", (told, given.train.labels), (held, given.validation.labels), given.seed
+    return Trained(
+        "embedded",
+        classical.fit(
+            "ridge", (told, given.train.labels), (held, given.validation.labels), given.seed
+        ),
     )
-    return lambda samples: answer(embedded_of(samples, given.features))
 
 
-def network(
-    given: Given, scheme: Scheme, build: Callable, source: Callable[[TrackSamples], Any]
-) -> Answer:
-    """Train a network and return its answers; source: makes the source of a training of a track's
-    samples.
-    """
+def network(given: Given, scheme: Scheme, build: Callable, sees: str) -> Trained:
+    """Train a network and return its answers."""
     from lowalt.recognition import runs
     from lowalt.recognition.inference import Machine
 
     block = given.config["recognition"]
     model = given.folder / "model.safetensors"
     if not model.is_file():
-        samples = {"train": source(given.train), "validation": source(given.validation)}
+        samples = {
+            "train": SEEN[sees](given.train, given.features),
+            "validation": SEEN[sees](given.validation, given.features),
+        }
         kept = {key: block[key] for key in ("network", "training", "augmentation")}
         settings = scheme.settled(
             {
@@ -127,35 +137,28 @@ def network(
         runs.train(samples, scheme, given.train.track.protocol, settings, given.folder, build=build)
     trained = runs.load(model, build=build)
     settings = block["evaluation"]
-    return lambda samples: runs.answers(
-        trained, source(samples), settings, Machine.here(settings["precision"])
-    )
+    machine = Machine.here(settings["precision"])
+    return Trained(sees, lambda seen: runs.answers(trained, seen, settings, machine))
 
 
-def on_images(backbone: str, given: Given) -> Answer:
+def on_images(backbone: str, given: Given) -> Trained:
     """Train a network on images; backbone: as a scheme names it, "" for the default's."""
     from lowalt.recognition.recogniser import built
 
     scheme = Scheme("images attention", given.train.track.stations, (0, 1, 2), backbone=backbone)
-    return network(given, scheme, built, lambda samples: samples)
+    return network(given, scheme, built, "images")
 
 
-def on_signals(backbone: str, given: Given) -> Answer:
+def on_signals(backbone: str, given: Given) -> Trained:
     """Train a network on signals."""
-    from signal_networks import SignalRecogniser
-
-    def built(
-        scheme: Scheme, block: dict, size: int, colours: str, classes: int
-    ) -> SignalRecogniser:
-        """Return a network on signals with fresh weights."""
-        return SignalRecogniser(replace(scheme, backbone=backbone), block, size, classes)
+    from signal_networks import builder
 
     # A model's file names at least one view per station; the network's is the signal.
     scheme = Scheme(f"signals {backbone}", given.train.track.stations, (0,))
-    return network(given, scheme, built, Signals)
+    return network(given, scheme, builder(backbone), "signals")
 
 
-METHODS: dict[str, Callable[[Given], Answer]] = {
+METHODS: dict[str, Callable[[Given], Trained]] = {
     "majority class": majority,
     "nearest centroid on moments": centroid,
     "small CNN on images": lambda given: on_images("", given),
@@ -179,5 +182,9 @@ KEPT = {
     "linear": Kept(embedded, "views/*/*.npz", embedded_chunk),
 }
 """By the last word of a method's name; its time is added to the method's."""
+CHOSEN_ON = {"majority class": "nothing", "nearest centroid on moments": "nothing"}
+"""Part on which a method's settings, candidates or training step were chosen: `validation` where it
+stands not here.
+"""
 SEEDLESS = ("majority class", "nearest centroid on moments", "frozen EfficientNet-Lite0, linear")
 """Methods that draw nothing, so that one seed is enough."""

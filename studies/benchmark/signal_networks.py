@@ -8,6 +8,9 @@ it, and fuse as the images' views do. A scheme names one as its backbone:
     transformer  an encoder over short pieces of the signal
 """
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import torch
 from torch import nn
 
@@ -173,3 +176,17 @@ class SignalRecogniser(Fused):
         degrees.
         """
         return signals.conj().resolve_conj()
+
+
+def builder(backbone: str) -> Callable[[Scheme, dict, int, str, int], SignalRecogniser]:
+    """Return the function that builds a network on signals with fresh weights; backbone: a name of
+    BACKBONES.
+    """
+
+    def built(
+        scheme: Scheme, block: dict, size: int, colours: str, classes: int
+    ) -> SignalRecogniser:
+        """Return a network on signals of `size` symbols."""
+        return SignalRecogniser(replace(scheme, backbone=backbone), block, size, classes)
+
+    return built

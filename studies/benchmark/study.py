@@ -5,14 +5,18 @@
 
 Each training is tested on all tracks that it serves, and finished ones are kept in
 results/lowalt-40-v1-baselines, so that an interrupted study goes on where it was. The table and
-what each baseline got right are written at the end of every call, of the methods that are finished
-on all tracks of the table; `--table` trains nothing. `--confirm` keeps the first training of each
-method of CONFIRMED in the zoo, and writes its confirmed result into the table.
+what each baseline got right are written at the end of every call; `--table` trains nothing. Rows
+are merged by track, method and training seed: a row of the kept table is replaced once all its
+seeds are finished here, and stays otherwise; a method that the table lacks enters it once it is
+finished on all tracks of the table. `--confirm` trains each method once for the tracks named,
+freezes it, and writes its confirmed result into the table; of the methods of ZOO_ENTRIES it keeps
+the model in the zoo.
 """
 
 import argparse
 import json
 import os
+import sys
 import time
 from collections.abc import Iterator
 from copy import copy
@@ -21,32 +25,35 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
+# The modules that studies share lie in the folder above, and those of this study beside this file.
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parent))
+
+import confirmations
 import kept_results
 import numpy as np
-from methods import KEPT, METHODS, SEEDLESS, Given
+from methods import CHOSEN_ON, KEPT, METHODS, SEEDLESS, Given
 from signals import cost_s
 
 import trainings
 from lowalt.config.command import run
 from lowalt.extensions.benchmark import baseline_table, scoring
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN, Track, named
-from lowalt.extensions.benchmark.confirm import confirm
+from lowalt.extensions.benchmark.confirm import Confirmed, confirm
 from lowalt.extensions.benchmark.definition import MAIN, PARTS, REFERENCE, RUN, config_of, run_name
 from lowalt.extensions.benchmark.part_samples import TrackSamples
+from lowalt.extensions.formats.zoo import kept as keep
+from lowalt.extensions.formats.zoo_files import ZOO
 from lowalt.files.atomic import replacing, slug
 from lowalt.machine.hardware import describe
 from lowalt.recognition import model_file
 from lowalt.recognition.predictions import Predictions
-from lowalt.recognition.zoo import kept as keep
-from lowalt.recognition.zoo_files import ZOO
 
 OUT = Path(f"results/{RUN}-baselines")
 FIRST = "majority class"
-"""The table has the tracks on which this method is finished, and the methods that are finished on
-all of them.
-"""
-CONFIRMED = {("unseen", "small CNN on images"): f"{RUN}-unseen"}
-"""Rows with a confirmed result: the name of the model in the zoo by track and method."""
+"""A new table has the tracks on which this method is finished."""
+ZOO_ENTRIES = {("unseen", "small CNN on images"): f"{RUN}-unseen"}
+"""Rows that are confirmed with a model of the zoo: its name by track and method."""
 
 
 def closed(samples: TrackSamples) -> TrackSamples:
@@ -126,10 +133,11 @@ def one(job: tuple[str, str, int], data: str) -> Path:
     for tested in served(name):
         samples = TrackSamples(tested, "test", data)
         begun = time.process_time()
-        shares = answer(closed(samples))
+        shares = answer.of(closed(samples), given.features)
         spent = time.process_time() - begun + len(samples) * told_s(method, samples)
         facts["test_core_s"][tested.name] = spent
         found[tested.name] = opened(samples, shares).astype(np.float32)
+        found[f"{tested.name} key"] = samples.key
     with replacing(folder / "answers.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **found)
     with replacing(folder / "tested.json") as temporary:
@@ -147,7 +155,10 @@ def finished(method: str, track: Track) -> Iterator[tuple[dict, Predictions]]:
         folder = place(method, track.trains_as, seed)
         if (folder / "tested.json").is_file():
             with np.load(folder / "answers.npz", allow_pickle=False) as data:
-                shares = data[track.name].astype(float)
+                number = {
+                    key: place for place, key in enumerate(data[f"{track.name} key"].tolist())
+                }
+                shares = data[track.name].astype(float)[[number[key] for key in facts.key.tolist()]]
             about = json.loads((folder / "tested.json").read_text())
             # A call that finds the network trained measures no training; `runs.train` has kept its
             # time.
@@ -157,8 +168,8 @@ def finished(method: str, track: Track) -> Iterator[tuple[dict, Predictions]]:
             yield about, scoring.tested(track, facts, shares)
 
 
-def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], group: int) -> dict:
-    """Return a method's row of the table."""
+def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]]) -> dict:
+    """Return a method's row of the table, without its group and what follows from the kept values."""
     about, parts = zip(*runs, strict=True)
     found = scoring.scores(track, [part.probabilities for part in parts], {})
     names = ("percent", "low", "high"), ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
@@ -172,90 +183,141 @@ def row_of(track: Track, method: str, runs: list[tuple[dict, Predictions]], grou
         "method": method,
         "seeds": "none" if method in SEEDLESS else len(parts),
         **cells,
-        "group": group,
         "train_core_s": float(np.mean([one["train_core_s"] for one in about])),
         "test_core_s_per_1000": float(1000 * test_s / len(parts[0])),
         "hardware": about[0]["hardware"],
     }
 
 
+def replaced(track: Track, out: Path) -> dict[str, list[tuple[dict, Predictions]]]:
+    """Return the finished trainings of the methods whose rows of a track are new: seed by seed, by
+    method.
+
+    A row of the kept table is new once all its seeds are finished. A method that the table lacks is
+    new once it is finished on all tracks of the table.
+    """
+    kept = kept_rows(out)
+    shown = {name for name, _ in kept} or {
+        track.name for track in TRACKS.values() if _done(FIRST, track)
+    }
+    found = {}
+    for method in METHODS:
+        runs = list(finished(method, track)) if _done(method, track) else []
+        known = kept.get((track.name, method))
+        if known is None:
+            complete = all(_done(method, TRACKS[name]) for name in shown)
+            fresh = bool(runs) and complete
+        else:
+            fresh = len(runs) >= (1 if known["seeds"] == "none" else int(known["seeds"]))
+        if fresh:
+            found[method] = runs
+    return found
+
+
+def _done(method: str, track: Track) -> bool:
+    """Whether a method's training with seed 0 that serves a track is finished."""
+    return (place(method, track.trains_as, 0) / "tested.json").is_file()
+
+
 def tables(out: Path) -> list[dict]:
-    """Write what is kept of all finished trainings, and return the rows of the table."""
+    """Write what is kept of all trainings, and return the rows of the table: finished here, or kept
+    before.
+    """
     rows = []
-    complete = [
-        method
-        for method in METHODS
-        if all(
-            place(method, track.trains_as, 0).joinpath("tested.json").is_file()
-            for track in shown_tracks()
-        )
-    ]
-    for track in shown_tracks():
-        runs = {method: list(finished(method, track)) for method in complete}
+    kept = kept_rows(out)
+    for track in TRACKS.values():
+        runs = replaced(track, out)
         classes = track.truth().classes
-        found = {
-            method: scoring.values_of(track, [part for _, part in one], classes)
-            for method, one in runs.items()
-        }
-        if not found:
+        arrays = kept_results.read_values(track, out)
+        for method, one in runs.items():
+            arrays[method] = kept_results.packed(track, [part for _, part in one], classes)
+        arrays = {method: arrays[method] for method in METHODS if method in arrays}
+        if not arrays:
             continue
-        first = next(iter(found.values()))
-        values = {name: one.values for name, one in found.items()}
-        numbers = kept_results.groups(track, first.weight, first.subtypes, values)
-        rows += [row_of(track, method, one, numbers[method]) for method, one in runs.items()]
-        arrays = {
-            name: kept_results.packed(track, [part for _, part in one], classes)
-            for name, one in runs.items()
-        }
+        weight, subtypes = scoring.models_of(track, *track.samples())
+        values = {name: kept_results.unpacked(array, weight) for name, array in arrays.items()}
+        numbers = kept_results.groups(track, weight, subtypes, values)
+        for method in arrays:
+            row = (
+                row_of(track, method, runs[method]) if method in runs else kept[track.name, method]
+            )
+            row |= {"group": numbers[method], "chosen_on": CHOSEN_ON.get(method, "validation")}
+            if track.whole:
+                row |= baseline_table.by_subtype(values[method], weight, subtypes)
+            rows.append(row)
         kept_results.write_values(track, arrays, out)
     return rows
 
 
-def shown_tracks() -> list[Track]:
-    """Return the tracks of the table: those on which the first method is finished."""
-    return [
-        track
-        for track in TRACKS.values()
-        if (place(FIRST, track.trains_as, 0) / "tested.json").is_file()
-    ]
-
-
 def kept_rows(out: Path) -> dict[tuple[str, str], dict]:
-    """Return the rows of the table that is already there, by track and method."""
+    """Return the rows of the table that is already there, by track and method; `percent` as a
+    number.
+    """
     rows = baseline_table.read(out) if (out / baseline_table.TABLE).is_file() else []
-    return {(row["track"], row["method"]): row for row in rows}
+    return {(row["track"], row["method"]): row | {"percent": float(row["percent"])} for row in rows}
 
 
 def with_confirmed(rows: list[dict], out: Path) -> list[dict]:
     """Return the rows with the confirmed results that the table has already."""
     kept = kept_rows(out)
-    names = ("confirmed_percent", "confirmed_low", "confirmed_high")
-    return [
-        row | {name: kept[row["track"], row["method"]][name] for name in names}
-        if (row["track"], row["method"]) in kept
-        else row
-        for row in rows
-    ]
+    found = []
+    for row in rows:
+        known = kept.get((row["track"], row["method"]), {})
+        found.append(
+            row | {name: known[name] for name in baseline_table.CONFIRMED if name in known}
+        )
+    return found
 
 
-def confirmed(rows: list[dict], data: str, zoo: Path) -> list[dict]:
-    """Keep the models of CONFIRMED in a zoo, and return the rows with their confirmed results."""
-    for (name, method), entry in CONFIRMED.items():
-        model = place(method, name, 0) / "model.safetensors"
-        config = config_of(MAIN)
-        content = replace(
-            model_file.of_run(model), input={block: config[block] for block in model_file.INPUT}
+def confirmed_by_zoo(name: str, method: str, data: str, zoo: Path) -> Confirmed:
+    """Keep the first training of a method as a model of the zoo, and return its confirmed result."""
+    entry = ZOO_ENTRIES[name, method]
+    track = named(name)
+    model = place(method, name, 0) / "model.safetensors"
+    config = config_of(MAIN)
+    content = replace(
+        model_file.of_run(model), input={block: config[block] for block in model_file.INPUT}
+    )
+    keep(content, model, TrackSamples(track, "validation", data), entry, zoo)
+    return confirm(zoo / f"{entry}.safetensors", track)
+
+
+def confirmed(job: tuple[str, str], data: str, zoo: Path) -> Confirmed:
+    """Train a method once for a track unless that is done, freeze it, and return its confirmed
+    result.
+    """
+    method, name = job
+    folder = OUT / f"confirmed/{slug(method)}/{name}"
+    track = named(name)
+    if found := confirmations.kept_result(folder):
+        return found
+    parts = [closed(TrackSamples(track, part, data)) for part in ("train", "validation")]
+    training = place(method, name, 0)
+    given = Given(*parts, parts[0].classes, 0, training, OUT / "features", config_of(MAIN))
+    trained = METHODS[method](given)
+    if (name, method) in ZOO_ENTRIES:
+        found = confirmed_by_zoo(name, method, data, zoo)
+        confirmations.keep(found, folder)
+        return found
+    confirmations.frozen(method, track, trained, training, given.features, folder)
+    return confirmations.result(folder, track)
+
+
+def write_confirmed(jobs: list[tuple[str, str]], data: str, out: Path) -> None:
+    """Confirm methods (method, track) one after the other, and write each result into the table as
+    it comes.
+    """
+    for method, name in jobs:
+        found = confirmed((method, name), data, ZOO)
+        print(
+            f"{name}, {method}: confirmed at {baseline_table.words(found.percent)} %, {found.sha256}",
+            flush=True,
         )
-        keep(content, model, TrackSamples(named(name), "validation", data), entry, zoo)
-        found = confirm(zoo / f"{entry}.safetensors", named(name)).percent
-        print(f"{name}, {method}: {entry} confirmed at {baseline_table.words(found)} %")
-        cells = dict(
-            zip(("confirmed_percent", "confirmed_low", "confirmed_high"), found, strict=True)
-        )
-        rows = [
-            row | cells if (row["track"], row["method"]) == (name, method) else row for row in rows
-        ]
-    return rows
+        rows = kept_rows(out)
+        if (name, method) in rows:
+            cells = dict(zip(baseline_table.CONFIRMED, (*found.percent, found.sha256), strict=True))
+            rows[name, method] |= cells
+            kept_results.write_table(list(rows.values()), out)
 
 
 def main(arguments: list[str]) -> None:
@@ -277,16 +339,22 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--workers", type=int, help="trainings side by side (default: the cores)")
     line.add_argument("--table", action="store_true", help="train nothing, write the table")
     line.add_argument(
-        "--confirm", action="store_true", help="train nothing, confirm results of the kept table"
+        "--confirm", action="store_true", help="confirm the methods on the tracks, such as unseen"
     )
     given = line.parse_args(arguments)
     out = Path(REFERENCE)
-    if given.confirm:
-        rows = [{**row, "percent": float(row["percent"])} for row in kept_rows(out).values()]
-        kept_results.write_table(confirmed(rows, given.data, ZOO), out)
-        return
     # Threads of OpenMP spin while they wait for each other, and that would count as processor time.
     os.environ["OMP_NUM_THREADS"] = "1"
+    if given.confirm:
+        known = kept_rows(out)
+        jobs = [
+            (method, name)
+            for name in given.tracks
+            for method in given.methods
+            if (name, method) in known
+        ]
+        write_confirmed(jobs, given.data, out)
+        return
     jobs = [
         (method, track, seed)
         for seed, method, track in product(given.seeds, given.methods, given.tracks)

@@ -1,36 +1,47 @@
-"""The test of networks on recordings: confusion by file, and balanced accuracy with an interval
-over files.
+"""The test of networks on recordings, counted from what `lowalt predict` answers, window by window.
 
-measured-recognition.csv: one row a radar, training seed and recording, with the number of windows
-of each name. The
-    seed "mean" stands for all networks together, by the mean of their probabilities.
-measured-accuracy.csv: share of right windows of each class in each half, mean over its files, and
-balanced accuracy
-    over the twin's classes. low and high resample files within their class; devices_low and
-    devices_high resample the radars that recorded a class, then their files, where there are two or
-    more; each of them has a row "CLASS by RADAR" as well. One row is for all twins together.
+A window counts where one interval of `labels.yaml` holds it as a whole. A recording that is not in
+that file, such as one of a user's own, is as a whole what its record's label says.
+
+measured-windows.csv: one row a radar, training seed, recording and labelled window: what it is and
+what is said. measured-recognition.csv: one row a radar, training seed, recording and label, with
+the number of windows by what is
+    said of them: a class, none of these, nothing there, a line beyond the network's speeds,
+    clipped, or lost. right_percent is of all windows of the label, named_percent of those that are
+    named at all.
+measured-accuracy.csv: right_percent and named_percent of each label in each half, mean over its
+files and over seeds,
+    and balanced accuracy over the classes of a radar. low and high resample files within their
+    class; devices_low and devices_high resample the radars that recorded a class, then their files,
+    where there are two or more; each of them has a row "CLASS by RADAR" as well; seeds_low and
+    seeds_high are the least and the most right of any seed.
 """
 
 import math
+from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from labels import EMPTY, TOGETHER, Interval, intervals_of, label_of, read_labels
+from lowalt.recognition.zoo import opened
 from recorded_sets import HALVES, Measured
-from torch import nn
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.extensions.recordings.answers import UNNAMED, Answers, answers
+from lowalt.extensions.recordings.record import Record
+from lowalt.extensions.recordings.twin import NO_CLASS, Twin
 from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.extensions.recordings.twin_training import simulated, train
-from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
-from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import model_file, runs
-from lowalt.recognition.inference import Machine, probabilities
-from lowalt.tiles import join
-from lowalt.tiles.image_settings import Images
-from lowalt.tiles.png import encode
+from lowalt.recognition.runs import Trained
 
+COUNTED = (*CATEGORIES, NO_CLASS, *UNNAMED)
+"""What is said of a window."""
+WINDOWS = ("radar", "seed", "set", "half", "file", "start_s", "label", "said")
 RECOGNITION = (
     "radar",
     "seed",
@@ -40,8 +51,9 @@ RECOGNITION = (
     "file",
     "label",
     "windows",
-    *CATEGORIES,
+    *COUNTED,
     "right_percent",
+    "named_percent",
 )
 ACCURACY = (
     "radar",
@@ -50,61 +62,19 @@ ACCURACY = (
     "devices",
     "files",
     "windows",
-    "accuracy_percent",
+    "right_percent",
     "low",
     "high",
     "devices_low",
     "devices_high",
-    "chance_percent",
+    "seeds_low",
+    "seeds_high",
+    "named_percent",
 )
 REPEATS = 4000
-PIXELS = 3
-"""Side of a network's pixel in a picture."""
-
-Heard = list[tuple[Measured, Windows]]
-"""Recordings with their windows."""
 
 
-def heard(recordings: list[Measured], library: Library, block: dict) -> Heard:
-    """Return the windows of recordings that hold a target, rendered as their radar's twin renders
-    its own.
-
-    Recordings without any such window are left out.
-    """
-    pairs = []
-    for recording in recordings:
-        twin = recording.twin(library)
-        images = rendered(
-            recording.windows(twin), twin, Images.from_settings(block["images"]), block["size"]
-        )
-        count = len(images)
-        label = CATEGORIES.index(recording.record.label)
-        about = facts(
-            np.full(count, label),
-            [recording.name] * count,
-            np.arange(count),
-            np.zeros(count),
-            "test",
-        )
-        if count:
-            pairs.append((recording, Windows(images, about)))
-    return pairs
-
-
-def write_picture(recording: Measured, windows: Windows, block: dict, folder: Path) -> None:
-    """Write the three spectra of a recording's middle window, as the network sees them, into
-    `folder` as PNG.
-    """
-    views = windows.images[len(windows.images) // 2]
-    tile = encode(
-        np.kron(join(views, len(views)), np.ones((PIXELS, PIXELS), np.uint8)),
-        Images.from_settings(block["images"]).palette,
-    )
-    with replacing(folder / f"spectra-{recording.set}-{recording.name}.png") as temporary:
-        temporary.write_bytes(tile)
-
-
-def loaded(path: Path, name: str) -> nn.Module:
+def loaded(path: Path, name: str) -> Trained:
     """Return the network in a file that `train` wrote.
 
     Raises: InputError where the file is missing, damaged, or was trained on another twin than
@@ -113,40 +83,72 @@ def loaded(path: Path, name: str) -> nn.Module:
     twin = model_file.read(path).model.get("twin")
     if twin != name:
         raise InputError(f"{path}: trained on the twin {twin!r}, expected {name!r}")
-    return runs.load(path).model
+    return runs.load(path)
 
 
-def recognition_rows(
-    name: str, measured: Heard, networks: dict[int, nn.Module], block: dict
-) -> list[list]:
-    """Return the rows of `RECOGNITION` of recordings with their windows, named by networks
-    {training seed: network}.
-
-    One row per network and recording, and one of all networks together (seed "mean"), whose
-    probabilities are averaged.
+class Said(NamedTuple):
+    """What a network says of the labelled windows of a recording: their starts (s), labels and
+    outcomes.
     """
-    rows = []
-    machine = Machine.here(block["evaluation"]["precision"])
-    for recording, windows in measured:
-        every = np.arange(len(windows.images))
-        answers = {
-            seed: probabilities(network, windows, every, machine, block["evaluation"]["batch"])
-            for seed, network in networks.items()
-        }
-        answers["mean"] = np.mean(list(answers.values()), axis=0)
-        about = (
-            recording.device,
-            recording.set,
-            recording.half,
-            recording.name,
-            recording.record.label,
+
+    starts_s: list[float]
+    labels: list[str]
+    outcomes: list[str]
+
+
+def said_of(found: Answers, classes: list[str], window_s: float, intervals: list[Interval]) -> Said:
+    """Return what answers say of the windows that lie in intervals."""
+    result = Said([], [], [])
+    for start_s, outcome in zip(found.starts_s.tolist(), found.outcomes(classes), strict=True):
+        label = label_of(start_s, window_s, intervals)
+        if label is None:
+            continue
+        result.starts_s.append(start_s)
+        result.labels.append(label)
+        result.outcomes.append(outcome)
+    return result
+
+
+def is_right(label: str, outcome: str) -> bool:
+    """Whether a window's outcome fits its label: one of its classes, or no class where nothing is
+    there.
+    """
+    if label == EMPTY:
+        return outcome in (EMPTY, NO_CLASS)
+    return outcome in label.split(TOGETHER)
+
+
+def counts(label: str, outcomes: list[str]) -> list:
+    """Return the columns of `RECOGNITION` from windows on, of the outcomes of the windows of one
+    label.
+    """
+    right = sum(is_right(label, outcome) for outcome in outcomes)
+    named = sum(outcome not in UNNAMED for outcome in outcomes)
+    named_percent = 100 * right / named if named and label != EMPTY else math.nan
+    return [
+        len(outcomes),
+        *(outcomes.count(one) for one in COUNTED),
+        100 * right / len(outcomes),
+        named_percent,
+    ]
+
+
+def by_label(said: Said) -> Iterator[tuple[str, list[str]]]:
+    """Yield each label of a recording, and the outcomes of its windows."""
+    for label in dict.fromkeys(said.labels):
+        yield (
+            label,
+            [
+                outcome
+                for one, outcome in zip(said.labels, said.outcomes, strict=True)
+                if one == label
+            ],
         )
-        for seed, shares in answers.items():
-            guesses = shares.argmax(1)
-            counts = np.bincount(guesses, minlength=len(CATEGORIES)).tolist()
-            right = 100 * float(np.mean(guesses == windows.facts.label))
-            rows.append([name, seed, *about, len(guesses), *counts, right])
-    return rows
+
+
+def record_of(recording: Measured) -> Record:
+    """Return a recording's record with the one of its set's possible rates that its file has."""
+    return replace(recording.record, rate_hz=recording.read().rate_hz)
 
 
 def radar_rows(
@@ -154,35 +156,62 @@ def radar_rows(
     recordings: list[Measured],
     library: Library,
     block: dict,
-    models: Path,
-    out: Path,
+    models: Path | None,
     reuse: bool = False,
-) -> list[list]:
-    """Train one network a seed on the twin `name` and return the rows of `RECOGNITION` of its
-    recordings.
+) -> tuple[list[list], list[list]]:
+    """Train one network a seed on the twin `name` and return the rows of `WINDOWS` and of
+    `RECOGNITION`.
 
-    models: where the networks go, one folder a seed; out: where a picture of every recording's
-    spectra goes; reuse: take the networks that are there and train none.
+    models: where the networks go, one folder a seed, and the windows that they learn from; None
+    asks the network of this name in the zoo, whose seed is "zoo"; reuse: take the networks that are
+    there and train none.
     """
-    measured = heard(
-        [recording for recording in recordings if recording.radar == name], library, block
-    )
+    labels = read_labels()
+    measured = [one for one in recordings if one.radar == name]
+    windows = []
+    rows = []
     if not measured:
-        return []
-    for recording, windows in measured:
-        write_picture(recording, windows, block, out)
-    if reuse:
-        networks = {
-            seed: loaded(models / f"{name}-{seed}/model.safetensors", name)
-            for seed in block["seeds"]
+        return windows, rows
+    twin = library.twins[name]
+    for seed, (trained, settings) in networks(name, library, block, models, reuse):
+        for recording in measured:
+            found = answers(trained, settings, record_of(recording), recording.name)
+            intervals = intervals_of(labels, recording.set, recording.name, recording.record.label)
+            said = said_of(found, list(trained.classes), window_s(twin), intervals)
+            about = recording.set, recording.half, recording.name
+            windows += [[name, seed, *about, *each] for each in zip(*said, strict=True)]
+            rows += [
+                [name, seed, recording.device, *about, label, *counts(label, outcomes)]
+                for label, outcomes in by_label(said)
+            ]
+    return windows, rows
+
+
+def networks(
+    name: str, library: Library, block: dict, models: Path | None, reuse: bool
+) -> Iterator[tuple[int | str, tuple[Trained, dict]]]:
+    """Yield the seed of each network of a radar, the network, and how its images are made;
+    arguments: as `radar_rows`."""
+    if models is None:
+        yield "zoo", opened(name)
+        return
+    classes = tuple(library.scenes[name])
+    if not reuse:
+        samples = {
+            fold: simulated(library, name, block, fold, classes, models)
+            for fold in ("train", "validation")
         }
-    else:
-        samples = {fold: simulated(library, name, block, fold) for fold in ("train", "validation")}
-        networks = {
-            seed: train(block, samples, name, seed, models / f"{name}-{seed}")
-            for seed in block["seeds"]
-        }
-    return recognition_rows(name, measured, networks, block)
+    settings = {"radar": asdict(library.twins[name]), "images": block["images"]}
+    for seed in block["seeds"]:
+        folder = models / f"{name}-{seed}"
+        if not reuse:
+            train(block, samples, name, seed, folder, classes)
+        yield seed, (loaded(folder / "model.safetensors", name), settings)
+
+
+def window_s(twin: Twin) -> float:
+    """Return the length of a twin's window (s)."""
+    return twin.symbols * twin.symbol_interval_s
 
 
 Right = dict[str, list[float]]
@@ -209,61 +238,93 @@ def _interval(classes: list[Right], rng: np.random.Generator, devices: bool) -> 
     return float(low), float(high)
 
 
+class _Files(NamedTuple):
+    """The files of a label: windows of each, and of each its right and its named windows by seed,
+    percent.
+    """
+
+    windows: dict[tuple[str, str], int]
+    right: dict[tuple[str, str], dict[int | str, float]]
+    named: dict[tuple[str, str], dict[int | str, float]]
+
+    @property
+    def by_device(self) -> Right:
+        """Right windows of each file, the mean over seeds, by the radar that recorded it."""
+        result: Right = {}
+        for (device, _), seeds in self.right.items():
+            result.setdefault(device, []).append(float(np.mean(list(seeds.values()))))
+        return result
+
+    def of_device(self, device: str) -> "_Files":
+        """The files that one radar recorded."""
+        return _Files(
+            *({key: item for key, item in part.items() if key[0] == device} for part in self)
+        )
+
+
+def _mean(parts: list[_Files], seed: int | str) -> float:
+    """Right windows (percent) of a seed: the mean over classes of the mean over files."""
+    return float(
+        np.mean([np.mean([seeds[seed] for seeds in part.right.values()]) for part in parts])
+    )
+
+
+def _accuracy_row(title: str, parts: list[_Files], rng: np.random.Generator) -> list:
+    """A row of `ACCURACY` from class on; parts: the files of each of its classes."""
+    shares = [part.by_device for part in parts]
+    seeds = sorted({seed for part in parts for of_file in part.right.values() for seed in of_file})
+    of_seeds = [_mean(parts, seed) for seed in seeds]
+    over = (
+        _interval(shares, rng, True) if all(len(of) > 1 for of in shares) else (math.nan, math.nan)
+    )
+    named = [
+        share for part in parts for of_file in part.named.values() for share in of_file.values()
+    ]
+    named = [share for share in named if not math.isnan(share)]
+    devices = {device for of in shares for device in of}
+    files = sum(len(part.right) for part in parts)
+    windows = sum(sum(part.windows.values()) for part in parts)
+    return [
+        title,
+        len(devices),
+        files,
+        windows,
+        float(np.mean(of_seeds)),
+        *_interval(shares, rng, False),
+        *over,
+        min(of_seeds),
+        max(of_seeds),
+        float(np.mean(named)) if named else math.nan,
+    ]
+
+
 def accuracy_rows(rows: list[list], seed: int) -> list[list]:
-    """Return the rows of `ACCURACY` from those of `RECOGNITION` whose seed is "mean"; a file counts
-    once.
+    """Return the rows of `ACCURACY` from those of `RECOGNITION`; a file counts once.
 
     Classes are counted for each twin: drones at 10 GHz and drones at 3.3 GHz are two classes.
     """
-    files: dict[tuple[str, str, str], Right] = {}
-    windows: dict[tuple[str, str, str], dict[str, int]] = {}
-    for name, kind, device, _, half, _, label, count, *_, right in rows:
-        if kind == "mean":
-            key = name, half, label
-            files.setdefault(key, {}).setdefault(device, []).append(right)
-            of_device = windows.setdefault(key, {})
-            of_device[device] = of_device.get(device, 0) + count
+    found: dict[tuple[str, str, str], _Files] = {}
+    for row in rows:
+        name, trained, device, _, half, file, label = row[:7]
+        part = found.setdefault((name, half, label), _Files({}, {}, {}))
+        part.windows[device, file] = row[7]
+        part.right.setdefault((device, file), {})[trained] = row[-2]
+        part.named.setdefault((device, file), {})[trained] = row[-1]
     result = []
 
-    def add(name: str, half: str, title: str, shares: list[Right], windows: int) -> None:
-        """Append a row under the name `title`; shares: of each of its classes."""
+    def add(name: str, half: str, title: str, parts: list[_Files]) -> None:
+        """Append a row under the name `title`."""
         rng = stream(seed, "measured-accuracy", name, half, title)
-        middle = float(np.mean([np.mean(np.concatenate(list(of.values()))) for of in shares]))
-        devices = {device for of in shares for device in of}
-        over = (math.nan, math.nan)
-        interval = _interval(shares, rng, False)
-        if all(len(of) > 1 for of in shares):
-            over = _interval(shares, rng, True)
-        count = sum(len(right) for of in shares for right in of.values())
-        result.append(
-            [
-                name,
-                half,
-                title,
-                len(devices),
-                count,
-                windows,
-                middle,
-                *interval,
-                *over,
-                100 / len(CATEGORIES),
-            ]
-        )
+        result.append([name, half, *_accuracy_row(title, parts, rng)])
 
     for half in HALVES:
-        for name in dict.fromkeys(name for name, _, _ in files):
-            classes = [key for key in files if key[:2] == (name, half)]
-            for key in classes:
-                add(name, half, key[2], [files[key]], sum(windows[key].values()))
-                for device, right in files[key].items() if len(files[key]) > 1 else ():
-                    add(
-                        name, half, f"{key[2]} by {device}", [{device: right}], windows[key][device]
-                    )
+        for name in dict.fromkeys(name for name, _, _ in found):
+            of_radar = {key[2]: part for key, part in found.items() if key[:2] == (name, half)}
+            for label, part in of_radar.items():
+                add(name, half, label, [part])
+                for device in part.by_device if len(part.right) > 1 else ():
+                    add(name, half, f"{label} by {device}", [part.of_device(device)])
+            classes = [part for label, part in of_radar.items() if label in CATEGORIES]
             if len(classes) > 1:
-                every = sum(sum(windows[key].values()) for key in classes)
-                add(name, half, "balanced", [files[key] for key in classes], every)
-        of_half = [key for key in files if key[1] == half]
-        if of_half:
-            every = sum(sum(windows[key].values()) for key in of_half)
-            add("all", half, "balanced", [files[key] for key in of_half], every)
+                add(name, half, "balanced", classes)
     return result

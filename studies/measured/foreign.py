@@ -5,9 +5,8 @@ radars.
 
 Some inputs are simulated at each network's own carrier, rate and channel: white noise, and a hand
 that waves in front of a body that stands still (`hand`). The others are public recordings
-(`foreign.yaml`). The table measured-foreign.csv has one row a network and input: of the windows,
-how many hold nothing, are clipped, have a line beyond the network's speeds, or are named as which
-class. A recording at another carrier is refused: its windows are 0.
+(`foreign.yaml`). The table measured-foreign.csv has one row a network and input, with the number of
+windows by what `lowalt predict` says. A recording at another carrier is refused: its windows are 0.
 """
 
 import argparse
@@ -16,8 +15,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from accuracy import COUNTED
 
-from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.extensions.recordings.answers import Answers, answers
@@ -26,10 +25,10 @@ from lowalt.extensions.recordings.twin import Twin, radars
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
-from lowalt.recognition.zoo import opened
+from lowalt.recognition.runs import opened
 
 RECORDS = Path(__file__).with_name("foreign.yaml")
-COLUMNS = ("network", "input", "windows", "nothing", "clipped", "beyond", *CATEGORIES)
+COLUMNS = ("network", "input", "windows", *COUNTED)
 SECONDS = 12.0
 SEED = 20260701
 HAND_M = 0.15
@@ -82,22 +81,12 @@ def inputs_of(twin: Twin, recorded: Path, folder: Path) -> Iterator[tuple[str, R
         )
 
 
-def row(network: str, name: str, said: Answers | None) -> list:
-    """Return a row of `COLUMNS` from what a network says, None where it is not asked."""
-    if said is None:
-        return [network, name, *[0] * (len(COLUMNS) - 2)]
-    beyond = np.isfinite(said.beyond_mps) & ~said.clipped
-    nothing = ~(said.present | said.clipped | beyond)
-    named = np.bincount(
-        said.probabilities.argmax(1)[said.present], minlength=len(CATEGORIES)
-    ).tolist()
-    return [
-        network,
-        name,
-        len(said.present),
-        *(int(which.sum()) for which in (nothing, said.clipped, beyond)),
-        *named,
-    ]
+def row(network: str, name: str, said: Answers | None, classes: list[str]) -> list:
+    """Return a row of `COLUMNS` from what a network of some classes says, None where it is not
+    asked.
+    """
+    outcomes = said.outcomes(classes) if said else []
+    return [network, name, len(outcomes), *(outcomes.count(one) for one in COUNTED)]
 
 
 def main(arguments: list[str]) -> None:
@@ -118,7 +107,7 @@ def main(arguments: list[str]) -> None:
                 said = (
                     answers(trained, settings, about, name) if twin.near(about.carrier_hz) else None
                 )
-                rows.append(row(trained.path.stem, name, said))
+                rows.append(row(trained.path.stem, name, said, list(trained.classes)))
                 print(*rows[-1], sep=", ", flush=True)
     write_csv(options.out / "measured-foreign.csv", COLUMNS, rows)
 

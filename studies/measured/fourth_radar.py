@@ -5,24 +5,29 @@ recordings of cars.
 
 `lowalt recording train` simulates an HB100 module (10.525 GHz, one real channel) by the record of
 one recording (`fourth_radar.yaml`), of which it takes the noise floor alone, and trains. The table
-measured-fourth.csv has the windows of each recording by class, as this network names them, and as
-`KNOWN` does, which learned another radar near that carrier. The recordings were used for no
-decision, and the figures are written whatever they are.
+measured-fourth.csv has the labelled windows of each recording by what `lowalt predict` says of them
+with this network, and with `KNOWN`, which learned another radar near that carrier. The recordings
+were used for no decision.
 """
 
 import argparse
 from pathlib import Path
 
 import numpy as np
+from accuracy import COUNTED, counts, said_of, window_s
+from labels import intervals_of, read_labels
 
 from lowalt.config.command import run
 from lowalt.extensions.recordings.answers import answers
 from lowalt.extensions.recordings.own_radar import trained_radar
+from lowalt.extensions.recordings.presence import strongest_mps
 from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.twin import Twin
 from lowalt.extensions.recordings.twin_training import RECOGNITION, settings
+from lowalt.extensions.recordings.windows import looks
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition.zoo import opened
+from lowalt.recognition.runs import opened
 
 RECORDS = Path(__file__).with_name("fourth_radar.yaml")
 KNOWN = "bird_drone_10ghz"
@@ -30,37 +35,46 @@ COLUMNS = (
     "network",
     "file",
     "label",
+    "slower_or_faster",
     "windows",
-    "with_target",
-    "UAV",
-    "Bird",
-    "Vehicle",
-    "Pedestrian",
+    *COUNTED,
     "right_percent",
+    "named_percent",
 )
+SLOW_MPS = 1.0
+"""Speed of a window's strongest line that parts the windows of each file."""
 
 
 def rows(model: str, inputs: Path) -> list[list]:
-    """Return the rows of `COLUMNS` of all recordings by a model, a file or a name of the zoo; a
-    file of no window with a target has no percentage."""
+    """Return the rows of `COLUMNS` of all recordings by a model, a file or a name of the zoo: of
+    each label, the windows whose strongest line is slower than `SLOW_MPS`, and the others."""
     trained, made_with = opened(model)
+    labels = read_labels()
     result = []
     for block in load_yaml(RECORDS, "records")["records"]:
-        said = answers(trained, made_with, record(block, inputs, block["file"]), block["file"])
-        guesses = np.array(trained.classes)[said.probabilities.argmax(1)][said.present]
-        counts = [int((guesses == label).sum()) for label in COLUMNS[5:9]]
-        right = f"{100 * np.mean(guesses == block['label']):.1f}" if len(guesses) else None
-        result.append(
-            [
-                trained.path.stem,
-                block["file"],
-                block["label"],
-                len(said.present),
-                len(guesses),
-                *counts,
-                right,
-            ]
-        )
+        about = record(block, inputs, block["file"])
+        twin = Twin.from_settings(made_with["radar"]).at_carrier(about.carrier_hz)
+        said = answers(trained, made_with, about, block["file"])
+        intervals = intervals_of(labels, *Path(block["file"]).parts)
+        found = said_of(said, list(trained.classes), window_s(twin), intervals)
+        strongest = strongest_mps(looks(about, twin).intervals, twin)
+        slow = strongest[np.isin(said.starts_s, found.starts_s)] < SLOW_MPS
+        for words, chosen in (
+            (f"below {SLOW_MPS:g} m/s", slow),
+            (f"from {SLOW_MPS:g} m/s on", ~slow),
+        ):
+            for label in dict.fromkeys(found.labels):
+                outcomes = [
+                    outcome
+                    for outcome, one, taken in zip(
+                        found.outcomes, found.labels, chosen, strict=True
+                    )
+                    if taken and one == label
+                ]
+                if outcomes:
+                    result.append(
+                        [trained.path.stem, block["file"], label, words, *counts(label, outcomes)]
+                    )
     return result
 
 
@@ -74,17 +88,14 @@ def main(arguments: list[str]) -> None:
     )
     options = line.parse_args(arguments)
     first = load_yaml(RECORDS, "records")["records"][0]
-    expected = trained_radar(
-        record(first, options.inputs, first["file"]),
-        options.out / "hb100",
-        settings(options.recognition),
-    )
+    about = record(first, options.inputs, first["file"])
+    expected = trained_radar(about, options.out / "hb100", settings(options.recognition))
     print(f"expected: {expected['percent']:.1f} % of {expected['windows']} simulated windows right")
     found = [row for model in (str(expected["file"]), KNOWN) for row in rows(model, options.inputs)]
     write_csv(options.out / "measured-fourth.csv", COLUMNS, found)
     for row in found:
         print(
-            f"{row[0]}, {row[1]}: {row[-1]} % of {row[4]} windows with a target ({row[3]} in all) say {row[2]}"
+            f"{row[0]}, {row[1]}, {row[3]}: {row[-2]:.1f} % of {row[4]} windows of {row[2]} are right"
         )
 
 

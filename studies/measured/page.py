@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from accuracy import ACCURACY, RECOGNITION
+from accuracy import ACCURACY, COUNTED, RECOGNITION
 from comparison import DISTANCES, FIGURES
 
 from lowalt.config.classes import CATEGORIES
@@ -71,8 +71,8 @@ def _address(path: Path) -> str:
 def page(folder: Path) -> str:
     """Return the page of the tables measured-*.csv and pictures in a folder.
 
-    Every recording's answers by all networks together stand there, the least right first, beside
-    its spectra.
+    What each network says of every recording stands there, the least right first, and every
+    recording's spectrogram with its labels.
     Raises: InputError for a table that is missing or lacks a column.
     """
     figures = read_csv(folder / "measured-figures.csv", *FIGURES)
@@ -94,21 +94,20 @@ def page(folder: Path) -> str:
                 "pictures": [(pair, address) for pair, address in pictures.items() if address],
             }
         )
-    answers = sorted(
-        (row for row in recognition if row["seed"] == "mean"),
-        key=lambda row: float(row["right_percent"]),
-    )
+    answers = sorted(recognition, key=lambda row: float(row["right_percent"]))
+    pictures = {
+        (row["set"], row["file"]): _address(folder / f"label-{row['set']}-{row['file']}.png")
+        for row in recognition
+    }
     html = (
         templates()
         .from_string(TEMPLATE.read_text())
         .render(
             classes=classes,
-            categories=CATEGORIES,
-            accuracy=[row for row in accuracy if row["class"] == "balanced"],
-            answers=[
-                (row, _address(folder / f"spectra-{row['set']}-{row['file']}.png"))
-                for row in answers
-            ],
+            counted=COUNTED,
+            accuracy=accuracy,
+            answers=answers,
+            pictures=[(*key, address) for key, address in pictures.items() if address],
         )
     )
     return assembled(TITLE, [{"id": "measured", "title": TITLE, "html": html}])

@@ -1,7 +1,7 @@
 """Recordings of real radars held against the twins of these radars.
 
-    python studies/measured/study.py pairs | compare | noise | recognise --inputs FOLDER --out
-    FOLDER python studies/measured/study.py presence | page --out FOLDER
+    python studies/measured/study.py pairs | compare | noise | recognise | labels --inputs FOLDER
+    --out FOLDER python studies/measured/study.py presence | page --out FOLDER
 
 FOLDER of the inputs: one folder a measured set (`sets.yaml`). `--out` gets the tables
 measured-*.csv, the pictures and report.html. `recognise` trains networks into the folder
@@ -16,13 +16,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from any_speed import ANY_SPEED, any_speed
 from recorded_sets import Measured, recordings, usable
 
 from lowalt.config.command import dispatch, run
 from lowalt.extensions.recordings.twin import RADARS
 from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.files.atomic import replacing
-from lowalt.files.csv_tables import write_csv
+from lowalt.files.csv_tables import read_csv, write_csv
 from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.side_by_side import together
 
@@ -49,7 +50,9 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
     if name == "compare":
         line.add_argument("--count", type=int, default=60, help="simulated windows per class")
     if trains:
-        line.add_argument("--models", required=True, type=Path, help="folder of the networks")
+        line.add_argument(
+            "--models", type=Path, help="folder of the networks (default: ask those of the zoo)"
+        )
         line.add_argument(
             "--recognition", type=Path, default=Path("config/measured/recognition.yaml")
         )
@@ -59,6 +62,9 @@ def _inputs(name: str, description: str, arguments: list[str], *, trains: bool =
         )
         line.add_argument(
             "--only", type=Path, help="list of files by set (.yaml): take no other recordings"
+        )
+        line.add_argument(
+            "--any-speed", action="store_true", help=f"learn from the scenes of {ANY_SPEED.name}"
         )
         line.add_argument("--jobs", type=int, default=os.cpu_count(), help="radars at a time")
     options = line.parse_args(arguments)
@@ -172,25 +178,64 @@ def presence(arguments: list[str]) -> None:
 
 
 def recognise(arguments: list[str]) -> None:
-    """Train networks on the twins, test them on recordings: measured-recognition.csv and
-    measured-accuracy.csv.
-    """
+    """Train networks on the twins and ask them about recordings: measured-windows.csv,
+    measured-recognition.csv and measured-accuracy.csv."""
     inputs = _inputs("recognise", recognise.__doc__, arguments, trains=True)
-    from accuracy import ACCURACY, RECOGNITION, accuracy_rows, radar_rows
+    from accuracy import ACCURACY, RECOGNITION, WINDOWS, accuracy_rows, radar_rows
     from fetch import addresses
 
     from lowalt.extensions.recordings.twin_training import settings
 
-    options, block = inputs.options, settings(inputs.options.recognition)
+    options = inputs.options
+    library = inputs.library
+    over = None
+    block = settings(options.recognition)
+    if options.any_speed:
+        over, learning = any_speed()
+        library = Library.read(options.radars, over)
+        block = settings(options.recognition, learning)
     named = addresses(load_yaml(options.only, "list of recordings")) if options.only else None
     taken = [one for one in inputs.recordings if named is None or f"{one.set}/{one.name}" in named]
-    shared = taken, inputs.library, block, options.models, options.out, options.reuse
     # The radars do not depend on each other, so neither their order nor the number of processes
     # changes a result. The last radar takes longest, so it starts first.
-    calls = [partial(radar_rows, name, *shared) for name in reversed(inputs.library.twins)]
-    rows = [row for rows in reversed(together(calls, options.jobs, "spawn")) for row in rows]
+    calls = [
+        partial(radar_rows, name, taken, library, block, options.models, options.reuse)
+        for name in reversed(over or library.twins)
+    ]
+    found = list(reversed(together(calls, options.jobs, "spawn")))
+    windows, rows = ([row for of_radar in found for row in of_radar[part]] for part in (0, 1))
+    _write(options.out, "windows", WINDOWS, windows)
     _write(options.out, "recognition", RECOGNITION, rows)
     _write(options.out, "accuracy", ACCURACY, accuracy_rows(rows, block["seed"]))
+
+
+def draw_labels(arguments: list[str]) -> None:
+    """Draw the labels of every recording over its spectrogram, and below what networks say of each
+    window where measured-windows.csv is there: label-SET-FILE.png."""
+    inputs = _inputs("labels", draw_labels.__doc__, arguments)
+    from accuracy import WINDOWS, window_s
+    from labels import intervals_of, picture, read_labels
+
+    folder = inputs.options.out
+    labels = read_labels()
+    table = folder / "measured-windows.csv"
+    said = read_csv(table, *WINDOWS) if table.is_file() else []
+    for recording in inputs.recordings:
+        intervals = intervals_of(labels, recording.set, recording.name, recording.record.label)
+        of_file = [
+            row for row in said if (row["set"], row["file"]) == (recording.set, recording.name)
+        ]
+        twin = recording.twin(inputs.library)
+        outcomes: dict[str, list[tuple[float, str]]] = {}
+        for row in of_file:
+            outcomes.setdefault(f"network {row['seed']}", []).append(
+                (float(row["start_s"]), row["said"])
+            )
+        image = picture(
+            recording.read(), twin.carrier_hz, intervals, recording.name, window_s(twin), outcomes
+        )
+        with replacing(folder / f"label-{recording.set}-{recording.name}.png") as temporary:
+            temporary.write_bytes(image)
 
 
 def write_page(arguments: list[str]) -> None:
@@ -222,6 +267,7 @@ COMMANDS = {
     "noise": noise,
     "presence": presence,
     "recognise": recognise,
+    "labels": draw_labels,
     "page": write_page,
 }
 

@@ -20,6 +20,7 @@ from comparison import DISTANCES, FIGURES, distance_rows
 from recorded_sets import SETS, halves, recordings, usable
 from scipy.io import wavfile
 
+from lowalt.config.classes import CATEGORIES
 from lowalt.extensions.recordings.answers import Answers
 from lowalt.extensions.recordings.twin import Twin
 from lowalt.extensions.recordings.twin_scenes import Library
@@ -237,7 +238,7 @@ def test_a_folder_that_is_no_set_becomes_one_by_a_file(tmp_path, capsys, library
         recordings(tmp_path)
 
 
-def test_a_network_names_each_recording_once_a_seed_and_by_the_mean(tmp_path):
+def test_each_network_says_something_of_every_labelled_window(tmp_path):
     """Two networks of two steps each: what they say is of no use, where it stands is."""
     (tmp_path / "inputs/vehicle_24ghz").mkdir(parents=True)
     drive(tmp_path / "inputs/vehicle_24ghz", 22050, label="Vehicle")
@@ -285,63 +286,17 @@ def test_a_network_names_each_recording_once_a_seed_and_by_the_mean(tmp_path):
         (tmp_path / "inputs/vehicle_24ghz/other.yaml").write_text(record)
     rows = read_csv(tmp_path / "trained/measured-recognition.csv", *accuracy.RECOGNITION)
     assert [(row["radar"], row["seed"], row["file"], row["windows"]) for row in rows] == [
-        ("cw_24ghz", seed, "drive.wav", "3") for seed in ("0", "1", "mean")
+        ("cw_24ghz", seed, "drive.wav", "3") for seed in ("0", "1")
     ]
-    assert all(
-        sum(int(row[name]) for name in ("UAV", "Bird", "Vehicle", "Pedestrian")) == 3
-        for row in rows
-    )
+    assert all(sum(int(row[name]) for name in accuracy.COUNTED) == 3 for row in rows)
     assert read_csv(tmp_path / "again/measured-recognition.csv") == rows
-    assert (tmp_path / "trained/spectra-vehicle_24ghz-drive.wav.png").is_file()
+    windows = read_csv(tmp_path / "trained/measured-windows.csv", *accuracy.WINDOWS)
+    assert len(windows) == 6 and {row["label"] for row in windows} == {"Vehicle"}
+    study(["labels", "--inputs", str(tmp_path / "inputs"), "--out", str(tmp_path / "trained")])
+    assert (tmp_path / "trained/label-vehicle_24ghz-drive.wav.png").is_file()
     (tmp_path / "models/cw_24ghz-0").rename(tmp_path / "models/uav_3ghz-0")
     with pytest.raises(InputError, match="trained on the twin 'cw_24ghz', expected 'uav_3ghz'"):
         accuracy.loaded(tmp_path / "models/uav_3ghz-0/model.safetensors", "uav_3ghz")
-
-
-def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
-    def row(radar, seed, device, half, file, label, windows, right):
-        return [radar, seed, device, "set", half, file, label, windows, 0, 0, 0, 0, right]
-
-    test = "test"
-    rows = [
-        row("cw", "mean", "one", test, "a", "Bird", 10, 40.0),
-        row("cw", "mean", "two", test, "a", "Bird", 20, 80.0),
-        row("cw", "mean", "one", test, "b", "UAV", 5, 90.0),
-        row("cw", 0, "one", test, "b", "UAV", 5, 0.0),
-        row("fm", "mean", "one", test, "c", "UAV", 7, 30.0),
-        row("cw", "mean", "one", "tuning", "d", "UAV", 3, 10.0),
-    ]
-    found = {tuple(line[:3]): line[3:] for line in accuracy.accuracy_rows(rows, 1)}
-    assert {key: line[:4] for key, line in found.items()} == {
-        ("cw", "tuning", "UAV"): [1, 1, 3, 10.0],
-        ("all", "tuning", "balanced"): [1, 1, 3, 10.0],
-        ("cw", "test", "Bird"): [2, 2, 30, 60.0],
-        ("cw", "test", "UAV"): [1, 1, 5, 90.0],
-        ("cw", "test", "Bird by one"): [1, 1, 10, 40.0],
-        ("cw", "test", "Bird by two"): [1, 1, 20, 80.0],
-        ("cw", "test", "balanced"): [2, 3, 35, 75.0],
-        ("fm", "test", "UAV"): [1, 1, 7, 30.0],
-        ("all", "test", "balanced"): [2, 4, 42, 60.0],
-    }
-    # Two files of a class are drawn with replacement: both bounds are reached, and a class of one
-    # file stays.
-    assert found["cw", "test", "Bird"][4:] == [40.0, 80.0, 40.0, 80.0, 25.0]
-    assert (
-        found["cw", "test", "UAV"][4:6] == [90.0, 90.0]
-        and np.isnan(found["cw", "test", "UAV"][6:8]).all()
-    )
-    assert found["cw", "test", "balanced"][4:6] == [65.0, 85.0]
-
-
-def test_two_radars_that_differ_widen_the_interval_over_radars_and_not_that_over_files():
-    rows = [
-        ["cw", "mean", device, "set", "test", f"{number}", "Vehicle", 5, 0, 0, 0, 0, right]
-        for device, right in (("one", 90.0), ("two", 50.0))
-        for number in range(8)
-    ]
-    found = {row[2]: row[3:] for row in accuracy.accuracy_rows(rows, 1)}
-    *_, low, high, devices_low, devices_high, _ = found["Vehicle"]
-    assert (devices_low, devices_high) == (50.0, 90.0) and 55 < low < 65 and 75 < high < 85
 
 
 def test_a_recording_counts_once_under_two_names(tmp_path, capsys, library):
@@ -447,7 +402,7 @@ def test_the_page_shows_what_the_tables_and_pictures_hold(tmp_path):
         [
             [
                 {
-                    "seed": "mean",
+                    "seed": "0",
                     "set": "birds",
                     "label": "Bird",
                     "file": name,
@@ -458,7 +413,7 @@ def test_the_page_shows_what_the_tables_and_pictures_hold(tmp_path):
             for name, right in (("good.csv", "96"), ("bad.csv", "12"))
         ],
     )
-    (tmp_path / "spectra-birds-bad.csv.png").write_bytes(b"a picture")
+    (tmp_path / "label-birds-bad.csv.png").write_bytes(b"a picture")
     arguments = ["page", "--out", str(tmp_path)]
     study(arguments)
     page = (tmp_path / "report.html").read_text()
@@ -466,10 +421,13 @@ def test_the_page_shows_what_the_tables_and_pictures_hold(tmp_path):
     assert (
         "Held against measurement" in page and "2.31" in page and page.count("data:image/png") == 2
     )
-    assert page.index("<td>bad.csv") < page.index("<td>good.csv") and "spectra of bad.csv" in page
+    assert (
+        page.index("<td>bad.csv") < page.index("<td>good.csv")
+        and "labels of bad.csv of birds" in page
+    )
     study(arguments)
     assert (tmp_path / "measured-bird.png").read_bytes() == picture
-    for name in ("pair-bird.npz", "spectra-birds-bad.csv.png", "measured-bird.png"):
+    for name in ("pair-bird.npz", "label-birds-bad.csv.png", "measured-bird.png"):
         (tmp_path / name).unlink()
     study(arguments)
     page = (tmp_path / "report.html").read_text()
@@ -555,8 +513,19 @@ def test_foreign_inputs_are_counted_and_a_hand_moves_at_its_speed(library):
     beyond = np.array([np.nan, np.nan, 31.0, np.nan, np.nan])
     shares = np.eye(4)[[1, 3, 0, 0, 0]]
     clipped = np.array([False, False, False, True, False])
-    said = Answers(np.arange(5.0), present, shares, clipped, beyond, 20.0, [])
-    assert foreign.row("net", "input", said) == ["net", "input", 5, 1, 1, 1, 0, 1, 0, 1]
+    lost = np.zeros(5, bool)
+    said = Answers(np.arange(5.0), present, shares, clipped, beyond, lost, 20.0, [])
+    row = dict(
+        zip(foreign.COLUMNS, foreign.row("net", "input", said, list(CATEGORIES)), strict=True)
+    )
+    counted = {name: row[name] for name in accuracy.COUNTED if row[name]}
+    assert row["windows"] == 5 and counted == {
+        "Bird": 1,
+        "Pedestrian": 1,
+        "nothing": 1,
+        "beyond": 1,
+        "clipped": 1,
+    }
     twin = library.twins["cw_24ghz"]
     values = foreign.hand(twin, 0.5, np.random.default_rng(0))
     for part, fastest in zip(

@@ -7,7 +7,15 @@ import pytest
 
 from lowalt.extensions.recordings.twin import Twin
 from lowalt.extensions.recordings.twin_echo import radii, sized
-from lowalt.extensions.recordings.twin_receiver import Receiver, clipped, highpassed, received
+from lowalt.extensions.recordings.twin_receiver import (
+    Receiver,
+    clipped,
+    controlled,
+    highpassed,
+    quantised,
+    received,
+    shaped,
+)
 from lowalt.extensions.recordings.twin_scenes import (
     MARGIN,
     Library,
@@ -122,3 +130,30 @@ def test_a_longer_vehicle_keeps_round_wheels(library):
         mine = np.flatnonzero(cloud.part == wheel)
         np.testing.assert_allclose(radii(longer, mine), radii(cloud, mine), atol=1e-12)
         np.testing.assert_allclose(longer.hinges[wheel], cloud.hinges[wheel] * [0.5, 2.0, 1.5])
+
+
+def test_gain_control_converter_and_slope_of_the_slow_noise():
+    time = np.arange(60_000) / 6000.0
+    tone = np.cos(2 * np.pi * 500.0 * time) * np.where(time < 5, 1.0, 10.0)
+    levels = [
+        controlled(tone, 6000.0, share, 0.05)[part].std()
+        for share in (0.5, 1.0)
+        for part in (slice(12_000, 24_000), slice(48_000, None))
+    ]
+    # Of 20 dB between weak and strong, the gain leaves the other half, or nothing.
+    assert 20 * np.log10(levels[1] / levels[0]) == pytest.approx(10.0, abs=0.2)
+    assert 20 * np.log10(levels[3] / levels[2]) == pytest.approx(0.0, abs=0.2)
+    assert controlled(tone, 6000.0, 0.0, 0.05) is tone and quantised(tone, 0) is tone
+    ramp = np.linspace(-3.0, 3.0, 1001)
+    assert (
+        len(np.unique(quantised(ramp, 4))) == 17
+        and abs(quantised(tone, 8) - tone).max() <= 10 / 2**8 + 1e-12
+    )
+    pair = quantised(tone + 0.5j * tone, 4)
+    np.testing.assert_array_equal(pair.real, quantised(tone, 4))
+    powers = []
+    for slope in (1.0, 3.0):
+        noise = np.fft.fft(shaped(60_000, 6000.0, 5.0, np.random.default_rng(1), slope))
+        powers.append([np.mean(abs(noise[place : 2 * place]) ** 2) for place in (1000, 10_000)])
+    for (near, far), slope in zip(powers, (1.0, 3.0), strict=True):
+        assert np.log10(near / far) == pytest.approx(slope, abs=0.12)

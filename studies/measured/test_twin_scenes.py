@@ -5,7 +5,7 @@ import pytest
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.extensions.recordings.twin import Twin
-from lowalt.extensions.recordings.twin_courses import hover, straight, to_and_fro
+from lowalt.extensions.recordings.twin_courses import drive, hover, straight, to_and_fro
 from lowalt.extensions.recordings.twin_echo import (
     beam_gain,
     blade_points,
@@ -14,6 +14,7 @@ from lowalt.extensions.recordings.twin_echo import (
     strengthened,
     textured,
 )
+from lowalt.extensions.recordings.twin_others import KINDS, other_echo
 from lowalt.extensions.recordings.twin_receiver import Receiver, received
 from lowalt.extensions.recordings.twin_scenes import (
     MARGIN,
@@ -269,3 +270,29 @@ def test_the_craft_at_3_ghz_has_propellers_of_its_maker_s_length():
         assert np.linalg.norm(tips[:, None] - tips, axis=2).max() == pytest.approx(
             4.7 * 0.0254, abs=5e-4
         )
+
+
+def test_a_car_leaves_from_rest_stops_and_turns_and_its_clock_is_the_way():
+    times = np.linspace(0, 4, 4001)
+    leaves = drive(times, np.array([1.0, 2.0, 0.0]), 0.0, 0.0, 3.0, 0.0, 1.0)
+    np.testing.assert_allclose(leaves.place_m[:, 1] - 2.0, 1.5 * times**2, atol=1e-9)
+    np.testing.assert_allclose(leaves.clock_s, 1.5 * times**2, atol=1e-9)
+    stops = drive(times, np.zeros(3), 6.0, np.pi, -3.0, 0.0, 2.0)
+    np.testing.assert_allclose(stops.place_m[times > 2, 1], -6.0, atol=1e-9)
+    np.testing.assert_allclose(stops.clock_s[-1], 3.0)
+    # A bend of 10 m: after a quarter of the circle it stands 10 m ahead and 10 m to the left, and
+    # looks there.
+    bend = drive(times, np.zeros(3), 5 * np.pi / 4, 0.0, 0.0, 0.1, 1.0)
+    np.testing.assert_allclose(bend.place_m[-1], [-10.0, 10.0, 0.0], atol=1e-6)
+    assert bend.tilt_rad[-1, 0] == pytest.approx(np.pi / 2)
+    speed = np.linalg.norm(np.gradient(bend.place_m, times, axis=0), axis=1)
+    np.testing.assert_allclose(speed[1:-1], 5 * np.pi / 4, rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_what_belongs_to_no_class_has_unit_power_and_moves_no_faster_than_it_can(kind):
+    twin = Twin(24.0e9, "real", 6000.0, 1 / 3000.0, 400, "one_sided", 0.4, 15.0)
+    for seed in range(3):
+        echo = other_echo(kind, twin, 2400, np.random.default_rng(seed))
+        assert np.mean(np.abs(echo) ** 2) == pytest.approx(1.0)
+        assert len(echo) == 2400 and np.ptp(np.abs(echo - echo.mean())) > 0

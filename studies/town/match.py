@@ -18,8 +18,9 @@ import numpy as np
 
 from lowalt.config.layers import overlaid
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m
-from lowalt.extensions.town import image_paths, shadow_loops
+from lowalt.extensions.town import image_paths
 from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town.bundle_loops import blocked
 from lowalt.extensions.town.facets import Occluders, Town
 from lowalt.extensions.town.town import DEFAULTS
 from lowalt.files.atomic import replacing
@@ -80,9 +81,7 @@ def drawn(
         place = np.array(
             [*(corners[0] * u + corners[1] * (v - u) + corners[2] * (1 - v)), rng.uniform(*heights)]
         )
-        if not shadow_loops.blocked(town.occluders, place[None], place[None] + [0.0, 0.0, 1000.0])[
-            0
-        ]:
+        if not blocked(town.occluders, place[None], place[None] + [0.0, 0.0, 1000.0])[0]:
             found.append(place)
     return np.array(found)
 
@@ -96,15 +95,11 @@ def roof_m(occluders: Occluders, place: np.ndarray) -> float:
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (
-            (middle, high)
-            if shadow_loops.blocked(occluders, middle[None], high[None])[0]
-            else (low, middle)
+            (middle, high) if blocked(occluders, middle[None], high[None])[0] else (low, middle)
         )
     return (
         float(high[2])
-        if shadow_loops.blocked(
-            occluders, low[None] - [0.0, 0.0, 1.0], np.array([[*place, 2000.0]])
-        )[0]
+        if blocked(occluders, low[None] - [0.0, 0.0, 1.0], np.array([[*place, 2000.0]]))[0]
         else 0.0
     )
 

@@ -37,7 +37,7 @@ from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
-from lowalt.recognition import runs, zoo
+from lowalt.recognition import runs
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.samples import Samples, fingerprint, joined
 from lowalt.recognition.schemes import TABLE, named
@@ -105,7 +105,7 @@ class Part(NamedTuple):
 
 def opened(name: str) -> Radar:
     """Return a network of the zoo by name."""
-    trained, settings = zoo.opened(name)
+    trained, settings = runs.opened(name)
     twin = Twin.from_settings(settings["radar"])
     return Radar(name, trained.model, twin, Images.from_settings(settings["images"]), trained.size)
 

@@ -78,7 +78,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_command_that_installs
     for module in [name for name in sys.modules if name.startswith("lowalt.recognition.predict")]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "torch", None)
-    assert main(["predict", "default-seen", str(sample)]) == 2
+    assert main(["predict", "results/zoo/default-seen.safetensors", str(sample)]) == 2
     assert capsys.readouterr().err == (
         "error: the package torch is not installed, expected `pip install torch torchvision timm`\n"
     )

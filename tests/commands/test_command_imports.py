@@ -20,7 +20,7 @@ SLOW = (
 )
 PLANNING = (
     "from lowalt.config.layers import overlaid; from lowalt.workflow.run import Run; import "
-    "lowalt.workflow.options\n"
+    "lowalt.workflow.stages.tiles\n"
     "Run.of(overlaid([]), 'workflow/schemas/config.schema.yaml', None)"
 )
 
@@ -40,7 +40,10 @@ def imported(program: str) -> set[str]:
     [
         (["--help"], set()),
         (["run", "--help"], {"jsonschema", "numpy"}),
-        (["predict", "default-seen", "missing.png"], {"numpy", "jsonschema"}),
+        (
+            ["predict", "results/zoo/default-seen.safetensors", "missing.png"],
+            {"numpy", "jsonschema"},
+        ),
     ],
 )
 def test_a_command_imports_what_its_answer_needs(words, packages):

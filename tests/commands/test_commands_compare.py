@@ -6,7 +6,6 @@ import pytest
 
 from lowalt.__main__ import main
 from lowalt.commands import workflow
-from lowalt.extensions.benchmark import baseline_table
 from lowalt.files.errors import LONGEST
 from run_folders import run_folder
 
@@ -41,36 +40,6 @@ data: {one} | {other}
     )
     assert main(["compare", str(one), str(tmp_path)]) == 2
     assert f"{tmp_path}: has no config.yaml" in capsys.readouterr().err
-
-
-def test_compare_holds_two_methods_of_the_benchmark_against_each_other(tmp_path, capsys):
-    first = "nearest centroid on moments"
-    second = "majority class"
-    assert main(["compare", first, second, "--json"]) == 0
-    facts = json.loads(capsys.readouterr().out)["tracks"]
-    kept = {row["track"]: row for row in baseline_table.read() if row["method"] == first}
-    assert set(facts) == set(kept)
-    for track, found in facts.items():
-        value, low, high = found["difference"]
-        assert found["first"] == [float(kept[track][name]) for name in ("percent", "low", "high")]
-        # What is kept of AUROC has three digits.
-        assert (
-            value == pytest.approx(found["first"][0] - found["second"][0], abs=0.05)
-            and low < value < high
-        )
-    assert main(["compare", first, second]) == 0
-    text = capsys.readouterr().out
-    assert (
-        text.startswith(f"paired difference in percent: {first} | {second}\n  seen ")
-        and "  better; " in text
-    )
-    for wrong, words in (
-        ("majority clas", "expected perhaps ['majority class']"),
-        ("none", "lowalt benchmark table"),
-    ):
-        assert main(["compare", first, wrong]) == 2
-        error = capsys.readouterr().err
-        assert f"{wrong!r}: neither a folder nor a method" in error and words in error
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ import yaml
 from lowalt.__main__ import main as lowalt_command
 from lowalt.commands import explain, workflow
 from lowalt.config.layers import overlaid
-from lowalt.extensions.drafting import target
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 
@@ -72,15 +71,11 @@ def test_a_run_is_refused_before_snakemake_starts(changes, words):
         workflow.command(given(**changes))
 
 
-def test_a_sample_to_explain_is_a_subtype_and_a_number_and_a_unit_a_name_or_metres():
+def test_a_sample_to_explain_is_a_subtype_and_a_number():
     assert explain._sample("Crow:3") == ("Crow", 3) and explain._sample("a:b:12") == ("a:b", 12)
     for wrong in ("Crow", ":3", "Crow:", "Crow:-1", "Crow:1.5"):
         with pytest.raises(argparse.ArgumentTypeError, match="expected SUBTYPE:MODEL"):
             explain._sample(wrong)
-    assert [target._unit(text) for text in ("mm", "0.3048", "1e6")] == ["mm", 0.3048, 1e6]
-    for wrong in ("yard", "0", "-1", "1000001", "nan"):
-        with pytest.raises(argparse.ArgumentTypeError, match="or metres"):
-            target._unit(wrong)
 
 
 def test_the_page_of_a_run_is_refused_where_its_folder_names_code(tmp_path, monkeypatch, capsys):

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from lowalt.config.layers import canonical, check, load, load_yaml, merge
-from lowalt.config.plan import Plan
 from lowalt.files import yaml_files
 from lowalt.files.errors import InputError
 from lowalt.motion import COLUMNS
 from lowalt.report.stage_times import COLUMNS as STAGE_COLUMNS
+from lowalt.shards.plan import Plan
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"

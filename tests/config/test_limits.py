@@ -12,12 +12,12 @@ import pytest
 from configured import ROOT, SCHEMA
 from dataset import build
 from lowalt.config.layers import load, merge
-from lowalt.config.plan import Plan
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import digest
 from lowalt.shards import ShardSet, index
 from lowalt.shards import write as shard_module
 from lowalt.shards.dataset import Dataset
+from lowalt.shards.plan import Plan
 from lowalt.shards.sample_record import sample_key
 from lowalt.shards.sample_table import SAMPLE, map_samples, table_path
 from lowalt.shards.tar import Writer

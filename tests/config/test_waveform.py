@@ -10,8 +10,8 @@ import pytest
 
 from lowalt.config.layers import check, load, merge
 from lowalt.config.network import Network
-from lowalt.config.plan import sample_bytes
 from lowalt.files.errors import InputError
+from lowalt.shards.sizes import sample_bytes
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"

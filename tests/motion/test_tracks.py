@@ -13,9 +13,9 @@ import pytest
 
 from builtin_records import TABLE
 from configured import run_of
+from lowalt.config.blocks import motion_block
 from lowalt.config.layers import check, merge
 from lowalt.config.network import masts_m
-from lowalt.config.plan import motion_block
 from lowalt.config.splits import FOLDS
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
@@ -29,7 +29,7 @@ from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.sample_record import record, row_of
 from lowalt.shards.write import select
 from lowalt.targets.cloud import write as write_cloud
-from lowalt.workflow.stage_settings import Settings
+from lowalt.workflow.stages.motion import Motion
 
 SUBTYPES = ["DJI Mini 2", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"]
 LOOKS = 12
@@ -250,14 +250,14 @@ def test_a_track_is_in_one_fold_whole(dataset):
 @pytest.mark.parametrize("which", ["dataset", "logged"])
 def test_the_motion_stage_writes_the_rows_of_the_samples(which, request, tmp_path):
     tracks = request.getfixturevalue(which)
-    settings = Settings(run_of(merge(OVERLAY, {"motion": tracks.config["motion"]})))
+    stage = Motion(run_of(merge(OVERLAY, {"motion": tracks.config["motion"]})))
     cloud, path, again = (tmp_path / name for name in ("cloud.npz", "motion.csv", "again.csv"))
     write_cloud(cloud, tracks.clouds[SUBTYPES[0]])
     wildcards = type("", (), {"group": "seen", "part": "00000"})()
     motion(
         [
             "--settings",
-            settings.motion(wildcards),
+            stage.settings(wildcards),
             "--clouds",
             str(cloud),
             "--group",

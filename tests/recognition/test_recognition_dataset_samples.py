@@ -12,7 +12,7 @@ import torch
 import yaml
 
 import model_files
-from configured import Inputs, parts
+from configured import Inputs, stages_of
 from lowalt.config.classes import CATEGORIES
 from lowalt.files.errors import InputError
 from lowalt.recognition import samples
@@ -24,7 +24,7 @@ from lowalt.shards import maker
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
 from lowalt.spectra import NAMES
-from lowalt.workflow import options
+from lowalt.workflow.stages.stage import given
 from small_configuration import configuration
 from trainings import SCHEME
 
@@ -136,15 +136,15 @@ def test_the_configuration_names_the_source():
         "effects": {"occlusion": {}},
         "echo": {"tolerance": 1e-3},
     }
-    _, products, _ = parts(overlay)
-    found = products.samples(SimpleNamespace(scheme="a-vrp-trp-vt"))
+    found = stages_of(overlay).recognition.samples(SimpleNamespace(scheme="a-vrp-trp-vt"))
     assert (
         found["dataset"] == "results/default/config.yaml"
         and len(found["clouds"]) == len(found["surfaces"]) == 40
     )
-    assert options.samples(None, Inputs(found)) == ["--dataset", "results/default/config.yaml"]
+    options = given("dataset", "views", "index")
+    assert options(None, Inputs(found)) == ["--dataset", "results/default/config.yaml"]
     with pytest.raises(InputError, match=r"recognition\.input"):
-        parts({"recognition": {"input": "dataset"}})
+        stages_of({"recognition": {"input": "dataset"}})
 
 
 @pytest.mark.parametrize("effects", [{}, {"carrier_offset": {}}, {"cell_noise": {}}])

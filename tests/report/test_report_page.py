@@ -8,8 +8,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from lowalt.extensions.benchmark import benchmark_results
-from lowalt.files.csv_tables import read_csv
 from lowalt.report.inputs import FILES, KEPT, Inputs
 from lowalt.report.page import PARTS, assembled, rendered
 from lowalt.report.sections import recognition_cost, simulation_cost
@@ -61,29 +59,6 @@ def test_a_run_s_own_table_goes_before_the_kept_one(kept):
         rendered("recognition_cost", recognition_cost.values(SimpleNamespace(inputs=own))).split()
     )
     assert "This run measured it on " in text and "did not" not in text
-
-
-def test_a_run_on_a_benchmark_s_data_shows_the_table_of_baselines(kept):
-    assert benchmark_results.values(kept) is None
-    path = "results/reference/lowalt-40-v1/table.csv"
-    own = SimpleNamespace(inputs=Inputs(kept.inputs.files | {"benchmark": path}))
-    html = rendered("benchmark_results", benchmark_results.values(own))
-    assert "Baselines of lowalt-40-v1" in html
-    tables = sound(assembled("kept", [{"id": "results", "title": "Results", "html": html}])).tables
-    rows = read_csv(path, "method", "track", "percent", "low", "high", "group")
-    assert sum(len(table["rows"]) for table in tables) == 2 * len({row["method"] for row in rows})
-    for row in rows:
-        (cell,) = [
-            line[table["head"].index(row["track"])]
-            for table in tables
-            if row["track"] in table["head"]
-            for line in table["rows"]
-            if line[0] == row["method"]
-        ]
-        interval = "{:.1f} ({:.1f} to {:.1f})".format(
-            *(float(row[name]) for name in ("percent", "low", "high"))
-        )
-        assert cell.startswith(f"{interval} {'abcdefghijkl'[int(row['group']) - 1]}")
 
 
 def test_the_contents_name_every_part_of_the_page():

@@ -33,7 +33,7 @@ from lowalt.scene.observe import observe
 from lowalt.scene.response import ImagePath
 from lowalt.scene.target_classes import LARGE_UAV, VEHICLE
 from lowalt.scene.view import View
-from scenes import A, B, link, linked, scene, seen_by, target
+from scenes import A, B, link, linked, network, scene, seen_by, target
 
 LINK = link()
 
@@ -66,6 +66,8 @@ def test_an_element_has_its_3db_widths_and_its_front_to_back():
     for off in ((32.5, 0), (-32.5, 0), (0, 32.5), (0, -32.5)):
         assert toward(*off) == pytest.approx(5.0)
     assert toward(180, 0) == pytest.approx(-22.0)
+    element = Element(downtilt_deg=0.0, back_db=20.0)
+    assert toward(180, 0) == pytest.approx(-12.0) and toward(32.5, 0) == pytest.approx(5.0)
     tilted = gain(
         Element(downtilt_deg=10.0),
         A,
@@ -350,15 +352,11 @@ def test_routes_show_the_sides_that_their_images_see(station):
         ImagePath(view.places, 0.5),
     ]
 
-    def weight(view: View, names=("occlusion", "walls"), but=()) -> np.ndarray:
+    def weight(view: View, one_sided: bool) -> np.ndarray:
         """A follower's factor that tells a place from another, and one of all others that does not."""
         ends = [np.sum(np.square(end.station.position_m)) for end in view.ends()]
         followed = (2.0 + np.sin(ends[0])) * (2.0 + np.sin(ends[-1]))
-        names = set(names) - set(but)
-        return np.full(
-            view.places.shape[:2],
-            (followed if "occlusion" in names else 1.0) * (3.0 if "walls" in names else 1.0),
-        )
+        return np.full(view.places.shape[:2], followed if one_sided else 3.0)
 
     found = reflected_aspect.routes(reflected_aspect.DEFAULTS, view, paths, weight)
     assert found.shape == (3, 3, *view.places.shape[:2])
@@ -390,7 +388,12 @@ def test_companions_stand_clear_of_each_other_and_fly_alike():
     cloud = replace(cloud, record=record)
     settings = companions.DEFAULTS | {"count": [3, 3], "spread_m": 2.0}
     found = companions.companions(settings, cloud, row, {}, np.random.default_rng(2))
-    assert [name for name in companions.listed(settings, 1, row)] == ["Thing"] * 3
+    recorded = companions.record(settings, network(), row, np.random.default_rng(2))
+    assert (
+        recorded
+        == {"companions": [other.subtype for other, _ in found]}
+        == {"companions": ["Thing"] * 3}
+    )
     places = np.array(
         [[r[f"{axis}_m"] for axis in "xyz"] for r in (row, *(mine for _, mine in found))]
     )

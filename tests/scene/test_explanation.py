@@ -66,6 +66,43 @@ def test_an_effect_that_hides_or_drowns_a_target_says_so_in_db(named, signal, te
     assert line.split()[2 : 2 + len(text.split())] == text.split()
 
 
+@pytest.mark.parametrize(
+    "named, by_class, text",
+    [
+        (True, {"UAV": 50.7, "Bird": 134.9, "Vehicle": 3.43, "Pedestrian": 6.17}, "-43 to -11 dB"),
+        (False, {"UAV": 20.0, "Bird": 200.0}, "+26 to +46 dB"),
+        (False, {"UAV": 0.0, "Bird": 100.0}, "-inf to +40 dB"),
+        (True, {"UAV": 0.5, "Bird": 7.16}, "x0.5 to x7.2"),
+        (True, {"UAV": 7.16}, "x7.2"),
+        (True, {"UAV": 0.5, "Bird": 0.7}, "60.0%"),
+    ],
+)
+def test_a_change_beyond_the_signal_is_a_range_over_the_classes_and_no_share(named, by_class, text):
+    """A mean of amplitude ratios would be that of the class that is hidden most."""
+    mean = float(np.mean(list(by_class.values())))
+    change = explanation.Change("town", "channel", named, mean, 0.2, by_class=by_class)
+    line = explanation.effects_table([change], False)[1]
+    assert line.split("named" if named else "added")[1].split("20.0%")[0].strip() == text
+
+
+def test_a_comb_changes_no_range_cell_of_a_near_target_and_its_ratio_is_that_of_each_class():
+    """Its cells are those of the whole band modulo their number, where the target stands in one
+    cell.
+    """
+    config = configuration()
+    config["targets"]["select"] = ["DJI Mini 2", "Owl"]
+    config["network"]["symbols"] = 64
+    config["effects"] = {"comb_pilots": {"spacing": 4}}
+    chosen = explanation.samples(config, None, [("DJI Mini 2", 0), ("Owl", 1)])
+    found = explanation.changes(config, chosen, ["A", "B"], lambda signals: {})
+    comb = next(change for change in found if change.effect == "comb_pilots")
+    assert comb.cells < 0.1
+    assert list(comb.by_class) == ["Bird", "UAV"]
+    assert np.mean(list(comb.by_class.values())) == pytest.approx(comb.signal)
+    canceller = next(change for change in found if change.effect == "cell_error")
+    assert canceller.cells > 0.01
+
+
 def test_parts_of_an_effect_are_no_effects_of_a_suggested_scene():
     whole = explanation.Change("town", "channel", True, 0.5)
     part = whole._replace(part="second order", signal=0.1)

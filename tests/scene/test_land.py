@@ -147,6 +147,25 @@ def test_windblown_land_has_billingsleys_spectrum_and_ratio(slow):
     assert (calm == calm[:, :1]).all()
 
 
+def test_neighbouring_cells_of_land_are_alike_over_the_correlation_length():
+    """Cells are 78 m long, so that a length of 1 km makes neighbours alike; side lobes always do a
+    little.
+    """
+    radio = network(subcarriers=16, symbols=2)
+    aim = AIMS[0]
+    view = view_of(radio, np.broadcast_to(aim, (2, 1, 3)), np.ones(1), aim)
+    alike = []
+    for length_m in (0.0, 1000.0):
+        settings = settings_of(law="k", shape=0.5, reach_m=500.0, correlation_m=length_m)
+        drawn = [
+            clutter.scatter(settings, view, np.random.default_rng(seed)).response[0]
+            for seed in range(400)
+        ]
+        level = np.log(abs(np.fft.ifft(drawn, axis=1)[:, :5]))
+        alike.append(np.mean([np.corrcoef(level[:, i : i + 2].T)[0, 1] for i in range(4)]))
+    assert alike[0] < 0.65 and alike[1] > alike[0] + 0.15
+
+
 def test_drawn_land_has_its_mean_power_in_every_cell_side_lobes_and_folds_included():
     radio = network(subcarriers=16, symbols=2)
     aim = AIMS[0]

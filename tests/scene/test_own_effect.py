@@ -14,10 +14,13 @@ import lowalt
 from lowalt.config.layers import overlaid
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
-from lowalt.scene.effects import called
+from lowalt.scene.effects import called, dotted
 from lowalt.scene.observe import observe
 from lowalt.shards.remake import Remaker
-from lowalt.workflow import options, sources
+from lowalt.workflow import sources
+from lowalt.workflow.stages.noise import Noise
+from lowalt.workflow.stages.shards import Shards
+from lowalt.workflow.stages.tiles import Tiles
 from scenes import network, scene, target
 
 HALF = """
@@ -238,10 +241,12 @@ def test_its_file_is_an_input_of_the_jobs_that_use_it_alone(half):
         "shards": {"kind": "cube"},
         "spectra": {"vt": {}},
     }
-    echo = sources.code("lowalt.scene", *map(options.dotted, config["effects"]))
+    echo = sources.code("lowalt.scene", *map(dotted, config["effects"]))
     assert "half.py" in echo and any(name.endswith("measure/fifty_digits.py") for name in echo)
-    assert "half.py" in sources.code("lowalt.shards", *options.shard_modules(config))
-    for modules in (options.noise_modules(config), options.tile_modules(config)):
+    run = SimpleNamespace(config=config)
+    assert "half.py" in sources.code("lowalt.shards", *Shards(run).modules)
+    for modules in (Noise(run).modules, Tiles(run).modules):
         assert "half.py" not in sources.code("lowalt.tiles", *modules)
     cells = config | {"spectra": {"range_doppler": {}}}
-    assert "half.py" in sources.code("lowalt.tiles", *options.tile_modules(cells))
+    modules = Tiles(SimpleNamespace(config=cells)).modules
+    assert "half.py" in sources.code("lowalt.tiles", *modules)

@@ -107,6 +107,7 @@ def test_noise_is_white_of_the_level_that_link_budget_and_snr_ask_for():
     look = look_of(radio, reference=4.0)
     for effect, changes, variance in (
         (receiver_noise, {}, 1.380649e-23 * 290 * 120e3 * 10**0.7 / 32),
+        (receiver_noise, {"temperature_k": 77.0}, 1.380649e-23 * 77 * 120e3 * 10**0.7 / 32),
         (cell_noise, {"snr_db": 13.0}, 4.0 / 10**1.3),
     ):
         cells = waveform.range_cells(heard(effect, changes, np.zeros(look.data.shape), look))

@@ -14,7 +14,7 @@ import yaml
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import check
-from lowalt.scene.effects import PLACES, called, dotted
+from lowalt.scene.effects import ADDED, PLACES, called, dotted
 from lowalt.scene.observe import Scene, observe
 from lowalt.scene.view import Still
 from scenes import target
@@ -252,6 +252,17 @@ def test_settings_that_contradict_each_other_are_refused_by_name(network, effect
 
 
 @pytest.mark.parametrize(
+    "effects",
+    [
+        {"timing_offset": {"sigma_s": 1e-6, "prefix_slack_s": 3.1e-6}},
+        {"clock_offset": {"fixed_ppm": 1.0, "sigma_ppm": 0.0, "prefix_slack_s": 1.1e-6}},
+    ],
+)
+def test_a_longer_prefix_allows_a_larger_slip(effects):
+    assert check({"network": ALONE, "effects": effects, "noise": {"snr_db": QUIET}})
+
+
+@pytest.mark.parametrize(
     ("blocks", "said"),
     [
         (
@@ -319,7 +330,8 @@ def test_the_schema_knows_every_setting_and_each_effect_names_its_source(name):
     assert set(schema["properties"]["effects"]["properties"][name].get("properties", {})) == set(
         module.DEFAULTS
     )
-    assert module.SOURCE and f".{PLACES[name]}." in module.__name__
+    assert module.SOURCE
+    assert name in ADDED or f".{PLACES[name]}." in module.__name__
     assert all(set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "IDLE", ()))
     assert all(
         set(entry) <= set(module.DEFAULTS) for entry in getattr(module, "PARTS", {}).values()

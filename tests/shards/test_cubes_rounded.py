@@ -11,13 +11,13 @@ from test_dataset import configuration, run_stages
 
 from lowalt.__main__ import main
 from lowalt.config.layers import plain
-from lowalt.config.plan import sample_bytes
 from lowalt.config.splits import FOLDS
 from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, card, faults
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.hub import features
+from lowalt.shards.sizes import sample_bytes
 from lowalt.shards.stored_cubes import restored, rounded
 from lowalt.spectra.cube import TRUTH
 from lowalt.workflow import space

@@ -12,7 +12,9 @@ from lowalt.__main__ import main
 from lowalt.config.layers import overlaid
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.files.errors import InputError
+from lowalt.shards import kept_datasets
 from lowalt.shards import receive as module
+from lowalt.spectra.cube import TRUTH
 
 CAR = "AITO M9 2024"
 DRONE = "DJI Mini 2"
@@ -222,6 +224,86 @@ def test_the_command_writes_every_array_by_name(tmp_path, capsys):
             if array.dtype.kind != "U":
                 np.testing.assert_array_equal(read[name][()], array)
     assert read["parts"].asstr()[0] == echo.parts[0] and read["unit"].asstr()[()] == "sqrt(W)"
+
+
+@pytest.mark.parametrize("symbols", [1, 2])
+@pytest.mark.parametrize(
+    "network, effects",
+    [({"symbol_interval_s": 1e-4}, {}), (FMCW, {"symbol_motion": {}})],
+    ids=["OFDM", "FMCW"],
+)
+def test_one_or_two_symbols_have_the_truth_of_the_first_symbols_of_many(symbols, network, effects):
+    """A rigid body that flies straight has the same range, speed and cell, however long the look
+    lasts, and so have its cubes.
+    """
+    many = made({"network": network, "effects": effects})
+    few = made({"network": network | {"symbols": symbols}, "effects": effects})
+    expected = lowalt.receive(many, CAR, 2, at="receiver")
+    found = lowalt.receive(few, CAR, 2, at="receiver")
+    assert found.values.shape == (symbols, 64)
+    assert abs(expected.truth["observed_mps"]).min() > 1
+    for name, values in found.truth.items():
+        wanted = expected.truth[name][:symbols]
+        np.testing.assert_allclose(values, wanted, rtol=1e-6, atol=2e-4, err_msg=name)
+    row = few.row(few.place_of(CAR, 2, 3.0))
+    cube = few.maker.cubes(row, 3.0, few.maker.signal(row, 3.0))[0]
+    assert (cube.truth == np.column_stack([found.truth[name] for name in TRUTH])).all()
+
+
+def test_an_echo_has_names_and_truth_of_companions_as_cubes_have():
+    dataset = made({"effects": {"companions": {"subtypes": [DRONE], "count": [2, 2]}}})
+    echo = lowalt.receive(dataset, CAR, 1, "B")
+    row = dataset.row(dataset.place_of(CAR, 1, np.inf))
+    cube = dataset.maker.cubes(row, np.inf, dataset.maker.signal(row, np.inf))[1]
+    assert echo.companions == tuple(row["companions"]) and len(echo.companions) > 0
+    for place, name in enumerate(TRUTH):
+        expected = np.array([other[:, place] for other in cube.others])
+        np.testing.assert_array_equal(echo.others[name], expected)
+        np.testing.assert_array_equal(echo.arrays()[f"others_{name}"], expected)
+    lonely = lowalt.receive(made(), CAR, 1)
+    assert lonely.companions == () and lonely.others["range_m"].shape == (0, 64)
+
+
+def test_a_configuration_is_checked_once_and_again_when_a_file_of_it_changes(tmp_path, monkeypatch):
+    """The second call reads no record, also for another subtype; the content of a layer and of a
+    file that it names decides.
+    """
+    checks = []
+
+    def counted(*arguments):
+        checks.append(arguments)
+        return records_of(*arguments)
+
+    records_of = kept_datasets.records_of
+    monkeypatch.setattr(kept_datasets, "records_of", counted)
+    monkeypatch.setattr(kept_datasets, "_kept", {})
+    effect = tmp_path / "loss.py"
+    text = (
+        "SOURCE = 'test'\nDEFAULTS = {}\n"
+        "def visible(settings, view, rng):\n    return FACTOR * (view.ways_m(view.places) > 0)\n"
+    )
+    effect.write_text(text.replace("FACTOR", "1.0"))
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(f"network: {{symbols: 64, subcarriers: 64}}\neffects: {{{effect}: {{}}}}\n")
+    first = lowalt.receive(scene, CAR, 1).values
+    assert (lowalt.receive(scene, CAR, 1).values == first).all()
+    lowalt.receive(scene, DRONE, 1)
+    assert len(checks) == 1
+    effect.write_text(text.replace("FACTOR", "0.5"))
+    np.testing.assert_allclose(lowalt.receive(scene, CAR, 1).values, 0.5 * first, rtol=1e-9)
+    assert len(checks) == 2
+    scene.write_text(scene.read_text().replace("symbols: 64", "symbols: 32"))
+    assert len(lowalt.receive(scene, CAR, 1).values) == 32
+    assert len(checks) == 3
+
+
+def test_a_layer_that_is_changed_in_place_is_another_configuration():
+    layer = {"network": {"symbols": 64, "subcarriers": 64, "stations": {}}}
+    first = lowalt.receive(layer, CAR, 1)
+    layer["network"]["subcarriers"] = 32
+    assert lowalt.receive(layer, CAR, 1).values.shape == (64, 32)
+    layer["network"]["subcarriers"] = 64
+    assert (lowalt.receive(layer, CAR, 1).values == first.values).all()
 
 
 def test_wrong_words_are_refused(plain):

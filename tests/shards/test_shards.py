@@ -11,7 +11,6 @@ import webdataset
 
 from dataset import SEED, SNRS, SPLIT, TARGETS, build, motion_rows, write_settings
 from lowalt.config.network import Network
-from lowalt.config.plan import sample_bytes
 from lowalt.config.splits import fold
 from lowalt.files.errors import InputError
 from lowalt.motion import write_table
@@ -19,6 +18,7 @@ from lowalt.shards import ShardSet
 from lowalt.shards.__main__ import main
 from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import map_samples, table_path
+from lowalt.shards.sizes import sample_bytes
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.tiles import decode, resize, split
 from pictures import NETWORK, echoes
@@ -221,3 +221,8 @@ def test_a_fold_in_several_shards_holds_each_sample_once_and_every_class_in_each
     # All SNRs of a motion model lie in one shard.
     models = [{key.rpartition(b"-")[0] for key in table["key"].tolist()} for table in tables]
     assert sum(map(len, models)) == len(set().union(*models))
+
+
+def test_an_address_that_no_extension_reads_is_refused():
+    with pytest.raises(InputError, match="carrier-pigeon://: no extension reads such addresses"):
+        ShardSet("carrier-pigeon://loft/index.json")

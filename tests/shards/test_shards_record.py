@@ -12,14 +12,8 @@ from dataset import SEED, motion_rows
 from forks import printed
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
-from lowalt.shards.sample_record import (
-    DATA_VERSION,
-    geometry,
-    record,
-    row_of,
-    sample_key,
-    snr_label,
-)
+from lowalt.shards.sample_list import sample_key, snr_label
+from lowalt.shards.sample_record import DATA_VERSION, geometry, record, row_of
 from lowalt.shards.tar import Writer
 from pictures import NETWORK
 

@@ -1,12 +1,21 @@
-"""A run of the default configuration with an overlay: its facts, its files and its settings."""
+"""A run of the default configuration with an overlay, and what the rules of its stages take."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from lowalt.config.layers import merge
 from lowalt.files.yaml_files import load_yaml
-from lowalt.workflow.products import Products
 from lowalt.workflow.run import Run
-from lowalt.workflow.stage_settings import Settings
+from lowalt.workflow.stages.accuracy_cost import AccuracyCost
+from lowalt.workflow.stages.cost import Cost
+from lowalt.workflow.stages.echo import Echo
+from lowalt.workflow.stages.motion import Motion
+from lowalt.workflow.stages.noise import Noise
+from lowalt.workflow.stages.recognition import Recognition
+from lowalt.workflow.stages.report import Report
+from lowalt.workflow.stages.shards import Shards
+from lowalt.workflow.stages.targets import Targets
+from lowalt.workflow.stages.tiles import Tiles
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
@@ -18,12 +27,30 @@ class Inputs(dict):
     __getattr__ = dict.__getitem__
 
 
+@dataclass
+class Stages:
+    """The stages of a run, by the names that rules give them."""
+
+    run: Run
+
+    def __post_init__(self) -> None:
+        self.targets = Targets(self.run)
+        self.motion = Motion(self.run)
+        self.echo = Echo(self.run)
+        self.noise = Noise(self.run)
+        self.tiles = Tiles(self.run)
+        self.shards = Shards(self.run)
+        self.recognition = Recognition(self.run)
+        self.cost = Cost(self.run)
+        self.accuracy_cost = AccuracyCost(self.run)
+        self.page = Report(self.run)
+
+
 def run_of(overlay: dict | None = None, inputs: str | None = None) -> Run:
     """The run of the default configuration with an overlay on it."""
     return Run.of(merge(load_yaml("config/default.yaml"), overlay or {}), SCHEMA, inputs)
 
 
-def parts(overlay: dict | None = None) -> tuple[Run, Products, Settings]:
-    """The run of an overlay, the files it makes, and the settings of its stages."""
-    run = run_of(overlay)
-    return run, Products(run), Settings(run)
+def stages_of(overlay: dict | None = None) -> Stages:
+    """The stages of the run of an overlay."""
+    return Stages(run_of(overlay))

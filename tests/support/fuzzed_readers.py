@@ -1,120 +1,25 @@
-"""Every reader of files with a good file of its kind, for `fuzzing` to damage."""
+"""Every reader of files of the core with a good file of its kind, for `fuzzing` to damage."""
 
 import hashlib
-import importlib.util
 import json
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-import yaml
-from scipy.io import savemat, wavfile
 
-import towns
 from craft import craft, row
 from fuzzed_folders import folders
-from fuzzed_seals import ARCHIVE, INDEX, JSON, MATLAB, MODEL, PNG, YAML
+from fuzzed_seals import ARCHIVE, INDEX, JSON, MODEL, PNG, YAML
 from fuzzing import Reader
-from shown_meshes import dae, ply, prism, skinned
+from shown_meshes import dae, prism
 
 
-def _bytes(write: Callable[[Path], object], name: str) -> bytes:
+def bytes_of(write: Callable[[Path], object], name: str) -> bytes:
     """The bytes of a file that `write` makes."""
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder) / name)
         return (Path(folder) / name).read_bytes()
-
-
-def _recording(kind: str) -> Callable[[Path], object]:
-    """A reader of recordings of one kind."""
-    from lowalt.extensions.recordings.files import read
-    from lowalt.extensions.recordings.record import record
-
-    more = {
-        ".wav": {},
-        ".csv": {"columns": ["i", "q"], "rate_hz": 800.0},
-        ".sigmf-meta": {},
-        ".txt": {"columns": ["i", "q"], "rate_hz": 800.0},
-        ".iq": {"rate_hz": 800.0, "dtype": "float32", "layout": "iqiq"},
-    }.get(kind, {"rate_hz": 800.0})
-    base = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", **more}
-    return lambda path: read(record({**base, "file": path.name}, path.parent, "record"))
-
-
-def _recordings() -> list[Reader]:
-    """Readers of recordings, each with a good file."""
-    times = np.arange(2000) / 800
-    wave = np.exp(2j * np.pi * 97 * times) * (1 + 0.3 * np.cos(5 * times)) * 0.4
-    pair = np.stack([wave.real, wave.imag], axis=1)
-    text = "i,q\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in pair)
-    files = {
-        ".wav": _bytes(lambda path: wavfile.write(path, 800, pair.astype(np.float32)), "a.wav"),
-        ".mat": _bytes(lambda path: savemat(path, {"x": wave}, do_compression=True), "a.mat"),
-        ".npy": _bytes(lambda path: np.save(path, wave), "a.npy"),
-        ".csv": text.encode(),
-        ".txt": text.replace(",", "\t").encode(),
-        ".iq": pair.astype("<f4").tobytes(),
-        ".cfile": wave.astype("<c8").tobytes(),
-    }
-    special = {".mat": {"share": 0.1, "seal": MATLAB}}
-    cells = "iq;t\n" + "".join(
-        f"{a:.6f}{b:+.6f}i;{t:.6f}\n" for (a, b), t in zip(pair, times, strict=True)
-    )
-    about = {"core:datatype": "cf32_le", "core:sample_rate": 800, "core:version": "1.0.0"}
-    captures = [{"core:sample_start": 0, "core:frequency": 24e9}]
-    about = json.dumps({"global": about, "captures": captures, "annotations": []})
-    more = [
-        ("recording .sigmf-meta", "a.sigmf-meta", about.encode(), _metadata),
-        ("recording .csv, complex", "a.csv", cells.replace(".", ",").encode(), _semicolons),
-    ]
-    if importlib.util.find_spec("h5py"):
-        more.append(
-            (
-                "recording .mat 7.3",
-                "a.mat",
-                _bytes(lambda path: _hdf5(path, wave), "a.mat"),
-                _recording(".mat"),
-                0.1,
-            )
-        )
-    return [
-        Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), **special.get(kind, {}))
-        for kind, data in files.items()
-    ] + [Reader(*each) for each in more]
-
-
-def _semicolons(path: Path) -> object:
-    """Read a table with semicolons, decimal commas and complex cells."""
-    from lowalt.extensions.recordings.files import read
-    from lowalt.extensions.recordings.record import record
-
-    block = {
-        "carrier_hz": 24e9,
-        "channel": "complex",
-        "source": "test",
-        "licence": "none",
-        "times": "t",
-    }
-    return read(record({**block, "file": path.name}, path.parent, "record"))
-
-
-def _hdf5(path: Path, wave: np.ndarray) -> None:
-    """Write samples as MATLAB's version 7.3 does."""
-    import h5py
-
-    with h5py.File(path, "w", userblock_size=512) as file:
-        pair = np.zeros(len(wave), [("real", "<f8"), ("imag", "<f8")])
-        pair["real"], pair["imag"] = wave.real, wave.imag
-        file["rec/iq"] = pair
-
-
-def _metadata(path: Path) -> object:
-    """Read a SigMF recording whose metadata are damaged, beside good samples."""
-    values = np.exp(0.7j * np.arange(2000)) * (1 + 0.1 * np.cos(0.01 * np.arange(2000)))
-    values.astype(np.complex64).tofile(path.with_suffix(".sigmf-data"))
-    return _recording(".sigmf-meta")(path)
 
 
 def _meshes() -> list[Reader]:
@@ -124,7 +29,7 @@ def _meshes() -> list[Reader]:
     from lowalt.targets.mesh_files import read_mesh
 
     box = trimesh.creation.box((0.3, 0.4, 0.1)).subdivide()
-    kinds = ("stl", "obj", "ply", "glb", "dae")
+    kinds = ("stl", "obj", "dae")
     readers = []
     for kind in kinds:
         data = box.export(file_type=kind)
@@ -133,8 +38,6 @@ def _meshes() -> list[Reader]:
             Reader(f"mesh .{kind}", f"a.{kind}", data, lambda path: read_mesh(path, "m"))
         )
     more = {
-        "skinned .glb": _bytes(skinned, "a.glb"),
-        "mixed .ply": ply(*prism(), "little", [[0, 1, 2, 3]]),
         "polygons .dae": dae(*prism()).encode(),
     }
     readers += [
@@ -144,50 +47,10 @@ def _meshes() -> list[Reader]:
     return readers
 
 
-def _towns() -> list[Reader]:
-    """Readers of buildings, each with a good file."""
-    from lowalt.extensions.town.buildings import read
-    from lowalt.extensions.town.town import DEFAULTS
-
-    def buildings(path: Path) -> object:
-        """Read a town; a Mitsuba scene has its mesh next to it."""
-        towns.ply(path.with_name("cube.ply"), [(0.0, 0.0, 1.0, 1.0, 1.0)])
-        origin = towns.ORIGIN if path.suffix == ".geojson" else None
-        return read(DEFAULTS | {"buildings": str(path), "origin": origin})
-
-    kinds = {".geojson": towns.geojson, ".xml": towns.mitsuba}
-    good = {
-        kind: _bytes(partial(write, boxes=towns.BOXES), f"a{kind}") for kind, write in kinds.items()
-    }
-    return [Reader(f"town {kind}", f"a{kind}", data, buildings) for kind, data in good.items()]
-
-
-def _robots() -> list[Reader]:
-    """Readers of robots' descriptions, each with a good file."""
-    from lowalt.extensions.drafting.robot_files import read_robot
-    from made_robots import MJCF, SDF, urdf
-
-    files = {
-        ".urdf": urdf(blade="").replace(
-            '<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'
-        ),
-        ".sdf": SDF,
-        ".xml": MJCF.replace('type="mesh"', 'type="sphere" size="1"'),
-    }
-    return [
-        Reader(
-            f"robot {kind}", f"a{kind}", text.encode(), lambda path: read_robot(path, path.parent)
-        )
-        for kind, text in files.items()
-    ]
-
-
 def _texts() -> list[Reader]:
     """Readers of configurations, tables and other texts, each with a good file."""
     from lowalt.config.command import settings
     from lowalt.config.layers import check, merge
-    from lowalt.extensions.recordings.record import read_record
-    from lowalt.extensions.recordings.twin_scenes import Library
     from lowalt.files.csv_tables import read_csv
     from lowalt.files.yaml_files import load_yaml
     from lowalt.motion import read_table, write_table
@@ -209,13 +72,6 @@ def _texts() -> list[Reader]:
         (path.parent / "a").touch()
         return freeze.verify(path)
 
-    def scenes(path: Path) -> object:
-        """The twin and the scenes of the record of a radar."""
-        return Library.read(path.parent)
-
-    record = yaml.safe_dump(
-        {"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"}
-    )
     return [
         Reader(
             "configuration",
@@ -240,13 +96,6 @@ def _texts() -> list[Reader]:
             lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p]),
             seal=YAML,
         ),
-        Reader(
-            "record of a radar",
-            "a.yaml",
-            Path("config/measured/radars/cw_24ghz.yaml").read_bytes(),
-            scenes,
-            seal=YAML,
-        ),
         Reader("table of targets", "a.csv", table, load_table),
         Reader(
             "schemes",
@@ -264,7 +113,7 @@ def _texts() -> list[Reader]:
         Reader(
             "motion table",
             "a.csv",
-            _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
+            bytes_of(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
             read_table,
         ),
         Reader(
@@ -276,7 +125,6 @@ def _texts() -> list[Reader]:
         Reader(
             "checksums", "SHA256SUMS", (hashlib.sha256(b"").hexdigest() + "  a\n").encode(), sums
         ),
-        Reader("record of a recording", "a.yaml", record.encode(), read_record, seal=YAML),
         Reader(
             "settings",
             "a.json",
@@ -299,7 +147,7 @@ def _captures() -> list[Reader]:
         path = Path(folder) / "a.asf"
         path.write_text(text)
         skeleton = read_skeleton(path)
-    joints = _bytes(lambda path: np.savez(path, joints=np.ones((4, 22, 3)), fps=30.0), "a.npz")
+    joints = bytes_of(lambda path: np.savez(path, joints=np.ones((4, 22, 3)), fps=30.0), "a.npz")
     return [
         Reader("skeleton .asf", "a.asf", text.encode(), read_skeleton),
         Reader("motion .amc", "a.amc", walk(40).encode(), lambda path: read_motion(path, skeleton)),
@@ -333,7 +181,7 @@ def _arrays() -> list[Reader]:
         np.add.outer(np.arange(48), np.arange(48)).astype(np.uint8), np.zeros((256, 3), np.uint8)
     )
     wave = np.exp(0.3j * np.arange(1200)).reshape(3, 400).astype(np.complex64)
-    signals = _bytes(lambda p: np.save(p, wave), "a.npy")
+    signals = bytes_of(lambda p: np.save(p, wave), "a.npy")
     count = 6
     facts = samples.Facts(
         *(np.array([f"{name}{n}" for n in range(count)]) for name in ("k", "s")),
@@ -345,22 +193,24 @@ def _arrays() -> list[Reader]:
         np.ones((count, 3)),
         np.ones((count, 3)),
     )
-    cache = _bytes(
+    cache = bytes_of(
         lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz"
     )
     rows = np.zeros(count, sample_table.SAMPLE)
-    header = _bytes(lambda p: sample_table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
-    surfaces = _bytes(
+    header = bytes_of(
+        lambda p: sample_table.write(p, {"name": "a", "samples": count}, rows), "a.npz"
+    )
+    surfaces = bytes_of(
         lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz"
     )
-    tiles = _bytes(lambda p: write_tiles(p, [png, png]), "a.npz")
-    model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
+    tiles = bytes_of(lambda p: write_tiles(p, [png, png]), "a.npz")
+    model = bytes_of(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
     said = predictions.from_facts(facts, (0,), np.eye(4)[np.arange(count) % 4])
     return [
         Reader(
             "cloud",
             "a.npz",
-            _bytes(lambda p: write_cloud(p, craft()), "a.npz"),
+            bytes_of(lambda p: write_cloud(p, craft()), "a.npz"),
             read_cloud,
             seal=ARCHIVE,
         ),
@@ -384,7 +234,7 @@ def _arrays() -> list[Reader]:
         Reader(
             "predictions",
             "a.csv",
-            _bytes(lambda p: predictions.write(p, said), "a.csv"),
+            bytes_of(lambda p: predictions.write(p, said), "a.csv"),
             predictions.read,
         ),
     ]
@@ -415,9 +265,9 @@ def _index(render: dict) -> bytes:
 
 def _models() -> list[Reader]:
     """Readers of trained models."""
-    from lowalt.recognition import model_file, zoo_files
+    from lowalt.recognition import model_file
 
-    path = zoo_files.path_of("default-seen")
+    path = Path("results/zoo/default-seen.safetensors")
     return [
         Reader(
             "model file", "a.safetensors", path.read_bytes(), model_file.read, share=0.2, seal=MODEL
@@ -431,6 +281,5 @@ def _all(tiles) -> list[bytes]:
 
 
 def readers() -> list[Reader]:
-    """Return every reader with a good file of its kind."""
-    texts = [*_texts(), *_arrays(), *_models(), *_captures(), *_recordings()]
-    return [*texts, *_meshes(), *_towns(), *_robots(), *folders()]
+    """Return every reader of the core with a good file of its kind."""
+    return [*_texts(), *_arrays(), *_models(), *_captures(), *_meshes(), *folders()]

@@ -1,7 +1,7 @@
-"""Damaged inputs for every reader of files (`fuzzed_readers`): seeded ways to break a good file,
+"""Damaged inputs for every reader of files (`fuzzed_readers`, `fuzzed_extensions`): seeded ways to break a good file,
 and the ends allowed.
 
-    PYTHONPATH=src:tests/support python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
+    PYTHONPATH=src:tests/support:tests/extensions/support python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
 A reader must accept its good file. A damaged one it may accept or refuse with one `InputError`.
 Every other end is a
@@ -15,6 +15,7 @@ import argparse
 import contextlib
 import csv
 import hashlib
+import importlib.util
 import io
 import json
 import multiprocessing
@@ -262,6 +263,16 @@ def attack(reader: Reader, count: int, seed: int, folder: Path) -> dict:
     return found
 
 
+def all_readers() -> list[Reader]:
+    """Every reader of the core and, where they are there, of the extensions."""
+    from fuzzed_readers import readers
+
+    found = readers()
+    if importlib.util.find_spec("fuzzed_extensions"):
+        found += importlib.import_module("fuzzed_extensions").readers()
+    return found
+
+
 def _apart(name: str, count: int, seed: int, queue) -> None:
     """Read damaged files in a process of its own, with limited memory, and put the faults into the
     queue.
@@ -271,9 +282,7 @@ def _apart(name: str, count: int, seed: int, queue) -> None:
     resource.setrlimit(resource.RLIMIT_AS, ((LIMIT_MB + 6144) << 20,) * 2)
     with Path(os.devnull).open("w") as silent, tempfile.TemporaryDirectory() as folder:
         os.dup2(silent.fileno(), 2)
-        from fuzzed_readers import readers
-
-        (reader,) = [reader for reader in readers() if reader.name == name]
+        (reader,) = [reader for reader in all_readers() if reader.name == name]
         queue.put(attack(reader, max(1, round(count * reader.share)), seed, Path(folder)))
 
 
@@ -285,11 +294,9 @@ def main() -> None:
     line.add_argument("--only", help="part of the names of the readers to attack")
     line.add_argument("--out", required=True, help="table to write (.csv)")
     given = line.parse_args()
-    from fuzzed_readers import readers
-
     context = multiprocessing.get_context("spawn")
     rows = []
-    for reader in readers():
+    for reader in all_readers():
         if given.only and given.only not in reader.name:
             continue
         queue = context.Queue()

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.targets.mesh_files import pieces
+
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 STRIP = [0, 1, 2, 3, 7, 1, 5, 0, 4, 2, 6, 7, 4, 5]
@@ -129,3 +131,11 @@ def skinned(path: Path) -> Path:
         "bind": bind,
     }
     return glb(path, head, **arrays)
+
+
+def measures(path: Path) -> tuple[np.ndarray, float, float]:
+    """Extents (3,), area and enclosed volume of all pieces of a file, in the file's unit."""
+    corners = np.concatenate([piece.vertices[piece.faces] for piece in pieces(path)])
+    a, b, c = np.moveaxis(corners, 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    return np.ptp(corners.reshape(-1, 3), axis=0), area, float((a * np.cross(b, c)).sum() / 6)

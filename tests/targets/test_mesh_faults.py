@@ -34,8 +34,6 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
             "0 triangles with an area|no triangle",
         ),
         ("text.stl", "this is no mesh at all", "no triangle|not a readable"),
-        ("bytes.ply", bytes(range(256)) * 4, "no triangle|not a readable"),
-        ("bytes.glb", bytes(range(256)) * 4, "no triangle|not a readable"),
         ("bytes.dae", bytes(range(256)) * 4, "no triangle|not a readable"),
         ("mesh.fbx", b"Kaydara FBX", "format '.fbx', expected one of"),
         ("gone.stl", None, "no file"),

@@ -1,9 +1,4 @@
-"""Mesh files are read as viewers show them: indices, polygons, strips, quantised and skinned
-surfaces, stated units.
-"""
-
-import base64
-from pathlib import Path
+"""Mesh files are read as viewers show them: indices, polygons, stated units."""
 
 import numpy as np
 import pytest
@@ -11,17 +6,9 @@ import pytest
 from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import pieces, read_mesh, stated_unit_m
 from real_inputs import FOLDER
-from shown_meshes import CORNERS, FACES, STRIP, TETRAHEDRON, dae, glb, ply, prism, skinned
+from shown_meshes import FACES, TETRAHEDRON, dae, measures, prism
 
 FAULTS = FOLDER / "faults" / "meshes"
-
-
-def measures(path: Path) -> tuple[np.ndarray, float, float]:
-    """Extents (3,), area and enclosed volume of all pieces of a file, in the file's unit."""
-    corners = np.concatenate([piece.vertices[piece.faces] for piece in pieces(path)])
-    a, b, c = np.moveaxis(corners, 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-    return np.ptp(corners.reshape(-1, 3), axis=0), area, float((a * np.cross(b, c)).sum() / 6)
 
 
 @pytest.mark.skipif(not FAULTS.is_dir(), reason=f"no real inputs: {FOLDER} lacks faults/")
@@ -30,11 +17,7 @@ def measures(path: Path) -> tuple[np.ndarray, float, float]:
     [
         ("neg.obj", [11, 1, 1], 2 * 2.366, 2 / 6, None),
         ("pos.obj", [11, 1, 1], 2 * 2.366, 2 / 6, None),
-        ("quant.glb", [1, 1, 1], 2.366, 1 / 6, 1.0),
-        ("skin.glb", [2, 2, 2], 4 * 2.366, 8 / 6, 1.0),
         ("concave.obj", [2, 2, 0.1], 2.32, 0.076, None),
-        ("strip.ply", [1, 1, 1], 6, 1, None),
-        ("mixed.ply", [1, 1, 1], 6 + 2.366, 1 + 1 / 6, None),
         ("box.dae", [100, 100, 20], 28000, 2e5, None),
         ("comment.dae", [100, 100, 20], 28000, 2e5, None),
         ("comment2.dae", [100, 100, 20], 28000, 2e5, 0.0254),
@@ -89,121 +72,21 @@ def test_a_unit_in_an_obj_s_comment_counts(comment, metres, tmp_path):
     assert stated_unit_m(tmp_path / "a.obj") == metres
 
 
-@pytest.mark.parametrize("kind", ["obj", "dae", "ascii", "little", "big"])
-def test_a_polygon_with_a_dent_covers_its_own_area_in_every_format(kind, tmp_path):
+@pytest.mark.parametrize("kind", ["obj", "dae"])
+def test_a_polygon_with_a_dent_covers_its_own_area(kind, tmp_path):
     vertices, faces = prism()
-    path = tmp_path / f"a.{kind if kind in ('obj', 'dae') else 'ply'}"
+    path = tmp_path / f"a.{kind}"
     if kind == "obj":
         rows = [f"v {x} {y} {z}" for x, y, z in vertices]
         path.write_text(
             "\n".join(rows + ["f " + " ".join(str(i + 1) for i in face) for face in faces]) + "\n"
         )
     else:
-        path.write_bytes(
-            dae(vertices, faces).encode() if kind == "dae" else ply(vertices, faces, kind)
-        )
+        path.write_text(dae(vertices, faces))
     extent, area, volume = measures(path)
     assert extent == pytest.approx([2, 2, 0.1])
     assert (area, volume) == pytest.approx((2 * 0.76 + 8 * 0.1, 0.076), rel=1e-6)
     assert len(read_mesh(path, "in" if kind == "dae" else "m").faces) == 20
-
-
-@pytest.mark.parametrize("kind", ["ascii", "little", "big"])
-def test_triangle_strips_of_a_ply_count_alone_and_beside_faces(kind, tmp_path):
-    (tmp_path / "alone.ply").write_bytes(ply(CORNERS, [], kind, [STRIP]))
-    assert measures(tmp_path / "alone.ply")[1:] == pytest.approx((6, 1))
-    moved = [*CORNERS, *(TETRAHEDRON + 5).tolist()]
-    restarted = [*STRIP, -1, *(8 + np.array([0, 2, 1]))]
-    (tmp_path / "beside.ply").write_bytes(ply(moved, (FACES[1:] + 8).tolist(), kind, [restarted]))
-    assert measures(tmp_path / "beside.ply")[1:] == pytest.approx((6 + 2.366, 1 + 1 / 6), rel=1e-3)
-
-
-def test_quantised_places_are_fractions_of_their_type(tmp_path):
-    places = np.round(TETRAHEDRON * 32767).astype("<i2")
-    node = {
-        "mesh": 0,
-        "name": "here",
-        "scale": [2, 2, 2],
-        "rotation": [0, 0, np.sqrt(0.5), np.sqrt(0.5)],
-    }
-    (piece,) = pieces(
-        glb(
-            tmp_path / "a.glb",
-            {"nodes": [node]},
-            POSITION=places,
-            indices=FACES.ravel().astype("<u2"),
-        )
-    )
-    assert piece.names == ("here", "shape")
-    turned = 2 * TETRAHEDRON[:, [1, 0, 2]] * [-1, 1, 1]  # a quarter turn about z
-    np.testing.assert_allclose(piece.vertices, turned, atol=1e-9)
-    # The same numbers in the text of the file, and a turn of zeros, which is none.
-    text = base64.b64encode(
-        places.tobytes() + bytes(-places.nbytes % 4) + FACES.astype("<u2").tobytes()
-    ).decode()
-    buffer = {"byteLength": 48, "uri": f"data:application/octet-stream;base64,{text}"}
-    head = {"buffers": [buffer], "nodes": [{"mesh": 0, "rotation": [0, 0, 0, 0]}]}
-    (piece,) = pieces(
-        glb(tmp_path / "b.glb", head, POSITION=places, indices=FACES.ravel().astype("<u2"))
-    )
-    np.testing.assert_allclose(piece.vertices, TETRAHEDRON, atol=1e-9)
-
-
-def test_a_skin_s_joints_place_it_and_its_own_node_does_not(tmp_path):
-    (piece,) = pieces(skinned(tmp_path / "a.glb"))
-    np.testing.assert_allclose(
-        piece.vertices, TETRAHEDRON + np.array([4, 0.75 * 8, 0.75 * -3]), atol=1e-6
-    )
-
-
-@pytest.mark.parametrize(
-    ("mode", "order", "area"), [(5, STRIP, 6), (6, [0, 4, 6, 2], 1), (1, [0, 1], None)]
-)
-def test_strips_and_fans_are_surfaces_and_lines_are_not(mode, order, area, tmp_path):
-    path = glb(
-        tmp_path / "a.glb",
-        {"surface": {"mode": mode}},
-        POSITION=np.array(CORNERS, "<f4"),
-        indices=np.array(order, "<u2"),
-    )
-    if area is None:
-        assert pieces(path) == []
-    else:
-        assert measures(path)[1] == pytest.approx(area)
-
-
-@pytest.mark.parametrize(
-    ("head", "words"),
-    [
-        (
-            {"extensionsRequired": ["EXT_meshopt_compression"]},
-            "compressed by meshopt, .* without compression",
-        ),
-        (
-            {"extensionsRequired": ["KHR_draco_mesh_compression"]},
-            "compressed by Draco, .* without compression",
-        ),
-        (
-            {"nodes": [{"mesh": 0, "children": [0]}], "scenes": [{"nodes": [0]}]},
-            "hangs on two nodes",
-        ),
-        (
-            {"buffers": [{"uri": "../../etc/passwd", "byteLength": 9}]},
-            "its data lies in another file",
-        ),
-        ({"nodes": [{"mesh": -1}]}, "-1 is no whole number"),
-    ],
-)
-def test_a_glb_that_cannot_be_shown_is_refused_by_its_reason(head, words, tmp_path):
-    with pytest.raises(InputError, match=rf"a\.glb: .*{words}"):
-        pieces(
-            glb(
-                tmp_path / "a.glb",
-                head,
-                POSITION=TETRAHEDRON.astype("<f4"),
-                indices=FACES.ravel().astype("<u2"),
-            )
-        )
 
 
 def test_a_collada_file_states_its_unit_outside_comments_and_has_no_entities_or_skins(tmp_path):
@@ -224,27 +107,6 @@ def test_a_collada_file_states_its_unit_outside_comments_and_has_no_entities_or_
     path.write_text(dae(*prism()).replace("instance_geometry", "instance_controller"))
     with pytest.raises(InputError, match=r"a\.dae: has a skin or morph .*apply it"):
         pieces(path)
-
-
-def test_every_instance_of_a_glb_is_placed_turned_and_scaled_in_its_node(tmp_path):
-    shifts = np.array([[1, 0, 0], [0, 2, 0]], "<f4")
-    turns = np.array([[0, 0, 0, 1], [0, 0, 1, 0]], "<f4")
-    sizes = np.array([[1, 1, 1], [2, 2, 2]], "<f4")
-    attributes = {"TRANSLATION": 2, "ROTATION": 3, "SCALE": 4}
-    node = {
-        "mesh": 0,
-        "translation": [0, 0, 5],
-        "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}},
-    }
-    head = {"nodes": [node], "extensionsUsed": ["EXT_mesh_gpu_instancing"]}
-    arrays = {"POSITION": TETRAHEDRON.astype("<f4"), "indices": FACES.ravel().astype("<u4")}
-    found = pieces(glb(tmp_path / "a.glb", head, **arrays, shifts=shifts, turns=turns, sizes=sizes))
-    np.testing.assert_allclose(found[0].vertices, TETRAHEDRON + np.array([1, 0, 5]))
-    # Half a turn about z, and twice the size.
-    np.testing.assert_allclose(
-        found[1].vertices, TETRAHEDRON * [-2, -2, 2] + np.array([0, 2, 5]), atol=1e-6
-    )
-    assert len(found) == 2 and len({piece.names[0] for piece in found}) == 2
 
 
 def test_a_collada_surface_whose_texture_is_missing_is_kept(tmp_path):

@@ -359,20 +359,3 @@ def test_one_file_is_enough_for_real_inputs_and_none_is_refused(tmp_path):
         run_of(tmp_path, {}, str(inputs), "real")
     with pytest.raises(InputError, match="missing inputs"):
         run_of(tmp_path, {"targets": {"where_missing": "refuse"}}, str(inputs), "real")
-
-
-def test_the_command_makes_a_record_with_its_row(tmp_path, monkeypatch):
-    from lowalt.__main__ import main
-    from lowalt.extensions.drafting import target
-    from lowalt.targets.cloud import read
-
-    monkeypatch.setattr(target, "_picture", lambda cloud, out: str(out))
-    monkeypatch.chdir(tmp_path)
-    out = tmp_path / "bus.npz"
-    own = records(tmp_path, {"My bus": BUS})
-    assert main(["target", "make", own, "--out", str(out)]) == 0
-    assert read(out).record["published"]["len_m"] == 11.95
-    bare = records(
-        tmp_path, {"My bus": {key: value for key, value in BUS.items() if key != "row"}}, "bare"
-    )
-    assert main(["target", "make", bare, "--out", str(out)]) != 0

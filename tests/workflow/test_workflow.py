@@ -293,12 +293,12 @@ MOVED = {
 REMOVED = {
     "flight log": (
         "workflow/rules/motion.smk",
-        "        track=products.track,\n",
+        "        track=motion.track,\n",
         "",
         "motion/seen-00000.csv",
     ),
     "style sheet": (
-        "src/lowalt/workflow/products.py",
+        "src/lowalt/workflow/stages/report.py",
         '".html", ".css", ".js"',
         '".html", ".js"',
         "report.html",
@@ -311,12 +311,12 @@ REMOVED = {
     ),
     "card template": (
         "workflow/rules/shards.smk",
-        "        template=products.card_template,\n",
+        "        template=shards.card_template,\n",
         "",
         "shards/README.md",
     ),
     "sizes_m": (
-        "src/lowalt/workflow/stage_settings.py",
+        "src/lowalt/workflow/stages/motion.py",
         ' "sizes_m",',
         "",
         "motion/seen-00000.csv",

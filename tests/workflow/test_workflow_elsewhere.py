@@ -8,7 +8,8 @@ from types import SimpleNamespace
 from lowalt.files.shipped import SHIPPED, as_named, located
 from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow.sources import code, sources
-from lowalt.workflow.stage_settings import Settings
+from lowalt.workflow.stages.report import Report
+from lowalt.workflow.stages.shards import Shards
 
 ROOT = Path(__file__).parents[2]
 
@@ -61,7 +62,7 @@ def test_what_a_run_keeps_names_the_package_s_files_alike_wherever_it_is_install
 def test_the_kept_configuration_and_the_page_s_have_no_path_of_this_machine(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     config = located(load_yaml(ROOT / "config/default.yaml"), SHIPPED)
-    settings = Settings(SimpleNamespace(config=config, records={}))
+    run = SimpleNamespace(config=config, records={})
     assert str(SHIPPED) in config["targets"]["table"]
-    for text in (settings.configuration(None), settings.report(None)):
+    for text in (Shards(run).configuration(None), Report(run).settings(None)):
         assert str(SHIPPED) not in text and "config/targets.csv" in text

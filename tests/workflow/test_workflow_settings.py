@@ -1,6 +1,4 @@
-"""Settings of stages (`lowalt.workflow.stage_settings`), options of commands and the report's
-manifest.
-"""
+"""Settings that rules take of their stages (`lowalt.workflow.stages`), and the report's manifest."""
 
 import json
 from pathlib import Path
@@ -8,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from configured import parts
+from configured import Stages, stages_of
 from lowalt.config.layers import plain
 from lowalt.files.yaml_files import load_yaml
 from lowalt.report.inputs import KEPT, OPTIONAL
@@ -43,65 +41,65 @@ def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay
         train_seed="3",
         get=lambda key, default: 3,
     )
-    names = (
-        "cloud",
-        "motion",
-        "echo",
-        "echo_in_scene",
-        "noise",
-        "images",
-        "shard",
-        "cost_table",
-        "views",
-        "training",
-        "evaluation",
-        "seed",
-    )
-    before = parts()[2]
-    after = parts(overlay)[2]
-    assert {
-        name for name in names if getattr(before, name)(job) != getattr(after, name)(job)
-    } == changed
-    # The whole configuration stands next to the results and in the report.
-    assert before.configuration(job) != after.configuration(job) and before.report(
-        job
-    ) != after.report(job)
+    before = settings(stages_of(), job)
+    after = settings(stages_of(overlay), job)
+    assert {name for name in before if before[name] != after[name]} == changed | WHOLE
+
+
+WHOLE = {"configuration", "report"}
+"""Settings that hold the whole configuration: next to the results, and of the report."""
+
+
+def settings(stages: Stages, job: SimpleNamespace) -> dict[str, str]:
+    """The settings of every stage for a job of it."""
+    return {
+        "cloud": stages.targets.settings(job),
+        "motion": stages.motion.settings(job),
+        "echo": stages.echo.settings(job),
+        "echo_in_scene": stages.echo.settings_in_scene(job),
+        "noise": stages.noise.settings(job),
+        "images": stages.tiles.settings(job),
+        "shard": stages.shards.settings(job),
+        "configuration": stages.shards.configuration(job),
+        "cost_table": stages.cost.settings(job),
+        "views": stages.recognition.views(job),
+        "training": stages.recognition.training(job),
+        "evaluation": stages.recognition.evaluation(job),
+        "seed": stages.recognition.seed(job),
+        "report": stages.page.settings(job),
+    }
 
 
 def test_settings_of_different_jobs_differ_and_are_json():
-    _, _, settings = parts()
+    stages = stages_of()
     one, other = (
         SimpleNamespace(run="default", group=group, part="00000") for group in ("seen", "unseen")
     )
-    drawn = [set(json.loads(settings.motion(job))["published"]) for job in (one, other, one)]
+    drawn = [set(json.loads(stages.motion.settings(job))["published"]) for job in (one, other, one)]
     assert drawn[0] == drawn[2] and drawn[0].isdisjoint(drawn[1])
-    assert json.loads(settings.configuration(one)) == plain(load_yaml("config/default.yaml"))
+    written = json.loads(stages.shards.configuration(one))
+    assert written == plain(load_yaml("config/default.yaml"))
 
 
 def test_tiles_of_range_cells_follow_the_seed_and_the_snrs():
     """Their noise is drawn from both; tiles of signals alone need neither."""
-    job = CHUNK
     cells = {"spectra": {"hrrp": {"window": 1, "hop": 1, "cells": 9}}}
-    changes = [{}, {"seed": 2}, {"noise": {"snr_db": [3.0]}}]
-    plain, of_cells = (
-        [parts({**block, **change})[2].images(job) for change in changes] for block in ({}, cells)
-    )
-    assert len(set(plain)) == 1 and len(set(of_cells)) == 3
+    for block, different in (({}, 1), (cells, 3)):
+        texts = set()
+        for change in ({}, {"seed": 2}, {"noise": {"snr_db": [3.0]}}):
+            texts.add(stages_of(block | change).tiles.settings(CHUNK))
+        assert len(texts) == different
 
 
 def test_the_report_s_files_are_a_manifest_that_the_report_takes():
     shown = {"cost": "config/schemes.csv", "accuracy": "config/cost/accuracy.csv"}
     more = {"report": shown, "recognition": {"transfer": ["other"]}}
     for overlay, names in (({}, set()), (more, {"transfer", "accuracy_cost", "echo_cost"})):
-        _, products, _ = parts(overlay)
-        files = ReportInputs(products.report(CHUNK)).files
+        files = ReportInputs(stages_of(overlay).page.files(CHUNK)).files
         kept = {name for name in files if name.startswith("kept_")}
         assert kept == {f"kept_{name}" for name in KEPT}
         assert names == (set(files) & set(OPTIONAL)) - {"published", "predictions"} - kept
         assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
-    assert (
-        parts({"run": "lowalt-40-v1"})[1]
-        .report(CHUNK)["benchmark"]
-        .endswith("lowalt-40-v1/table.csv")
-    )
-    assert "src/lowalt/report/sections/accuracy.html" in products.page_templates(CHUNK)
+    page = stages_of({"run": "lowalt-40-v1"}).page
+    assert page.files(CHUNK)["benchmark"].endswith("lowalt-40-v1/table.csv")
+    assert "src/lowalt/report/sections/accuracy.html" in page.templates

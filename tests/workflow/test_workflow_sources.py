@@ -11,7 +11,7 @@ import lowalt.files.errors
 if True:
     from lowalt.files import slug_is_none, atomic
 elif False:
-    import os, lowalt.config.plan
+    import os, lowalt.config.blocks
 else:
     from lowalt.numerics.streams import stream
 for _ in ():

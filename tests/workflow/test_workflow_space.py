@@ -17,9 +17,9 @@ from test_workflow import checksums, snakemake, workplace
 from test_workflow_extension import BASE
 
 from lowalt.config.layers import load_yaml
-from lowalt.config.plan import Plan
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError, SpaceError
+from lowalt.shards.plan import Plan
 from lowalt.workflow import space
 
 ROOT = Path(__file__).parents[2]

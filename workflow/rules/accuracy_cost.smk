@@ -1,7 +1,12 @@
-# Accuracy: recognition accuracy against computing time, for trained schemes and for networks that are only timed.
-# REQUIRED INPUTS: predictions of the run in the unseen protocol; those of the presets that a study trains
-#                  (`make accuracy-cost` does all); a quiet machine
-# OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv, results/{run}/accuracy_cost.svg
+# Accuracy: recognition accuracy against computing time, for trained schemes and for networks that
+# are only timed.
+# REQUIRED INPUTS: predictions of the run in the unseen protocol; those of the presets that a study
+#                  trains (`make accuracy-cost` does all); a quiet machine
+# OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv,
+#          results/{run}/accuracy_cost.svg
+from lowalt.workflow.stages.accuracy_cost import AccuracyCost
+
+accuracy_cost = Refusing(AccuracyCost(RUN))
 
 
 rule speed:
@@ -18,21 +23,22 @@ rule speed:
     # Reserve all cores, so that nothing else runs during the timing.
     threads: workflow.cores or 1
     params:
-        settings=settings.training,
+        settings=recognition.training,
     shell:
-        "python -m lowalt.measure.network_speed --settings {params.settings:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.measure.network_speed --settings {params.settings:q} --out {output:q}"
+        " 2> {log:q}"
 
 
 rule accuracy_cost_table:
     input:
         code=code("lowalt.measure.accuracy_cost"),
         predictions=expand("results/{{run}}/predictions/{training}.csv", training=RUN.priced),
-        studied=products.studied,
+        studied=accuracy_cost.studied,
         about=expand("results/{{run}}/predictions/{training}.json", training=RUN.priced),
         speeds=expand("results/{{run}}/speed/{scheme}.json", scheme=RUN.schemes_by_slug),
         index=f"{DATA}/shards/index.json",
-        data_jobs=products.data_benchmarks,
-        presets=str(shipped(PRESETS)),
+        data_jobs=expand(f"{DATA}/benchmarks/{{job}}.jsonl", job=accuracy_cost.data_jobs),
+        presets=accuracy_cost.presets,
         schemes=config["recognition"]["table"],
     output:
         report(
@@ -47,11 +53,12 @@ rule accuracy_cost_table:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.seed,
+        settings=recognition.seed,
     shell:
-        "python -m lowalt.measure.accuracy_cost --settings {params.settings:q} --predictions {input.predictions:q}"
-        " {input.studied:q} --speeds {input.speeds:q} --data-jobs {input.data_jobs:q} --index {input.index:q}"
-        " --presets {input.presets:q} --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.measure.accuracy_cost --settings {params.settings:q}"
+        " --predictions {input.predictions:q} {input.studied:q} --speeds {input.speeds:q}"
+        " --data-jobs {input.data_jobs:q} --index {input.index:q} --presets {input.presets:q}"
+        " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_figure:
@@ -71,4 +78,5 @@ rule accuracy_cost_figure:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.report.figures.cost_plots recognition --table {input.table:q} --figure {output:q} 2> {log:q}"
+        "python -m lowalt.report.figures.cost_plots recognition --table {input.table:q}"
+        " --figure {output:q} 2> {log:q}"

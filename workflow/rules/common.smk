@@ -1,18 +1,18 @@
 # Common to all rules: the run derived from the configuration, and the functions used in rules.
-# RUN: names, plan and schemes; products: the files a rule reads; settings: what a stage reads of the configuration;
-# options: command-line options that only some jobs have; code: the source files of a command.
+# RUN: names, plan and schemes; given: options for inputs that only some jobs have; code: the
+# source files of a command.
+# Each rule file begins with the module of its stage, which holds what its rules take besides paths.
 from functools import partial
 from pathlib import Path
 
 from lowalt.config.command import Refusing, refusing
 from lowalt.machine.environment import prepare
-from lowalt.config.plan import PART, PIECE
+from lowalt.shards.plan import PART, PIECE
 from lowalt.scene.effects import dotted
-from lowalt.workflow import mends, options, space
-from lowalt.files.shipped import located, shipped
-from lowalt.workflow.products import PRESETS, TABLES, Products
+from lowalt.workflow import mends, space
+from lowalt.files.shipped import located
 from lowalt.workflow.run import Run
-from lowalt.workflow.stage_settings import Settings
+from lowalt.workflow.stages.stage import given
 from lowalt.workflow.sources import ROOT, code as code_of
 
 mends.install()
@@ -22,12 +22,17 @@ with refusing():
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
     space.writable(Path.cwd(), RUN.name)
 
-products = Refusing(Products(RUN))
-settings = Refusing(Settings(RUN))
 code = partial(code_of, spectra=tuple(name for name in config["spectra"] if name != "times"))
 
 # The run whose data set is used for training: RUN, unless the configuration names another.
 DATA = f"results/{RUN.data}"
+# Images of this run's own samples, shrunk to the sizes of the schemes that are trained.
+OWN_VIEWS = expand(
+    "results/{run}/views/{size}/{shard}.npz",
+    run=RUN.name,
+    size=RUN.image_sizes,
+    shard=RUN.plan.shards,
+)
 # An echo job computes the signals of one station or of all stations.
 LISTENING = ["{station}"] if RUN.echo_per_station else RUN.stations
 OF_STATION = "-{station}" if RUN.echo_per_station else ""

@@ -1,12 +1,16 @@
 # Cost: error of the echo against computing time, with one cloud per category.
-# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of this workflow runs meanwhile)
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of
+#                  this workflow runs meanwhile)
 # OUTPUTS: results/{run}/cost.csv, results/{run}/cost.svg
+from lowalt.workflow.stages.cost import Cost
+
+cost = Refusing(Cost(RUN))
 
 
 rule cost_table:
     input:
         code=code("lowalt.measure.echo_cost"),
-        clouds=products.cost_clouds,
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=cost.first_subtypes),
     output:
         "results/{run}/cost.csv",
     log:
@@ -17,11 +21,10 @@ rule cost_table:
         "../../envs/environment.yaml"
     threads: workflow.cores
     params:
-        settings=settings.cost_table,
+        settings=cost.settings,
     shell:
-        "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1"
-        " python -m lowalt.measure.echo_cost --settings {params.settings:q} --clouds {input.clouds:q}"
-        " --out {output:q} 2> {log:q}"
+        "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python -m lowalt.measure.echo_cost"
+        " --settings {params.settings:q} --clouds {input.clouds:q} --out {output:q} 2> {log:q}"
 
 
 rule cost_figure:
@@ -37,4 +40,5 @@ rule cost_figure:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.report.figures.cost_plots echo --table {input.table:q} --figure {output:q} 2> {log:q}"
+        "python -m lowalt.report.figures.cost_plots echo --table {input.table:q}"
+        " --figure {output:q} 2> {log:q}"

@@ -1,17 +1,22 @@
-# Echo in a scene with effects: the signals at one base station, or at all in one job, and the powers of the targets'
-# own echoes.
-# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz; results/{run}/occluders/*.npz
-#                  where the scene hides points behind surfaces; the file of buildings that effects.town names
-# OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
+# Echo in a scene with effects: the signals at one base station, or at all in one job, and the
+# powers of the targets' own echoes.
+# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz;
+#                  results/{run}/occluders/*.npz where the scene hides points behind surfaces; the
+#                  files that effects read
+# OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and
+#          {station}.power.npy
+from lowalt.workflow.stages.echo import Echo
+
+echo = Refusing(Echo(RUN))
 
 
 rule echo_in_scene:
     input:
         code=code("lowalt.scene", *map(dotted, config["effects"])),
         motion="results/{run}/motion/{group}-{part}.csv",
-        clouds=products.scene_clouds,
-        occluders=products.chunk_occluders,
-        town=products.town,
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=echo.scene_subtypes),
+        occluders=expand("results/{{run}}/occluders/{subtype}.npz", subtype=echo.opaque_subtypes),
+        effect_files=echo.effect_files,
     output:
         signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),
         power=expand(
@@ -24,9 +29,10 @@ rule echo_in_scene:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.echo_in_scene,
-        occluders=options.occluders,
-        stations=products.listening,
+        settings=echo.settings_in_scene,
+        occluders=given("occluders"),
+        stations=echo.stations,
     shell:
-        "python -m lowalt.scene --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
-        " {params.occluders:q} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"
+        "python -m lowalt.scene --settings {params.settings:q} --motion {input.motion:q}"
+        " --clouds {input.clouds:q} {params.occluders:q} --station {params.stations:q}"
+        " --out {output.signals:q} --power {output.power:q} 2> {log:q}"

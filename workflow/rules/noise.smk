@@ -1,14 +1,26 @@
-# Noise: complex white Gaussian noise at every SNR of the set, independent from station to station and SNR to SNR.
+# Noise: complex white Gaussian noise at every SNR of the set, independent from station to station
+# and SNR to SNR.
 # REQUIRED INPUTS: motion table and echoes of the chunk
 # OUTPUTS: results/{run}/noisy/{group}-{part}.npy, complex64 (models, snrs, stations, symbols)
+from lowalt.workflow.stages.noise import Noise
+
+noise = Refusing(Noise(RUN))
 
 
 rule noise:
     input:
-        code=code("lowalt.noise", *options.noise_modules(config)),
-        motion=products.motion,
-        echoes=products.chunk_echoes,
-        powers=products.chunk_powers,
+        code=code("lowalt.noise", *noise.modules),
+        motion=expand("results/{{run}}/motion/{source}.csv", source=noise.source),
+        echoes=expand(
+            "results/{{run}}/echo/{source}/{station}.npy",
+            source=noise.source,
+            station=RUN.stations,
+        ),
+        powers=expand(
+            "results/{{run}}/echo/{source}/{station}.power.npy",
+            source=noise.source,
+            station=noise.power_stations,
+        ),
     output:
         "results/{run}/noisy/{group}-{part}.npy",
     log:
@@ -18,8 +30,8 @@ rule noise:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.noise,
-        powers=options.powers,
+        settings=noise.settings,
+        powers=given("powers"),
     shell:
         "python -m lowalt.noise --settings {params.settings:q} --motion {input.motion:q}"
         " --echoes {input.echoes:q} {params.powers:q} --out {output:q} 2> {log:q}"

@@ -1,4 +1,4 @@
-# Occluders: the opaque surfaces of a subtype, made only for scenes with the effect `occlusion`.
+# Occluders: the opaque surfaces of a subtype, made only for scenes whose effects need them.
 # REQUIRED INPUTS: as the cloud of the subtype
 # OUTPUTS: results/{run}/occluders/{subtype}.npz
 
@@ -6,7 +6,7 @@
 rule occluders:
     input:
         code=code("lowalt.targets.occluders"),
-        files=products.record_files,
+        files=targets.record_files,
     output:
         "results/{run}/occluders/{subtype}.npz",
     log:
@@ -16,6 +16,7 @@ rule occluders:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.cloud,
+        settings=targets.settings,
     shell:
-        "python -m lowalt.targets.occluders --settings {params.settings:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.targets.occluders --settings {params.settings:q} --out {output:q}"
+        " 2> {log:q}"

@@ -1,16 +1,28 @@
-# Recognition: freeze the simulated data, train every scheme in its protocols, predict, and make the tables.
+# Recognition: freeze the simulated data, train every scheme in its protocols, predict, and make
+# the tables.
 # REQUIRED INPUTS: results/{run}/shards/index.json and its shards, all clouds and motion tables
-# OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its companions; where the
-#          configuration names other runs, results/{run}/transfer.csv: their models on this run's test samples
+# OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its
+#          companions; where the configuration names other runs, results/{run}/transfer.csv: their
+#          models on this run's test samples
+from lowalt.workflow.stages.recognition import Recognition
+
+recognition = Refusing(Recognition(RUN))
 
 
 rule views:
     input:
-        unpack(products.reduced),
         code=code("lowalt.recognition", "lowalt.recognition.views"),
-        # All that is read of the index follows from the shard and from `render`; it grows where chunks are added.
+        # All that is read of the index follows from the shard and from `render`; it grows where
+        # chunks are added.
         index=ancient("results/{run}/shards/index.json"),
         shard="results/{run}/shards/{group}-{fold}-{part}{piece}.tar",
+        reduced=branch(
+            recognition.is_reduced, then="results/{run}/reduced/{size}/{group}-{part}.npy"
+        ),
+        motion=branch(
+            recognition.is_reduced,
+            then=expand("results/{{run}}/motion/{source}.csv", source=recognition.source),
+        ),
     output:
         "results/{run}/views/{size}/{group}-{fold}-{part}{piece}.npz",
     log:
@@ -20,12 +32,13 @@ rule views:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.views,
-        render=settings.index,
-        reduced=options.reduced_chunk,
+        settings=recognition.views,
+        render=shards.index_settings,
+        reduced=given("reduced", "motion"),
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}{wildcards.piece:q}.tar {params.reduced:q} --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}{wildcards.piece:q}.tar"
+        " {params.reduced:q} --out {output:q} 2> {log:q}"
 
 
 rule freeze:
@@ -40,15 +53,15 @@ rule freeze:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.recognition freeze --settings '{{}}' --files {input.clouds:q} {input.motion:q}"
-        " --out {output:q} 2> {log:q}"
+        "python -m lowalt.recognition freeze --settings '{{}}'"
+        " --files {input.clouds:q} {input.motion:q} --out {output:q} 2> {log:q}"
 
 
 rule distances:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.distances"),
         clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=RUN.subtypes),
-        motion=products.first_motion,
+        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=recognition.first_chunks),
     output:
         "results/{run}/distances.csv",
     log:
@@ -58,13 +71,13 @@ rule distances:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.recognition distances --settings '{{}}' --clouds {input.clouds:q} --motion {input.motion:q}"
-        " --out {output:q} 2> {log:q}"
+        "python -m lowalt.recognition distances --settings '{{}}' --clouds {input.clouds:q}"
+        " --motion {input.motion:q} --out {output:q} 2> {log:q}"
 
 
 rule train:
     input:
-        unpack(products.training_samples),
+        unpack(recognition.samples),
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
@@ -72,6 +85,7 @@ rule train:
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
+        backbone=recognition.backbone_file,
     output:
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.safetensors",
         history="results/{run}/models/{protocol}/{scheme}/{train_seed}/history.csv",
@@ -79,7 +93,8 @@ rule train:
         "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
     benchmark:
         "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
-    # Trainings with more images take longer. Start the longest first, so that no core waits for it at the end.
+    # Trainings with more images take longer. Start the longest first, so that no core waits for it
+    # at the end.
     priority: RUN.images_of_job
     conda:
         "../../envs/environment.yaml"
@@ -87,8 +102,8 @@ rule train:
     resources:
         gpu=RUN.gpus,
     params:
-        settings=settings.training,
-        source=options.samples,
+        settings=recognition.training,
+        source=given("dataset", "views", "index"),
         events=["--tensorboard"] if config["recognition"]["tensorboard"] else [],
     shell:
         "python -m lowalt.recognition train --settings {params.settings:q} {params.source:q}"
@@ -98,7 +113,7 @@ rule train:
 
 rule evaluate:
     input:
-        unpack(products.samples),
+        unpack(recognition.samples),
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
@@ -120,12 +135,13 @@ rule evaluate:
     resources:
         gpu=RUN.gpus,
     params:
-        settings=settings.evaluation,
-        source=options.samples,
-        backbone=settings.backbone,
+        settings=recognition.evaluation,
+        source=given("dataset", "views", "index"),
+        backbone=recognition.backbone,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
-        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q} --out {output.table:q} 2> {log:q}"
+        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q}"
+        " --out {output.table:q} 2> {log:q}"
 
 
 rule tables:
@@ -139,7 +155,14 @@ rule tables:
         report(
             multiext(
                 "results/{run}/",
-                *TABLES,
+                "accuracy.csv",
+                "confusion.csv",
+                "confusion_by_snr.csv",
+                "subtypes.csv",
+                "comparisons.csv",
+                "orderings.csv",
+                "alarms.csv",
+                "calibration.csv",
                 "seeds.csv",
                 "seen_test.csv",
                 "ranges.csv",
@@ -155,15 +178,16 @@ rule tables:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.seed,
+        settings=recognition.seed,
     shell:
-        "python -m lowalt.recognition tables --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --published {input.published:q} --schemes {input.schemes:q} --out results/{wildcards.run:q} 2> {log:q}"
+        "python -m lowalt.recognition tables --settings {params.settings:q}"
+        " --predictions {input.predictions:q} --published {input.published:q}"
+        " --schemes {input.schemes:q} --out results/{wildcards.run:q} 2> {log:q}"
 
 
 rule transfer_evaluate:
     input:
-        unpack(products.samples),
+        unpack(recognition.samples),
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
@@ -185,12 +209,13 @@ rule transfer_evaluate:
     resources:
         gpu=RUN.gpus,
     params:
-        settings=settings.evaluation,
-        source=options.samples,
-        backbone=settings.backbone,
+        settings=recognition.evaluation,
+        source=given("dataset", "views", "index"),
+        backbone=recognition.backbone,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
-        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q} --trained-on {wildcards.other:q} --out {output.table:q} 2> {log:q}"
+        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q}"
+        " --trained-on {wildcards.other:q} --out {output.table:q} 2> {log:q}"
 
 
 rule transfer:
@@ -208,7 +233,7 @@ rule transfer:
             other=config["recognition"]["transfer"],
             training=RUN.trainings,
         ),
-        configs=products.transferred,
+        configs=expand("results/{other}/config.yaml", other=recognition.transferred),
         schemes=config["recognition"]["table"],
     output:
         report(
@@ -221,7 +246,8 @@ rule transfer:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.seed,
+        settings=recognition.seed,
     shell:
-        "python -m lowalt.recognition transfer --settings {params.settings:q} --own {input.own:q} --other {input.other:q}"
-        " --configs {input.configs:q} --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.recognition transfer --settings {params.settings:q} --own {input.own:q}"
+        " --other {input.other:q} --configs {input.configs:q} --schemes {input.schemes:q}"
+        " --out {output:q} 2> {log:q}"

@@ -1,8 +1,11 @@
 # Report: one self-contained page of the run, and the table of the time that each stage took.
-# REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every job's benchmark;
-#                  where report.cost says so the echo's cost
-# OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html, results/{run}/stages.csv,
-#          results/{run}/figures (each plot as SVG and CSV)
+# REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every
+#                  job's benchmark; where report.cost says so the echo's cost
+# OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html,
+#          results/{run}/stages.csv, results/{run}/figures (each plot as SVG and CSV)
+from lowalt.workflow.stages.report import Report
+
+page = Refusing(Report(RUN))
 
 
 rule report_manifest:
@@ -14,16 +17,16 @@ rule report_manifest:
     conda:
         "../../envs/environment.yaml"
     params:
-        manifest=products.manifest,
+        manifest=page.manifest,
     shell:
         "printf '%s\\n' {params.manifest:q} > {output:q} 2> {log:q}"
 
 
 rule report:
     input:
-        unpack(products.report),
-        code=code("lowalt.report"),
-        templates=products.page_templates,
+        unpack(page.files),
+        code=page.code,
+        templates=page.templates,
         configuration="results/{run}/config.yaml",
         manifest="results/{run}/report.json",
     output:
@@ -36,7 +39,8 @@ rule report:
         "../../envs/environment.yaml"
     threads: 2
     params:
-        settings=settings.report,
+        settings=page.settings,
     shell:
-        "python -m lowalt.report --settings {params.settings:q} --manifest {input.manifest:q} --jobs {threads}"
-        " --stages {output.stages:q} --figures {output.figures:q} --out {output.page:q} 2> {log:q}"
+        "python -m lowalt.report --settings {params.settings:q} --manifest {input.manifest:q}"
+        " --jobs {threads} --stages {output.stages:q} --figures {output.figures:q}"
+        " --out {output.page:q} 2> {log:q}"

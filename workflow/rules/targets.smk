@@ -1,12 +1,16 @@
 # Targets: one calibration point cloud per subtype, from a built-in model, a mesh or a recording.
-# REQUIRED INPUTS: config/targets.csv and the record files; the user's files where a record names one.
+# REQUIRED INPUTS: config/targets.csv and the record files; the user's files where a record names
+#                  one.
 # OUTPUTS: results/{run}/clouds/{subtype}.npz, results/{run}/clouds.png
+from lowalt.workflow.stages.targets import Targets
+
+targets = Refusing(Targets(RUN))
 
 
 rule cloud:
     input:
         code=code("lowalt.targets"),
-        files=products.record_files,
+        files=targets.record_files,
     output:
         "results/{run}/clouds/{subtype}.npz",
     log:
@@ -16,7 +20,7 @@ rule cloud:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.cloud,
+        settings=targets.settings,
     shell:
         "python -m lowalt.targets --settings {params.settings:q} --out {output:q} 2> {log:q}"
 

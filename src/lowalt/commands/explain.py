@@ -13,10 +13,11 @@ import numpy as np
 
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import merge, overlaid
-from lowalt.config.plan import Plan
 from lowalt.files.atomic import write_file
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
+from lowalt.machine.progress import announced
+from lowalt.shards.plan import Plan
 from lowalt.spectra.catalogue import named
 from lowalt.targets.records import records_of
 from lowalt.workflow.space import cubes_sentence, cubes_size
@@ -87,19 +88,23 @@ def run(options: argparse.Namespace) -> Answer:
     print(
         "lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True
     )
-    chosen = explanation.samples(config, inputs, options.sample)
+    with announced("lowalt explain: making samples"):
+        chosen = explanation.samples(config, inputs, options.sample)
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
     listed = options.levels or options.json
-    findings = [
-        explanation.finding(scene, end, sample, clouds, listed)
-        for sample in chosen
-        for end in stations
-    ]
+    findings = []
+    with announced("lowalt explain: reading each station"):
+        for sample in chosen:
+            for station in stations:
+                findings.append(explanation.finding(scene, station, sample, clouds, listed))
     changes = []
     if not options.no_table or options.suggest is not None:
         print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
         names = [station.name for station in stations] if options.model else [first]
-        changes = explanation.changes(config, chosen, names, _shown(config, names, options.model))
+        with announced("lowalt explain: leaving out and adding every effect"):
+            changes = explanation.changes(
+                config, chosen, names, _shown(config, names, options.model)
+            )
     if options.out is not None:
         overlay: dict = {}
         for path in options.scene:
@@ -145,7 +150,7 @@ def _shown(
     renderer = Renderer(seen, whole.spectra, whole.images)
     if model is not None:
         from lowalt.recognition.predict_sample import answer
-        from lowalt.recognition.zoo import opened
+        from lowalt.recognition.runs import opened
         from lowalt.tiles import split
 
         trained, _ = opened(model)

@@ -11,7 +11,8 @@ from lowalt.config.extensions import module_offered, offered
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
-from lowalt.recognition.zoo_files import path_of
+from lowalt.machine.progress import announced
+from lowalt.recognition.named_models import path_of
 
 
 def add_to(commands: argparse._SubParsersAction, name: str) -> None:
@@ -53,10 +54,11 @@ def run(options: argparse.Namespace) -> Answer:
     if sys.stderr.isatty():
         print("lowalt predict: loading the network", file=sys.stderr, flush=True)
     from lowalt.recognition.predict_sample import predict
-    from lowalt.recognition.zoo import opened
+    from lowalt.recognition.runs import opened
 
     own = options.backbone or (config["recognition"]["network"]["backbone"] if config else "")
-    model, settings = opened(options.model, trusted=own)
+    with announced("lowalt predict: loading the network"):
+        model, settings = opened(options.model, trusted=own)
     if reader:
         return Answer(*reader.answer(model, settings, content, str(options.input)))
     if "radar" in settings and options.input.suffix == ".npy":

@@ -12,12 +12,13 @@ from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
 from lowalt.config.layers import SCHEMA, check, of_run
-from lowalt.config.named_code import allowed, refuse_effects
+from lowalt.config.named_code import allowed
 from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import as_named, located, shipped
 from lowalt.files.yaml_files import load_yaml
+from lowalt.scene.trust import refuse_effects
 
 BASE = "config/default.yaml"
 

@@ -14,6 +14,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any, NamedTuple
 
+import lowalt
 from lowalt.config.core_commands import CORE_COMMANDS, Command
 from lowalt.files.errors import InputError, shown
 from lowalt.files.package_plan import PACKAGE
@@ -39,21 +40,36 @@ class AddedEffect(NamedTuple):
 class Extension:
     """What an extension adds: mappings from names to modules, all of them empty by default.
 
-    commands: of `lowalt NAME`; effects: of the block `effects`; spectra: of the block `spectra`,
-    modules that keep `lowalt.spectra.interface`; readers: of inputs of `lowalt predict` by the
-    suffix of the file, modules that offer `read(path)` and `answer(model, settings, content,
-    name)`; comparisons: what `lowalt compare` takes besides runs, modules that offer
-    `compared_named(first, second)`; sections: of the report by the name of the file in its manifest
-    without which the page has no such section, modules that offer `values(run)` beside a template
-    of the same name.
+    A suffix that the core reads or writes itself remains the core's.
     """
 
     commands: Mapping[str, Command] = field(default_factory=dict)
+    """Of `lowalt NAME`."""
     effects: Mapping[str, AddedEffect] = field(default_factory=dict)
+    """Of the block `effects`."""
     spectra: Mapping[str, str] = field(default_factory=dict)
+    """Of the block `spectra`: modules that keep `lowalt.spectra.interface`."""
+    functions: Mapping[str, str] = field(default_factory=dict)
+    """That programs call as `lowalt.NAME`: modules that offer a function of this name."""
+    meshes: Mapping[str, str] = field(default_factory=dict)
+    """Formats of targets' meshes by suffix: modules that offer `pieces(path)` and, where the format
+    states them, METRES of its unit and its axis UP."""
     readers: Mapping[str, str] = field(default_factory=dict)
+    """Of inputs of `lowalt predict` by suffix: modules that offer `read(path)` and `answer(model,
+    settings, content, name)`."""
+    stores: Mapping[str, str] = field(default_factory=dict)
+    """Of data sets by the scheme of their addresses, such as https: modules that offer `span`,
+    `beside` and `fetched` as `lowalt.extensions.formats.web_files` does."""
+    models: Mapping[str, str] = field(default_factory=dict)
+    """Collections of trained models: modules that offer `names()` and `path_of(name)`."""
+    exports: Mapping[str, str] = field(default_factory=dict)
+    """Formats of trained models by suffix: modules that offer `export(trained, out)`."""
     comparisons: Mapping[str, str] = field(default_factory=dict)
+    """What `lowalt compare` takes besides runs: modules that offer `compared_named(first,
+    second)`."""
     sections: Mapping[str, str] = field(default_factory=dict)
+    """Of the report, by the name of the file in its manifest without which the page has no such
+    section: modules that offer `values(run)` beside a template of the same name."""
 
 
 KINDS = {
@@ -63,7 +79,7 @@ KINDS = {
 """Type of what an extension offers under a name, by the fields of `Extension`."""
 
 
-class Found(NamedTuple):
+class Installed(NamedTuple):
     """The extensions of this installation by their names, their packages, and a sentence for each
     left out.
     """
@@ -111,7 +127,13 @@ def _core_names() -> dict[str, set[str]]:
     """
     effects = {path.stem for path in PACKAGE.glob("scene/effects/*/*.py")}
     spectra = {path.stem for path in PACKAGE.glob("spectra/kinds/*.py")}
-    return {"commands": {*CORE_COMMANDS}, "effects": effects, "spectra": spectra}
+    rooms = {path.stem for path in PACKAGE.iterdir()}
+    return {
+        "commands": {*CORE_COMMANDS},
+        "effects": effects,
+        "spectra": spectra,
+        "functions": {*lowalt.__all__, *rooms},
+    }
 
 
 def _taken(extension: Extension, others: dict[str, Extension]) -> str:
@@ -130,7 +152,7 @@ def _taken(extension: Extension, others: dict[str, Extension]) -> str:
 
 
 @functools.cache
-def found() -> Found:
+def found() -> Installed:
     """Return the extensions that are installed, read once per process; a faulty one is left out
     whole.
 
@@ -159,7 +181,7 @@ def found() -> Found:
             continue
         extensions[point.name] = extension
         packages[point.name] = point.dist.name if point.dist else "an unknown package"
-    return Found(extensions, packages, faults)
+    return Installed(extensions, packages, faults)
 
 
 def offered(kind: str) -> dict[str, Any]:

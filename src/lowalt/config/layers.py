@@ -148,8 +148,8 @@ def load(layers: Iterable[str | Path | dict], schema_path: str | Path) -> dict:
     A file that is not in the working directory is taken from the package.
     Raises: InputError naming file, key and value.
 
-        >>> config = load(["config/default.yaml", "config/tiny.yaml"],
-        "workflow/schemas/config.schema.yaml")
+        >>> paths = ["config/default.yaml", "config/tiny.yaml"]
+        >>> config = load(paths, "workflow/schemas/config.schema.yaml")
         >>> config["run"], config["noise"]["snr_db"]
         ('tiny', [3, inf])
     """

@@ -1,10 +1,9 @@
-"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py, and files that effects
-read.
+"""User code that a setting names, FILE.py:FUNCTION or an effect's FILE.py.
 
-Only the user may choose them.
+Only the user may choose it.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from lowalt.files.errors import InputError
@@ -24,29 +23,6 @@ def own_effects(effects: Iterable[str]) -> list[str]:
     return sorted(name for name in effects if name.endswith(".py"))
 
 
-def buildings_of(effects: Mapping[str, dict | None]) -> str | None:
-    """Return the file of buildings that an `effects` block names, None for none."""
-    return (effects.get("town") or {}).get("buildings")
-
-
-def refuse_effects(effects: Mapping[str, dict | None], where: str | Path) -> None:
-    """Refuse effects of the user's own, and files that effects read, in what may be a stranger's
-    file or folder.
-
-    Raises: InputError naming the effect.
-    """
-    if buildings := buildings_of(effects):
-        raise InputError(
-            f"{where}: its effect 'town' reads the file {buildings!r}, which a file may not choose; expected an "
-            "overlay of your own that names it"
-        )
-    for name in own_effects(effects):
-        raise InputError(
-            f"{where}: its effect {name!r} is code, which a file may not choose; expected an overlay of your own that "
-            "names it"
-        )
-
-
 def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME) -> str:
     """Return the backbone of a file that names `name`; trusted: the FILE.py:FUNCTION that the user
     names, or "".
@@ -57,8 +33,8 @@ def allowed(name: str, trusted: str, where: str | Path = "", how: str = BY_NAME)
     if file_of(name) is None:
         return name
     if file_of(trusted) is None:
-        place = f"{where}: " if where else ""
+        source = f"{where}: " if where else ""
         raise InputError(
-            f"{place}its backbone {name!r} is code, which a file may not choose; expected {how}"
+            f"{source}its backbone {name!r} is code, which a file may not choose; expected {how}"
         )
     return trusted

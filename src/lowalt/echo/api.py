@@ -61,8 +61,8 @@ def echo_signal(
         >>> from lowalt.config.layers import overlaid
         >>> network = Network.from_settings(overlaid([])["network"])
         >>> point = np.array([200.0, 100.0, 60.0])
-        >>> positions = np.tile(point, (network.symbols, 1, 1))
-        >>> result = echo_signal(network, network.stations[0], positions, 0.01, point)
+        >>> still = np.tile(point, (network.symbols, 1, 1))
+        >>> result = echo_signal(network, network.stations[0], still, 0.01, point)
         >>> result.signal.shape, int(result.cell[0]), result.bound < 1e-12
         ((400,), 46, True)
     """
@@ -131,7 +131,7 @@ def prepared(network, station, motion, rcs_m2, aim_m, sample):
     if station.transmitter is not None:
         raise InputError(
             f"{_named(sample)}station {station.name} is a link between two stations, expected a "
-            "station that hears itself; scenes with effects.direct_path have links"
+            "station that hears itself; only scenes with effects have links"
         )
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
     radio = radar(network, station)

@@ -28,9 +28,16 @@ DRAFTING = Extension(
             "your own mesh or robot: look, draft a record, make its cloud",
             "lowalt target inspect inputs/mydrone.stl",
         )
-    }
+    },
+    functions={"draft_target": f"{_HERE}.drafting.scaled"},
+    meshes={
+        ".glb": f"{_HERE}.drafting.mesh_glb",
+        ".ply": f"{_HERE}.drafting.mesh_ply",
+    },
 )
-"""Drafts of records from meshes, robots' descriptions and data sheets."""
+"""Drafts of records from meshes, robots' descriptions and data sheets, and further formats of
+meshes.
+"""
 
 RECORDINGS = Extension(
     commands={
@@ -41,6 +48,7 @@ RECORDINGS = Extension(
         )
     },
     readers={".yaml": f"{_HERE}.recordings.predicted"},
+    functions={"inspect_recording": f"{_HERE}.recordings.file_inspection"},
 )
 """Recordings of radars, and their twins."""
 
@@ -57,5 +65,11 @@ BENCHMARK = Extension(
 )
 """The benchmark lowalt-40."""
 
-FORMATS = Extension(readers={})
-"""Files for other tools."""
+FORMATS = Extension(
+    stores=dict.fromkeys(("http", "https"), f"{_HERE}.formats.web_files"),
+    models={"zoo": f"{_HERE}.formats.zoo_files"},
+    exports={".onnx": f"{_HERE}.formats.onnx_export"},
+)
+"""Files for other tools: data sets on web servers, the zoo of small models, ONNX, and SigMF by
+`python -m lowalt.extensions.formats.sigmf`.
+"""

@@ -11,16 +11,28 @@ from pathlib import Path
 from lowalt.files.atomic import replacing, text_file
 from lowalt.files.errors import InputError, shown
 
+COMPRESSED = {"gzip": b"\x1f\x8b", "zip": b"PK\x03\x04"}
+"""First bytes of compressed files."""
+
 
 def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[str, str]]:
     """Return a CSV file's rows as dicts of text; what: the file in words, for errors.
 
-    Raises: InputError naming the file and the columns it lacks, or the line whose number of cells
-    differs.
+    Raises: InputError naming the file and the columns that it lacks or has twice, the line whose
+    number of cells differs, a compressed file, and one whose cells are separated by semicolons.
     """
+    _refuse_compressed(path, what)
     with text_file(path, what) as file:
         reader = csv.reader(file)
         columns = next(reader, [])
+        if len(columns) == 1 and ";" in columns[0]:
+            raise InputError(
+                f"{path}: cells are separated by semicolons, expected commas and points in numbers"
+            )
+        if twice := sorted({name for name in columns if columns.count(name) > 1}):
+            raise InputError(
+                f"{path}: column {shown(twice[0])} stands twice, expected every column once"
+            )
         missing = set(needed) - set(columns)
         if missing:
             raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {columns}")
@@ -32,6 +44,19 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
                 )
             rows.append(dict(zip(columns, cells, strict=True)))
         return rows
+
+
+def _refuse_compressed(path: str | Path, what: str) -> None:
+    """Refuse a file that gzip or zip has compressed. Raises: InputError naming it."""
+    if not Path(path).is_file():
+        return
+    with Path(path).open("rb") as file:
+        begins = file.read(4)
+    for name, mark in COMPRESSED.items():
+        if begins.startswith(mark):
+            raise InputError(
+                f"{path}: {what} is compressed ({name}), expected plain text; unpack it first"
+            )
 
 
 def number(row: Mapping[str, str], column: str, path: str | Path) -> float:

@@ -158,7 +158,10 @@ VECTOR = kernel(fastmath=_REORDERED, **_LEAN)
 """As LEAN, and the compiler may reorder sums and fuse products, so that it can vectorise loops."""
 INNER_VECTOR = kernel(inner=True, fastmath=_REORDERED, **_LEAN)
 """As VECTOR, for functions that only kernels call."""
-ORDERED = kernel(fastmath={*_REORDERED, "nnan"}, **_LEAN)
-"""As VECTOR, and NaN is not expected, so that minima and maxima can be vectorised."""
-INNER_ORDERED = kernel(inner=True, fastmath={*_REORDERED, "nnan"}, **_LEAN)
+_ORDERED = {"nnan", "nsz"}
+ORDERED = kernel(fastmath=_ORDERED, **_LEAN)
+"""As LEAN, and neither NaN nor the sign of a zero matters, so that minima and maxima can be
+vectorised; sums keep their order.
+"""
+INNER_ORDERED = kernel(inner=True, fastmath=_ORDERED, **_LEAN)
 """As ORDERED, for functions that only kernels call."""

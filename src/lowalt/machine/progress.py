@@ -1,14 +1,17 @@
 """The progress of a long command, as lines in its log for users and the workflow's display.
 
 A line is `progress 340/2000 steps`; the last one is current. Commands write to their log (standard
-error) at most every two seconds, so short ones write none.
+error) at most every two seconds, so short ones write none. A step that cannot count its parts is
+`announced`.
 """
 
 import os
 import re
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, TextIO, TypeVar
 
@@ -53,6 +56,30 @@ class Reporter:
                 file=self._stream or sys.stderr,
                 flush=True,
             )
+
+
+@contextmanager
+def announced(words: str, stream: TextIO | None = None, every_s: float = EVERY_S) -> Iterator[None]:
+    """Write every `every_s` seconds that a step goes on which cannot count its parts: its words and
+    its seconds.
+    """
+    ended = threading.Event()
+    began = time.monotonic()
+
+    def write() -> None:
+        """Write until the step has ended."""
+        while not ended.wait(every_s):
+            print(
+                f"{words}, {time.monotonic() - began:.0f} s", file=stream or sys.stderr, flush=True
+            )
+
+    writer = threading.Thread(target=write, daemon=True)
+    writer.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        writer.join()
 
 
 def reported(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:

@@ -48,8 +48,8 @@ def polynomials(count: int, at: np.ndarray) -> np.ndarray:
     return result
 
 
-def _to_terms(count: int, terms: int) -> np.ndarray:
-    """The matrix (count, terms) from values at `chebyshev_points(count)` to the first terms of
+def to_terms(count: int, terms: int) -> np.ndarray:
+    """Return the matrix (count, terms) from values at `chebyshev_points(count)` to the first terms of
     their series.
     """
     # Whole turns of a cosine are left out as whole numbers.
@@ -65,7 +65,7 @@ def interpolation(count: int, at: np.ndarray) -> np.ndarray:
 
     Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
     """
-    return matrix_product(_to_terms(count, count), polynomials(count, np.clip(at, -1.0, 1.0)))
+    return matrix_product(to_terms(count, count), polynomials(count, np.clip(at, -1.0, 1.0)))
 
 
 @lru_cache(maxsize=64)
@@ -90,9 +90,9 @@ def band_tables(
     # Bessel functions.
     places = chebyshev_points(orders + SPARE)
     sine, cosine = sine_cosine(argument * points[:, None] * places)
-    to_terms = _to_terms(orders + SPARE, orders)
-    real = matrix_product(cosine, to_terms).T
-    imag = -matrix_product(sine, to_terms).T
+    to_series = to_terms(orders + SPARE, orders)
+    real = matrix_product(cosine, to_series).T
+    imag = -matrix_product(sine, to_series).T
     weights = interpolation(nodes, points)[:, None, None]
     parts = np.block([[real, imag], [-imag, real]]).reshape(1, 2 * orders, 2, kept)
     to_nodes = (weights * parts).reshape(2 * nodes * orders, 2 * kept)
@@ -151,7 +151,7 @@ def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.n
     half = max(0.5 * float(np.ptp(places)), 1e-12)
     for count in (8, 16, 32, 64) if places.size > 256 else ():
         values = function(middle + half * chebyshev_points(count)).astype(np.complex128)
-        parts = matrix_product(np.stack([values.real, values.imag]), _to_terms(count, count))
+        parts = matrix_product(np.stack([values.real, values.imag]), to_terms(count, count))
         terms = parts[0] + 1j * parts[1]
         if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
             out = np.empty(places.shape, np.complex128)

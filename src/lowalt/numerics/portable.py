@@ -147,6 +147,11 @@ def exp(x: np.ndarray | float) -> np.ndarray:
     return np.ldexp(1.0 - ((low - (rest * c) / (2.0 - c)) - high), twos.astype(np.int32))
 
 
+def from_decibels(level_db: np.ndarray | float) -> np.ndarray:
+    """Return 10^(x / 10), the ratio of powers of levels (dB) of any shape, within 3000 dB of 0."""
+    return exp(0.1 * LN_10 * np.asarray(level_db, np.float64))
+
+
 def log(x: np.ndarray | float) -> np.ndarray:
     """Return the natural logarithm of positive numbers of any shape."""
     mantissa, twos = np.frexp(np.asarray(x, np.float64))

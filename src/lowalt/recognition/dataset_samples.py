@@ -14,6 +14,7 @@ import numpy as np
 
 from lowalt.config.classes import label
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import reported
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import columns_in
@@ -22,7 +23,8 @@ from lowalt.scene.set_noise import in_all_cells
 from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.maker import Maker
-from lowalt.shards.sample_record import record, sample_key
+from lowalt.shards.sample_list import sample_key
+from lowalt.shards.sample_record import record
 from lowalt.shards.write import select
 from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import named, of_cells
@@ -80,7 +82,15 @@ def views_of(
     row: of a motion table, at the SNR snr_db (dB); stations: the stations to compute, as
     `stations_of` returns them; all by default.
     """
-    signal = maker.signal(row, snr_db, stations)
+    return images_of(maker, row, snr_db, maker.signal(row, snr_db, stations), columns, size)
+
+
+def images_of(
+    maker: Maker, row: dict, snr_db: float, signal: np.ndarray, columns: list[int], size: int
+) -> np.ndarray:
+    """Return the index images (len(columns), size, size) uint8 of a sample's signal (stations,
+    symbols).
+    """
     images = maker.renderer.some(signal, columns, maker.late(row), maker.shown(row, snr_db, signal))
     return images if images.shape[-1] == size else resize(images, size)
 
@@ -163,7 +173,7 @@ class DatasetSamples(samples.Samples):
         heard = len(maker.network.stations if self.stations is None else self.stations)
         if 8 * heard * maker.network.symbols * len(used) <= CLEAN_BYTES:
             maker.kept = max(maker.kept, len(used))
-            for number in used:
+            for number in reported(used, len(used), "models"):
                 maker.received(self.rows[number], stations=self.stations)
 
     def keep(self, numbers: np.ndarray) -> None:

@@ -1,70 +1,31 @@
-"""A trained model for other programs: index images in, class probabilities out, as ONNX; or its
-weights and records as safetensors, with a card.
+"""A trained model for others: its weights and records as safetensors with a card, or a format that
+an extension writes.
 """
 
 from pathlib import Path
 
-import torch
-from torch import nn
-
-from lowalt.files.atomic import replacing
-from lowalt.files.errors import InputError, install_command
+from lowalt.config.extensions import module_offered, offered
+from lowalt.files.errors import InputError
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.runs import Trained
 
-
-class Probabilities(nn.Module):
-    """The network with its softmax: index images (B, views, size, size) uint8 -> probabilities (B,
-    classes).
-    """
-
-    def __init__(self, model: nn.Module) -> None:
-        """model: a Recogniser in evaluation mode."""
-        super().__init__()
-        self.model = model
-
-    def forward(self, index: torch.Tensor) -> torch.Tensor:
-        """Index images of the scheme's views, station-major -> class probabilities."""
-        return self.model(index).softmax(1)
+OWN = ".safetensors"
 
 
 def export(trained: Trained, out: str | Path) -> None:
-    """Write the model as ONNX (.onnx), for any batch size; or its weights and records
-    (.safetensors) with a card (.md) next to them.
+    """Write the model's weights and records (.safetensors) with a card (.md) next to them, or as
+    the extension that offers the suffix writes it.
 
-    Raises: InputError for another suffix, or where ONNX is asked for and its packages are not
-    installed.
+    Raises: InputError for a suffix that nobody writes, or as the extension does.
     """
     suffix = Path(out).suffix
-    if suffix not in (".onnx", ".safetensors"):
-        raise InputError(f"--out {out}: expected a name ending in .safetensors or .onnx")
-    if suffix == ".safetensors":
-        content = model_file.of_run(trained.path)
-        model_file.write(out, content)
-        model_card.write(
-            out,
-            content,
-            model_card.accuracy_rows(trained.path, trained.protocol, trained.scheme.name),
-        )
+    writers = offered("exports")
+    if suffix in writers:
+        module_offered("exports", suffix, writers[suffix]).export(trained, out)
         return
-    model = Probabilities(trained.model).eval()
-    # Two samples, since a batch of one would be taken for a constant.
-    example = torch.zeros(
-        2, len(trained.scheme.columns), trained.size, trained.size, dtype=torch.uint8
-    )
-    dynamic = {"index": {0: torch.export.Dim("batch")}}
-    with torch.no_grad(), replacing(out) as temporary:
-        try:
-            torch.onnx.export(
-                model,
-                (example,),
-                temporary,
-                dynamic_shapes=dynamic,
-                dynamo=True,
-                external_data=False,
-            )
-        except ImportError as error:
-            raise InputError(
-                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected "
-                f"`{install_command('export')}`"
-            ) from error
+    if suffix != OWN:
+        raise InputError(f"--out {out}: expected a name ending in {' or '.join([OWN, *writers])}")
+    content = model_file.of_run(trained.path)
+    model_file.write(out, content)
+    rows = model_card.accuracy_rows(trained.path, trained.protocol, trained.scheme.name)
+    model_card.write(out, content, rows)

@@ -5,7 +5,8 @@ The file's metadata has one entry, `lowalt`, a JSON object (the library writes s
 random order):
     identity    all that determined the weights, as in the training's checkpoint: settings, scheme,
     protocol, SHA-256 of
-                the samples, version of torch
+                the samples, version of torch; trained_on, the [subtype, fold, motion models] of
+                those that trained
     model       scheme, protocol, network, size, seed, colour_map, classes; start, where it had one
     run         content of the training's run.json; {} where there was none
     input       network, spectra and images of the run's configuration; {} where there was none

@@ -57,9 +57,9 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
 
     A signal of three stations, by a model of the zoo:
 
-        >>> from lowalt.recognition.zoo import opened
-        >>> np.save("sample.npy", np.exp(1j * np.arange(1200).reshape(3, 400) **
-        1.4).astype(np.complex64))
+        >>> from lowalt.recognition.runs import opened
+        >>> signal = np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4)
+        >>> np.save("sample.npy", signal.astype(np.complex64))
         >>> model, settings = opened("default-seen")
         >>> list(predict(model, Path("sample.npy"), settings))
         ['UAV', 'Bird', 'Vehicle', 'Pedestrian']

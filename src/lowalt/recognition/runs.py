@@ -28,8 +28,9 @@ from lowalt.recognition import checkpoint, inference, model_file, predictions, r
 from lowalt.recognition.batches import Prefetch, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import ModelFile
+from lowalt.recognition.named_models import path_of
 from lowalt.recognition.recogniser import built
-from lowalt.recognition.samples import Samples, first_models
+from lowalt.recognition.samples import Samples, first_models, statement
 from lowalt.recognition.schemes import Scheme, of_record
 from lowalt.recognition.training import Trainer, TrainingRun, tensorboard
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
@@ -143,6 +144,7 @@ def _identity(
         settings={**settings, "training": {**settings["training"], **replaced}},
         samples={part: source.sha256() for part, source in samples.items()},
         torch=torch.__version__,
+        trained_on=statement(samples["train"].facts),
         **({"own": sha256(code)} if code and code.is_file() else {}),
     )
 
@@ -171,6 +173,20 @@ def load(path: str | Path, trusted: str = "", build: Build = built) -> Trained:
     Raises: InputError where the file is missing, damaged or not a model of this project.
     """
     return of_file(model_file.read(path), path, trusted, build)
+
+
+def opened(model: str | Path, trusted: str = "") -> tuple["Trained", dict]:
+    """Return a trained model and how its images are made of signals ({network, spectra, images}; {}
+    where unknown).
+
+    model: a model file (.safetensors) of a training or another, or a name that
+    `named_models.path_of` knows; trusted: the user's FILE.py:FUNCTION for a model whose backbone is
+    such code.
+    Raises: InputError naming the models there are, or the fault of the file.
+    """
+    path = path_of(model)
+    content = model_file.read(path)
+    return of_file(content, path, trusted), content.input
 
 
 def of_file(

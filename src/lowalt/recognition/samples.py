@@ -84,6 +84,20 @@ def first_models(facts: Facts, share: float) -> np.ndarray:
     return np.flatnonzero(chosen)
 
 
+def statement(facts: Facts) -> list[list]:
+    """Return what a trained model states of its samples: [subtype, fold, number of motion models],
+    sorted.
+    """
+    motion = facts.motion
+    found = []
+    for subtype in np.unique(facts.subtype).tolist():
+        of_subtype = facts.subtype == subtype
+        for fold in np.unique(facts.fold[of_subtype]).tolist():
+            models = np.unique(motion[of_subtype & (facts.fold == fold)])
+            found.append([subtype, fold, len(models)])
+    return found
+
+
 def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
     """Return the SHA-256 of keys, labels, subtypes, models and SNRs of some samples, and of
     `content`.

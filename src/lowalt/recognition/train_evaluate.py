@@ -12,7 +12,7 @@ from lowalt.config.network import station_names
 from lowalt.files.csv_tables import number, read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located, shipped
-from lowalt.recognition import inference, runs, zoo
+from lowalt.recognition import inference, runs
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.sample_sources import Source
@@ -75,7 +75,7 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path, backbone: str = 
     calibration.
     Raises: InputError for a run that is not finished, or a model that does not fit its images.
     """
-    trained = model if isinstance(model, runs.Trained) else zoo.opened(model, trusted=backbone)[0]
+    trained = model if isinstance(model, runs.Trained) else runs.opened(model, backbone)[0]
     config, index = _opened(run)
     settings = config["recognition"]["evaluation"]
     machine = Machine.here(inference.evaluation(settings)[2])

@@ -1,7 +1,7 @@
 """The run that the sections of the page show: its files, its configuration and its shards."""
 
+from lowalt.config.blocks import snrs_of
 from lowalt.config.network import station_names
-from lowalt.config.plan import snrs_of
 from lowalt.report.inputs import Inputs
 from lowalt.shards import ShardSet
 

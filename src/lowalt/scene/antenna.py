@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.config.network import Station
-from lowalt.machine.jit import VECTOR, kernel
-from lowalt.numerics.portable import TANGENT
+from lowalt.machine.jit import LEAN, kernel
+from lowalt.numerics.portable import TANGENT, from_decibels, sine_cosine
 
 
 class Element(NamedTuple):
@@ -27,10 +27,8 @@ _ARCTANGENT = (1.0, *(-coefficient for coefficient in TANGENT))
 _A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7, _A8, _A9, _A10, _A11 = _ARCTANGENT
 
 
-_SCALAR = kernel(
-    forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"}
-)
-"""As VECTOR, and copied into the loop that calls it."""
+_SCALAR = kernel(forceinline=True, error_model="numpy", _nrt=False)
+"""As LEAN, and copied into the loop that calls it."""
 
 
 @_SCALAR
@@ -64,7 +62,7 @@ def pattern_db(element, azimuth_deg, zenith_deg):
     return element.gain_dbi - min(up + across, element.back_db)
 
 
-@VECTOR
+@LEAN
 def _gains_db(element, station, across, tilt, places, result):
     """Fill result (N, L) with the gains (dBi) toward places (N, 3, L) m; across: the array's axis;
     tilt: (cos, sin).
@@ -92,17 +90,17 @@ def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
     """
     places = np.asarray(places, np.float64)
     points = places if places.ndim == 3 else places.reshape(1, -1, 3)
-    tilt = np.radians(element.downtilt_deg)
+    sine, cosine = sine_cosine(np.radians(element.downtilt_deg))
     result = np.empty(points.shape[:2])
     _gains_db(
         Element(*map(float, element)),
         np.array(station.position_m, np.float64),
         station.horizontal,
-        (np.cos(tilt), np.sin(tilt)),
+        (float(cosine), float(sine)),
         np.ascontiguousarray(points.swapaxes(1, 2)),
         result,
     )
-    return np.exp(np.log(10.0) / 10.0 * result).reshape(places.shape[:-1])
+    return from_decibels(result).reshape(places.shape[:-1])
 
 
 def array_sum(count: int, x: np.ndarray) -> np.ndarray:

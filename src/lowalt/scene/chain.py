@@ -7,7 +7,7 @@ computes scenes whose effects change the motion only, and time samples are made 
 acts on them.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from itertools import zip_longest
@@ -34,8 +34,8 @@ class Received(NamedTuple):
     """The signal of one target at one station.
 
     signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells, -1 where no symbol was received;
-    power: the mean |Y_bin|^2 (W) of the target's own echo on the direct path, with occlusion,
-    aspect and fluctuation. The SNRs of the configuration refer to this power.
+    power: the mean |Y_bin|^2 (W) of the target's own echo on the direct path, with the amplitude
+    factors of effects. The SNRs of the configuration refer to this power.
     """
 
     signal: np.ndarray
@@ -54,7 +54,7 @@ class SceneSample:
         power: float | None = None,
     ):
         """Take the scene, the sample's view in it (`observe`), and the clouds of all subtypes, for
-        companions.
+        effects that add other targets.
 
         power: the reference of the configuration's SNRs (W), None for the power of the target's own
         echo.
@@ -67,63 +67,72 @@ class SceneSample:
         self.only = partial(only, scene.effects)
         self.all = partial(every, scene.effects)
         self.detection = [effect for effect in scene.effects if effect.place == "detection"]
-        self._waves = {
-            key: value for waves in self.all("waves").values() for key, value in waves().items()
-        }
+        self._waves: dict[str, bool] = {}
+        for waves in self.all("waves").values():
+            self._waves |= waves()
         self._factors: dict[tuple[View, str], np.ndarray] = {}
 
-    def weight(
-        self, view: View, names: Collection[str] | None = None, but: Collection[str] = ()
-    ) -> np.ndarray:
+    def weight(self, view: View, one_sided: bool | None = None) -> np.ndarray:
         """Return the product (N, L) of the amplitude factors that effects put on the points of a
         view.
 
-        names: effects to include, None for all; but: effects to leave out. Raises: InputError for a
-        wrong shape.
+        one_sided: True for the effects with ONE_SIDED alone, False for the others, None for all.
+        Raises: InputError for a wrong shape.
         """
         result = np.ones(view.places.shape[:2])
-        one_way = self.all("visible_one_way")
-        for name, visible in (self.all("visible") | one_way).items():
-            if name in but or (names is not None and name not in names):
+        # Factors of both ends come last, so that a product always has the same order.
+        for effect in sorted(self.scene.effects, key=lambda one: one.offers("visible_one_way")):
+            if not (effect.offers("visible") or effect.offers("visible_one_way")):
                 continue
-            if (view, name) not in self._factors:
-                ends = (
-                    [(end, end.station) for end in view.ends()]
-                    if name in one_way
-                    else [(view, self.view.station)]
-                )
-                function = "visible_one_way" if name in one_way else "visible"
-                shapes = [result.shape, (len(result), 1)]
-                factors = [
-                    numbers(
-                        name,
-                        function,
-                        visible(end, self.scene.drawn(view.row, station, name)),
-                        shapes,
-                        real=True,
-                    )
-                    for end, station in ends
-                ]
-                if len(factors) == 2 and (factors[0] * factors[1] < 0).any():
-                    raise InputError(
-                        f"{name}: factors of unlike signs at both ends of a link, expected none below 0"
-                    )
-                self._factors[view, name] = (
-                    factors[0] if len(factors) == 1 else np.sqrt(factors[0] * factors[1])
-                )
-            result *= self._factors[view, name]
+            if one_sided is not None and effect.offers("ONE_SIDED") != one_sided:
+                continue
+            key = view, effect.name
+            if key not in self._factors:
+                self._factors[key] = self._factor(view, effect)
+            result *= self._factors[key]
         return result
+
+    def _factor(self, view: View, effect: NamedEffect) -> np.ndarray:
+        """The amplitude factor (N, L) or (N, 1) of one effect on the points of a view.
+
+        A one-way factor of a link is the root of the product of those at both ends.
+        """
+        shapes = [view.places.shape[:2], (len(view.places), 1)]
+        if not effect.offers("visible_one_way"):
+            visible = self.all("visible")[effect.name]
+            rng = self.scene.drawn(view.row, self.view.station, effect.name)
+            return numbers(effect.name, "visible", visible(view, rng), shapes, real=True)
+        visible = self.all("visible_one_way")[effect.name]
+        factors = []
+        for end in view.ends():
+            rng = self.scene.drawn(view.row, end.station, effect.name)
+            factors.append(
+                numbers(effect.name, "visible_one_way", visible(end, rng), shapes, real=True)
+            )
+        if len(factors) == 1:
+            return factors[0]
+        product = factors[0] * factors[1]
+        if (product < 0).any():
+            raise InputError(
+                f"{effect.name}: factors of unlike signs at both ends of a link, expected none "
+                "below 0"
+            )
+        return np.sqrt(product)
 
     def paths(self, view: View) -> list[ImagePath]:
         """Return all paths but the direct one; on a link, those of the receiver, each with the
         sender's of its kind.
         """
-        adding = self.all("paths").values()
-        ends = [[path for paths in adding for path in paths(end)] for end in view.ends()]
+        ends = []
+        for end in view.ends():
+            seen: list[ImagePath] = []
+            for paths in self.all("paths").values():
+                seen += paths(end)
+            ends.append(seen)
         if len(ends) == 1:
             return ends[0]
-        # In a town the ends of a link may see different numbers of paths: pad the shorter list with
-        # paths of factor 0.
+        # Both ends of a link may see different numbers of paths: pad the shorter list with paths of
+        # factor 0.
         none = ImagePath(view.places, 0.0)
         return [there._replace(sender=here) for here, there in zip_longest(*ends, fillvalue=none)]
 
@@ -137,7 +146,8 @@ class SceneSample:
     @cached_property
     def targets(self) -> list[View]:
         """The views of the target and of its companions; all have the same beams and instants."""
-        view, result = self.view, [self.view]
+        view = self.view
+        result = [view]
         for name, companions in self.all("companions").items():
             cloud = self.clouds.get(view.cloud.subtype, view.cloud)
             for other, row in companions(
@@ -162,9 +172,8 @@ class SceneSample:
         if self._power is not None:
             return self._power
         cells = waveform.range_cells(self.direct)
-        return arriving_power(
-            np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0]
-        )
+        strongest = abs(cells).argmax(axis=1)
+        return arriving_power(cells[np.arange(len(cells)), strongest])
 
     def direct_echo(self, view: View) -> np.ndarray:
         """Return the target's frequency response (N, M) on the direct path, with the scene's
@@ -263,10 +272,12 @@ class SceneSample:
         """What the receiver and the detection know of the coherent processing interval (our
         "look").
         """
-        view, delay_s = self.view, float(self.view.ways_m(self.view.aim_m)) / SPEED_OF_LIGHT
-        data = self._data("waveform"), self.on_air("waveform")
+        view = self.view
+        delay_s = float(view.ways_m(view.aim_m)) / SPEED_OF_LIGHT
+        data = self._data("waveform")
+        aired = self.on_air("waveform")
         return waveform.Look(
-            self.scene.network, view.station, *data, view.times_s, self.power, delay_s
+            self.scene.network, view.station, data, aired, view.times_s, self.power, delay_s
         )
 
     @cached_property
@@ -291,13 +302,20 @@ class SceneSample:
             result = choose(result, cells, self.look, self.draws(name))
         return result
 
+    @property
+    def moves_only(self) -> bool:
+        """Whether the echo engine computes the sample: a station that sends and receives, and
+        effects that change nothing but the target's motion and its cross sections.
+        """
+        changing = [effect for effect in self.scene.effects if not effect.offers("cross_sections")]
+        return self.view.station.transmitter is None and all(
+            effect.place == "motion" for effect in changing
+        )
+
     def received(self) -> Received:
         """Return the sample's signal, the chosen range cells and the reference power."""
         view, sampling = self.view, self.view.sampling
-        beyond = [
-            effect for effect in self.scene.effects if not hasattr(effect.module, "cross_sections")
-        ]
-        if view.station.transmitter is None and all(effect.place == "motion" for effect in beyond):
+        if self.moves_only:
             echo = echo_signal(
                 self.scene.network,
                 view.station,
@@ -314,9 +332,9 @@ class SceneSample:
         if sampling is not None:
             if regridded := self.only("regridded"):
                 signal = regridded(signal, sampling, self.scene.network)
-            every = np.full(len(sampling.times_s), -1)
-            every[sampling.present] = chosen
-            chosen = every
+            of_all_symbols = np.full(len(sampling.times_s), -1)
+            of_all_symbols[sampling.present] = chosen
+            chosen = of_all_symbols
         return Received(signal, chosen, self.power)
 
     def without_target(self) -> "SceneSample":
@@ -331,10 +349,8 @@ class SceneSample:
         geometric truth.
         """
         ways_m = view.ways_m(view.places.mean(axis=1))
-        cells = (
-            np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
-        )
-        return self._present(cells)
+        cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64)
+        return self._present(cells % self.cells.shape[1])
 
     def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
         """Return where the echo of the middle of a view's target appears on the direct path: the
@@ -405,8 +421,8 @@ def received_signal(
     """Return the signal of the motion model `row` (motion table) at `station`, with the scene's
     effects.
 
-    occluders: the target's surfaces, for self-occlusion; clouds: the clouds of all subtypes, for
-    companions.
+    occluders: the target's surfaces, where an effect needs them; clouds: the clouds of all
+    subtypes, for effects that add other targets.
     Raises: InputError naming the sample that cannot be computed.
     """
     return SceneSample(scene, observe(scene, station, cloud, row, occluders), clouds).received()
@@ -423,8 +439,8 @@ def scene_signals(
     """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W
     of the motion table.
 
-    clouds: by subtype, companions included; occluders: each subtype's surfaces, needed for
-    self-occlusion; snrs (dB): given if the scene itself adds noise at set SNRs; the result has one
+    clouds: by subtype, those of other targets included; occluders: each subtype's surfaces, where an
+    effect needs them; snrs (dB): given if the scene itself adds noise at set SNRs; the result has one
     signal per SNR, (models, snrs, N).
     Raises: InputError naming the sample whose subtype has no cloud, or that cannot be computed.
     """
@@ -436,9 +452,9 @@ def scene_signals(
     for index, row in enumerate(reported(rows, len(rows), "models")):
         cloud = cloud_of(clouds, row)
         surfaces = occluders.get(row["subtype"])
-        for place, level in enumerate(levels):
+        for number, level in enumerate(levels):
             received = received_signal(level, station, cloud, row, surfaces, clouds)
-            result[index, place] = received.signal
+            result[index, number] = received.signal
             power[index] = received.power
     return result[:, 0] if snrs is None else result, power
 

@@ -6,17 +6,18 @@ from collections.abc import Collection, Mapping
 from types import ModuleType
 from typing import NamedTuple
 
+from lowalt.config.blocks import snrs_of
 from lowalt.config.network import Network
-from lowalt.config.plan import snrs_of
 from lowalt.files.errors import InputError
-from lowalt.scene.effects import PLACES, called, every, module_of
+from lowalt.scene.effects import called, complete, every, module_of, with_offer
 
 
 class CheckedScene(NamedTuple):
     """The part of a scene's configuration that an effect's `check` may look at.
 
     effects, modules: the complete settings and the module of every effect that is not idle, by
-    name; snr_db: the set SNRs; known_times: whether spectra use the instants of received symbols.
+    name; snr_db: the set SNRs; known_times: whether spectra use the instants of received symbols;
+    all_cells: whether range cells of all symbols are stored or shown.
     """
 
     network: Network
@@ -24,16 +25,30 @@ class CheckedScene(NamedTuple):
     modules: dict[str, ModuleType]
     snr_db: tuple[float, ...]
     known_times: bool
+    all_cells: bool = False
 
     @property
     def noisy(self) -> bool:
         """Whether noise is added at set SNRs."""
         return any(snr != float("inf") for snr in self.snr_db)
 
+    def offering(self, name: str) -> list[str]:
+        """Return the names of the effects that offer a name of the contract."""
+        return [effect for effect, module in self.modules.items() if getattr(module, name, False)]
 
-def check(config: dict) -> CheckedScene:
+    def saying(self, function: str) -> list[str]:
+        """Return the names of the effects whose function of their settings gives True."""
+        return [
+            name
+            for name in self.offering(function)
+            if getattr(self.modules[name], function)(self.effects[name])
+        ]
+
+
+def check(config: dict, all_cells: bool = False) -> CheckedScene:
     """Return the scene of a configuration whose effects fit together.
 
+    all_cells: whether the data set stores or shows range cells of all symbols.
     Raises: InputError naming the effect, the value and what was expected, before any job starts.
     """
     effects = called(config["effects"])
@@ -43,7 +58,9 @@ def check(config: dict) -> CheckedScene:
         {effect.name: effect.module for effect in effects},
         snrs_of(config),
         config.get("spectra", {}).get("times") == "known",
+        all_cells,
     )
+    refuse_same_waves(scene)
     refuse_unmodelled(scene.network, scene.modules)
     refuse_missing(scene.network, [module_of(name) for name in config["effects"]])
     coloured = [name for name, module in scene.modules.items() if hasattr(module, "SET_SNR")]
@@ -58,6 +75,28 @@ def check(config: dict) -> CheckedScene:
         if hasattr(effect.module, "check"):
             effect.module.check(effect.settings, scene)
     return scene
+
+
+def refuse_same_waves(scene: CheckedScene) -> None:
+    """Raise InputError where two effects reflect or block the same waves (WAVES)."""
+    owners: dict[str, str] = {}
+    for name in scene.offering("WAVES"):
+        for wave in scene.modules[name].WAVES:
+            other = owners.setdefault(wave, name)
+            if other != name:
+                raise InputError(
+                    f"effects: {other} together with {name}, which both hold the waves {wave}; "
+                    "expected one or the other"
+                )
+
+
+def refuse_unknown_subtypes(effects: dict, subtypes: Collection[str]) -> None:
+    """Raise InputError where an effect of an `effects` block needs clouds of other subtypes."""
+    for effect in complete(effects):
+        if unknown := sorted(set(effect.texts("subtypes")) - set(subtypes)):
+            raise InputError(
+                f"effects.{effect.name}.subtypes: {unknown}, expected subtypes of the run"
+            )
 
 
 def refuse_missing(network: Network, named: Collection[ModuleType]) -> None:
@@ -75,11 +114,9 @@ def refuse_missing(network: Network, named: Collection[ModuleType]) -> None:
         needed["heard"] = f"network.guard_subcarriers: {guard}, sub-bands overlap"
     for function, said in needed.items():
         if not any(hasattr(module, function) for module in named):
-            fit = " or ".join(
-                f"effects.{name}" for name in PLACES if hasattr(module_of(name), function)
-            )
             raise InputError(
-                f"{said}, expected {fit} in the same scene, or an own effect that offers {function}"
+                f"{said}, expected {with_offer(function)} in the same scene, or an own effect that "
+                f"offers {function}"
             )
 
 

@@ -12,15 +12,30 @@ DEFAULTS, and then the arguments that `takes` lists. It may also define
   `checks.CheckedScene`;
 - UNMODELLED, what the effect is not modelled with: "links" between two stations, the waveforms
   "fmcw" and "cw";
-- STILL, whether it adds echoes that stand still, which a canceller removes;
+- STILL, whether it adds echoes that stand still, which a filter over the symbols removes;
 - SET_SNR, the setting that holds an SNR of noise.snr_db: where it is null, the echo stage makes a
   signal for each SNR;
 - STREAM, the name of its random stream, its own by default: effects with the same STREAM draw the
   same numbers;
-- PARTS, settings that leave out a part of the effect, by the part's name: `lowalt explain` measures
-  each;
+- PARTS, settings that leave out one component of the effect, by the component's name: `lowalt
+  explain` measures each;
+- KINDS, settings of the kinds of the effect that `lowalt explain` compares, by the kind's name;
+- TRIED, of an effect of the detection: `lowalt explain` tries it where the scene does not name it;
 - DRAWN, for whom its stream is drawn: each "station" (default), the whole "look", or the "pair" of
-  a link's stations.
+  a link's stations;
+- FILES, the settings that hold the path of a file which the effect reads: jobs run again when the
+  file changes, and the file of a stranger may not choose it;
+- `files(settings)`, all files that the effect reads, where those of FILES name further ones;
+- `subtypes(settings)`, subtypes whose clouds it needs besides the target's own;
+- SURFACES, whether it needs the opaque surfaces of the target;
+- JUMPS, whether it draws the target's motion anew for each look, so that the looks of a track do
+  not join;
+- ONE_SIDED, whether its factor on amplitudes depends on the side that the target shows;
+- WAVES, what the effect does to waves between a station and a target, as words that it shares with
+  other effects: two effects with a word in common would count the same waves twice;
+- `gaps(settings)`, whether symbols of a look are not received;
+- `even(settings)`, whether it makes an evenly spaced signal that range cells of all symbols do not
+  hold.
 
 N symbols, M subcarriers or range cells, L points of a target; arrays are float64 or complex128.
 """
@@ -57,7 +72,8 @@ ARGUMENTS = {
     "timing": "`Sampling`",
     "view": "`View` of the target at the station",
     "wavelength_m": "wavelength of the carrier (m)",
-    "weight": "`SceneSample.weight`, the product of the amplitude factors of all or some effects",
+    "weight": "`SceneSample.weight`, the product of the amplitude factors of all effects, of those with "
+    "ONE_SIDED, or of the others",
 }
 """What functions take, with shapes and units."""
 
@@ -208,6 +224,13 @@ OFFERS = {
         "receiver", MANY, ("samples", "look", "rng"), "(N, M) time samples after the effect"
     ),
     "filtered": Offer("detection", MANY, ("cells",), "(N, M) range cells behind a linear filter"),
+    "record": Offer(
+        "",
+        MANY,
+        ("network", "row", "rng"),
+        "fields that it adds to the record of a sample, by name, alike for all SNRs; numbers, texts, "
+        "lists and dicts that JSON holds",
+    ),
     "choose": Offer(
         "detection", MANY, ("chosen", "cells", "look", "rng"), "(N,) chosen range cells"
     ),

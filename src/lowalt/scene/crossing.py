@@ -5,6 +5,7 @@ at the target.
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Station
+from lowalt.numerics.portable import norm
 from lowalt.scene.antenna import array_sum, gain
 from lowalt.scene.response import cosines
 from lowalt.scene.view import View
@@ -20,7 +21,7 @@ def crossing(view: View, sends: Station, hears: Station) -> tuple[np.ndarray, fl
     1946.
     """
     network = view.network
-    distance = float(np.linalg.norm(np.asarray(hears.position_m) - np.asarray(sends.position_m)))
+    distance = float(norm(np.asarray(hears.position_m) - np.asarray(sends.position_m)))
     elements = np.prod(network.transmit) * np.prod(network.receive)
     level = (
         np.sqrt(network.power / elements)

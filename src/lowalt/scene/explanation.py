@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import yaml
 
+from lowalt.config.blocks import motion_block
 from lowalt.config.network import Network, Station, masts_m
-from lowalt.config.plan import motion_block
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import reported
 from lowalt.motion.drawing import region_polygon
@@ -26,28 +26,25 @@ from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.checks import check
-from lowalt.scene.effects import PLACES, NamedEffect, called, module_of
+from lowalt.scene.effects import PLACES, NamedEffect, called, module_of, only
 from lowalt.scene.levels import Level, levels, table
 from lowalt.scene.observe import Scene, observe
+from lowalt.scene.truth import geometric
 from lowalt.targets import occluders
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 
-CANCELLERS = (
-    ("none", {"kind": "none"}),
-    ("mean", {"kind": "mean"}),
-    ("pulse, order 1", {"kind": "pulse", "order": 1}),
-    ("pulse, order 2", {"kind": "pulse", "order": 2}),
-    ("clutter", {"kind": "clutter"}),
-)
-"""Cancellers that a verdict compares."""
 CLOSE_CELLS = 1
 """A chosen range cell is right if it lies at most this many cells from the target's."""
 VISIBLE = 8
 """A pixel, 0 to 255, counts as changed if it changes by more than this."""
 FOUND = 0.9
 """A target counts as found if the range cell is right in at least this share of the symbols."""
+
+
+MOST_RATIO = 10
+"""A change that is larger than this multiple of the signal is written in dB."""
 
 
 class ExplainedSample(NamedTuple):
@@ -64,8 +61,7 @@ class Finding(NamedTuple):
     radial_mps: mean rate of the target's range over the look (m/s); right: share of symbols whose
     chosen cell is within one of the target's; over_db: power of the target in its cell over the
     mean power of the loudest cell of everything else, behind the filters (dB, inf without anything
-    else); otherwise: the share `right` with other detection: with each of CANCELLERS if the scene
-    has one, with and without a detector.
+    else); otherwise: the share `right` with other detections (`_other_detections`).
     """
 
     category: str
@@ -83,8 +79,9 @@ class Finding(NamedTuple):
 class Change(NamedTuple):
     """What leaving an effect out, or adding it, changes.
 
-    signal: root mean square of the signal's change over the signal's; cells: share of symbols with
-    another range cell;
+    signal: root mean square of the signal's change over the signal's, the mean over samples and
+    stations; by_class: the same of each class; cells: share of symbols with another range cell,
+    modulo the smaller number of cells where the effect changes that number;
     more: share of the pixels, or of a network's answers, that differ; ms: processor time of the
     effect per sample and station, a median; spread_ms: standard deviation of that time over samples
     and stations; also: a further change without which the scene would be refused; refused: why the
@@ -102,6 +99,7 @@ class Change(NamedTuple):
     also: str = ""
     refused: str = ""
     part: str = ""
+    by_class: dict[str, float] = {}  # noqa: RUF012
 
 
 def samples(
@@ -185,26 +183,13 @@ def finding(
     loudest = float((abs(background) ** 2).mean(axis=0).max())
     with np.errstate(divide="ignore"):
         over_db = 10 * np.log10(np.mean(abs(at_target) ** 2) / loudest) if loudest > 0 else np.inf
-    named = {effect.name for effect in sample.detection}
-    otherwise = {}
-    for kind, changed in CANCELLERS if "canceller" in named else (("", {}),):
-        detection = [
-            effect._replace(settings=effect.settings | changed)
-            if effect.name == "canceller"
-            else effect
-            for effect in sample.detection
-        ]
-        for added in ("",) if "detector" in named else ("", "detector"):
-            label = " and ".join(filter(None, (kind and f"canceller {kind}", added))) or "the same"
-            otherwise[label] = _right(
-                sample, detection + called({added: {}} if added else {}), target_cell
-            )
-    view, range_m = (
-        sample.view,
-        float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m))),
-    )
-    ways_m = view.ways_m(view.places.mean(axis=1))
-    radial_mps = float((ways_m[-1] - ways_m[0]) / (2 * (view.times_s[-1] - view.times_s[0])))
+    otherwise = {
+        label: _right(sample, detection, target_cell)
+        for label, detection in _other_detections(sample.detection).items()
+    }
+    view = sample.view
+    range_m = float(np.linalg.norm(view.aim_m - np.asarray(station.position_m)))
+    radial_mps = float(geometric(view)[:, 1].mean())
     return Finding(
         row["category"],
         row["subtype"],
@@ -217,6 +202,27 @@ def finding(
         otherwise,
         levels(sample.view, scene.effects, sample.power) if listed else [],
     )
+
+
+def _other_detections(detection: list[NamedEffect]) -> dict[str, list[NamedEffect]]:
+    """Other detections than a scene's, by label: the kinds of its effects (KINDS), without and with
+    each effect of the place that it does not name and that is worth a trial (TRIED).
+    """
+    kinds = {}
+    for number, effect in enumerate(detection):
+        for kind, settings in getattr(effect.module, "KINDS", {}).items():
+            changed = effect._replace(settings=effect.settings | settings)
+            label = f"{effect.name} {kind}"
+            kinds[label] = [*detection[:number], changed, *detection[number + 1 :]]
+    named = {effect.name for effect in detection}
+    unnamed = [name for name, place in PLACES.items() if place == "detection" and name not in named]
+    tried = [name for name in unnamed if hasattr(module_of(name), "TRIED")]
+    result = {}
+    for label, effects in (kinds or {"": detection}).items():
+        result[label or "the same"] = effects
+        for name in tried:
+            result[f"{label} and {name}" if label else name] = effects + called({name: {}})
+    return result
 
 
 def _right(sample: SceneSample, detection: Sequence[NamedEffect], target_cell: np.ndarray) -> float:
@@ -247,30 +253,63 @@ def changes(
     # sample with each effect, whose time is no median of several.
     passes = 2 if len(chosen) * len(station_names) == 1 else 1
     signals, cells, times_ms = _received(config, station_names, chosen, 2)
+    count = _cell_count(scene_of(config))
+    classes = np.array([explained.row["category"] for explained in chosen])
     before = shown(signals)
     result = []
     parts = [(name, part) for name in named for part in getattr(module_of(name), "PARTS", {})]
     others = [name for name in PLACES if name not in config["effects"]]
-    tried = [*((name, "") for name in named), *parts, *((name, "") for name in others)]
+    tried = [(name, "") for name in named] + parts + [(name, "") for name in others]
     for name, part in reported(tried, len(tried), "effects"):
         place = places.get(name) or PLACES[name]
         inside = name in named
         try:
-            changed, also = (
-                (_without_part(config, name, part), "") if part else _changed(config, name)
-            )
+            if part:
+                changed = _without_part(config, name, part)
+                also = ""
+            else:
+                changed, also = _changed(config, name)
             new_signals, new_cells, new_times_ms = _received(changed, station_names, chosen, passes)
         except InputError as error:
             result.append(Change(name, place, inside, refused=str(error)))
             continue
         moved = np.linalg.norm(new_signals - signals, axis=2) / np.linalg.norm(signals, axis=2)
-        cost_ms = (times_ms - new_times_ms) if inside else (new_times_ms - times_ms)
-        shares = float(np.mean(moved)), float(np.mean(cells != new_cells))
+        added_ms = new_times_ms - times_ms
+        cost_ms = -added_ms if inside else added_ms
+        fewest = min(count, _cell_count(scene_of(changed)))
+        other_cell = _folded(cells, fewest) != _folded(new_cells, fewest)
+        by_class = {str(kind): float(moved[classes == kind].mean()) for kind in np.unique(classes)}
         after = shown(new_signals)
-        more = {kind: _differing(before[kind], after[kind]) for kind in before}
-        cost = float(np.median(cost_ms)), float(np.std(cost_ms))
-        result.append(Change(name, place, inside, *shares, more, *cost, also, part=part))
+        result.append(
+            Change(
+                name,
+                place,
+                inside,
+                signal=float(np.mean(moved)),
+                cells=float(np.mean(other_cell)),
+                more={kind: _differing(before[kind], after[kind]) for kind in before},
+                ms=float(np.median(cost_ms)),
+                spread_ms=float(np.std(cost_ms)),
+                also=also,
+                part=part,
+                by_class=by_class,
+            )
+        )
     return result
+
+
+def _cell_count(scene: Scene) -> int:
+    """The number of range cells of a scene's receiver; combs of pilots have fewer than subcarriers."""
+    subcarriers = scene.network.subcarriers
+    range_cells = only(scene.effects, "range_cells")
+    if range_cells is None:
+        return subcarriers
+    return range_cells(np.zeros((1, subcarriers), np.complex128)).shape[1]
+
+
+def _folded(cells: np.ndarray, count: int) -> np.ndarray:
+    """Range cells as a receiver with `count` cells numbers them; -1, no symbol, stays."""
+    return np.where(cells < 0, cells, cells % count)
 
 
 def _without_part(config: dict, name: str, part: str) -> dict:
@@ -330,10 +369,9 @@ def _received(
                     received_signal(scene, scene.network.station(name), *explained, clouds)
                 )
                 times_s.append(time.process_time())
-    shape = len(chosen), len(station_names)
-    signals, cells = (
-        np.array([result[k] for result in received]).reshape(*shape, -1) for k in range(2)
-    )
+    shape = (len(chosen), len(station_names))
+    signals = np.array([result.signal for result in received]).reshape(*shape, -1)
+    cells = np.array([result.cell for result in received]).reshape(*shape, -1)
     return signals, cells, 1e3 * np.diff(times_s).reshape(shape)
 
 
@@ -380,22 +418,24 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
     """
     more = list(dict.fromkeys(key for change in changes for key in change.more))
     columns = "".join(f"{key:>9}" for key in more)
-    lines = [f"{'effect':<20} {'':<7} {'signal':>8} {'cells':>7} {columns}{'ms':>9}"]
+    lines = [f"{'effect':<20} {'':<7} {'signal':>16} {'cells':>7} {columns}{'ms':>9}"]
     for change in changes:
         head = f"{change.effect:<20} {'named' if change.named else 'added':<7} "
         if change.refused:
             lines.append(f"{head}not tried: {change.refused}")
             continue
         shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
-        cells = f"{_signal_text(change):>8} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
+        cells = f"{_signal_text(change):>16} {change.cells:>7.1%} {shares}{cost_text(change.ms, change.spread_ms):>9}"
         lines.append(
             f"{head}{cells}  {change.also}{f'its {change.part} left out' * bool(change.part)}".rstrip()
         )
     lines.append(
         "named: without it; added: with it and its defaults. Shares of the signal's rms, of "
         "symbols, of pixels; "
-        "dB: how much the effect weakens (-) or strengthens (+) a signal that changes more than "
-        "tenfold; "
+        "x: the change over the signal, from the least to the most changed class, where it exceeds "
+        "the signal in one; "
+        "dB: how much the effect weakens (-) or strengthens (+) the signal, over the classes, where "
+        "one changes more than tenfold; "
         "<: a time that the measurement cannot tell from zero."
     )
     if sources:
@@ -408,12 +448,26 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
 
 
 def _signal_text(change: Change) -> str:
-    """The change of the signal as a share of it, or in dB where an effect hides or drowns nearly
-    all of it.
+    """The change of the signal as a share of it, else the range of its ratio over the classes.
+
+    It is a share up to 100 % in every class, a ratio with an x up to tenfold, and beyond that, where
+    an effect hides or drowns nearly all of a signal, in dB.
     """
-    if change.signal < 10:
+    ratios = sorted(change.by_class.values()) or [change.signal]
+    largest = ratios[-1]
+    if largest <= 1:
         return f"{change.signal:.1%}"
-    return f"{20 * math.log10(change.signal) * (-1 if change.named else 1):+.0f} dB"
+    if largest <= MOST_RATIO:
+        ends = [f"x{ratio:.2g}" for ratio in ratios]
+        unit = ""
+    else:
+        sign = -1 if change.named else 1
+        levels = [sign * 20 * math.log10(ratio) if ratio > 0 else -math.inf for ratio in ratios]
+        ends = [f"{level:+.0f}" for level in sorted(levels)]
+        unit = " dB"
+    if ends[0] == ends[-1]:
+        return ends[0] + unit
+    return f"{ends[0]} to {ends[-1]}{unit}"
 
 
 def cost_text(ms: float, spread_ms: float) -> str:

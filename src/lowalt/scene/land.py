@@ -29,6 +29,8 @@ OFFSET = 0.25
 """Distance of a patch from the centre of its range cell, in cells."""
 NODES = 6
 """Ellipses of a range cell, at the nodes of Gauss and Legendre."""
+FAINTEST = 1e-300
+"""A power below this divides nothing."""
 
 
 class Land(NamedTuple):
@@ -59,11 +61,11 @@ def folded(values: np.ndarray, subcarriers: int) -> np.ndarray:
     """Return values (cells, ...) summed into the M cells that they share: land beyond the
     unambiguous range folds.
     """
-    whole = np.zeros(
-        (-(-len(values) // subcarriers) * subcarriers, *values.shape[1:]), values.dtype
-    )
+    periods = -(-len(values) // subcarriers)
+    beside = values.shape[1:]
+    whole = np.zeros((periods * subcarriers, *beside), values.dtype)
     whole[: len(values)] = values
-    return whole.reshape(-1, subcarriers, *values.shape[1:]).sum(axis=0)
+    return whole.reshape(periods, subcarriers, *beside).sum(axis=0)
 
 
 def with_side_lobes(power: np.ndarray, subcarriers: int) -> np.ndarray:
@@ -83,12 +85,13 @@ def ellipses(
     The masts stand at -half_m and +half_m on the long axis, the sender first. Source: (R1 + R2)^2 =
     4 t^2 for points in the plane, with the square completed.
     """
-    c, (sends, hears) = half_m, heights_m
+    c = half_m
+    sends, hears = heights_m
     g = (sends**2 - hears**2) / (4.0 * t)
     q = 1.0 - (c / t) ** 2
     centre = g * c / (t * q)
     centre_rate = -2.0 * t * centre / (t**2 - c**2)
-    q_rate = 2.0 * c**2 / t**3
+    q_rate = 2.0 * c**2 / (t * t * t)
     short = np.maximum((t + g) ** 2 - c**2 - sends**2 + q * centre**2, 0.0)
     short_rate = 2.0 * (t + g) * (1.0 - g / t) + q_rate * centre**2 + 2.0 * q * centre * centre_rate
     return (
@@ -103,7 +106,8 @@ def ellipses(
 
 def nearest_m(station: Station) -> float:
     """Return the least half range sum (m) by the land: half the way by the mirrored ground."""
-    (x, y, z), (u, v, w) = (station.transmitter or station).position_m, station.position_m
+    x, y, z = (station.transmitter or station).position_m
+    u, v, w = station.position_m
     return 0.5 * float(np.sqrt((x - u) ** 2 + (y - v) ** 2 + (z + w) ** 2))
 
 
@@ -116,6 +120,77 @@ def _edges(station: Station, reach_m: float, cells_per_m: float) -> tuple[np.nda
     return low, high
 
 
+class _Rings(NamedTuple):
+    """Ellipses of the land, several in each range cell that has land.
+
+    lit: (C,) those cells, of `cells`; t: (T,) half range sums (m); step: (T,) their shares of a
+    cell's extent (m); shapes: what `ellipses` returns; counts: (T,) patches of each ellipse.
+    """
+
+    lit: np.ndarray
+    cells: int
+    t: np.ndarray
+    step: np.ndarray
+    shapes: tuple[np.ndarray, ...]
+    counts: np.ndarray
+
+
+def _rings(
+    station: Station,
+    reach_m: float,
+    cells_per_m: float,
+    half_m: float,
+    heights_m: tuple[float, float],
+    turns: int,
+    nodes: int,
+) -> _Rings:
+    """Return `nodes` ellipses in each range cell; turns: half the patches of a circle."""
+    low, high = _edges(station, reach_m, cells_per_m)
+    cells = len(low)
+    lit = np.flatnonzero(high > low)
+    low = low[lit]
+    high = high[lit]
+    node, share = gauss_legendre(nodes)
+    t = (0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node).ravel()
+    step = (0.5 * (high - low)[:, None] * share).ravel()
+    shapes = ellipses(t, half_m, heights_m)
+    centre, long, short = shapes[:3]
+    # The beams turn past the patches fastest where the ellipse passes a mast.
+    tip = [np.hypot(centre + side * (long - half_m), heights_m[side > 0]) for side in (-1, 1)]
+    stretch = np.maximum(1.0, short / np.minimum(*tip))
+    counts = 2 * np.ceil(turns * stretch - 1e-9).astype(int)
+    return _Rings(lit, cells, t, step, shapes, counts)
+
+
+def _patches(
+    rings: _Rings, masts_m: np.ndarray, half_m: float, axis: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middles (K, 3) m and areas (K,) m2 of the patches of all ellipses.
+
+    masts_m: (2, 3) of the sender and the receiver; axis: (2,) direction of the long axis.
+    """
+    of_ring = np.repeat(np.arange(len(rings.t)), rings.counts)
+    number = np.concatenate([np.arange(0), *map(np.arange, rings.counts)])
+    centre, long, short, centre_rate, long_rate, short_rate = (
+        values[of_ring] for values in rings.shapes
+    )
+    nu = 2.0 * np.pi * (number + 0.5) / rings.counts[of_ring]
+    s, c = portable.sine_cosine(nu)
+    along = centre + long * c
+    aside = short * s
+    middle_m = 0.5 * (masts_m[0] + masts_m[1])
+    points = np.zeros((len(nu), 3))
+    points[:, 0] = middle_m[0] + along * axis[0] - aside * axis[1]
+    points[:, 1] = middle_m[1] + along * axis[1] + aside * axis[0]
+    narrow = np.sqrt(1.0 - (half_m / rings.t[of_ring]) ** 2)
+    area = (
+        centre_rate * short * c
+        + 0.5 * narrow * long_rate * c * c
+        + 0.5 * short_rate / narrow * s * s
+    )
+    return points, area * (rings.step * 2.0 * np.pi / rings.counts)[of_ring]
+
+
 @lru_cache(maxsize=12)
 def land(
     network: Network, station: Station, reach_m: float, element: Element | None, nodes: int = NODES
@@ -125,66 +200,40 @@ def land(
     """
     radio = radar(network, station)
     ends = (station.transmitter or station, station)
-    places = np.array([end.position_m for end in ends])
-    between = places[1, :2] - places[0, :2]
-    half = 0.5 * float(np.hypot(*between))
-    heights = (float(places[0, 2]), float(places[1, 2]))
+    masts_m = np.array([end.position_m for end in ends])
+    between = masts_m[1, :2] - masts_m[0, :2]
+    half_m = 0.5 * float(np.hypot(*between))
+    heights_m = (float(masts_m[0, 2]), float(masts_m[1, 2]))
     # For a station, or ends above each other, the ellipses are circles, which begin along the
     # receiver's array.
-    axis = between / (2.0 * half) if half > 0 else station.horizontal[:2]
-    low, high = _edges(station, reach_m, radio.cells)
-    cells = len(low)
-    lit = np.flatnonzero(high > low)
-    low = low[lit]
-    high = high[lit]
-    node, share = gauss_legendre(nodes)
-    t = (0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node).ravel()
-    step = (0.5 * (high - low)[:, None] * share).ravel()
-    rings = ellipses(t, half, heights)
-    # The beams turn past the patches fastest where the ellipse passes a mast.
-    tip = [np.hypot(rings[0] + side * (rings[1] - half), heights[side > 0]) for side in (-1, 1)]
-    stretch = np.maximum(1.0, rings[2] / np.minimum(*tip))
+    axis = between / (2.0 * half_m) if half_m > 0 else station.horizontal[:2]
     # Over azimuth the trapezoidal rule is exact for a station's arrays, whose patterns are
     # trigonometric.
     turns = int(np.pi * radio.kappa * (network.transmit[0] + network.receive[0])) + 24
-    counts = 2 * np.ceil(turns * stretch - 1e-9).astype(int)
-    ring = np.repeat(np.arange(len(t)), counts)
-    place = np.concatenate([np.arange(0), *map(np.arange, counts)])
-    centre, long, short, centre_rate, long_rate, short_rate = (values[ring] for values in rings)
-    nu = 2.0 * np.pi * (place + 0.5) / counts[ring]
-    c = np.cos(nu)
-    s = np.sin(nu)
-    along = centre + long * c
-    aside = short * s
-    points = np.zeros((len(nu), 3))
-    points[:, 0] = 0.5 * (places[0, 0] + places[1, 0]) + along * axis[0] - aside * axis[1]
-    points[:, 1] = 0.5 * (places[0, 1] + places[1, 1]) + along * axis[1] + aside * axis[0]
-    narrow = np.sqrt(1.0 - (half / t[ring]) ** 2)
-    area = (
-        centre_rate * short * c
-        + 0.5 * narrow * long_rate * c * c
-        + 0.5 * short_rate / narrow * s * s
-    )
-    r = [portable.norm(points - mast) for mast in places]
-    weight = area * (step * 2.0 * np.pi / counts)[ring]
-    weight *= np.sqrt(heights[0] * heights[1] / (r[0] * r[1])) / (r[0] * r[1]) ** 2
+    rings = _rings(station, reach_m, radio.cells, half_m, heights_m, turns, nodes)
+    points, weight = _patches(rings, masts_m, half_m, axis)
+    r1, r2 = (portable.norm(points - mast_m) for mast_m in masts_m)
+    weight *= np.sqrt(heights_m[0] * heights_m[1] / (r1 * r2)) / (r1 * r2) ** 2
     if element is not None:
         weight *= antenna.gain(element, ends[0], points) * antenna.gain(element, ends[1], points)
-    apart = float(np.sum((places[0] - places[1]) ** 2))
-    slow = np.sqrt(np.clip(0.5 + (r[0] ** 2 + r[1] ** 2 - apart) / (4.0 * r[0] * r[1]), 0.0, 1.0))
-    seen = np.stack([cosines(end, points).T for end in (ends if station.transmitter else ends[1:])])
-    if station.transmitter is None:
+    counts = rings.counts
+    if station.transmitter is not None:
+        apart = float(np.sum((masts_m[0] - masts_m[1]) ** 2))
+        squared = 0.5 + (r1**2 + r2**2 - apart) / (4.0 * r1 * r2)
+        slow = np.sqrt(np.clip(squared, 0.0, 1.0))
+        seen = np.stack([cosines(end, points).T for end in ends])
+    else:
         # A station sees both halves of each circle, before and behind its array's line, under the
         # same cosines.
-        circles = (len(t), 2, turns)
-        weight = (weight.reshape(circles) + weight.reshape(circles)[:, ::-1, ::-1])[:, 0].ravel()
-        seen = seen.reshape(1, 2, *circles)[:, :, :, 0].reshape(1, 2, -1)
+        circles = (len(rings.t), 2, turns)
+        both = weight.reshape(circles)
+        weight = (both + both[:, ::-1, ::-1])[:, 0].ravel()
+        seen = cosines(station, points).T.reshape(2, *circles)[:, :, 0].reshape(1, 2, -1)
         slow = np.ones(len(weight))
         counts = counts // 2
-    first = np.concatenate(
-        [np.zeros(1, int), np.cumsum(counts.reshape(-1, nodes).sum(axis=1))[:-1]]
-    )[: len(lit)]
-    return Land(lit, first, cells, weight, seen, slow)
+    of_cells = counts.reshape(-1, nodes).sum(axis=1)
+    first = np.cumsum(of_cells) - of_cells
+    return Land(rings.lit, first, rings.cells, weight, seen, slow)
 
 
 def cell_power(
@@ -208,21 +257,18 @@ def cell_power(
     power = np.zeros(held.cells)
     slow = np.ones(held.cells)
     lit = held.weight.copy()
-    aims = [
-        cosines(end, aim_m)
-        for end, aim_m in zip((station.transmitter or station, station), aims_m, strict=True)
-    ]
-    for end, counts in enumerate((network.transmit, network.receive)):
+    ends = (station.transmitter or station, station)
+    for number, elements in enumerate((network.transmit, network.receive)):
+        aim = cosines(ends[number], aims_m[number])
+        # A station has one set of cosines, a link one for each end.
+        seen = held.seen[-number]
         gain = np.ones(len(lit))
         for axis in range(2):
-            row_sum(
-                held.seen[-end][axis], radio.kappa, radio.kappa, aims[end][axis], counts[axis], gain
-            )
+            row_sum(seen[axis], radio.kappa, radio.kappa, aim[axis], elements[axis], gain)
         lit *= gain * gain
     if len(lit):
-        power[held.cell] = np.add.reduceat(lit, held.first)
+        of_cells = np.add.reduceat(lit, held.first)
         slowed = np.add.reduceat(lit * held.slow, held.first)
-        slow[held.cell] = np.where(
-            power[held.cell] > 0, slowed / np.maximum(power[held.cell], 1e-300), 1.0
-        )
+        power[held.cell] = of_cells
+        slow[held.cell] = np.where(of_cells > 0, slowed / np.maximum(of_cells, FAINTEST), 1.0)
     return radio.scale**2 * settings["gamma"] * power, slow

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from lowalt.config.network import Network
-from lowalt.numerics.streams import stream
-from lowalt.scene.effects import called, offering, only
+from lowalt.scene.effects import called, look_stream, offering, only
 
 
 def late_effects(config: Mapping[str, Any]) -> dict[str, dict]:
-    """Return the part of a configuration's `effects` that sets the instants of symbols, if its
-    spectra know them.
+    """Return those of a configuration's `effects` that set the instants of symbols, if its spectra
+    know them.
     """
     known = config["spectra"].get("times") == "known"
     return offering(config["effects"], "transmitter", "sampling") if known else {}
@@ -35,9 +34,9 @@ def lateness(
     if sampling is None:
         return None
     (effect,) = named
-    names = [
-        (effect.name, row["subtype"], row["model"], station.name) for station in network.stations
-    ]
-    times_s = np.stack([sampling(network, stream(seed, "effect", *name)).times_s for name in names])
-    late = (times_s - network.times_s) / network.symbol_interval_s
+    times_s = []
+    for station in network.stations:
+        rng = look_stream(seed, effect.name, row, station.name)
+        times_s.append(sampling(network, rng).times_s)
+    late = (np.stack(times_s) - network.times_s) / network.symbol_interval_s
     return late if late.any() else None

@@ -10,10 +10,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.motion.cross_section import mean_cross_section
+from lowalt.numerics.portable import norm
 from lowalt.scene import antenna
 from lowalt.scene.effects import NamedEffect, every, only
 from lowalt.scene.view import View
@@ -49,7 +48,7 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
     network = view.network
     link = view.station.transmitter is not None
     wavelength_m = SPEED_OF_LIGHT / network.carrier_hz
-    out_m, back_m = (float(np.linalg.norm(view.origin_m - mast_m)) for mast_m in view.masts_m)
+    out_m, back_m = (float(norm(view.origin_m - mast_m)) for mast_m in view.masts_m)
     ends = {"toward the target, each way": view.station}
     if link:
         ends = {"of the sender": view.station.transmitter, "of the receiver": view.station}

@@ -6,10 +6,9 @@ import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.files.errors import InputError
-from lowalt.numerics.streams import stream
 from lowalt.scene.checks import refuse_unmodelled
 from lowalt.scene.contract import numbers
-from lowalt.scene.effects import NamedEffect, every, only
+from lowalt.scene.effects import NamedEffect, every, look_stream, only
 from lowalt.scene.view import Perturbations, View, located
 from lowalt.targets.cloud import Cloud
 
@@ -36,16 +35,7 @@ class Scene:
             for effect in self.effects
             if effect.name == name and effect.snr_db is not None
         ]
-        # The stream of a user's own effect has the name of its file, wherever that lies.
-        return stream(
-            self.seed,
-            "effect",
-            name.rpartition("/")[2],
-            row["subtype"],
-            row["model"],
-            *ends,
-            *levels,
-        )
+        return look_stream(self.seed, name, row, *ends, *levels)
 
     def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
         """Return the random stream of an effect, or of another name, at a station, from its start.
@@ -109,14 +99,10 @@ def observe(
     network = scene.network
     cloud = with_cross_sections(scene, cloud)
     grid_s = np.append(network.times_s, len(network.times_s) * network.symbol_interval_s)
-    perturbing = every(scene.effects, "perturb")
-    moved = Perturbations(
-        grid_s,
-        tuple(
-            perturb(cloud, row, grid_s, scene.stream(name, row))
-            for name, perturb in perturbing.items()
-        ),
-    )
+    changes = []
+    for name, perturb in every(scene.effects, "perturb").items():
+        changes.append(perturb(cloud, row, grid_s, scene.stream(name, row)))
+    moved = Perturbations(grid_s, tuple(changes))
     if beside is not None:
         motion, places = located(cloud, row, beside.times_s, moved)
         return replace(
@@ -152,8 +138,8 @@ def observe(
     )
     stations = [end for end in network.stations if end.transmitter is None]
     for name, beams in every(scene.effects, "beams").items():
-        drawn = {
-            end.name: beams(view.of(end), scene.stream(name, row, end.name)) for end in stations
-        }
+        drawn = {}
+        for end in stations:
+            drawn[end.name] = beams(view.of(end), scene.stream(name, row, end.name))
         view = replace(view, beams=drawn)
     return view

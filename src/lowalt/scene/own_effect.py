@@ -54,6 +54,9 @@ def kept_contract(name: str, module: ModuleType) -> ModuleType:
         raise InputError(
             f"effects: {name}: no SOURCE, expected a text that says where its law comes from"
         )
+    named = getattr(module, "FILES", ())
+    if not set(named) <= set(defaults):
+        raise InputError(f"effects: {name}: FILES is {named}, expected names of DEFAULTS")
     place_of(name, module)
     return module
 

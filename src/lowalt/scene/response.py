@@ -9,6 +9,7 @@ subcarriers, so that no array of symbols x points x subcarriers is needed:
     exp(-j B x u) = sum over p of eps_p (-j)^p J_p(B x) T_p(u),   |u| <= 1.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -67,47 +68,48 @@ def response(
     """
     network = view.network
     station = view.station
-    every = [ImagePath(view.places), *paths]
+    physics = (squint, wavefront)
+    all_paths = [ImagePath(view.places), *paths]
     strength = _amplitudes(view, factor)
-    ends = [_end(view, station, network.receive, every, (squint, wavefront))]
+    back = _end(view, station, network.receive, all_paths, physics)
+    out = back
     same = station.transmitter is None and network.transmit == network.receive
     if not same:
-        outward = [path.outward for path in every]
-        ends.insert(
-            0,
-            _end(
-                view, station.transmitter or station, network.transmit, outward, (squint, wavefront)
-            ),
-        )
-    out = ends[0]
-    back = ends[-1]
+        sender = station.transmitter or station
+        outward = [path.outward for path in all_paths]
+        out = _end(view, sender, network.transmit, outward, physics)
     points = back.places[0]
     reach = float(np.sqrt(np.square(points - points.mean(axis=2, keepdims=True)).sum(axis=1).max()))
     if squint:
         # Ranges are then measured from the arrays' middles, whose directions to the points differ.
+        ends = (out, back)
         aperture = max(end.spacing * _half_diagonal(end.counts) for end in ends)
         nearest = min(float(end.centre.min()) for end in ends) - reach
-        reach += 2.0 * aperture * min(reach / nearest if nearest > 0 else 1.0, 1.0)
+        sine = min(reach / nearest, 1.0) if nearest > 0 else 1.0
+        reach += 2.0 * aperture * sine
     # Rounded up to a power of sqrt(2), so that a few tables serve all samples.
-    reach = 2.0 ** (np.ceil(2 * np.log2(max(reach, 1e-3))) / 2)
+    reach = 2.0 ** (math.ceil(2 * math.log2(max(reach, 1e-3))) / 2)
     band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
     tables = band_tables(len(out.kappas), float(2.0 * reach * band_m), network.subcarriers, ERROR)
-    shape = len(view.times_s), len(out.kappas), 2, len(tables[0]) // (2 * len(out.kappas))
-    result = np.empty((len(out.places), len(back.places), *shape))
+    symbols = len(view.times_s)
+    bands = len(out.kappas)
+    orders = len(tables[0]) // (2 * bands)
+    result = np.empty((len(out.places), len(back.places), symbols, bands, 2, orders))
     fault = response_loops.moments(out, back, same, strength, reach, result)
     if fault:
         raise InputError(
-            f"position of a point at symbol {fault - 1} is that of station {station.name} (r = 0), expected r > 0"
+            f"position of a point at symbol {fault - 1} is that of station {station.name} (r = 0), "
+            "expected r > 0"
         )
-    total = np.zeros((len(view.times_s), network.subcarriers), np.complex128)
+    total = np.zeros((symbols, network.subcarriers), np.complex128)
     for a, b in np.ndindex(result.shape[:2]):
         if same and b < a:
             continue
         weight = 2.0 if same and a != b else 1.0
-        bands = over_band(weight * result[a, b].reshape(len(view.times_s), -1), tables)
+        values = over_band(weight * result[a, b].reshape(symbols, -1), tables)
         range_m = out.centre[a] + back.centre[b]
         response_loops.add_turned(
-            bands, -out.turns * range_m, -range_m * band_m / network.subcarriers, total
+            values, -out.turns * range_m, -range_m * band_m / network.subcarriers, total
         )
     return total
 
@@ -149,7 +151,8 @@ def _end(
     physics: tuple[bool, bool],
 ) -> response_loops.End:
     """One end's array and paths as the loops take them; physics: squint and wavefront."""
-    network, (squint, wavefront) = view.network, physics
+    network = view.network
+    squint, wavefront = physics
     # On a link, all frequencies are those of the signal, which is the transmitter's.
     radio = radar(network, view.station)
     beams = view.beams_of(station)
@@ -196,9 +199,7 @@ def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
     half = 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz / network.carrier_hz
     if not squint or half == 0.0:
         return np.array([lowest])
-    spread = (
-        np.pi
-        * half
-        * (_half_diagonal(np.array(network.transmit)) + _half_diagonal(np.array(network.receive)))
-    )
+    sends = _half_diagonal(np.array(network.transmit))
+    hears = _half_diagonal(np.array(network.receive))
+    spread = np.pi * half * (sends + hears)
     return lowest + half + half * chebyshev_points(orders_of(spread, ERROR))

@@ -5,11 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.echo.fast.polynomials import smooth
-from lowalt.machine.jit import INNER_VECTOR, VECTOR, kernel
+from lowalt.machine.jit import INLINED, INNER, LEAN, kernel
+from lowalt.numerics.large_matrices import multiply
 
-CHUNK = 128
-"""Points per chunk, so few that their polynomials fit into the first-level cache."""
-LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+LANES = 8
+"""Numbers of double precision in the widest vector register."""
+LOOPS = kernel(error_model="numpy")
+"""As LEAN, for functions that allocate."""
 
 # cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2 on [-1/2, 1/2], to rounding; written out one
 # by one, all steps stay in registers.
@@ -17,7 +19,7 @@ _C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10, _C11 = smooth("cosine", 
 _S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11 = smooth("sine", 11)[0].tolist()
 
 
-@kernel(inner=True, forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract"})
+@INLINED
 def phasor(turns):
     """Cosine and sine of 2 pi turns; the angle's rounding is that of `turns`."""
     t = turns - np.rint(turns)
@@ -57,7 +59,7 @@ class End(NamedTuple):
     gains: np.ndarray
 
 
-@VECTOR
+@LEAN
 def row_sum(cosine, kappa, beam, aim, count, gain):
     """Multiply gain (L,) by the sum of `count` elements in a row about their middle, sin(N pi x /
     2) / sin(pi x / 2).
@@ -78,7 +80,7 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
         gain[i] *= sign * every / single
 
 
-@INNER_VECTOR
+@INNER
 def _one_way(end, path, n, work, factors, excess):
     """Fill factors (Q, 2, L) with coefficient, array sum, 1/r and half the two-way phase, and
     excess (L,) with metres.
@@ -134,67 +136,58 @@ def _one_way(end, path, n, work, factors, excess):
     return clear
 
 
-@INNER_VECTOR
-def _add_moments(factors, strength, excess, reach, table, parts, result):
-    """Add to result (Q, 2, P) the sums over points of strength x factors x T_p(u), u = excess / (2
-    reach).
+@INNER
+def _tabulate(u, table):
+    """Fill table (L, K) with the Chebyshev polynomials T_0 to T_(K - 1) at u (L,)."""
+    for i in range(len(u)):
+        row = table[i]
+        older = 1.0
+        old = u[i]
+        twice = 2.0 * u[i]
+        row[0] = older
+        row[1] = old
+        for p in range(2, len(row)):
+            new = twice * old - older
+            row[p] = new
+            older = old
+            old = new
+
+
+@INNER
+def _fill_moments(factors, strength, excess, reach, work, result):
+    """Fill result (Q, 2, P) with the sums over points of strength x factors x T_p(u), u = excess /
+    (2 reach).
 
     factors, excess: of the way out and of the way back, whose factors (Q, 2, L) multiply and whose
-    excess ranges (L,) add; table (P, CHUNK) and parts (3, CHUNK): work space.
+    excess ranges (L,) add; work: u (L,), polynomials (L, K), products (2 Q, L), sums (2 Q, K).
+    Points are added in their order: vector registers hold several polynomials, so that the order
+    does not depend on their width.
     """
-    orders, scale, (out, back), (excess_out, excess_back) = (
-        result.shape[2],
-        0.5 / reach,
-        factors,
-        excess,
-    )
-    for first in range(0, len(strength), CHUNK):
-        count = min(CHUNK, len(strength) - first)
-        u = parts[0]
-        real = parts[1]
-        imag = parts[2]
-        zero = table[0]
-        linear = table[1]
-        for i in range(np.uint64(count)):
-            u[i] = scale * (excess_out[first + i] + excess_back[first + i])
-            zero[i] = 1.0
-            linear[i] = u[i]
-        for p in range(2, orders):
-            older = table[p - 2]
-            old = table[p - 1]
-            new = table[p]
-            for i in range(np.uint64(count)):
-                new[i] = 2.0 * u[i] * old[i] - older[i]
-        for q in range(len(out)):
-            out_re = out[q, 0]
-            out_im = out[q, 1]
-            back_re = back[q, 0]
-            back_im = back[q, 1]
-            for i in range(np.uint64(count)):
-                a = out_re[first + i]
-                b = out_im[first + i]
-                c = back_re[first + i]
-                d = back_im[first + i]
-                real[i] = strength[first + i] * (a * c - b * d)
-                imag[i] = strength[first + i] * (a * d + b * c)
-            # Two orders share a pass over the points; an odd last order is paired with itself.
-            for p in range(0, orders, 2):
-                even = table[p]
-                odd = table[min(p + 1, orders - 1)]
-                a = 0.0
-                b = 0.0
-                c = 0.0
-                d = 0.0
-                for i in range(np.uint64(count)):
-                    a += even[i] * real[i]
-                    b += even[i] * imag[i]
-                    c += odd[i] * real[i]
-                    d += odd[i] * imag[i]
-                result[q, 0, p] += a
-                result[q, 1, p] += b
-                if p + 1 < orders:
-                    result[q, 0, p + 1] += c
-                    result[q, 1, p + 1] += d
+    (out, back), (excess_out, excess_back) = factors, excess
+    u, table, products, sums = work
+    scale = 0.5 / reach
+    for i in range(np.uint64(len(u))):
+        u[i] = scale * (excess_out[i] + excess_back[i])
+    _tabulate(u, table)
+    for q in range(len(out)):
+        out_re = out[q, 0]
+        out_im = out[q, 1]
+        back_re = back[q, 0]
+        back_im = back[q, 1]
+        real = products[2 * q]
+        imag = products[2 * q + 1]
+        for i in range(np.uint64(len(strength))):
+            a = out_re[i]
+            b = out_im[i]
+            c = back_re[i]
+            d = back_im[i]
+            real[i] = strength[i] * (a * c - b * d)
+            imag[i] = strength[i] * (a * d + b * c)
+    multiply(products, table, sums)
+    for q in range(len(result)):
+        for p in range(result.shape[2]):
+            result[q, 0, p] = sums[2 * q, p]
+            result[q, 1, p] = sums[2 * q + 1, p]
 
 
 @LOOPS
@@ -214,8 +207,14 @@ def moments(out, back, same, strength, reach, result):
     excess_there = np.empty((ways_out, points))
     excess_home = np.empty((ways_back, points))
     work = np.empty((3, points))
-    table = np.empty((max(orders, 2), CHUNK))
-    parts = np.empty((3, CHUNK))
+    # A whole number of vector registers.
+    padded = (orders + LANES - 1) // LANES * LANES
+    sums = (
+        np.empty(points),
+        np.empty((points, padded)),
+        np.empty((2 * nodes, points)),
+        np.empty((2 * nodes, padded)),
+    )
     for n in range(symbols):
         for a in range(ways_out):
             if not _one_way(out, a, n, work, there[a], excess_there[a]):
@@ -228,11 +227,10 @@ def moments(out, back, same, strength, reach, result):
                 homeward, excess = (
                     (there[b], excess_there[b]) if same else (home[b], excess_home[b])
                 )
-                result[a, b, n] = 0.0
                 amplitudes = strength[a % strength.shape[0], b % strength.shape[1], n]
                 factors = (there[a], homeward)
                 ranges = (excess_there[a], excess)
-                _add_moments(factors, amplitudes, ranges, reach, table, parts, result[a, b, n])
+                _fill_moments(factors, amplitudes, ranges, reach, sums, result[a, b, n])
     return 0
 
 

@@ -14,23 +14,24 @@ def white(rng: np.random.Generator, variance: float, shape: tuple[int, ...]) -> 
     return np.sqrt(variance / 2) * rng.standard_normal((*shape, 2)).view(np.complex128)[..., 0]
 
 
-def in_all_cells(effects: Mapping[str, dict | None]) -> bool:
-    """Return whether a configuration's `effects` add the noise of noise.snr_db themselves, before
-    range compression.
+def in_all_cells(effects: Mapping[str, dict | None]) -> list[str]:
+    """Return the names of those of a configuration's `effects` that add the noise of noise.snr_db
+    themselves, before range compression.
     """
-    return any(effect.snr_db is None for effect in called(offering(effects, "receiver", "SET_SNR")))
+    adding = called(offering(effects, "receiver", "SET_SNR"))
+    return [effect.name for effect in adding if effect.snr_db is None]
 
 
 def filters(effects: Mapping[str, dict | None]) -> dict[str, dict]:
-    """Return the part of a configuration's `effects` that filters range cells, and so the noise
-    that is added later.
+    """Return those of a configuration's `effects` that filter range cells, and so the noise that is
+    added later.
     """
     return offering(effects, "detection", "filtered")
 
 
 def behind(noise: np.ndarray, filters: Mapping[str, dict | None]) -> np.ndarray:
-    """Return noise (N,) of one range cell as these filters leave it: behind a canceller, its
-    spectrum is not flat.
+    """Return noise (N,) of one range cell as these filters leave it: their spectrum is not
+    flat.
 
     Filters are linear and act on each range cell by itself, so this is the noise that the cell
     would hold if it had been there before. A pulse canceller shapes it as |2 sin(pi f T_r)|^(2 k)

@@ -12,11 +12,13 @@ from itertools import pairwise
 import numpy as np
 from scipy import fft
 
-from lowalt.machine.jit import INNER_VECTOR
+from lowalt.machine.jit import INNER
 from lowalt.numerics.chebyshev_series import chebyshev_points, orders_of
 from lowalt.numerics.large_matrices import multiply
-from lowalt.scene.response_loops import CHUNK, LOOPS, End, phasor
+from lowalt.scene.response_loops import LOOPS, End, phasor
 
+CHUNK = 128
+"""Points per chunk, so few that their polynomials fit into the first-level cache."""
 SYMBOLS = 600
 """Largest number of symbols that share a box."""
 
@@ -142,7 +144,7 @@ def _sums(end, symbol, at, result):
                 result[n, q, i] = complex(real[i], imag[i])
 
 
-@INNER_VECTOR
+@INNER
 def _scaled(values, middle, half, table):
     """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half; at most L
     values.

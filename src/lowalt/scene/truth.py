@@ -6,7 +6,7 @@ arrays' middles, since elements are counted from the one at the station's place.
 moves echoes in delay or in frequency offers `displaced`, which says by how much.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -15,14 +15,42 @@ from lowalt.numerics import portable
 from lowalt.scene.response import cosines
 from lowalt.scene.view import Displacement, View
 
+FEWEST = 3
+"""Symbols that a difference between symbols needs to be exact to the second order at both ends."""
+STEP_S = 1e-6
+"""Half the time over which rates are taken where they are not differences between symbols."""
+
+
+def rate(quantity: Callable[[View], np.ndarray], view: View) -> np.ndarray:
+    """Return the change per second at each symbol, (N, ...), of a quantity (N, ...) of a view.
+
+    It is the difference between neighbouring symbols. One or two symbols have no such difference of
+    second order, so the target is then placed twice more, STEP_S apart: after the first symbol, and
+    before the second, since a recording may end with the look.
+    """
+    here = quantity(view)
+    count = len(view.times_s)
+    if count >= FEWEST:
+        return np.gradient(here, view.times_s, axis=0, edge_order=2)
+    steps_s = np.array([STEP_S, -STEP_S])[:count]
+    near = quantity(view.at(view.times_s + steps_s))
+    far = quantity(view.at(view.times_s + 2 * steps_s))
+    change = -3 * here + 4 * near - far
+    return (change.T / (2 * steps_s)).T
+
+
+def middle_of(view: View) -> np.ndarray:
+    """Return the place (N, 3) m of a target's middle, the mean of its points."""
+    return view.places.mean(axis=1)
+
 
 def geometric(view: View) -> np.ndarray:
     """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each
     symbol, (N, 4).
     """
     station = view.station
-    middle = view.places.mean(axis=1)
-    moved = np.gradient(middle, view.times_s, axis=0, edge_order=2)
+    middle = middle_of(view)
+    moved = rate(middle_of, view)
     ends = [station] if station.transmitter is None else [station, station.transmitter]
     ways = [middle - np.asarray(end.position_m) for end in ends]
     ranges = [portable.norm(way) for way in ways]
@@ -63,11 +91,14 @@ def observed(
     """
     network = view.network
     station = view.station
-    middle = view.places.mean(axis=1)
     wavelength_m = SPEED_OF_LIGHT / network.effective_hz(station)
-    way_m = view.ways_m(middle)
-    turns = array_turns(view) - way_m / wavelength_m
-    doppler_hz = np.gradient(turns, view.times_s, edge_order=2)
+    way_m = view.ways_m(middle_of(view))
+
+    def turns(seen: View) -> np.ndarray:
+        """The turns (N,) of the echo's phase."""
+        return array_turns(seen) - seen.ways_m(middle_of(seen)) / wavelength_m
+
+    doppler_hz = rate(turns, view)
     for displacement in displacements:
         way_m = way_m + SPEED_OF_LIGHT * displacement.delay_s
         doppler_hz = doppler_hz + displacement.rise_hz
@@ -81,11 +112,12 @@ def of_parts(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     highest radial speed (N, P) m/s of its points at each symbol, not folded, positive away from the
     station.
 
-    Rotors turn far between two symbols, so speeds are taken over two microseconds.
+    Rotors turn far between two symbols, so speeds are taken over twice STEP_S.
     """
-    before, after = (view.ways_m(view.at(view.times_s + step).places) for step in (-1e-6, 1e-6))
-    # Ways are there and back, and the step from before to after is twice 1e-6 s.
-    speeds = (after - before) / 4e-6
+    before = view.ways_m(view.at(view.times_s - STEP_S).places)
+    after = view.ways_m(view.at(view.times_s + STEP_S).places)
+    # Ways are there and back.
+    speeds = (after - before) / (4 * STEP_S)
     parts = [view.cloud.part == part for part in range(len(view.cloud.names))]
     ranges = [view.ways_m(view.places[:, part].mean(axis=1)) / 2 for part in parts]
     low, high = ([bound(speeds[:, part], axis=1) for part in parts] for bound in (np.min, np.max))

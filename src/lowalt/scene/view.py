@@ -11,7 +11,7 @@ import numpy as np
 
 from lowalt.config.network import Network, Station
 from lowalt.echo import Rigid
-from lowalt.machine.jit import VECTOR
+from lowalt.machine.jit import LEAN
 from lowalt.motion.poses import Perturbation, poses
 from lowalt.numerics import portable
 from lowalt.scene.antenna import Element, gain
@@ -83,7 +83,7 @@ class Perturbations(NamedTuple):
         return sum(np.stack(columns, axis=1) for columns in interpolated) if interpolated else None
 
 
-@VECTOR
+@LEAN
 def _carry(rotation, translation, vectors, part, result):
     """Fill result (N, 3, L) with rotation (N, P, 3, 3) times vectors (3, L) plus translation (N, P,
     3), by part.
@@ -162,7 +162,7 @@ class View:
     element: Element | None = None
     """The antenna elements' pattern, None for isotropic ones."""
     occluders: dict | None = field(default=None, repr=False)
-    """The target's surfaces (see `occlusion`)."""
+    """The target's surfaces, where an effect needs them."""
     sampling: Sampling | None = None
     """Instants of all symbols and which are received, None for all at n T_r."""
 

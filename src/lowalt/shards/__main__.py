@@ -7,13 +7,14 @@ set.
 from lowalt.config.classes import stated
 from lowalt.config.command import dispatch, parser, pick, run
 from lowalt.config.network import Network
-from lowalt.config.plan import CELL_BYTES, cell_type
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
+from lowalt.scene.effects import complete
 from lowalt.shards.content import clean_content, cube_content, noisy_content
 from lowalt.shards.index import build
 from lowalt.shards.sample_record import accompanied
 from lowalt.shards.sample_table import KINDS
+from lowalt.shards.sizes import CELL_BYTES, cell_type
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import read as read_cloud
 from lowalt.targets.occluders import read_all
@@ -23,9 +24,9 @@ from lowalt.tiles.cubes import Cubes
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
-    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions and of a
-    town in a scene that has them, those of canceller for recipe shards, and echo {tolerance,
-    effects} for cube shards.
+    Settings: seed, network, snr_db, split, shards {kind}; also record, the effects that add to the
+    record of a sample, in a scene that has them, filters, those that the noise passes, for recipe
+    shards, and echo {tolerance, effects} for cube shards.
     """
     line = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     line.add_argument("--motion", required=True, help="the chunk's motion table")
@@ -62,9 +63,9 @@ def write(arguments: list[str]) -> None:
     options = line.parse_args(arguments)
     settings = options.settings
     classes = _classes(settings)
-    canceller = settings.pop("canceller", None)
+    filters = settings.pop("filters", {})
     echo = settings.pop("echo", {})
-    company = {name: settings.pop(name) for name in ("companions", "town") if name in settings}
+    recorded = complete(settings.pop("record", {}))
     seed, network, snrs, split, shards = pick(
         settings, "seed", "network", "snr_db", "split", "shards"
     )
@@ -84,7 +85,7 @@ def write(arguments: list[str]) -> None:
     powers = None
     snrs = [float(snr) for snr in snrs]
     network = Network.from_settings(network)
-    rows = [accompanied(row, company, seed, network) for row in read_table(options.motion)]
+    rows = [accompanied(row, recorded, seed, network) for row in read_table(options.motion)]
     if kind == "recipe":
         content, powers = clean_content(options.echoes, options.powers, network, len(rows))
     elif kind == "cube":
@@ -97,7 +98,7 @@ def write(arguments: list[str]) -> None:
         content = noisy_content(
             kind, options.signals, options.tiles, network, (len(rows), len(snrs))
         )
-    samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, canceller)
+    samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, filters)
     write_shard(options.out, samples, options.fold, kind, content, tuple(options.piece))
 
 

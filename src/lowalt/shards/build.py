@@ -13,13 +13,14 @@ import numpy as np
 
 from lowalt.config.command import run
 from lowalt.config.layers import SCHEMA, load
-from lowalt.config.plan import cell_type
 from lowalt.files.atomic import slug
 from lowalt.motion.table import write_table
+from lowalt.scene.set_noise import filters
 from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
 from lowalt.shards.sample_record import npy
+from lowalt.shards.sizes import cell_type
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import write as write_cloud
 
@@ -84,14 +85,20 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
 
     powers = None
     effects = maker.echo["effects"]
-    canceller = (effects["canceller"] or {}) if "canceller" in effects else None
     if kind == "recipe":
         refuse(effects)
-    if kind == "recipe" and maker.echo["effects"]:
+    if kind == "recipe" and effects:
         powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
 
     samples = ChunkSamples(
-        rows, list(levels), plan.split, plan.seed, maker.network, dataset.classes, powers, canceller
+        rows,
+        list(levels),
+        plan.split,
+        plan.seed,
+        maker.network,
+        dataset.classes,
+        powers,
+        filters(effects),
     )
     paths = []
     for name in plan.folds(chunk):

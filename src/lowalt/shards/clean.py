@@ -3,7 +3,7 @@ Readers add noise.
 
 A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without
 noise, and the record of the same key has lists at `snr_db` and `noise`. In a scene with effects the
-record also has the reference powers of the SNRs and the canceller that filters the noise. Record
+record also has the reference powers of the SNRs and the effects that filter the noise. Record
 and signals of each sample are computed from these, with the same bytes as in a shard of signals.
 """
 
@@ -11,22 +11,25 @@ import functools
 import io
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
+from lowalt.config.named_code import own_effects
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals
+from lowalt.scene.effects import PLACES, module_of
 from lowalt.scene.set_noise import behind, in_all_cells
-from lowalt.shards.sample_record import encoded, sample_key
+from lowalt.shards.sample_list import sample_key
+from lowalt.shards.sample_record import encoded
 
 POWER = "power_w"
 """Field of the record: the power (W) that SNRs refer to, one number per station. Without it, the
 echoes' own power.
 """
-CANCELLER = "canceller"
-"""Field of the record for the settings, as JSON text, of the canceller that the noise passes;
-absent without one.
+FILTERS = tuple(name for name, place in PLACES.items() if place == "detection")
+"""Fields of the record for effects that the noise passes, by name: their settings as JSON text,
+absent without such an effect.
 """
 
 
@@ -35,10 +38,15 @@ def refuse(effects: dict) -> None:
 
     effects: the configuration's block. Raises: InputError naming the effect.
     """
-    if in_all_cells(effects):
+    if noisy := in_all_cells(effects):
         raise InputError(
-            "shards.kind: 'recipe' with the effect 'cell_noise', whose echoes hold noise; expected "
+            f"shards.kind: 'recipe' with the effect {noisy[0]!r}, whose echoes hold noise; expected "
             "signal or image"
+        )
+    if own := [name for name in own_effects(effects) if hasattr(module_of(name), "filtered")]:
+        raise InputError(
+            f"shards.kind: 'recipe' with the effect {own[0]!r}, whose code a reader of the shards "
+            "would need for the noise; expected signal or image"
         )
 
 
@@ -47,12 +55,12 @@ def packed(
     key: str,
     snrs_db: Iterable[float],
     power_w: Iterable[float] | None,
-    canceller: dict | None,
+    filters: Mapping[str, dict],
 ) -> bytes:
     """Return the record of a motion model, made from the record of one of its samples.
 
-    key: the model's own; snrs_db: SNRs of its samples, +inf for no noise; power_w, canceller: see
-    POWER and CANCELLER, None where they are absent.
+    key: the model's own; snrs_db: SNRs of its samples, +inf for no noise; power_w: see POWER,
+    None where it is absent; filters: the effects that filter the noise, see FILTERS.
     """
     snrs = [float(snr) for snr in snrs_db]
     entry = json.loads(record)
@@ -60,8 +68,8 @@ def packed(
     entry["noise"] = [not math.isinf(snr) for snr in snrs]
     if power_w is not None:
         entry[POWER] = [float(power) for power in power_w]
-    if canceller is not None:
-        entry[CANCELLER] = json.dumps(canceller, sort_keys=True)
+    for name, settings in filters.items():
+        entry[name] = json.dumps(settings, sort_keys=True)
     return encoded(entry)
 
 
@@ -89,7 +97,7 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
         raise InputError(
             f"record of {entry['key']}: SNRs {sample_snrs(entry)} dB, expected {snr_db} dB among them"
         )
-    kept = {name: value for name, value in entry.items() if name not in (POWER, CANCELLER)}
+    kept = {name: value for name, value in entry.items() if name not in (POWER, *FILTERS)}
     kept |= {
         "key": sample_key(entry["subtype"], entry["model"], snr_db),
         "noise": not math.isinf(snr_db),
@@ -104,8 +112,8 @@ def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) ->
     """
     powers = np.array(entry[POWER])[:, None] if POWER in entry else None
     filtered = None
-    if CANCELLER in entry:
-        filtered = functools.partial(behind, filters={"canceller": json.loads(entry[CANCELLER])})
+    if passed := {name: json.loads(entry[name]) for name in FILTERS if name in entry}:
+        filtered = functools.partial(behind, filters=passed)
     return noisy_signals(
         clean[:, None], [entry], stations, [snr_db], entry["seed"], powers, filtered
     )[0, 0]

@@ -5,8 +5,6 @@ expects, and `Endless` is an iterable. Both can be pickled, so the workers of an
 samples.
 """
 
-import functools
-import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -14,22 +12,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lowalt.config.classes import classes_of, label
+from lowalt.config.blocks import motion_block
 from lowalt.config.layers import SCHEMA, check
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import masts_m
-from lowalt.config.plan import GROUPS, Plan, cell_type, motion_block
-from lowalt.config.splits import FOLDS, fold
+from lowalt.config.splits import FOLDS
 from lowalt.files.errors import InputError, warn
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.drawing import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
+from lowalt.scene.effects import complete, needs_surfaces, of_record
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
-from lowalt.shards.read import refuse_unknown
+from lowalt.shards.plan import GROUPS, Plan
 from lowalt.shards.remake import CloudFolder
-from lowalt.shards.sample_record import accompanied, record, sample_key
+from lowalt.shards.sample_list import Place, SampleList
+from lowalt.shards.sample_record import accompanied, record
+from lowalt.shards.sizes import cell_type
 from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import missing_inputs, records_of
@@ -42,15 +42,6 @@ class Sample(NamedTuple):
     image: np.ndarray
     signal: np.ndarray
     record: dict
-
-
-class Place(NamedTuple):
-    """Identification of a sample: its group, subtype, motion model and SNR."""
-
-    group: str
-    subtype: str
-    model: int
-    snr_db: float
 
 
 class MadeOnDemand(Mapping):
@@ -128,6 +119,7 @@ class Dataset:
         inputs: str | Path | None = None,
         occluders: Mapping[str, dict] | None = None,
         published: dict[str, dict] | None = None,
+        records: dict[str, dict] | None = None,
     ) -> None:
         """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and
         choose groups and folds.
@@ -135,10 +127,11 @@ class Dataset:
         clouds: the clouds by subtype, or the folder of their files; by default they are made here,
         from the records that the configuration names and the folder `inputs` of meshes and
         recordings, each when it is first asked for.
-        occluders: each subtype's surfaces, for a scene with `occlusion`; by default made here if
+        occluders: each subtype's surfaces, for effects that need them; by default made here if
         the clouds are.
         published: the row of each subtype in the table of targets, which decides the classes; by
         default the records'.
+        records: the merged records of all targets; by default read from the configuration's files.
         Raises: InputError naming the key, value or file that is wrong.
         """
         if isinstance(config, (str, Path)):
@@ -146,18 +139,17 @@ class Dataset:
             config = check(load_yaml(config), shipped(SCHEMA))
             refuse_effects(config["effects"], path)
         self.config = config
-        self.folds = tuple(folds)
-        records = {}
-        if published is None or clouds is None:
+        if records is None and (published is None or clouds is None):
             # A run's configuration names tables and records as seen from the checkout it was made
             # in.
             records = records_of(located(config)["targets"], inputs)
+        records = records or {}
         self.published = published or {name: item["published"] for name, item in records.items()}
-        self.classes = classes_of(self.published)
         self.plan = Plan.of(config, self.published)
-        groups = tuple(groups)
-        refuse_unknown(groups, self.folds)
-        self.groups = tuple(name for name in self.plan.groups if name in groups)
+        self.listed = SampleList(self.plan, self.published, groups, folds)
+        self.classes = self.listed.classes
+        self.groups = self.listed.groups
+        self.folds = self.listed.folds
         if clouds is None:
             wanted = {
                 name: records[name] for group in self.groups for name in self.plan.groups[group]
@@ -166,7 +158,7 @@ class Dataset:
             if missing := missing_inputs(wanted, sources[-1]):
                 raise InputError("missing inputs:\n  " + "\n  ".join(missing))
             clouds = MadeOnDemand(made_cloud, *sources)
-            if occluders is None and "occlusion" in config["effects"]:
+            if occluders is None and needs_surfaces(config["effects"]):
                 occluders = MadeOnDemand(made_surfaces, *sources)
         self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
         self._masts = np.array(masts_m(config["network"]), float)
@@ -176,77 +168,32 @@ class Dataset:
         self._drawn: tuple[tuple, list[dict]] = (), []
         render = {key: config[key] for key in ("network", "spectra", "images")}
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
+        self._recorded = complete(of_record(config["effects"]))
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
         chosen = [self.published[name] for group in self.groups for name in self.plan.groups[group]]
         network = self.maker.network
-        for folds in filter(None, (network.folding(chosen), network.range_folding(self._corners))):
-            warn(folds)
-
-    @functools.cached_property
-    def _numbers(self) -> np.ndarray | None:
-        """Numbers of the chosen folds' samples, counted over all folds; None if all folds are
-        chosen.
-        """
-        if set(self.folds) == set(FOLDS):
-            return None
-        return np.array(
-            [n for n in range(self._all) if self._fold(self._place(n)) in self.folds], np.int64
-        )
-
-    @property
-    def _all(self) -> int:
-        """Number of samples of the chosen groups in all folds."""
-        return (
-            sum(len(self.plan.groups[group]) for group in self.groups)
-            * self.plan.models
-            * len(self.plan.snrs)
-        )
+        texts = network.folding(chosen), network.range_folding(self._corners)
+        self.folding = tuple(text for text in texts if text)
+        """Warnings that speeds or ranges fold."""
+        for text in self.folding:
+            warn(text)
 
     def __len__(self) -> int:
-        return self._all if self._numbers is None else len(self._numbers)
-
-    def _place(self, number: int) -> Place:
-        """Return the place of the sample with this number, counted over all folds."""
-        position, level = divmod(number, len(self.plan.snrs))
-        for group in self.groups:
-            names = self.plan.groups[group]
-            if position < len(names) * self.plan.models:
-                model, index = divmod(position, len(names))
-                return Place(group, names[index], model, self.plan.snrs[level])
-            position -= len(names) * self.plan.models
-        raise IndexError(number)
+        return len(self.listed)
 
     def place(self, number: int) -> Place:
         """Return group, subtype, motion model and SNR of a sample.
 
         Raises: IndexError where there is no sample of this number.
         """
-        number = int(number)
-        if not 0 <= number < len(self):
-            raise IndexError(f"sample {number}: expected 0 to {len(self) - 1}")
-        return self._place(number if self._numbers is None else int(self._numbers[number]))
+        return self.listed[number]
 
     def place_of(self, subtype: str, model: int, snr_db: float) -> Place:
         """Return the place of any motion model of a subtype at any SNR (dB).
 
         Raises: InputError for a subtype that is not selected.
         """
-        for group, members in self.plan.groups.items():
-            if subtype in members:
-                return Place(group, subtype, model, snr_db)
-        raise InputError(
-            f"subtype is {subtype!r}, expected one of {[*itertools.chain(*self.plan.groups.values())]}"
-        )
-
-    def _fold(self, place: Place) -> str:
-        """Fold of a sample."""
-        return fold(
-            self.plan.split,
-            self.plan.seed,
-            place.subtype,
-            place.model // self.plan.looks,
-            place.snr_db,
-        )
+        return self.listed.named(subtype, model, snr_db)
 
     def row(self, place: Place) -> dict:
         """Return the motion table's row of a sample; models beyond the configuration's count are
@@ -268,7 +215,7 @@ class Dataset:
                 model_rows(self.plan.seed, *sources, self._motion, track, self._path),
             )
         row = {**self._drawn[1][look], "group": place.group, "model": place.model}
-        return accompanied(row, self.config["effects"], self.plan.seed, self.maker.network)
+        return accompanied(row, self._recorded, self.plan.seed, self.maker.network)
 
     def made_signal(self, place: Place) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""
@@ -276,7 +223,13 @@ class Dataset:
 
     def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
         """Return the JSON record of a sample; cubes: its part about each station's cube."""
-        facts = place.snr_db, self._fold(place), self.plan.seed, self.maker.network, self.classes
+        facts = (
+            place.snr_db,
+            self.listed.fold(place),
+            self.plan.seed,
+            self.maker.network,
+            self.classes,
+        )
         return record(self.row(place), *facts, cubes)
 
     def made(self, place: Place) -> Sample:
@@ -293,19 +246,12 @@ class Dataset:
 
     def key(self, number: int) -> str:
         """Return the key of a sample, as in the shards."""
-        place = self.place(number)
-        return sample_key(place.subtype, place.model, place.snr_db)
+        return self.place(number).key
 
     @property
     def labels(self) -> np.ndarray:
         """Labels of all samples, (n,) int64 indices into `classes`; no sample is simulated."""
-        numbers = {
-            name: label(self.classes, item | {"subtype": name})
-            for name, item in self.published.items()
-        }
-        return np.array(
-            [numbers[self.place(number).subtype] for number in range(len(self))], np.int64
-        )
+        return self.listed.labels
 
     def signal(self, number: int) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""
@@ -360,14 +306,7 @@ class Endless:
 
     def places(self) -> Iterator[Place]:
         """Yield the place of each sample in turn; no sample is made."""
-        plan = self.dataset.plan
-        for model in itertools.count(self.first + self.part, self.parts):
-            for group in self.dataset.groups:
-                for subtype in plan.groups[group]:
-                    for snr_db in plan.snrs:
-                        place = Place(group, subtype, model, snr_db)
-                        if self.dataset._fold(place) in self.dataset.folds:
-                            yield place
+        return self.dataset.listed.models_from(self.first + self.part, self.parts)
 
     def __iter__(self) -> Iterator[Sample]:
         return map(self.dataset.made, self.places())

@@ -3,13 +3,19 @@ their shards.
 """
 
 import json
+from collections.abc import Iterator
 from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
 
 from lowalt.config.splits import FOLDS
+from lowalt.files.atomic import existing
+from lowalt.files.errors import reading
 from lowalt.shards.read import ShardSet
+from lowalt.shards.record_types import Type, column, joined, type_of
 from lowalt.shards.sample_table import EXTENSIONS
 from lowalt.shards.stored_cubes import cell_type_of
-from lowalt.spectra.cube import TRUTH
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
 
@@ -60,45 +66,52 @@ def configs(shards: ShardSet) -> list[dict]:
     return result
 
 
-DTYPES = {bool: "bool", int: "int64", float: "float64", str: "string", type(None): "float64"}
-"""The hub's type names for values of a record; an unknown number is null."""
+def records(shards: ShardSet) -> Iterator[dict]:
+    """Yield every stored record once, shard by shard; the samples of a motion model in a recipe
+    shard share one.
+
+    Only the records are read. Raises: InputError naming the shard where one is damaged.
+    """
+    for entry, table in shards.tables():
+        path = existing(Path(shards.index_path).parent / entry["path"], "shard")
+        offsets, places = np.unique(table["record_offset"], return_index=True)
+        with path.open("rb") as file:
+            for offset, size in zip(offsets, table["record_size"][places], strict=True):
+                file.seek(int(offset))
+                with reading(path, "shard"):
+                    record = json.loads(file.read(int(size)))
+                yield record
 
 
 def features(shards: ShardSet) -> list[dict]:
     """Return the columns of the data set as the hub's library `datasets` types them, the label's
     with its classes.
+
+    Raises: InputError where a field has unlike types in the records.
     """
-    if not len(shards):
+    kinds: Type = None
+    first = None
+    for entry in records(shards):
+        first = first or entry
+        kinds = joined(kinds, type_of(entry, "record"), "record")
+    if first is None:
         return []
-    names = {
-        "class_label": {"names": {str(number): name for number, name in enumerate(shards.classes)}}
-    }
-
-    def typed(name: str, value: object) -> dict:
-        """The type of one value of a record."""
-        if name == "label":
-            return {"name": name, "dtype": names}
-        if isinstance(value, dict):
-            return {"name": name, "struct": [typed(*item) for item in value.items()]}
-        if name == "others":
-            # The first sample may have no companion, so its list may be empty.
-            return {"name": name, "list": [{"name": column, "list": "float64"} for column in TRUTH]}
-        if isinstance(value, list):
-            return {"name": name, "list": DTYPES[type(value[0])] if value else "string"}
-        return {"name": name, "dtype": DTYPES[type(value)]}
-
-    entry = json.loads(shards.stored(0, "record"))
+    record = column("json", kinds)
+    classes = {str(number): name for number, name in enumerate(shards.classes)}
+    for field in record["struct"]:
+        if field["name"] == "label":
+            field["dtype"] = {"class_label": {"names": classes}}
     data: dict = {"dtype": "image"}
     if shards.kind != "image":
         # One nested list per axis of the array.
         axes = {
-            "list": {"list": {"list": "int16" if cell_type_of(entry) == "int16" else "float32"}}
+            "list": {"list": {"list": "int16" if cell_type_of(first) == "int16" else "float32"}}
         }
         data = {"list": axes} if shards.kind == "cube" else axes
     return [
-        typed("__key__", ""),
-        typed("__url__", ""),
-        typed("json", entry),
+        column("__key__", "string"),
+        column("__url__", "string"),
+        record,
         {"name": EXTENSIONS[shards.kind], **data},
     ]
 
@@ -106,6 +119,7 @@ def features(shards: ShardSet) -> list[dict]:
 def front(shards: ShardSet, name: str, license_name: str) -> dict:
     """Return the metadata block at the head of the data card, as dataset hubs read it."""
     protocols = configs(shards)
+    columns = features(shards)
     return {
         "pretty_name": name,
         "license": license_name.lower(),
@@ -113,8 +127,7 @@ def front(shards: ShardSet, name: str, license_name: str) -> dict:
         "task_categories": ["image-classification"],
         "configs": protocols,
         "dataset_info": [
-            {"config_name": block["config_name"], "features": features(shards)}
-            for block in protocols
+            {"config_name": block["config_name"], "features": columns} for block in protocols
         ],
         "tags": TAGS,
     }

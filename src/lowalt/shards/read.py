@@ -11,12 +11,13 @@ import json
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from lowalt.config.classes import stated
+from lowalt.config.extensions import module_offered, offered
 from lowalt.config.network import station_names
-from lowalt.config.plan import GROUPS
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import existing, sha256
 from lowalt.files.errors import InputError
@@ -24,7 +25,8 @@ from lowalt.files.json_objects import json_object
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import WHAT, checked, load
-from lowalt.shards.remote import MOST_INDEX_BYTES, beside, fetched, is_address, span
+from lowalt.shards.plan import GROUPS
+from lowalt.shards.sample_list import refuse_unknown
 from lowalt.shards.sample_record import npy, row_of
 from lowalt.shards.sample_table import MOST_OVERHEAD_BYTES, SAMPLE, map_samples, table_path
 from lowalt.shards.stored_cubes import cubes_of
@@ -35,12 +37,21 @@ from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
 
+MOST_INDEX_BYTES = 64 << 20
 
-def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
-    """Refuse groups and folds that no data set has. Raises: InputError naming them."""
-    for option, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
-        if set(names) - set(known):
-            raise InputError(f"{option} {names}, expected some of {known}")
+
+@functools.cache
+def store_of(scheme: str) -> ModuleType:
+    """Return the module of the extension that reads data sets at addresses SCHEME://...
+
+    Raises: InputError where no extension does.
+    """
+    stores = offered("stores")
+    if scheme not in stores:
+        raise InputError(
+            f"{scheme}://: no extension reads such addresses, expected a file or one of {sorted(stores)}"
+        )
+    return module_offered("stores", scheme, stores[scheme])
 
 
 class ShardSet:
@@ -60,11 +71,13 @@ class ShardSet:
     ) -> None:
         """Select the shards of these groups and folds.
 
-        index_path: a file, or an address (http or https) on a server that sends byte ranges.
+        index_path: a file, or an address that an extension reads, such as https://... on a server
+        that sends byte ranges.
         Raises: InputError naming an unknown group or fold, or a file that is missing or damaged.
         """
-        self.remote = is_address(index_path)
         self._base = str(index_path)
+        self.scheme = self._base.partition("://")[0] if "://" in self._base else ""
+        self.remote = bool(self.scheme)
         self.index_path = self._base if self.remote else Path(index_path)
         self.groups = tuple(groups)
         self.folds = tuple(folds)
@@ -88,14 +101,16 @@ class ShardSet:
 
     def _fetched_index(self) -> dict:
         """The index from its address."""
-        text = span(self._base, 0, MOST_INDEX_BYTES).decode(errors="replace")
+        store = store_of(self.scheme)
+        text = store.span(self._base, 0, MOST_INDEX_BYTES).decode(errors="replace")
         return checked(json_object(text, self._base, WHAT), self._base)
 
     def _read(self, shard: int, offset: int, size: int) -> bytes:
         """At most `size` bytes of a shard from `offset` on."""
         name = self.shards[shard]["path"]
         if self.remote:
-            return span(beside(self._base, name), offset, size)
+            store = store_of(self.scheme)
+            return store.span(store.beside(self._base, name), offset, size)
         # Open the shard for each access: there may be more shards than allowed open files, and a
         # memory map of a truncated file would crash the process.
         with existing(Path(self.index_path).parent / name, "shard").open("rb") as file:
@@ -110,7 +125,8 @@ class ShardSet:
             most = entry["samples"] * SAMPLE.itemsize + MOST_OVERHEAD_BYTES
             place: AbstractContextManager[Path] = nullcontext(Path(self.index_path).parent / name)
             if self.remote:
-                place = fetched(beside(self._base, name.as_posix()), most)
+                store = store_of(self.scheme)
+                place = store.fetched(store.beside(self._base, name.as_posix()), most)
             with place as path:
                 samples = map_samples(path)
                 if len(samples) != entry["samples"] or (

@@ -2,9 +2,7 @@
 the truth.
 """
 
-import copy
 import math
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -12,18 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from lowalt.config.layers import SCHEMA, check, overlaid
 from lowalt.config.network import Network, Station
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.files.shipped import shipped
-from lowalt.files.yaml_files import load_yaml
 from lowalt.machine.blas_threads import one_blas_thread
 from lowalt.noise.awgn import add_noise
 from lowalt.numerics.streams import stream
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.truth import of_parts
 from lowalt.shards.dataset import Dataset
+from lowalt.shards.kept_datasets import alone
 from lowalt.spectra.cube import TRUTH
 from lowalt.tiles.cubes import true_columns
 
@@ -45,6 +41,8 @@ class RawEcho:
     omega, cell, observed_cell and observed_mps (`lowalt.spectra.cube.TRUTH`), and of each part,
     each (N, P): part_range_m of its middle, part_low_mps and part_high_mps, the lowest and the
     highest radial speed of its points. parts: their names.
+    companions: the subtypes of the other targets in the beam; others: what is true of each of
+    them, the same quantities of `TRUTH`, each (C, N) of C companions in the order of their names.
     """
 
     values: np.ndarray
@@ -54,6 +52,8 @@ class RawEcho:
     speeds_mps: np.ndarray
     truth: dict[str, np.ndarray]
     parts: tuple[str, ...]
+    companions: tuple[str, ...]
+    others: dict[str, np.ndarray]
     subtype: str
     model: int
     station: str
@@ -65,15 +65,17 @@ class RawEcho:
         return np.array(self.values, dtype, copy=copy)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return everything by name, as a file holds it: the fields, and each entry of the truth by
-        its own name.
+        """Return everything by name, as a file holds it: the fields, each entry of the truth by its
+        own name, and each of the companions' with `others_` before it.
         """
         own = {
             field.name: np.asarray(getattr(self, field.name))
             for field in fields(self)
-            if field.name != "truth"
+            if field.name not in ("truth", "others")
         }
-        return own | self.truth
+        own["companions"] = np.array(self.companions, dtype=np.str_)
+        others = {f"others_{name}": values for name, values in self.others.items()}
+        return own | self.truth | others
 
 
 @one_blas_thread()
@@ -89,12 +91,11 @@ def receive(
     sqrt(W).
 
     configuration: overlays on the embedded default, each a path or a dict, a whole configuration,
-    or a `Dataset`, which keeps the targets between calls; station: the first one by default. Only
-    this target and its companions in the scene are made. at:
-    "subcarriers": Y[n, m] of Eq. 24, the known symbol removed, as a receiver without faults or
-    noise finds it; "receiver": the same behind the receiver's effects and noise; "cells": range
-    cells; "canceller": range cells behind the clutter canceller; "signal": the chosen range cell of
-    each symbol.
+    or a `Dataset`; station: the first one by default. Only this target and the others that the
+    scene adds are made. at: "subcarriers": Y[n, m] of Eq. 24, the known symbol removed, as a
+    receiver without faults or noise finds it; "receiver": the same behind the receiver's effects
+    and noise; "cells": range cells; "canceller": range cells behind the linear filters of the
+    detection; "signal": the chosen range cell of each symbol.
     snr_db: without it there is no noise but that of the scene's own receiver; with it there is
     white noise from "receiver" on, and "canceller" and "signal" are those of the data set.
 
@@ -108,8 +109,9 @@ def receive(
     A range-Doppler map in ten lines, speeds upwards:
 
         import lowalt, numpy as np, matplotlib.pyplot as plt
-        echo = lowalt.receive("config/scenes/urban.yaml", "Crow", model=3, station="A",
-        at="canceller") window = np.hanning(len(echo.times_s))[:, None]
+        scene = "config/scenes/urban.yaml"
+        echo = lowalt.receive(scene, "Crow", model=3, station="A", at="canceller")
+        window = np.hanning(len(echo.times_s))[:, None]
         power = abs(np.fft.fftshift(np.fft.fft(window * echo.values, axis=0), axes=0)[::-1]) ** 2
         plt.pcolormesh(echo.ranges_m, echo.speeds_mps, 10 * np.log10(power))
         plt.plot(echo.truth["range_m"], echo.truth["observed_mps"], "rx")
@@ -127,22 +129,6 @@ def receive(
     sample = dataset.maker.seen(row, snr_db, there)
     values = _values(dataset, sample, at, snr_db)
     return _described(values, sample, network, at, snr_db)
-
-
-def alone(configuration: dict | str | Path | Iterable[str | Path | dict], subtype: str) -> Dataset:
-    """Return the data set of one subtype and its companions in the scene, without any other target.
-
-    Raises: InputError naming the key, value or file that is wrong.
-    """
-    schema = shipped(SCHEMA)
-    if isinstance(configuration, dict) and set(load_yaml(schema)["required"]) <= set(configuration):
-        config = check(copy.deepcopy(configuration), schema)
-    else:
-        given = [configuration] if isinstance(configuration, (dict, str, Path)) else configuration
-        config = overlaid(given)
-    beside = (config["effects"].get("companions") or {}).get("subtypes", [])
-    config["targets"] |= {"select": list(dict.fromkeys([subtype, *beside]))}
-    return Dataset(config, inputs=config["inputs"] or os.environ.get("LOWALT_INPUTS"))
 
 
 def _values(dataset: Dataset, sample: SceneSample, at: str, snr_db: float) -> np.ndarray:
@@ -172,7 +158,7 @@ def _values(dataset: Dataset, sample: SceneSample, at: str, snr_db: float) -> np
         values[slice(None) if sample.view.sampling is None else sample.view.sampling.present] = (
             received
         )
-    if set_snr and not any(effect.name == "cell_noise" for effect in scene.effects):
+    if set_snr and not any(effect.offers("SET_SNR") for effect in scene.effects):
         rng = stream(scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
         noise = add_noise(np.zeros(values.shape), snr_db, rng, sample.power)
         values = values + (np.fft.fft(noise, axis=1) if at == "receiver" else noise)
@@ -193,9 +179,12 @@ def _described(
     of_part = of_parts(view)
     truth = dict(zip(TRUTH, columns.T, strict=True))
     truth |= dict(zip(("part_range_m", "part_low_mps", "part_high_mps"), of_part, strict=True))
-    even = at == "signal" and not any(
-        effect.settings.get("regrid") == "zero" for effect in sample.scene.effects
-    )
+    beside = sample.targets[1:]
+    columns_beside = np.empty((len(beside), len(TRUTH), len(view.times_s)))
+    for number, other in enumerate(beside):
+        columns_beside[number] = true_columns(sample, other).T
+    others = {name: columns_beside[:, number] for number, name in enumerate(TRUTH)}
+    even = at == "signal" and all(even() for even in sample.all("even").values())
     return RawEcho(
         values,
         network.times_s if even else view.times_s,
@@ -204,6 +193,8 @@ def _described(
         network.bin_speeds_mps(len(values), station),
         truth,
         view.cloud.names,
+        tuple(other.row["subtype"] for other in beside),
+        others,
         view.row["subtype"],
         int(view.row["model"]),
         station.name,

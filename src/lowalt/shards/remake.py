@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import Network
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, slug
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
+from lowalt.scene.effects import complete, needs_surfaces, of_record
+from lowalt.scene.trust import refuse_effects
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
 from lowalt.shards.sample_record import accompanied, record, row_of
@@ -52,8 +53,8 @@ class Remaker:
     def __init__(
         self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None
     ) -> None:
-        """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, for
-        scenes with occlusion.
+        """Take the data set and the clouds by subtype; occluders: each subtype's surfaces, where
+        effects need them.
 
         Raises: InputError where the index does not say how echoes were computed, or names code
         among the effects.
@@ -69,6 +70,7 @@ class Remaker:
         self.occluders = occluders
         self.network = Network.from_settings(shards.index["render"]["network"])
         self._makers: dict[int, Maker] = {}
+        self._recorded = complete(of_record(shards.index["echo"]["effects"]))
 
     def _maker(self, seed: int) -> Maker:
         """The maker of samples with a random seed."""
@@ -99,7 +101,7 @@ class Remaker:
         data, cubes = self._maker(seed).data(
             self.shards.kind, signal, row, snr_db, cell_type_of(entry)
         )
-        row = accompanied(row, self.shards.index["echo"]["effects"], seed, self.network)
+        row = accompanied(row, self._recorded, seed, self.network)
         return record(
             row, snr_db, entry["fold"], seed, self.network, self.shards.classes, cubes
         ), data
@@ -148,12 +150,14 @@ def opened(
 
     clouds: folder of the run's clouds, by default `clouds` next to the folder of the index;
     occluders: folder of the run's surfaces, by default `occluders` next to that of the clouds.
-    Surfaces are read only if the scene hides points.
+    Surfaces are read only where effects need them.
     Raises: InputError if the index or a surface cannot be read, or the index is too old.
     """
     shards = ShardSet(index)
     surfaces = None
     clouds = Path(clouds or Path(index).resolve().parent.parent / "clouds")
-    if "occlusion" in (shards.index.get("echo") or {}).get("effects", {}):
+    effects = (shards.index.get("echo") or {}).get("effects", {})
+    refuse_effects(effects, shards.index_path)
+    if needs_surfaces(effects):
         surfaces = read_all(sorted(Path(occluders or clouds.parent / "occluders").glob("*.npz")))
     return Remaker(shards, CloudFolder(clouds), surfaces)

@@ -1,5 +1,5 @@
-"""The bytes of a sample: its key, its place in the shuffled order, its JSON record, its signals as
-an .npy file.
+"""The bytes of a sample: its place in the shuffled order, its JSON record, its signals as an .npy
+file.
 
 Every field has one type in all records, and no value is missing, so that tables with typed columns
 (Arrow) hold them.
@@ -7,19 +7,28 @@ Every field has one type in all records, and no value is missing, so that tables
 
 import json
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from lowalt.config.classes import CATEGORIES, label
 from lowalt.config.network import Network, Station
-from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.motion.table import TRACK
 from lowalt.numerics.portable import dot, norm
 from lowalt.numerics.streams import digest
+from lowalt.scene.effects import NamedEffect, record_fields
+from lowalt.shards.sample_list import sample_key
 from lowalt.tiles.tile_files import npy_header
 
 NAMES = ("subtype", "category", "group", "model")
+OWN = (
+    *("key", "label", "fold", "snr_db", "noise", "seed"),
+    *("motion", "geometry", "cube", "versions", "power_w"),
+)
+"""Further fields of a record, which no effect may add."""
+ADDED = "added"
+"""Key of a row for the fields that effects add to the record."""
 DATA_VERSION = "0.2.0"
 """Version of the rules by which a configuration becomes bytes. A change of the default's bytes
 changes the rules.
@@ -27,30 +36,6 @@ changes the rules.
 It is not the version of the package: a release that changes no rule makes the same shards as the
 release before it.
 """
-
-
-def snr_label(snr_db: float) -> str:
-    """Return an SNR for a key: `snrinf`, `snr003`, `snr-60`, `snr003p5` (no dots, which end a key
-    in a tar).
-    """
-    if math.isinf(snr_db):
-        return "snrinf"
-    text = f"{int(snr_db):03d}" if float(snr_db).is_integer() else f"{snr_db:05.1f}"
-    if float(text) != snr_db:
-        text = repr(float(snr_db))
-    return "snr" + text.replace(".", "p")
-
-
-def model_key(subtype: str, model: int) -> str:
-    """Return the key of a motion model, {slug}-{model, six digits}."""
-    return f"{slug(subtype)}-{model:06d}"
-
-
-def sample_key(subtype: str, model: int, snr_db: float) -> str:
-    """Return the key of a sample, {slug}-{model, six digits}-{SNR}: unique, no dots, sorts by
-    subtype and model.
-    """
-    return f"{model_key(subtype, model)}-{snr_label(snr_db)}"
 
 
 def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:
@@ -128,21 +113,18 @@ def record(
 
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0
     here. `noise` says whether noise was added; where none was, `snr_db` is infinite. Numbers that
-    are unknown are null, as for a recorded target whose place was not recorded. Where `row` has the
-    key `companions`, the subtypes of the other targets in the beam, the record has it too; the
-    label is the row's own target's. The same holds for `paths`, those of each station to the target
-    in a town. A row of a track adds its track and look. classes: in the order of their labels;
-    cubes: facts on each station's cube.
-    Raises: InputError where the row's category is no class.
+    are unknown are null, as for a recorded target whose position was not recorded. Where `row` has
+    the key ADDED, what the scene's effects say of the sample (`accompanied`), the record has its
+    fields too; the label is the row's own target's. A row of a track adds its track and look.
+    classes: in the order of their labels; cubes: facts on each station's cube.
+    Raises: InputError where the row's category is no class, or an effect gives a field that the
+    record has already.
     """
     names = NAMES + TRACK * (TRACK[0] in row)
-    motion = {
-        name: value
-        for name, value in row.items()
-        if name not in (*names, "fold", "companions", "paths")
-    }
-    added = {"companions": list(row["companions"])} if "companions" in row else {}
-    added |= {"paths": row["paths"]} if "paths" in row else {}
+    motion = {name: value for name, value in row.items() if name not in (*names, "fold", ADDED)}
+    added = row.get(ADDED, {})
+    if taken := sorted({*OWN, *names} & set(added)):
+        raise InputError(f"effects: one adds {taken} to records, expected other names of fields")
     blank = None if math.isnan(row["x_m"]) else 0.0
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
@@ -166,19 +148,11 @@ def record(
     return encoded(content)
 
 
-def accompanied(row: dict, effects: dict, seed: int, network: Network) -> dict:
-    """Return the row with the subtypes that the scene's effects put next to its target, and with
-    the paths to it in a town; the row alone where the scene has neither."""
-    # Most runs have no companions, so the module is loaded only for those that have.
-    if "companions" in effects:
-        from lowalt.scene.effects.channel.companions import listed
-
-        row = {**row, "companions": listed(effects["companions"] or {}, seed, row)}
-    if "town" in effects:
-        from lowalt.scene.effects import module_of
-
-        row = {**row, "paths": module_of("town").listed(effects["town"], network, row)}
-    return row
+def accompanied(row: dict, effects: Sequence[NamedEffect], seed: int, network: Network) -> dict:
+    """Return the row with what effects say of its sample at the key ADDED; the row alone without
+    effects.
+    """
+    return {**row, ADDED: record_fields(effects, network, seed, row)} if effects else row
 
 
 def row_of(entry: dict) -> tuple[dict, float]:

@@ -2,7 +2,7 @@
 table.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,8 @@ from lowalt.config.splits import FOLDS, fold
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.shards.clean import packed
-from lowalt.shards.sample_record import model_key, rank, record, sample_key
+from lowalt.shards.sample_list import model_key, sample_key
+from lowalt.shards.sample_record import rank, record
 from lowalt.shards.sample_table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.sample_table import write as write_table
 from lowalt.shards.tar import Span, Writer
@@ -28,7 +29,7 @@ class ChunkSamples(NamedTuple):
     rows: the motion table; snrs: dB; split, seed: determine each sample's fold; classes: in the
     order of their labels;
     powers: (stations, rows) W, reference powers of the SNRs, None for those of the echoes;
-    canceller: settings of the canceller that filters the noise (both for kind "recipe").
+    filters: the effects that filter the noise, by name (both for kind "recipe").
     """
 
     rows: list[dict]
@@ -38,7 +39,7 @@ class ChunkSamples(NamedTuple):
     network: Network
     classes: tuple[str, ...] = CATEGORIES
     powers: np.ndarray | None = None
-    canceller: dict | None = None
+    filters: Mapping[str, dict] = {}
 
 
 def select(
@@ -88,7 +89,7 @@ def write_shard(
         raise InputError(
             f"{path}: fold {wanted!r} of kind {kind!r}, expected one of {FOLDS} and of {KINDS}"
         )
-    rows, snrs, split, seed, network, classes, powers, canceller = chunk
+    rows, snrs, split, seed, network, classes, powers, filters = chunk
     groups = sorted({row["group"] for row in rows})
     if len(groups) != 1:
         raise InputError(f"{path}: its motion table has the groups {groups}, expected exactly one")
@@ -117,7 +118,7 @@ def write_shard(
                     if kind == "recipe":
                         name = model_key(row["subtype"], row["model"])
                         power_w = None if powers is None else powers[:, number]
-                        text = packed(text, name, sorted(levels[number]), power_w, canceller)
+                        text = packed(text, name, sorted(levels[number]), power_w, filters)
                     span = tar.add(name, text, EXTENSIONS[kind], data)
                     if kind == "recipe":
                         spans[number] = span

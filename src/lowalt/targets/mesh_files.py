@@ -1,8 +1,8 @@
 """Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a
 target.
 
-OBJ, PLY and GLB have readers of their own (`mesh_polygons`, `mesh_glb`), which say why; trimesh
-reads STL and DAE and places a scene's surfaces. pymeshlab repairs, since its filters keep two
+OBJ has a reader of its own (`mesh_polygons`), which says why; trimesh reads STL and DAE and places
+a scene's surfaces; extensions offer readers of other formats. pymeshlab repairs, since its filters keep two
 million triangles within seconds and a gigabyte; sampling is that of `surfaces`, which is seeded
 (pymeshlab's sampling takes no seed and misses the count).
 """
@@ -12,6 +12,7 @@ import logging
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -21,11 +22,10 @@ from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import for_trimesh, stated_metres, stated_up
-from lowalt.targets.mesh_glb import read_glb
-from lowalt.targets.mesh_polygons import Piece, read_obj, read_ply, stated_unit
+from lowalt.targets.mesh_polygons import Piece, read_obj, stated_unit
 from lowalt.targets.surfaces import Surface, merged
 
-SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
+OWN_SUFFIXES = (".stl", ".obj", ".dae")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 LARGEST_TRIANGLES = 20_000_000
 """A file with more triangles is refused, since its arrays alone would take over two gigabytes."""
@@ -63,8 +63,8 @@ def metres(unit: str | float) -> float:
 def stated_unit_m(path: Path) -> float | None:
     """Return the metres that a mesh file says its unit has, None where it says nothing.
 
-    COLLADA states it (`<unit meter="...">`), an OBJ may in a comment; a GLB is in metres by its
-    standard; STL and PLY have no unit. Source: COLLADA 1.4.1, element unit; glTF 2.0, section 3.4.
+    COLLADA states it (`<unit meter="...">`), an OBJ may in a comment, an extension's format may by
+    its standard; STL has no unit. Source: COLLADA 1.4.1, element unit.
     Raises: InputError where a COLLADA file is no XML.
     """
     kind = path.suffix.lower()
@@ -72,19 +72,37 @@ def stated_unit_m(path: Path) -> float | None:
         return UNITS_M.get(stated_unit(path))
     if kind == ".dae":
         return stated_metres(path)
-    return 1.0 if kind == ".glb" else None
+    return getattr(_added(kind), "METRES", None)
 
 
 def stated_up_axis(path: Path) -> str | None:
     """Return the axis that a mesh file or its format says is up, None where neither says so.
 
-    Source: glTF 2.0, section 3.4 (y up, z front); COLLADA 1.4.1, element up_axis.
+    Source: COLLADA 1.4.1, element up_axis.
     Raises: InputError where a COLLADA file is no XML.
     """
     kind = path.suffix.lower()
     if kind == ".dae":
         return stated_up(path)
-    return "y" if kind == ".glb" else None
+    return getattr(_added(kind), "UP", None)
+
+
+def suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all files that are read, those of extensions last."""
+    from lowalt.config.extensions import offered
+
+    return (*OWN_SUFFIXES, *offered("meshes"))
+
+
+def _added(suffix: str) -> ModuleType | None:
+    """The module of the extension that reads files of this suffix, None where none does."""
+    if suffix in OWN_SUFFIXES:
+        return None
+    # Looking for extensions takes longer than making a built-in cloud.
+    from lowalt.config.extensions import module_offered, offered
+
+    readers = offered("meshes")
+    return module_offered("meshes", suffix, readers[suffix]) if suffix in readers else None
 
 
 def _scene(path: Path) -> list[Piece]:
@@ -143,9 +161,13 @@ def pieces(path: Path) -> list[Piece]:
     read.
     """
     path = existing(path, "mesh")
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
-    read = {".obj": read_obj, ".glb": read_glb, ".ply": read_ply}.get(path.suffix.lower(), _scene)
+    kind = path.suffix.lower()
+    added = _added(kind)
+    if added is None and kind not in OWN_SUFFIXES:
+        raise InputError(f"{path}: format {path.suffix!r}, expected one of {suffixes()}")
+    read = read_obj if kind == ".obj" else _scene
+    if added is not None:
+        read = added.pieces
     with reading(path, f"{path.suffix} mesh"):
         if path.suffix.lower() == ".stl":
             _refuse_truncated(path)
@@ -243,7 +265,7 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
 
 
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
-    """Return the repaired mesh of an STL, OBJ, PLY, DAE or GLB file in metres along the file's own
+    """Return the repaired mesh of a file of a format in `suffixes`, in metres along the file's own
     axes.
 
     `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry`

@@ -1,12 +1,9 @@
-"""Pieces of mesh files, and files of polygons, OBJ and PLY, as viewers show them.
+"""Pieces of mesh files, and OBJ files as viewers show them: a polygon with a dent is cut by earcut,
+not as a fan.
 
-A polygon with a dent is cut by earcut, not as a fan; strips are triangles. Of OBJ files vertices,
-faces and the names of objects, groups and materials are read; of PLY files polygons of any and of
-mixed sizes, and strips, in text and in both binary orders. trimesh counts negative indices of OBJ
-from the file's end, cuts polygons as fans and splits by one kind of name at a time; it drops strips
-of PLY, and takes all faces of a binary file to be as long as its first (Blender writes mixed ones).
-Sources: Wavefront's Object Files (.obj), version 3.0; Greg Turk, The PLY Polygon File Format
-(1994).
+Vertices, faces and the names of objects, groups and materials are read. trimesh counts negative
+indices from the file's end, cuts polygons as fans and splits by one kind of name at a time.
+Source: Wavefront's Object Files (.obj), version 3.0.
 """
 
 import re
@@ -93,24 +90,6 @@ def _ears(around: np.ndarray, ring: np.ndarray, fan: np.ndarray) -> np.ndarray:
     a, b, c = np.moveaxis(around[ears], 1, 0)
     wrong = portable.dot(np.cross(b - a, c - a), normal) < 0
     return ring[np.where(wrong[:, None], ears[:, ::-1], ears)]
-
-
-def stripped(strip: np.ndarray) -> np.ndarray:
-    """Return the triangles (F, 3) of a strip of vertices, of which every second one is turned.
-
-    -1 begins the strip anew.
-    Source: glTF 2.0, section 3.7.2.1; the restart is PLY's.
-    """
-    result = []
-    for run in np.split(strip, np.flatnonzero(strip < 0)):
-        run = run[run >= 0]
-        faces = np.zeros((0, 3), int)
-        if len(run) > 2:
-            faces = np.stack([run[:-2], run[1:-1], run[2:]], axis=1)
-        faces[1::2] = faces[1::2, [1, 0, 2]]
-        result.append(faces)
-    faces = np.concatenate(result)
-    return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
 NAMES = ("o", "g", "usemtl")
@@ -210,136 +189,3 @@ def stated_unit(path: Path) -> str:
                 if re.fullmatch(pattern, stated[1], re.IGNORECASE):
                     return unit
     return ""
-
-
-TYPES = {
-    "char": "i1",
-    "int8": "i1",
-    "uchar": "u1",
-    "uint8": "u1",
-    "short": "i2",
-    "int16": "i2",
-    "ushort": "u2",
-    "uint16": "u2",
-    "int": "i4",
-    "int32": "i4",
-    "uint": "u4",
-    "uint32": "u4",
-    "float": "f4",
-    "float32": "f4",
-    "double": "f8",
-    "float64": "f8",
-}
-ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-
-
-class _Element(NamedTuple):
-    """An element of a PLY file's header: its name, how many there are, its properties as words."""
-
-    name: str
-    count: int
-    properties: list[list[str]]
-
-
-class _Ply:
-    """A PLY file: the `elements` of its header, and its data, read from the front."""
-
-    def __init__(self, data: bytes) -> None:
-        end = data.index(b"end_header")
-        self.data = data
-        self.at = data.index(b"\n", end) + 1
-        self.elements: list[_Element] = []
-        lines = [line.split() for line in data[:end].decode("latin-1").splitlines()]
-        kind = next((words[1] for words in lines if words[:1] == ["format"]), "")
-        if not data.startswith(b"ply") or kind not in ORDERS:
-            raise ValueError(f"format {kind!r}, expected a PLY of format {list(ORDERS)}")
-        for words in lines:
-            if words[:1] == ["element"]:
-                _, name, count = words[:3]
-                if not count.isdecimal():
-                    raise ValueError(f"{count!r} of {name}, expected a count")
-                self.elements.append(_Element(name, int(count), []))
-            elif words[:1] == ["property"]:
-                self.elements[-1].properties.append(words[1:])
-        self.order = ORDERS[kind]
-        if not self.order:  # the numbers of a text, as if they were stored one by one
-            self.data = np.array(data[self.at :].split(), float).tobytes()
-            self.at = 0
-
-    def dtype(self, word: str) -> np.dtype:
-        """The type of a number as it is stored."""
-        return np.dtype(self.order + TYPES[word]) if self.order else np.dtype("f8")
-
-    def take(self, dtype: np.dtype, count: int) -> np.ndarray:
-        """The next `count` numbers or records. Raises: ValueError where the file ends before."""
-        values = np.frombuffer(self.data, dtype, count, self.at) if count else np.zeros(0, dtype)
-        self.at += dtype.itemsize * count
-        return values
-
-    def size(self, words: list[str]) -> int:
-        """The length of the next list. Raises: ValueError where it is negative."""
-        size = int(self.take(self.dtype(words[1]), 1)[0])
-        if size < 0:
-            raise ValueError(f"a list of {size} numbers")
-        return size
-
-    def element(
-        self, count: int, properties: list[list[str]]
-    ) -> dict[str, np.ndarray | list[np.ndarray]]:
-        """Return the values of an element's properties by name.
-
-        They are read at once where all lists of a property are as long as its first one, else list
-        by list.
-        """
-        if not count or not properties:
-            return {}
-        start = self.at
-        fields = []
-        for number, words in enumerate(properties):
-            kind = self.dtype(words[-2])
-            if words[0] == "list":
-                size = min(self.size(words), len(self.data))
-                fields.append((f"size {number}", self.dtype(words[1])))
-                kind = np.dtype((kind, (size,)))
-            fields.append((words[-1], kind))
-            self.at = start + np.dtype(fields).itemsize
-        self.at = start
-        rows = np.dtype(fields)
-        if start + rows.itemsize * count <= len(self.data):
-            table = self.take(rows, count)
-            sizes = [table[name] for name in table.dtype.names if name.startswith("size ")]
-            if all((size == size[0]).all() for size in sizes):
-                return {words[-1]: table[words[-1]] for words in properties}
-        self.at = start
-        values = {words[-1]: [] for words in properties}
-        for _ in range(count):
-            for words in properties:
-                size = self.size(words) if words[0] == "list" else 1
-                values[words[-1]].append(self.take(self.dtype(words[-2]), size))
-        return values
-
-
-def read_ply(path: Path) -> list[Piece]:
-    """Return a file's one surface, which has the file's name.
-
-    Raises: exceptions of many types for a damaged file.
-    """
-    ply = _Ply(path.read_bytes())
-    vertices = np.zeros((0, 3))
-    polygons = []
-    faces = []
-    for name, count, properties in ply.elements:
-        values = ply.element(count, properties)
-        lists = values.get("vertex_indices", values.get("vertex_index", []))
-        if name == "vertex" and values:
-            columns = [np.asarray(values[axis], float).reshape(-1) for axis in "xyz"]
-            vertices = np.stack(columns, axis=1)
-        elif name == "face":
-            polygons = lists
-        elif name.startswith("tristrip"):
-            faces += [stripped(np.asarray(strip).astype(np.int64)) for strip in lists]
-    if len(polygons):
-        counts = np.array([len(polygon) for polygon in polygons])
-        faces.append(triangulated(vertices, counts, np.concatenate(polygons).astype(np.int64))[0])
-    triangles = np.concatenate(faces) if faces else np.zeros((0, 3), np.int64)
-    return [Piece(vertices, triangles, (path.name,))]

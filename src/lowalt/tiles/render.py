@@ -37,10 +37,10 @@ class Renderer:
 
         >>> from lowalt.config.layers import overlaid
         >>> config = overlaid([])
-        >>> renderer = Renderer.from_settings({key: config[key] for key in ("network", "spectra",
-        "images")})
-        >>> tile = renderer.tile(np.exp(0.8j * np.arange(1200).reshape(3,
-        400)).astype(np.complex64))
+        >>> parts = ("network", "spectra", "images")
+        >>> renderer = Renderer.from_settings({key: config[key] for key in parts})
+        >>> signals = np.exp(0.8j * np.arange(1200).reshape(3, 400))
+        >>> tile = renderer.tile(signals.astype(np.complex64))
         >>> tile.shape, split(tile, spectra=3).shape
         ((768, 768), (9, 256, 256))
     """

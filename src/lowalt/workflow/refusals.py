@@ -6,12 +6,13 @@ before any job.
 """
 
 import contextlib
+import itertools
 from collections.abc import Collection
 from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
-from lowalt.config.named_code import buildings_of, own_effects
+from lowalt.config.named_code import file_of, own_effects
 from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
@@ -19,6 +20,8 @@ from lowalt.files.shipped import SHIPPED, as_named
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, columns_in, names
 from lowalt.recognition.schemes import named as scheme_named
+from lowalt.scene.checks import check, refuse_unknown_subtypes
+from lowalt.scene.effects import named_files
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.shards.clean import refuse
 from lowalt.spectra.catalogue import named, of_cells
@@ -38,32 +41,32 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
         ("report", "accuracy"),
         ("motion", "track"),
     )
-    paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
-    paths |= {"effects": " ".join(own_effects(config["effects"]))}
-    paths |= {"effects.town.buildings": buildings_of(config["effects"])}
-    paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
+    paths = {
+        "inputs": inputs,
+        "the folder of lowalt": str(SHIPPED),
+        "effects": " ".join(own_effects(config["effects"])),
+        **named_files(config["effects"]),
+    }
+    for block, key in keys:
+        paths[f"{block}.{key}"] = config.get(block, {}).get(key)
     for name, path in paths.items():
-        if path and {"{", "}"} & {*path}:
+        if path and ("{" in path or "}" in path):
             raise InputError(f"{name}: {path!r}, expected a path without braces")
 
 
 def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> None:
-    """Refuse incompatible effects, companions that are not subtypes of the run, and added SNRs with
-    `cell_noise`.
+    """Refuse incompatible effects, effects that need subtypes which the run lacks, and added SNRs
+    whose noise the echoes would have to hold.
     """
     links = any(station.transmitter is not None for station in network.stations)
     if config["effects"] or links or network.guard_subcarriers < 0:
-        from lowalt.scene.checks import check
-
-        check(config)
-    companions = (config["effects"].get("companions") or {}).get("subtypes", [])
-    if unknown := sorted(set(companions) - set(subtypes)):
-        raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
-    if in_all_cells(config["effects"]) and any(
-        "snr_db" in step for step in config.get("added", [])
-    ):
+        check(config, shows_all_cells(config))
+    refuse_unknown_subtypes(config["effects"], subtypes)
+    adds_snrs = any("snr_db" in step for step in config.get("added", []))
+    noisy = in_all_cells(config["effects"])
+    if adds_snrs and noisy:
         raise InputError(
-            "added: snr_db together with effects.cell_noise, whose echoes contain the noise of all "
+            f"added: snr_db together with effects.{noisy[0]}, whose echoes contain the noise of all "
             "SNRs"
         )
 
@@ -100,7 +103,8 @@ def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> 
     _refuse_ranges("motion.sizes_m", sizes, classes, f"some of the classes {list(classes)}")
     if sizes and config["effects"]:
         raise InputError(
-            f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected one or the other"
+            f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected one "
+            "or the other"
         )
 
 
@@ -123,9 +127,15 @@ def refuse_input(config: dict) -> None:
         )
 
 
+def shows_all_cells(config: dict) -> bool:
+    """Return whether the data set stores or shows range cells of all symbols."""
+    return config["shards"]["kind"] == "cube" or bool(of_cells(config["spectra"]))
+
+
 def refuse_cells(config: dict) -> None:
-    """Refuse three combinations: spectra of range cells with shards of signals, cubes with
-    interpolated gaps, and `shards.cells` for shards other than cubes."""
+    """Refuse spectra of range cells with shards of signals, and `shards.cells` for shards other than
+    cubes.
+    """
     kind = config["shards"]["kind"]
     shown = of_cells(config["spectra"])
     cells = config["shards"].get("cells")
@@ -133,13 +143,8 @@ def refuse_cells(config: dict) -> None:
         raise InputError(f"shards.cells: {cells!r} and shards.kind {kind!r}, expected kind 'cube'")
     if shown and kind not in ("image", "cube"):
         raise InputError(
-            f"spectra: {shown} and shards.kind {kind!r}, expected 'image' or 'cube': signals hold one cell"
-        )
-    regrid = (config["effects"].get("slow_time") or {}).get("regrid", "zero")
-    if (shown or kind == "cube") and regrid != "zero":
-        raise InputError(
-            f"effects.slow_time.regrid: {regrid!r} and range cells of all symbols, expected 'zero': cells of symbols "
-            "that were not received are zeros"
+            f"spectra: {shown} and shards.kind {kind!r}, expected 'image' or 'cube': signals hold "
+            "one cell"
         )
 
 
@@ -180,20 +185,20 @@ def refuse_data(config: dict) -> None:
         raise InputError(f"data: no {made}, expected a finished run; make run {name!r} first")
     here = plain(as_named(config))
     other = plain(as_named(load_yaml(made)))
-    differ = [
-        key
-        for key in sorted({*here, *other} - set(TRAINING_BLOCKS))
-        if here.get(key) != other.get(key)
-    ]
+    of_data = sorted({*here, *other} - set(TRAINING_BLOCKS))
+    differ = [key for key in of_data if here.get(key) != other.get(key)]
     if differ:
         raise InputError(
             f"data: run {name!r} was made with other settings of {differ}, expected equal ones"
         )
-    needed = ("SHA256SUMS", "views") if config["recognition"]["cache"] else ("SHA256SUMS",)
-    if lacking := [part for part in needed if not (made.parent / part).exists()]:
+    needed = ["SHA256SUMS"]
+    if config["recognition"]["cache"]:
+        needed.append("views")
+    lacking = [entry for entry in needed if not (made.parent / entry).exists()]
+    if lacking:
         raise InputError(
-            f"data: {made.parent} has no {' and no '.join(lacking)}, expected a run made to its end; "
-            f"make run {name!r} without --target first"
+            f"data: {made.parent} has no {' and no '.join(lacking)}, expected a run made to its "
+            f"end; make run {name!r} without --target first"
         )
 
 
@@ -201,25 +206,23 @@ def refuse_missing(config: dict) -> None:
     """Refuse a missing file or folder that the configuration names; some are needed only by the
     last jobs.
     """
-    report = config["report"]
     network = config["recognition"]["network"]
-    backbone, colon, _ = network["backbone"].rpartition(":")
     files = {
-        "inputs": [config["inputs"]],
-        "motion.track": [config["motion"].get("track")],
-        "effects.town.buildings": [buildings_of(config["effects"])],
-        "recognition.table": [config["recognition"]["table"]],
-        "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
-        "recognition.network.weights": []
-        if network["weights"] in ("none", "hub")
-        else [network["weights"]],
-        **{f"report.{key}": [report[key]] for key in ("published", "accuracy")},
+        "inputs": config["inputs"],
+        "motion.track": config["motion"].get("track"),
+        **named_files(config["effects"]),
+        "recognition.table": config["recognition"]["table"],
     }
-    for key, paths in files.items():
-        missing = [path for path in paths if path is not None and not Path(path).exists()]
-        if missing:
+    if file_of(network["backbone"]) is not None:
+        files["recognition.network.backbone"] = network["backbone"].rpartition(":")[0]
+    if network["weights"] not in ("none", "hub"):
+        files["recognition.network.weights"] = network["weights"]
+    for key in ("published", "accuracy"):
+        files[f"report.{key}"] = config["report"][key]
+    for key, path in files.items():
+        if path is not None and not Path(path).exists():
             raise InputError(
-                f"{key}: {missing[0]!r} is not there, expected the path of a file or folder that is"
+                f"{key}: {path!r} is not there, expected the path of a file or folder that is"
             )
 
 
@@ -228,15 +231,16 @@ def refuse_region(config: dict) -> None:
     polygon = config["motion"]["region"]["polygon_m"]
     corners = masts_m(config["network"]) if polygon is None else polygon
     sides = [(x - corners[0][0], y - corners[0][1]) for x, y in corners[1:]]
-    if all(a * d == b * c for a, b in sides for c, d in sides):
-        stations = (
-            f", the area between the stations, and there is none between {corners}"
-            if polygon is None
-            else ""
-        )
-        raise InputError(
-            f"motion.region.polygon_m: {polygon}{stations}; expected corners (m) such as [[0, 0], [500, 0], [250, 433]]"
-        )
+    parallel = all(a * d == b * c for (a, b), (c, d) in itertools.product(sides, repeat=2))
+    if not parallel:
+        return
+    stations = ""
+    if polygon is None:
+        stations = f", the area between the stations, and there is none between {corners}"
+    raise InputError(
+        f"motion.region.polygon_m: {polygon}{stations}; expected corners (m) such as "
+        "[[0, 0], [500, 0], [250, 433]]"
+    )
 
 
 def refuse_speeds(config: dict) -> None:
@@ -251,9 +255,9 @@ def refuse_speeds(config: dict) -> None:
     high = vt["speed_max_mps"]
     if high - low > 2 * fold + vt["speed_step_mps"]:
         raise InputError(
-            f"spectra.vt: speed_min_mps {low:g} to speed_max_mps {high:g}, expected at most {-fold:.3g} to {fold:.3g}: "
-            f"speeds fold there with network.carrier_hz {network['carrier_hz']:g} and symbol_interval_s "
-            f"{network['symbol_interval_s']:g}"
+            f"spectra.vt: speed_min_mps {low:g} to speed_max_mps {high:g}, expected at most "
+            f"{-fold:.3g} to {fold:.3g}: speeds fold there with network.carrier_hz "
+            f"{network['carrier_hz']:g} and symbol_interval_s {network['symbol_interval_s']:g}"
         )
 
 
@@ -284,24 +288,25 @@ def schemes_of(config: dict) -> dict[str, Scheme]:
     do; for one named twice; and if no scheme trains in a protocol of the run.
     """
     block = config["recognition"]
-    known = set(map(slug, names(block["table"])))
+    known = {slug(name) for name in names(block["table"])}
     schemes = {}
     for key in ("schemes", "timed"):
         for name in block[key]:
             try:
                 schemes[name] = _suited(config, name)
             except InputError as error:
-                able = _able(config) or "none: name a table of your own in recognition.table"
-                advice = f"; for this network and its spectra {block['table']} has {able}" * (
-                    slug(name) in known
-                )
+                advice = ""
+                if slug(name) in known:
+                    able = _able(config) or "none: name a table of your own in recognition.table"
+                    advice = f"; for this network and its spectra {block['table']} has {able}"
                 raise InputError(f"recognition.{key}: {name!r}: {error}{advice}") from None
     trained = [schemes[name] for name in block["schemes"]]
     if len({scheme.name for scheme in trained}) < len(trained):
         raise InputError(f"recognition.schemes: {block['schemes']}, expected every scheme once")
-    if not any(set(scheme.protocols) & set(block["protocols"]) for scheme in trained):
+    offered = {protocol for scheme in trained for protocol in scheme.protocols}
+    if not offered & set(block["protocols"]):
         raise InputError(
-            f"recognition.protocols: {block['protocols']}, expected a protocol of one of {block['schemes']}, which "
-            f"{block['table']} gives {sorted({name for scheme in trained for name in scheme.protocols})}"
+            f"recognition.protocols: {block['protocols']}, expected a protocol of one of "
+            f"{block['schemes']}, which {block['table']} gives {sorted(offered)}"
         )
     return schemes

@@ -12,10 +12,10 @@ from typing import Any
 from lowalt.config.classes import classes_of
 from lowalt.config.layers import check
 from lowalt.config.network import Network, station_names
-from lowalt.config.plan import Plan
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import Scheme
+from lowalt.shards.plan import Plan
 from lowalt.spectra import Spectra
 from lowalt.targets.records import missing_inputs, records_of
 from lowalt.tiles.image_settings import Images

@@ -11,12 +11,19 @@ import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 
+from lowalt.config.extensions import offered
 from lowalt.spectra.catalogue import module_name
 
 PACKAGE = Path(__file__).parents[1]
 ROOT = PACKAGE.parent
 CATALOGUE = "lowalt.spectra.catalogue"
 """The module that imports spectra by name, so that a new file in their folder changes no other."""
+EXTENSIONS = "lowalt.config.extensions"
+"""The module that finds extensions by their entry points."""
+DECLARATION = "lowalt.extensions"
+"""The entry point of the package's own extensions, which that module imports."""
+MESHES = "lowalt.targets.mesh_files"
+"""The module that imports the readers of extensions by name."""
 
 
 @functools.cache
@@ -81,23 +88,39 @@ def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     paths = [Path(name) for name in modules if name.endswith(".py")]
     for path in paths:
         todo += _imports(path)
-    for module in filter(lambda name: not name.endswith(".py"), modules):
+    for module in modules:
+        if module.endswith(".py"):
+            continue
         if _file(module) is None:
             raise ModuleNotFoundError(module)
-        todo += [module, *([f"{module}.__main__"] if _file(f"{module}.__main__") else [])]
+        todo.append(module)
+        if _file(f"{module}.__main__"):
+            todo.append(f"{module}.__main__")
     while todo:
         name = todo.pop()
-        if name not in seen:
-            seen.add(name)
-            parent = name.rpartition(".")[0]
-            own = name.split(".")[0] == PACKAGE.name
-            todo += [
-                *([parent] if parent and own else []),
-                *_imports(_file(name), name.split(".")[0]),
-            ]
-            if name == CATALOGUE:
-                todo += [module_name(spectrum) for spectrum in spectra]
+        if name in seen:
+            continue
+        seen.add(name)
+        package = name.split(".")[0]
+        parent = name.rpartition(".")[0]
+        if parent and package == PACKAGE.name:
+            todo.append(parent)
+        todo += _imports(_file(name), package)
+        if name == CATALOGUE:
+            todo += [module_name(spectrum) for spectrum in spectra]
+        if name == EXTENSIONS:
+            todo.append(DECLARATION)
+        if name == MESHES:
+            todo += offered("meshes").values()
     return tuple(sorted({*map(_file, seen), *(path.absolute() for path in paths)}))
+
+
+def file_of(module: str) -> Path:
+    """Return the file of a module. Raises: ModuleNotFoundError where there is no such module."""
+    path = _file(module)
+    if path is None:
+        raise ModuleNotFoundError(module)
+    return path
 
 
 def near(path: Path) -> str:

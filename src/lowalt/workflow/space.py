@@ -11,10 +11,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.config.plan import Plan, cell_type, sample_bytes
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import free_bytes
 from lowalt.files.errors import InputError, SpaceError
+from lowalt.shards.plan import Plan
+from lowalt.shards.sizes import cell_type, sample_bytes
 from lowalt.spectra.catalogue import named
 
 VARIABLE = "LOWALT_SPACE"
@@ -85,8 +86,8 @@ def check(needed: float, folder: Path) -> None:
     free = free_bytes(folder)
     if needed > free and not choice:
         raise SpaceError(
-            f"the run will write {needed / 1e6:.1f} MB, its disk has {free / 1e6:.1f} MB free (start anyway: "
-            f"{VARIABLE}=off)"
+            f"the run will write {needed / 1e6:.1f} MB, its disk has {free / 1e6:.1f} MB free "
+            f"(start anyway: {VARIABLE}=off)"
         )
 
 
@@ -100,10 +101,10 @@ def before(workflow: Any, plan: Plan, config: dict) -> None:
         print(cubes_sentence(size), file=sys.stderr)
     needed = 0.0
     for job in workflow.dag.needrun_jobs():
-        there = sum(
-            path.stat().st_size for path in map(Path, map(str, job.output)) if path.is_file()
-        )
-        needed += max(0.0, written(job.rule.name, dict(job.wildcards_dict), plan, config) - there)
+        outputs = [Path(str(name)) for name in job.output]
+        there = sum(path.stat().st_size for path in outputs if path.is_file())
+        left = written(job.rule.name, dict(job.wildcards_dict), plan, config)
+        needed += max(0.0, left - there)
     check(needed, Path.cwd() / "results")
 
 
@@ -121,15 +122,13 @@ def writable(folder: Path, run: str) -> None:
             f"{results}: a link to {results.readlink()}, which is not there (is its disk mounted?)"
         )
     made = results / run
-    for place in (
-        folder,
-        *(place for place in (results, made, *sorted(made.glob("*/"))) if place.exists()),
-    ):
+    below = [path for path in (results, made, *sorted(made.glob("*/"))) if path.exists()]
+    for tried in (folder, *below):
         try:
-            with tempfile.TemporaryFile(dir=place) as file:
+            with tempfile.TemporaryFile(dir=tried) as file:
                 file.write(bytes(TRIAL_BYTES))
         except OSError as error:
-            facts = f"{error.strerror}, {free_bytes(place) / 1e6:.1f} MB free"
+            facts = f"{error.strerror}, {free_bytes(tried) / 1e6:.1f} MB free"
             raise InputError(
-                f"{place.resolve()}: cannot write into this folder ({facts})"
+                f"{tried.resolve()}: cannot write into this folder ({facts})"
             ) from None

@@ -13,8 +13,9 @@ import model_files
 from lowalt.commands.compare import leaves
 from lowalt.config.layers import SCHEMA
 from lowalt.extensions.benchmark import definition, frozen_bytes
-from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN
+from lowalt.extensions.benchmark.benchmark_tracks import INNER, TRACKS, UNKNOWN, held_out
 from lowalt.extensions.benchmark.definition import MAIN, PARTS, VERSION, config_of, truth
+from lowalt.files.errors import InputError
 from lowalt.files.shipped import as_named
 from lowalt.recognition import recogniser, runs, schemes
 from lowalt.workflow.run import Run
@@ -37,7 +38,7 @@ MADE_OF = (
 
 def test_root_seeds_are_those_of_the_names_of_the_parts():
     for part in PARTS:
-        text = VERSION if part == MAIN else f"{VERSION} {part}"
+        text = VERSION if part == MAIN else f"{VERSION} {'town' if part == 'clutter' else part}"
         assert config_of(part)["seed"] == int(hashlib.sha256(text.encode()).hexdigest()[:8], 16)
 
 
@@ -54,8 +55,8 @@ def test_the_definition_takes_nothing_that_decides_bytes_from_the_default():
 
 @pytest.mark.parametrize("part", PARTS)
 def test_samples_made_again_are_those_that_are_kept(part):
-    """Every subtype, in the town a few: a change of targets, motion, echo, noise, spectra or
-    effects is seen here.
+    """Every subtype, of smaller parts a few: a change of targets, motion, echo, noise or effects is
+    seen here.
     """
     kept = [
         (name, digest)
@@ -155,6 +156,49 @@ def test_a_trained_network_may_have_the_classes_of_a_track(track, tmp_path):
         {"weights": weights, "colour_map": "gray", "classes": list(classes), **about},
     )
     assert runs.load(tmp_path / "model.safetensors").classes == classes
+
+
+def test_the_inner_splits_hold_out_each_subtype_that_trains_once():
+    track = TRACKS["unseen"]
+    classes = track.truth().classes
+    validated = []
+    names = []
+    for split in INNER:
+        train = track.samples("train", split).facts
+        validation = track.samples("validation", split).facts
+        held = set(held_out(split))
+        assert set(validation.subtype.tolist()) == held and not held & set(train.subtype.tolist())
+        assert sorted(set(validation.label.tolist())) == list(range(len(classes)))
+        assert len(train) == 24000 * 16 / 20 and set(train.group.tolist()) == {"seen"}
+        validated += validation.key.tolist()
+        names += sorted(held)
+    assert sorted(validated) == sorted(track.samples("validation").facts.key.tolist())
+    # Frozen with this version.
+    digest = hashlib.sha256("\n".join(names).encode()).hexdigest()
+    assert digest.startswith("27a0a248ec4821e0")
+    for wrong in (
+        ("seen", "train", "inner-1"),
+        ("unseen", "test", "inner-1"),
+        ("unseen", "train", "inner-6"),
+    ):
+        with pytest.raises(InputError, match=r"expected one of .'inner-1'"):
+            TRACKS[wrong[0]].numbers(*wrong[1:])
+
+
+@pytest.mark.parametrize("use", ["validation", "test"])
+@pytest.mark.parametrize("track", TRACKS.values(), ids=list(TRACKS))
+def test_neighbours_that_validate_or_test_have_no_class_in_common(track, use):
+    """Even whoever is told the most frequent class of each twentieth of the rows answers little
+    better than chance.
+    """
+    labels = track.samples(use).facts.label
+    right = [np.bincount(rows).max() for rows in np.array_split(labels, 20)]
+    assert sum(right) / len(labels) < np.bincount(labels).max() / len(labels) + 0.06
+
+
+def test_samples_that_train_stay_in_the_order_of_the_definition():
+    numbers = TRACKS["unseen"].numbers("train")
+    assert (np.diff(numbers) > 0).all()
 
 
 def test_each_part_has_a_seed_of_its_own_and_tests_alone():

@@ -1,5 +1,6 @@
 """Submissions, their scores and the groups of the table."""
 
+import gzip
 import sys
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from sklearn.metrics import f1_score, roc_auc_score
 
+from lowalt.__main__ import main
 from lowalt.extensions.benchmark import baselines, scoring
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, UNKNOWN
 from lowalt.extensions.benchmark.submission import read
@@ -84,6 +86,30 @@ def test_a_wrong_submission_is_refused_in_one_sentence(tmp_path, fault):
     assert len(str(caught.value)) <= 400 and "\n" not in str(caught.value)
 
 
+def test_a_compressed_file_semicolons_and_a_column_twice_are_named(tmp_path):
+    path = submission(tmp_path / "a.csv", UNSEEN, answers(UNSEEN, 0))
+    text = path.read_text()
+    (tmp_path / "a.csv.gz").write_bytes(gzip.compress(text.encode()))
+    with pytest.raises(
+        InputError, match=r"a\.csv\.gz: submission is compressed \(gzip\), expected plain text"
+    ):
+        read(tmp_path / "a.csv.gz", UNSEEN)
+    path.write_text(text.replace(",", ";"))
+    with pytest.raises(InputError, match="cells are separated by semicolons, expected commas"):
+        read(path, UNSEEN)
+    path.write_text(text.replace("p_bird", "p_uav", 1))
+    with pytest.raises(InputError, match="column 'p_uav' stands twice"):
+        read(path, UNSEEN)
+
+
+def test_the_track_of_one_station_says_what_its_scores_cannot_show(capsys):
+    assert main(["benchmark", "tracks"]) == 0
+    (line,) = [
+        line for line in capsys.readouterr().out.splitlines() if line.startswith("one-station")
+    ]
+    assert "cannot show whether other stations were used" in line
+
+
 def test_samples_that_are_not_tested_may_stand_in_a_submission(tmp_path):
     facts, _ = UNSEEN.truth()
     other = facts.take(UNSEEN.numbers("train")).key[0]
@@ -107,6 +133,10 @@ def test_headline_and_f1_are_those_of_the_definitions():
     assert found["by_subtype_percent"]["Owl"] == pytest.approx(
         100 * np.mean(guesses[owls] == facts.label[owls])
     )
+    by_name = found["by_subtype_percent"]
+    assert found["median_percent"] == pytest.approx(np.median(list(by_name.values())))
+    others = [share for name, share in by_name.items() if name not in ("EH 216 S", "Sparrow")]
+    assert len(others) == 18 and found["others_percent"] == pytest.approx(np.mean(others))
     assert list(found["by_snr_percent"]) == ["3", "8", "13", "18", "23", "inf"]
 
 

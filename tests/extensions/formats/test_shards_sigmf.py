@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dataset import RENDER, motion_rows, pack
+from dataset import build as write_shards
 from lowalt.extensions.formats.sigmf import main
 from lowalt.shards import ShardSet
 from lowalt.shards.index import build
@@ -92,3 +93,13 @@ def test_only_the_groups_and_folds_asked_for_are_exported(index, tmp_path):
         notes = metadata(tmp_path, "B")["annotations"]
         assert sorted({f"{note['lowalt:group']} {note['lowalt:fold']}" for note in notes}) == parts
         assert len(np.fromfile(tmp_path / "B.sigmf-data", np.complex64)) == 400 * len(notes)
+
+
+def test_recipe_shards_are_exported_as_the_signals_they_stand_for(tmp_path):
+    folder = write_shards(tmp_path / "shards", "recipe")
+    main(["--index", str(folder / "index.json"), "--out", str(tmp_path / "sigmf")])
+    shards = ShardSet(folder / "index.json")
+    signals = np.stack([shards.signal(number) for number in range(len(shards))])
+    for place, name in enumerate(NETWORK["stations"]):
+        stored = np.fromfile(tmp_path / f"sigmf/{name}.sigmf-data", np.complex64)
+        assert (stored == signals[:, place].ravel()).all() and abs(stored).max() > 0

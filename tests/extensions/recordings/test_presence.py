@@ -143,3 +143,21 @@ def test_a_line_beyond_the_speeds_that_windows_show_is_named_with_its_speed(name
     # A rotor's fast lines are no other kind of target: the slow ones are as strong.
     slow = np.exp(4j * np.pi * inside[0] / 299792458.0 * twin.carrier_hz * time)
     assert np.isnan(beyond_mps(slow + 2 * tone, rate, twin, 3)).all()
+
+
+def test_a_line_beyond_the_band_that_never_moves_is_interference_and_one_that_moves_is_not():
+    twin = radars()["cw_24ghz"]
+    rate = 48000.0
+    length = round(twin.symbols * twin.symbol_interval_s * rate)
+    time = np.arange(10 * length) / rate
+    noise = 0.01 * np.random.default_rng(6).standard_normal(len(time))
+    spur = np.cos(2 * np.pi * (10050.0 * time + 0.05 * np.sin(time)))
+    assert np.isnan(beyond_mps(spur + noise, rate, twin, 10)).all()
+    # A fast target is named where it stands as far above the spur, and where it changes its speed.
+    passes = spur + noise
+    passes[3 * length : 4 * length] += 8 * np.cos(2 * np.pi * 7000.0 * time[:length])
+    speed = 7000.0 * 299792458.0 / twin.carrier_hz / 2
+    found = beyond_mps(passes, rate, twin, 10)
+    assert found[3] == pytest.approx(speed, abs=0.3) and np.isnan(np.delete(found, 3)).all()
+    slower = np.cos(2 * np.pi * (9000.0 * time - 40.0 * time**2))
+    assert np.isfinite(beyond_mps(slower + noise, rate, twin, 10)).all()

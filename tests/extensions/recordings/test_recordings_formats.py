@@ -4,6 +4,7 @@ captures of SigMF.
 
 import json
 import re
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,12 @@ import yaml
 from scipy.io import savemat, wavfile
 
 from lowalt.extensions.recordings import read, read_record
-from lowalt.extensions.recordings.faults import clipped
-from lowalt.extensions.recordings.record import record
+from lowalt.extensions.recordings.faults import clipped, lost
+from lowalt.extensions.recordings.file_inspection import inspect_recording
+from lowalt.extensions.recordings.files import Baseband
+from lowalt.extensions.recordings.record import Record, record
+from lowalt.extensions.recordings.twin import radars
+from lowalt.extensions.recordings.windows import looks
 from lowalt.files.errors import InputError
 
 RATE = 12000.0
@@ -202,6 +207,59 @@ def test_sigmf_opens_no_file_elsewhere(tmp_path):
         read(entry(tmp_path, "a.sigmf-meta"))
 
 
+@pytest.mark.parametrize("dataset", [False, True], ids=["its own file", "core:dataset"])
+@pytest.mark.parametrize("headers", [(16, 0), (0, 24), (5, 3)])
+@pytest.mark.parametrize("trailing", [0, 16, 7])
+def test_bytes_that_sigmf_declares_to_be_no_samples_are_not_read(
+    tmp_path, headers, trailing, dataset
+):
+    """Each capture begins behind its header, and the last sample stands before the trailing
+    bytes.
+    """
+    pytest.importorskip("sigmf")
+    values = wave().astype(np.complex64)
+    captures = [
+        {"sample_start": start, "header_bytes": count}
+        for start, count in zip((0, 2000), headers, strict=True)
+    ]
+    more = {"core:trailing_bytes": trailing} if trailing else {}
+    if dataset:
+        more |= {"core:dataset": "raw.bin"}
+    sigmf_file(tmp_path, values, captures, **more)
+    own = tmp_path / "a.sigmf-data"
+    held = (
+        b"\x7f" * headers[0]
+        + values[:2000].tobytes()
+        + b"\x7e" * headers[1]
+        + values[2000:].tobytes()
+        + b"\x7d" * trailing
+    )
+    own.write_bytes(held)
+    if dataset:
+        own.rename(tmp_path / "raw.bin")
+    np.testing.assert_array_equal(read(entry(tmp_path, "a.sigmf-meta")).values, values)
+    second = read(entry(tmp_path, "a.sigmf-meta", capture=1))
+    np.testing.assert_array_equal(second.values, values[2000:])
+
+
+@pytest.mark.parametrize(
+    "header, trailing, words",
+    [
+        (-8, 0, "core:header_bytes is -8, expected a whole number from 0"),
+        ("8", 0, "core:header_bytes is '8', expected a whole number from 0"),
+        (0, 1.5, "core:trailing_bytes is 1.5, expected a whole number from 0"),
+        (10, 10**6, "1000000 trailing bytes"),
+    ],
+)
+def test_impossible_counts_of_bytes_in_sigmf_are_refused(tmp_path, header, trailing, words):
+    pytest.importorskip("sigmf")
+    captures = [{"sample_start": 0, "header_bytes": header}]
+    sigmf_file(tmp_path, wave(), captures, **{"core:trailing_bytes": trailing})
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        read(entry(tmp_path, "a.sigmf-meta"))
+    assert "a.sigmf-meta" in str(caught.value)
+
+
 def test_the_record_overrules_a_wrong_header_only_where_it_says_so(tmp_path):
     wavfile.write(tmp_path / "a.wav", 8000, wave().real.astype(np.int16))
     with pytest.raises(InputError, match="wrong rate, record 12000 Hz, file 8000 Hz"):
@@ -230,6 +288,137 @@ def test_a_clean_tone_is_not_clipped_and_a_cut_one_is(hertz, top):
         assert (abs(cut[found]) == np.round(0.9 * top)).all()
 
 
+def test_an_array_of_hdf5_is_named_by_its_path(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    values = wave()
+    pair = np.zeros(len(values), [("real", "<i2"), ("imag", "<i2")])
+    pair["real"], pair["imag"] = np.round(values.real), np.round(values.imag)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["sessions/first/frame"] = pair
+        file["native"] = values
+    for name in ("sessions/first/frame", "/sessions/first/frame", "sessions.first.frame"):
+        np.testing.assert_allclose(
+            read(entry(tmp_path, "a.h5", variable=name)).values, values, atol=0.8
+        )
+    np.testing.assert_array_equal(read(entry(tmp_path, "a.h5", variable="native")).values, values)
+    with pytest.raises(
+        InputError,
+        match=r"variables \['native', 'sessions.first.frame'\], expected the record to name",
+    ):
+        read(entry(tmp_path, "a.h5"))
+    (tmp_path / "b.hdf5").write_bytes(b"\x89HDF\r\n\x1a\nnothing")
+    with pytest.raises(InputError, match=r"b.hdf5: not a readable .hdf5 file"):
+        read(entry(tmp_path, "b.hdf5"))
+
+
+def chirps_of(count: int = 200, samples: int = 32) -> np.ndarray:
+    """Chirps (count, samples) complex of a target that moves by 0.1 cycles from chirp to chirp, and
+    of a wall.
+    """
+    fast = np.arange(samples) / samples
+    slow = np.arange(count)[:, None]
+    noise = np.random.default_rng(5).standard_normal((2, count, samples))
+    wall = 300 * np.exp(2j * np.pi * 3.2 * fast)
+    return 1000 * np.exp(2j * np.pi * (7.3 * fast + 0.1 * slow)) + wall + noise[0] + 1j * noise[1]
+
+
+@pytest.mark.parametrize("timed", [True, False])
+@pytest.mark.parametrize("parts", [1, 2])
+def test_a_text_matrix_with_a_chirp_a_row_is_read_and_recognised(tmp_path, timed, parts):
+    chirps = chirps_of()
+    every_s = 0.002
+    rows = np.concatenate([chirps.real, chirps.imag][:parts], axis=1)
+    if timed:
+        rows = np.column_stack([rows, 1.7e9 + every_s * np.arange(len(rows))])
+    np.savetxt(tmp_path / "a.txt", rows, fmt="%.6f")
+    rate = {"rate_hz": None if timed else 1 / every_s}
+    found = read(entry(tmp_path, "a.txt", chirps={"samples": 32}, **rate))
+    assert len(found.values) == len(chirps) and found.rate_hz == pytest.approx(
+        1 / every_s, rel=1e-3
+    )
+    turns = np.angle(found.values[1:] / found.values[:-1]) / (2 * np.pi)
+    # A beat note of a rising chirp at positive frequency is conjugated, so that positive Doppler
+    # approaches.
+    assert abs(np.median(turns)) == pytest.approx(0.1, abs=0.01)
+    best = inspect_recording(tmp_path / "a.txt", 24e9, None if timed else 1 / every_s)
+    assert best.readings[0].keys == {"channel": "complex", "chirps": {"samples": 32}}
+    assert best.rate_hz == pytest.approx(1 / every_s, rel=1e-3)
+    with pytest.raises(InputError, match="expected the 20 samples of a chirp, or twice as many"):
+        read(entry(tmp_path, "a.txt", chirps={"samples": 20}, **rate))
+
+
+def test_two_columns_that_nearly_repeat_each_other_are_no_pair(tmp_path):
+    rng = np.random.default_rng(7)
+    time = np.arange(48000) / 48000
+    beat = np.sign(np.sin(2 * np.pi * 400 * time)) * (1 + 0.1 * np.sin(2 * np.pi * 3 * time))
+    other = beat + 0.27 * np.convolve(
+        rng.standard_normal(len(time)), np.ones(8) / 8**0.5, mode="same"
+    )
+    assert np.corrcoef(beat, other)[0, 1] == pytest.approx(0.965, abs=0.01)
+    wavfile.write(
+        tmp_path / "a.wav", 48000, np.stack([8000 * beat, 8000 * other], axis=1).astype(np.int16)
+    )
+    with pytest.raises(
+        InputError,
+        match=r"a.wav: two columns that nearly repeat each other \(squared correlation 0.9",
+    ):
+        read(entry(tmp_path, "a.wav", rate_hz=None))
+    assert len(read(entry(tmp_path, "a.wav", "real", rate_hz=None, columns=[0])).values) == len(
+        time
+    )
+    # A target that moves by a small part of a wavelength draws nearly a line, too, but its noise
+    # does not.
+    breath = np.exp(0.3j * np.sin(2 * np.pi * 0.3 * time) + 0.8j)
+    noise = rng.standard_normal((2, len(time)))
+    small = 20000 * breath + 20 * (noise[0] + 1j * noise[1])
+    wavfile.write(
+        tmp_path / "b.wav", 48000, np.stack([small.real, small.imag], axis=1).astype(np.int16)
+    )
+    assert len(read(entry(tmp_path, "b.wav", rate_hz=None)).values) == len(time)
+
+
+def test_eight_columns_offer_the_pairs_of_four_real_and_four_imaginary_ones(tmp_path):
+    values = wave(3000)
+    gains = [1.0, 10.0, 100.0, 1000.0]
+    columns = [gain * part for part in (values.real, values.imag) for gain in gains]
+    np.savetxt(tmp_path / "a.txt", np.stack(columns, axis=1), fmt="%.3f", delimiter="\t")
+    found = inspect_recording(tmp_path / "a.txt", 24e9, RATE).readings
+    offered = [seen.keys["columns"] for seen in found if seen.keys["channel"] == "complex"]
+    assert {(0, 4), (1, 5), (2, 6), (3, 7)} <= {tuple(pair) for pair in offered[:4]}
+
+
+def test_compressed_sound_is_refused_with_what_to_do(tmp_path):
+    (tmp_path / "a.mp3").write_bytes(b"ID3")
+    words = r"a.mp3: .mp3 keeps what ears hear and drops faint lines of a radar, expected the recording as it was made"
+    with pytest.raises(InputError, match=words):
+        read(entry(tmp_path, "a.mp3"))
+    with pytest.raises(InputError, match=words):
+        inspect_recording(tmp_path / "a.mp3")
+
+
+def test_lost_packets_are_found_and_zeros_of_a_quiet_channel_are_not(tmp_path):
+    values = np.round(wave().real)
+    gaps = values.copy()
+    gaps[1000:1200] = 0
+    gaps[3000:3010] = 0
+    np.testing.assert_array_equal(np.flatnonzero(lost(gaps)), np.arange(1000, 1200))
+    assert (
+        lost(gaps + 0j)[1000:1200].all()
+        and not lost(values).any()
+        and not lost(np.zeros(100)).any()
+    )
+    # A window of which samples are lost is left out, and the others stay.
+    np.save(tmp_path / "a.npy", np.tile(values, 4))
+    whole = read(entry(tmp_path, "a.npy", "real"))
+    twin = radars()["cw_24ghz"]
+    torn = whole.values.copy()
+    torn[5000:5300] = 0
+    found = looks(entry(tmp_path, "a.npy", "real"), twin, Baseband(torn, RATE))
+    assert np.flatnonzero(found.lost).tolist() == [1] and len(found.intervals) == 5
+    quiet = np.round(1.4 * np.sin(2 * np.pi * np.arange(6000) / 500))
+    assert not lost(quiet).any()
+
+
 READ_AS = {
     "inter_cplx": "say `layout`",
     "inter_real": "mirrored about a quarter of the rate",
@@ -242,6 +431,7 @@ READ_AS = {
     "N10": None,
     "dca_iqiq": "layout 'dca2'",
     "dca_iiqq": "layout 'dca2'",
+    "steady_10khz_and_car": None,
 }
 
 
@@ -258,3 +448,15 @@ def test_every_file_of_the_folder_of_faults_is_read_rightly_or_refused():
         else:
             with pytest.raises(InputError, match=words):
                 read(read_record(found[name]))
+
+
+@pytest.mark.parametrize(
+    "chunk", [b"", b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 800, 1600, 2, 16)]
+)
+def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
+    path = tmp_path / "a.wav"
+    path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
+    with pytest.raises(
+        InputError, match=r"a\.wav: a \.wav file without a format or without samples"
+    ):
+        read(Record(file=path, carrier_hz=24e9, channel="real"))

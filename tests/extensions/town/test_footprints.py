@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from lowalt.__main__ import main
-from lowalt.extensions.town import town_plan
+from lowalt.extensions.town import town, town_plan
 from lowalt.extensions.town.building_tags import height_of, low_of, metres
 from lowalt.extensions.town.buildings import read
 from lowalt.extensions.town.footprints import middle_of
 from lowalt.files.errors import InputError
-from lowalt.scene.effects.channel import town
 from towns import BOXES, ORIGIN, SIDES, corners_of, mitsuba, ply
 
 M = 1e-5

@@ -11,18 +11,20 @@ import pytest
 from scipy.ndimage import maximum_filter1d
 from scipy.special import fresnel
 
+from linked_routes import link_of, seen_paths
 from lowalt.__main__ import main
-from lowalt.config.named_code import refuse_effects
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
-from lowalt.extensions.town import image_paths, knife_edge, town
+from lowalt.extensions.town import edge_loops, image_paths, town
 from lowalt.extensions.town.buildings import read
 from lowalt.extensions.town.facets import town as made
 from lowalt.extensions.town.materials import MATERIALS, named, properties
 from lowalt.files.errors import InputError
 from lowalt.scene.chain import received_signal
-from lowalt.scene.checks import CheckedScene
+from lowalt.scene.checks import CheckedScene, refuse_same_waves
+from lowalt.scene.effects import module_of
 from lowalt.scene.effects.channel import ground_reflection, walls
+from lowalt.scene.trust import refuse_effects
 from scenes import A, network, scene, target, view_of
 from shown_meshes import ply as ply_bytes
 from towns import BOXES, ORIGIN, block, geojson, mitsuba, ply
@@ -70,7 +72,7 @@ def edge_field(nu, edge=0):
     rows = np.full((3, len(nu)), 1e15)
     result = np.empty(len(nu), np.complex128)
     rows[edge] = nu
-    knife_edge.fields(rows, result)
+    edge_loops.fields(rows, result)
     return result
 
 
@@ -410,9 +412,12 @@ def test_a_record_names_the_paths(tmp_path):
     path = str(geojson(tmp_path / "town.geojson", BOXES))
     row = {"x_m": 40.0, "y_m": 0.0, "z_m": 1.5}
     settings = {"buildings": path, "origin": ORIGIN}
-    facts = town.listed(settings, NETWORK, row)
+    complete = town.DEFAULTS | settings
+    rng = np.random.default_rng(1)
+    facts = town.record(complete, NETWORK, row, rng)["paths"]
     assert facts["under_roof"] is False
-    assert town.listed(settings, NETWORK, row | {"x_m": 20.0})["under_roof"] is True
+    below = town.record(complete, NETWORK, row | {"x_m": 20.0}, rng)["paths"]
+    assert below["under_roof"] is True
     assert set(facts["stations"]) == {station.name for station in NETWORK.stations}
     for fact in facts["stations"].values():
         assert fact["direct"] == (fact["field_db"] > -6.1)
@@ -501,11 +506,10 @@ def test_materials_are_those_of_p2040():
 def test_what_counts_the_same_waves_twice_is_refused(tmp_path):
     settings = town.DEFAULTS | {"buildings": str(ply(tmp_path / "town.ply", BOXES))}
     for name in ("ground_reflection", "walls", "line_of_sight"):
-        with pytest.raises(InputError, match=f"{name}.*together with town"):
-            town.check(
-                settings,
-                CheckedScene(NETWORK, {name: {}, "town": settings}, {}, (math.inf,), False),
-            )
+        modules = {name: module_of(name), "town": town}
+        named = CheckedScene(NETWORK, {}, modules, (math.inf,), False)
+        with pytest.raises(InputError, match=f"{name} together with town"):
+            refuse_same_waves(named)
     town.check(
         settings, CheckedScene(NETWORK, {"clutter": {}, "town": settings}, {}, (math.inf,), False)
     )
@@ -542,3 +546,10 @@ def test_a_blocked_target_is_weaker_and_its_paths_add(tmp_path):
         scene({"town": {"buildings": str(alone), "order": 1}}), A, cloud, row
     ).signal
     np.testing.assert_allclose(both, ground, rtol=1e-6, atol=1e-6 * abs(ground).max())
+
+
+def test_on_a_link_every_path_out_meets_every_path_back(tmp_path):
+    """A sees a house, B does not."""
+    settings = {"buildings": str(ply(tmp_path / "town.ply", [(-40.0, 6.0, 20.0, 8.0, 40.0)]))}
+    sent, received = seen_paths(link_of({"town": settings}), town, settings)
+    assert sent > received > 0

@@ -25,7 +25,11 @@ def definition(
 
 
 def fill(
-    re: np.ndarray, im: np.ndarray, settings: Settings, tables: tuple, out: np.ndarray  # noqa: F811
+    re: np.ndarray,
+    im: np.ndarray,
+    settings: Settings,
+    tables: tuple,  # noqa: F811
+    out: np.ndarray,
 ) -> None:
     """Fill out (rows, starts) float32 with the squares of the windows that start at 0 .. starts -
     1.

@@ -5,8 +5,8 @@ of baselines.
 submission.
 """
 
-from lowalt.extensions.benchmark.benchmark_tracks import TRACKS
+from lowalt.extensions.benchmark.benchmark_tracks import INNER, TRACKS
 from lowalt.extensions.benchmark.part_samples import load
 from lowalt.extensions.benchmark.submission import write
 
-__all__ = ["TRACKS", "load", "write"]
+__all__ = ["INNER", "TRACKS", "load", "write"]

@@ -5,7 +5,7 @@ version.
 import argparse
 
 from lowalt.config.command import run, warn_in_one_line
-from lowalt.extensions.benchmark import frozen_bytes
+from lowalt.extensions.benchmark import costs, frozen_bytes
 from lowalt.extensions.benchmark.definition import REFERENCE
 
 
@@ -19,8 +19,14 @@ def main(arguments: list[str]) -> None:
     line.add_argument(
         "--out", default=REFERENCE, help=f"folder to write into (default: {REFERENCE})"
     )
+    line.add_argument(
+        "--costs", action="store_true", help="only the costs of the runs that are there"
+    )
     options = line.parse_args(arguments)
     warn_in_one_line()
+    if options.costs:
+        costs.write(options.results, options.out)
+        return
     frozen_bytes.write_samples(options.out)
     if not options.samples:
         frozen_bytes.write(options.results, options.out)

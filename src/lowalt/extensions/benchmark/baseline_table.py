@@ -14,23 +14,35 @@ from lowalt.recognition.intervals import Interval
 TABLE = "table.csv"
 SHOWN = (
     ("seen", "unseen", "one-station", "few-shot-1", "few-shot-5", "few-shot-20"),
-    ("forty", "open-set", "low-snr", "town", "fr2"),
+    ("forty", "open-set", "low-snr", "clutter", "fr2"),
 )
 """Tracks of the tables of a document, side by side."""
+CONFIRMED = ("confirmed_percent", "confirmed_low", "confirmed_high", "confirmed_sha256")
+"""Columns of a confirmed result: accuracy with its interval, and the checksum of what was
+confirmed.
+"""
+HARDEST = ("EH 216 S", "Sparrow")
+"""The unseen subtypes on which most errors of every method fall."""
+BY_SUBTYPE = ("median_percent", "others_percent")
+"""Columns of tracks of unseen subtypes: the median accuracy over subtypes, and the accuracy without
+HARDEST.
+"""
+DECIDES = ("unseen, median subtype", f"unseen without {' and '.join(HARDEST)}")
+"""Heads of the columns BY_SUBTYPE of the track `unseen`."""
 COLUMNS = (
     "track",
     "method",
     "seeds",
+    "chosen_on",
     "percent",
     "low",
     "high",
+    *BY_SUBTYPE,
     "macro_f1_percent",
     "macro_f1_low",
     "macro_f1_high",
     "group",
-    "confirmed_percent",
-    "confirmed_low",
-    "confirmed_high",
+    *CONFIRMED,
     "train_core_s",
     "test_core_s_per_1000",
     "hardware",
@@ -63,6 +75,23 @@ def result(row: dict) -> str:
     return f"{words(interval(row))} {chr(ord('a') + int(row['group']) - 1)}{' ✓' if row['confirmed_percent'] else ''}"
 
 
+def by_subtype(values: np.ndarray, weight: np.ndarray, subtypes: np.ndarray) -> dict[str, float]:
+    """Return the columns BY_SUBTYPE in percent.
+
+    values (seeds, models): shares of correct samples; weight, subtypes (models,): of the motion
+    models.
+    """
+    shares = values.mean(0)
+    accuracy = []
+    for name in np.unique(subtypes):
+        accuracy.append(np.average(shares[subtypes == name], weights=weight[subtypes == name]))
+    others = ~np.isin(subtypes, HARDEST)
+    found = {"median_percent": 100 * float(np.median(accuracy))}
+    if others.any():
+        found["others_percent"] = 100 * float(np.average(shares[others], weights=weight[others]))
+    return found
+
+
 def _mean(rows: list[dict], column: str) -> str:
     """The mean of a column of core-seconds with two digits, over the rows that have it; a dash
     where none has.
@@ -77,12 +106,17 @@ def _mean(rows: list[dict], column: str) -> str:
     )
 
 
+def _digit(cell: str | None) -> str:
+    """A number of the table with one digit; a dash where there is none."""
+    return f"{float(cell):.1f}" if cell else "-"
+
+
 def tables(rows: list[dict]) -> list[list[tuple[str, ...]]]:
     """Return the rows as tables of texts, one for each of SHOWN: names of columns, then a line for
     each method.
 
     Methods are sorted by the mean over a table's tracks, best first; costs are means over all
-    tracks.
+    tracks. After `unseen` stand its columns BY_SUBTYPE.
     """
     by_method: dict[str, dict[str, dict]] = {}
     for row in rows:
@@ -96,16 +130,26 @@ def tables(rows: list[dict]) -> list[list[tuple[str, ...]]]:
             name: [number(one[track], "percent", TABLE) for track in tracks if track in one]
             for name, one in by_method.items()
         }
-        lines = [("method", *tracks, "seeds", "training, core-s", "1000 samples, core-s")]
+        heads = []
+        for track in tracks:
+            heads += [track, *DECIDES] if track == "unseen" else [track]
+        lines = [
+            ("method", *heads, "chosen on", "seeds", "training, core-s", "1000 samples, core-s")
+        ]
         for name in sorted(by_method, key=lambda name: -np.mean(percents[name] or [0])):
             own = by_method[name]
-            results = (result(own[track]) if track in own else "-" for track in tracks)
+            results = []
+            for track in tracks:
+                results.append(result(own[track]) if track in own else "-")
+                if track == "unseen":
+                    results += [_digit(own.get(track, {}).get(column)) for column in BY_SUBTYPE]
+            chosen = next(iter(own.values()))["chosen_on"]
             seeds = sorted({row["seeds"] for row in own.values()})
             counts = " to ".join(dict.fromkeys((seeds[0], seeds[-1])))
             costs = (
                 _mean(list(own.values()), column)
                 for column in ("train_core_s", "test_core_s_per_1000")
             )
-            lines.append((name, *results, counts, *costs))
+            lines.append((name, *results, chosen, counts, *costs))
         found += [lines] if tracks else []
     return found

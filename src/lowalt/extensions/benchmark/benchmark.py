@@ -3,17 +3,27 @@ of baselines.
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 from lowalt.commands import workflow
 from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.command_table import COMMANDS
 from lowalt.config.command import name_backbone
-from lowalt.extensions.benchmark import baseline_table, frozen_bytes
+from lowalt.extensions.benchmark import baseline_table, frozen_bytes, submitted_rows
 from lowalt.extensions.benchmark.baselines import kept
 from lowalt.extensions.benchmark.benchmark_tracks import TRACKS, Track, named
-from lowalt.extensions.benchmark.definition import MAIN, VERSION, overlays, run_name
+from lowalt.extensions.benchmark.costs import cost_of, parts_of
+from lowalt.extensions.benchmark.definition import (
+    RUN,
+    VERSION,
+    config_of,
+    listed,
+    overlays,
+    run_name,
+)
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import announced
 from lowalt.recognition.intervals import Interval
 
 EXAMPLE = "lowalt benchmark score predictions.csv --track unseen"
@@ -35,7 +45,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         "make",
         make,
         "make the data of tracks and compare them with the kept checksums",
-        "lowalt benchmark make --track unseen town",
+        "lowalt benchmark make --track unseen clutter",
     )
     line.add_argument(
         "--track", nargs="+", default=["unseen"], help="tracks whose data to make (default: unseen)"
@@ -56,14 +66,28 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
         "confirm",
         confirmed,
         "test a model on a set whose root seed follows from its file",
-        "lowalt benchmark confirm default-unseen --track unseen",
+        f"lowalt benchmark confirm {RUN}-unseen --track unseen",
     )
-    line.add_argument(
-        "model",
-        help="a .safetensors file, of a training or another, or the name of one in results/zoo",
-    )
+    about = "a .safetensors file, of a training or another, or the name of one in results/zoo"
+    line.add_argument("model", nargs="?", help=about)
+    about = "instead of a model: a Python file that answers; it runs with your rights"
+    line.add_argument("--predict", type=Path, metavar="FILE.py", help=about)
     line.add_argument("--track", required=True, help="the track, such as unseen")
     name_backbone(line)
+    line = add_command(
+        own,
+        "submissions",
+        rescored,
+        "score every submission of a folder and write their table",
+        "lowalt benchmark submissions",
+    )
+    line.add_argument(
+        "folder",
+        nargs="?",
+        type=Path,
+        default=Path(submitted_rows.FOLDER),
+        help="folder of submissions",
+    )
     line = add_command(
         own, "table", shown, "the table of baselines", "lowalt benchmark table --track unseen"
     )
@@ -78,33 +102,62 @@ def tracks(options: argparse.Namespace) -> Answer:
         {
             "track": track.name,
             "serves": track.serves,
+            "limit": track.limit,
             "headline": track.headline,
             "part": track.part,
             **{use: len(track.numbers(use)) for use in ("train", "validation", "test")},
+            **_cost(track),
         }
         for track in TRACKS.values()
     ]
-    lines = [
-        "{track:12} {train:6} train {validation:6} validate {test:6} test {serves}".format(**one)
-        for one in facts
-    ]
+    line = "{track:12} {train:6} train {validation:6} validate {test:6} test {cost:42} {serves} {limit}"
+    lines = [line.format(**one, cost=_words(TRACKS[one["track"]])).rstrip() for one in facts]
     return Answer(facts, "\n".join(lines))
+
+
+def _cost(track: Track) -> dict:
+    """The cost of a track's data as facts; none where it has not been measured."""
+    cost = cost_of([track])
+    return cost._asdict() if cost else {}
+
+
+def _words(*tracks: Track) -> str:
+    """The cost of the data of tracks as text."""
+    cost = cost_of(list(tracks))
+    return cost.words if cost else "cost not measured"
+
+
+def _targets(part: str, pairs: set[tuple[str, str]]) -> list[str]:
+    """What the workflow makes of a part: signals, and the images of the (group, fold) pairs that
+    tracks need.
+    """
+    run = run_name(part)
+    views = f"results/{run}/views/{config_of(part)['recognition']['size']}"
+    shards = [shard for shard in listed(part).plan.shards if tuple(shard.split("-")[:2]) in pairs]
+    images = [f"{views}/{shard}.npz" for shard in shards]
+    return ["signals", f"results/{run}/SHA256SUMS", f"results/{run}/config.yaml", *images]
 
 
 def make(options: argparse.Namespace) -> Answer:
     """Make the data of tracks with the workflow, and compare them with the kept checksums; status 1
     where they differ.
 
+    Images are made of those groups and folds only that the tracks train, validate or test on.
+
     Raises: InputError for an unknown track.
     """
-    parts = list(dict.fromkeys([MAIN, *(named(name).part for name in options.track)]))
+    asked = [named(name) for name in options.track]
+    print(
+        f"{' '.join(options.track)}: from empty {_words(*asked)}; what is there is kept",
+        file=sys.stderr,
+    )
     facts = {}
     lines = []
-    for part in parts:
+    for part, pairs in parts_of(asked).items():
         words = argparse.Namespace(
             overlay=[Path(one) for one in map(str, map(workflow.shipped, overlays(part)))],
             configfile=[],
-            target=["training_samples", "signals"],
+            target=_targets(part, pairs),
             cores=options.cores,
             dry_run=False,
             printshellcmds=False,
@@ -138,7 +191,8 @@ def score(options: argparse.Namespace) -> Answer:
     from lowalt.extensions.benchmark.submission import read
 
     track = named(options.track)
-    facts = scores(track, [read(path, track) for path in options.predictions], kept(track))
+    with announced("benchmark score: reading answers and computing intervals"):
+        facts = scores(track, [read(path, track) for path in options.predictions], kept(track))
     return Answer(facts, _report(track, facts))
 
 
@@ -152,6 +206,11 @@ def _report(track: Track, facts: dict) -> str:
             *map(baseline_table.words, (facts["percent"], facts["macro_f1_percent"])),
         ),
     ]
+    if "others_percent" in facts:
+        lines.append(
+            f"median over subtypes {facts['median_percent']:.1f}, without {' and '.join(baseline_table.HARDEST)} "
+            f"{facts['others_percent']:.1f}"
+        )
     if "rejected_percent" in facts:
         lines.append(
             f"rejected of the held-out class at 95 % acceptance: {facts['rejected_percent']:.1f}"
@@ -160,6 +219,7 @@ def _report(track: Track, facts: dict) -> str:
         "by SNR: "
         + ", ".join(f"{snr} dB {share:.1f}" for snr, share in facts["by_snr_percent"].items())
     )
+    lines += [track.limit] if track.limit else []
     worst = sorted(facts["by_subtype_percent"].items(), key=lambda pair: pair[1])
     lines.append(
         "lowest subtypes: " + ", ".join(f"{name} {share:.1f}" for name, share in worst[:5])
@@ -171,15 +231,42 @@ def _report(track: Track, facts: dict) -> str:
 
 
 def confirmed(options: argparse.Namespace) -> Answer:
-    """Confirm a model. Raises: as `lowalt.extensions.benchmark.confirm.confirm`."""
-    from lowalt.extensions.benchmark.confirm import confirm
+    """Confirm a model, or a file that answers. Raises: as the functions of
+    `lowalt.extensions.benchmark.confirm`.
+    """
+    from lowalt.extensions.benchmark.confirm import confirm, confirm_predictions
 
-    found = confirm(options.model, named(options.track), options.backbone)
+    track = named(options.track)
+    if (options.model is None) == (options.predict is None):
+        raise InputError("benchmark confirm: expected either a model or --predict FILE.py")
+    if options.predict:
+        print(
+            f"{options.predict} runs in this process, with your rights and at your own risk",
+            file=sys.stderr,
+        )
+        found = confirm_predictions(options.predict, track)
+    else:
+        found = confirm(options.model, track, options.backbone)
     text = (
         f"{VERSION} {found.track}, confirmed: {baseline_table.words(found.percent)} % of {found.samples} samples, "
-        f"root seed {found.seed}, model {found.sha256}"
+        f"root seed {found.seed}, SHA-256 {found.sha256}"
     )
     return Answer(found._asdict(), text)
+
+
+def rescored(options: argparse.Namespace) -> Answer:
+    """Score all submissions of a folder and write its table. Raises: InputError naming what is
+    wrong with one.
+    """
+    if not options.folder.is_dir():
+        raise InputError(f"{options.folder}: no such folder of submissions")
+    with announced("benchmark submissions: scoring"):
+        rows = list(submitted_rows.rows(options.folder))
+    path = submitted_rows.write(options.folder, rows)
+    line = "{submission:24} {track:12} {percent} ({low} to {high})"
+    return Answer(
+        rows, "\n".join([*(line.format(**row) for row in rows), f"{path}: {len(rows)} rows"])
+    )
 
 
 def shown(options: argparse.Namespace) -> Answer:

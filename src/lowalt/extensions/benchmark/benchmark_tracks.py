@@ -2,19 +2,26 @@
 number counts.
 
 The samples that train and validate are always those of the main part. Validation uses fold val of
-the subtypes that train. docs/benchmark.md lists the tracks.
+the subtypes that train. Samples that validate or test come in the order of a digest of their keys,
+so that neither the number of a row nor its neighbours tell its class. docs/benchmark.md lists the
+tracks.
 """
 
+import hashlib
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.extensions.benchmark.definition import MAIN, Truth, truth
+from lowalt.extensions.benchmark.definition import MAIN, Truth, listed, truth
 from lowalt.files.errors import InputError, instead
 from lowalt.recognition.protocols import FOLDS
 from lowalt.recognition.samples import Facts
 
 USES = ("train", "validation", "test")
+INNER = ("inner-1", "inner-2", "inner-3", "inner-4", "inner-5")
+"""Splits of the subtypes that train in tracks of unseen subtypes, for choices that should hold for
+other subtypes.
+"""
 UNKNOWN = "Bird"
 """The class that the track open-set holds out."""
 _TESTED = {("unseen", "val"), ("unseen", "test")}
@@ -24,7 +31,8 @@ _TESTED = {("unseen", "val"), ("unseen", "test")}
 class Track:
     """One track. serves: whom it serves, one sentence; part: the part it tests on; stations:
     numbers of those that may be used; shots: motion models of each unseen subtype that train too;
-    headline: "accuracy" or "AUROC"."""
+    headline: "accuracy" or "AUROC"; limit: what a score on this track cannot show, one sentence or
+    ""."""
 
     name: str
     serves: str
@@ -34,6 +42,7 @@ class Track:
     shots: int = 0
     headline: str = "accuracy"
     subtypes: bool = False
+    limit: str = ""
 
     @property
     def whole(self) -> bool:
@@ -59,21 +68,28 @@ class Track:
         order = np.argsort(first)
         return Truth(replace(facts, label=np.argsort(order)[labels]), tuple(names[order].tolist()))
 
-    def samples(self, use: str = "test") -> Truth:
-        """Return the samples of a use, and their classes. Raises: as `numbers`."""
+    def samples(self, use: str = "test", split: str = "") -> Truth:
+        """Return the samples of a use, and their classes; split: as in `numbers`. Raises: as
+        `numbers`.
+        """
         every, classes = self.truth(self.part if use == "test" else MAIN)
-        return Truth(every.take(self.numbers(use)), classes)
+        return Truth(every.take(self.numbers(use, split)), classes)
 
-    def numbers(self, use: str) -> np.ndarray:
+    def numbers(self, use: str, split: str = "") -> np.ndarray:
         """Return which samples of `truth(MAIN)` train or validate, or which of `truth()` test, as
         numbers.
 
-        Raises: InputError for another use than USES.
+        Those that train come in the order of `truth`, the others in that of `shuffled`. split: a
+        name of INNER, of which one subtype of each class does not train, and only these validate.
+        Raises: InputError for another use than USES, and for a split where there is none.
         """
+        if split:
+            return self._inner(use, split)
         if use not in USES:
             raise InputError(f"part {use!r}: expected one of {list(USES)}")
         if use == "test" and self.part != MAIN:
-            return np.arange(len(self.truth().facts))
+            facts = self.truth().facts
+            return shuffled(facts, np.arange(len(facts)))
         facts = self.truth(MAIN).facts
         pairs = FOLDS[self.protocol][use]
         if use == "test" and self.whole:
@@ -85,7 +101,48 @@ class Track:
             chosen |= _first(facts, self.shots)
         if use != "test" and self.headline == "AUROC":
             chosen &= facts.label != self.truth(MAIN).classes.index(UNKNOWN)
-        return np.flatnonzero(chosen)
+        numbers = np.flatnonzero(chosen)
+        return numbers if use == "train" else shuffled(facts, numbers)
+
+    def _inner(self, use: str, split: str) -> np.ndarray:
+        """Which samples of `truth(MAIN)` train or validate in an inner split. Raises: InputError;
+        see `numbers`.
+        """
+        if not self.whole or split not in INNER or use == "test":
+            whole = [track.name for track in TRACKS.values() if track.whole]
+            raise InputError(
+                f"split {split!r} of track {self.name}, part {use!r}: expected one of {list(INNER)}, a track of "
+                f"{whole}, and the part train or validation"
+            )
+        numbers = self.numbers(use)
+        held = np.isin(self.truth(MAIN).facts.subtype[numbers], held_out(split))
+        return numbers[held if use == "validation" else ~held]
+
+
+def held_out(split: str) -> tuple[str, ...]:
+    """Return the subtypes that an inner split holds out: one of each class of the subtypes that
+    train.
+
+    The subtypes of each class are ordered by the SHA-256 of their names; split k holds out the k-th
+    of each class.
+    """
+    samples = listed(MAIN)
+    by_class: dict[int, list[str]] = {}
+    for name in samples.plan.groups["seen"]:
+        by_class.setdefault(samples.label_of[name], []).append(name)
+    number = INNER.index(split)
+    found = []
+    for names in by_class.values():
+        ordered = sorted(names, key=lambda name: hashlib.sha256(name.encode()).digest())
+        found.append(ordered[number % len(ordered)])
+    return tuple(found)
+
+
+def shuffled(facts: Facts, numbers: np.ndarray) -> np.ndarray:
+    """Return the numbers (n,) of samples in the order of the SHA-256 of their keys."""
+    digests = [hashlib.sha256(key.encode()).digest() for key in facts.key[numbers].tolist()]
+    order = sorted(range(len(numbers)), key=digests.__getitem__)
+    return numbers[order]
 
 
 def _first(facts: Facts, count: int) -> np.ndarray:
@@ -109,6 +166,8 @@ TRACKS = {
             "Serves operators of a single radar: unseen types, station A alone.",
             "unseen",
             stations=(0,),
+            limit="A file of answers cannot show whether other stations were used; `confirm` can, "
+            "because it shows station A alone.",
         ),
         Track(
             "few-shot-1",
@@ -140,9 +199,11 @@ TRACKS = {
             part="low-snr",
         ),
         Track(
-            "town",
-            "Serves deployment between buildings: trained in the paper's scene, tested in a town.",
-            part="town",
+            "clutter",
+            "Serves deployment near the ground: trained without clutter, tested in clutter and "
+            "wind.",
+            part="clutter",
+            limit="The scene has ground, clutter and wind, and no building.",
         ),
         Track(
             "fr2",

@@ -10,12 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import overlaid
-from lowalt.config.plan import Plan
-from lowalt.config.splits import fold
 from lowalt.recognition.samples import Facts
-from lowalt.shards.sample_record import sample_key
+from lowalt.shards.plan import Plan
+from lowalt.shards.sample_list import SampleList
 from lowalt.targets.records import records_of
 
 VERSION = "lowalt-40 v1"
@@ -24,7 +22,9 @@ REFERENCE = f"results/reference/{RUN}"
 """Folder of what is kept of this version: checksums, the table, and what the baselines got right.
 """
 MAIN = "main"
-PARTS = (MAIN, "low-snr", "town", "fr2")
+PARTS = (MAIN, "low-snr", "clutter", "fr2")
+SEEDED_AS = {"clutter": "town"}
+"""Word from which a part's root seed is drawn, where it is not the part's name."""
 
 
 def root_seed(text: str | bytes) -> int:
@@ -38,10 +38,10 @@ def root_seed(text: str | bytes) -> int:
 
 
 def named_seed(part: str) -> int:
-    """Return the root seed of a part: that of the version's name, followed by the part's unless it
-    is the main one.
+    """Return the root seed of a part: that of the version's name, followed by a word unless it is
+    the main one.
     """
-    return root_seed(VERSION if part == MAIN else f"{VERSION} {part}")
+    return root_seed(VERSION if part == MAIN else f"{VERSION} {SEEDED_AS.get(part, part)}")
 
 
 def overlays(part: str) -> list[str]:
@@ -67,23 +67,23 @@ class Truth(NamedTuple):
 
 
 @cache
-def truth(part: str) -> Truth:
-    """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
+def listed(part: str) -> SampleList:
+    """Return the list of a part's samples, which is read without any data."""
     config = config_of(part)
     published = {
         name: record["published"] for name, record in records_of(config["targets"]).items()
     }
-    plan = Plan.of(config, published)
-    classes = classes_of(published)
-    rows = [
-        (sample_key(name, model, snr), name, model, snr, group, of_model, number)
-        for group, names in plan.groups.items()
-        for name in names
-        for number in [label(classes, {"subtype": name, **published[name]})]
-        for model in range(plan.models)
-        for of_model in [fold(plan.split, plan.seed, name, model)]
-        for snr in plan.snrs
-    ]
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    nowhere = np.full((len(rows), len(config["network"]["stations"])), np.nan)
-    return Truth(Facts(*columns, range_m=nowhere, aspect_rad=nowhere), classes)
+    return SampleList(Plan.of(config, published), published)
+
+
+@cache
+def truth(part: str) -> Truth:
+    """Return the samples of a part and its classes, subtype by subtype, model by model, SNR by SNR."""
+    samples = listed(part)
+    nowhere = np.full((len(samples), len(config_of(part)["network"]["stations"])), np.nan)
+    facts = Facts(**samples.columns(), range_m=nowhere, aspect_rad=nowhere)
+    # The list goes model by model, and this part's order subtype by subtype.
+    subtypes = [name for members in samples.plan.groups.values() for name in members]
+    numbers = {name: number for number, name in enumerate(subtypes)}
+    order = np.argsort([numbers[name] for name in facts.subtype.tolist()], kind="stable")
+    return Truth(facts.take(order), samples.classes)

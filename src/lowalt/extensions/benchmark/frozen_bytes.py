@@ -21,7 +21,7 @@ FILES = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy")
 """
 WHOLE = "checksums.txt"
 SAMPLES = "samples.txt"
-FEW = {"low-snr": 8, "town": 8, "fr2": 8}
+FEW = {"low-snr": 8, "clutter": 8, "fr2": 8}
 """Number of subtypes of which a sample is kept, where it is not one of each: two of each class."""
 
 

@@ -12,6 +12,7 @@ from lowalt.config.network import Network
 from lowalt.extensions.benchmark.benchmark_tracks import Track, named
 from lowalt.extensions.benchmark.definition import MAIN, config_of, overlays, run_name
 from lowalt.files.errors import InputError
+from lowalt.machine.progress import announced, reported
 from lowalt.motion import read_table
 from lowalt.recognition.samples import Samples, ViewSamples, fingerprint
 from lowalt.recognition.schemes import Scheme
@@ -21,12 +22,17 @@ VIEWS = (0, 1, 2)
 """Indices of VRP, TRP and VT among the known spectra."""
 
 
-def _of_unit_power(signals: np.ndarray) -> np.ndarray:
-    """Signals (..., symbols) complex64 divided by the root of their mean power; signals of zeros
-    stay zeros.
+def of_unit_power(signals: np.ndarray) -> np.ndarray:
+    """Return signals (..., symbols) complex64 divided by the root of their mean power; zeros stay
+    zeros.
     """
     power = np.mean(np.abs(signals).astype(float) ** 2, axis=-1, keepdims=True)
     return (signals / np.sqrt(np.where(power > 0, power, 1))).astype(np.complex64)
+
+
+def columns_of(track: Track) -> list[int]:
+    """Return the numbers of the images that a track shows: VRP, TRP and VT of each of its stations."""
+    return Scheme("all spectra", track.stations, VIEWS).columns
 
 
 class TrackSamples(Samples):
@@ -37,15 +43,14 @@ class TrackSamples(Samples):
     at each station.
     """
 
-    def __init__(self, track: Track, part: str, folder: str | Path) -> None:
-        """track: which samples; part: "train", "validation" or "test"; folder: where the runs'
-        folders are.
+    def __init__(self, track: Track, part: str, folder: str | Path, split: str = "") -> None:
+        """track: which samples; part, split: as in `load`; folder: where the runs' folders are.
 
         Raises: InputError for another part, or where the data have not been made.
         """
         self.track = track
         source = track.part if part == "test" else MAIN
-        (self.facts, self.classes), self.config = track.samples(part), config_of(source)
+        (self.facts, self.classes), self.config = track.samples(part, split), config_of(source)
         self.run = Path(folder) / run_name(source)
         self.size = self.config["recognition"]["size"]
         if not self.run.is_dir():
@@ -73,17 +78,21 @@ class TrackSamples(Samples):
         none.
         """
         pairs = set(zip(self.facts.group.tolist(), self.facts.fold.tolist(), strict=True))
-        columns = Scheme("all spectra", self.track.stations, VIEWS).columns
+        columns = columns_of(self.track)
         stored = [
             path
             for path in (self.run / f"views/{self.size}").glob("*.npz")
             if tuple(path.stem.split("-")[:2]) in pairs
         ]
-        found = ViewSamples(stored, columns, pairs)
-        places = {key: number for number, key in enumerate(found.facts.key.tolist())}
+        with announced(f"{self.run}: reading images"):
+            found = ViewSamples(stored, columns, pairs) if stored else None
+        places = (
+            {key: number for number, key in enumerate(found.facts.key.tolist())} if found else {}
+        )
         if missing := [key for key in self.key.tolist() if key not in places]:
             raise InputError(
-                f"{self.run}/views: no image of {missing[0]}, expected one of every sample"
+                f"{self.run}/views: no image of {missing[0]}, expected one of every sample; "
+                f"`lowalt benchmark make --track {self.track.name}` makes them"
             )
         return found.images[[places[key] for key in self.key.tolist()]]
 
@@ -96,7 +105,7 @@ class TrackSamples(Samples):
         docs/benchmark-rules.md.
         """
         network = Network.from_settings(self.config["network"])
-        return self.of_chunks(lambda path: _of_unit_power(load_signals(path, network)))
+        return self.of_chunks(lambda path: of_unit_power(load_signals(path, network)))
 
     def of_chunks(self, values: Callable[[Path], np.ndarray]) -> np.ndarray:
         """Return what `values` computes, for the samples and the track's stations alone, (n,
@@ -114,7 +123,8 @@ class TrackSamples(Samples):
         levels = {float(snr): place for place, snr in enumerate(self.config["noise"]["snr_db"])}
         level = [levels[snr] for snr in self.facts.snr_db.tolist()]
         result: np.ndarray | None = None
-        for path in sorted((self.run / "noisy").glob("*.npy")):
+        paths = sorted((self.run / "noisy").glob("*.npy"))
+        for path in reported(paths, len(paths), "files"):
             chunk = values(path)
             if result is None:
                 result = np.empty(
@@ -138,10 +148,14 @@ class TrackSamples(Samples):
         return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
 
 
-def load(track: str, part: str = "train", folder: str | Path = "results") -> TrackSamples:
+def load(
+    track: str, part: str = "train", folder: str | Path = "results", split: str = ""
+) -> TrackSamples:
     """Return the samples of a track's part, "train", "validation" or "test"; folder: where the
     runs' folders are.
 
-    Raises: InputError for an unknown track or part, or where the data have not been made.
+    split: in tracks of unseen subtypes the name of an inner split, "inner-1" to "inner-5". One
+    subtype of each class is then absent from "train", and "validation" has these subtypes only.
+    Raises: InputError for an unknown track, part or split, or where the data have not been made.
     """
-    return TrackSamples(named(track), part, folder)
+    return TrackSamples(named(track), part, folder, split)

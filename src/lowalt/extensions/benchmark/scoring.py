@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.extensions.benchmark.baseline_table import by_subtype
 from lowalt.extensions.benchmark.benchmark_tracks import UNKNOWN, Track
 from lowalt.extensions.benchmark.definition import MAIN, named_seed
 from lowalt.numerics.streams import stream
@@ -141,6 +142,8 @@ def scores(track: Track, answers: list[np.ndarray], baselines: dict[str, np.ndar
         )
     }
     more = {}
+    if track.whole:
+        more |= by_subtype(found.values, found.weight, found.subtypes)
     if track.headline == "AUROC":
         label = classes.index(UNKNOWN)
         more["rejected_percent"] = 100 * float(np.mean([kept_share(part, label) for part in parts]))

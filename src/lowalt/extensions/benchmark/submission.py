@@ -82,17 +82,24 @@ def write(path: str | Path, samples: "TrackSamples", probabilities: np.ndarray) 
     Raises: InputError for another shape, and for a row that `read` would refuse, such as one of
     logits.
     """
-    wanted = (len(samples), len(samples.classes))
+    checked(probabilities, samples.key, samples.classes)
+    rows = []
+    for key, shares in zip(
+        samples.key.tolist(), np.asarray(probabilities, float).tolist(), strict=True
+    ):
+        rows.append([key, *(f"{share:.6f}" for share in shares)])
+    write_csv(path, ("key", *probability_columns(samples.classes)), rows)
+
+
+def checked(probabilities: np.ndarray, keys: np.ndarray, classes: tuple[str, ...]) -> None:
+    """Refuse probabilities (n, classes) that are none; keys (n,): of the samples that they answer.
+
+    Raises: InputError for another shape, a value that is no probability, and a row that does not
+    sum to one.
+    """
+    wanted = (len(keys), len(classes))
     if np.shape(probabilities) != wanted:
         raise InputError(f"probabilities: shape {np.shape(probabilities)}, expected {wanted}")
-    columns = probability_columns(samples.classes)
-    rows = zip(samples.key.tolist(), np.asarray(probabilities, float).tolist(), strict=True)
-    whole = [
-        (key, _shares(dict(zip(columns, values, strict=True)), columns, f"row {key}"))
-        for key, values in rows
-    ]
-    write_csv(
-        path,
-        ("key", *columns),
-        ([key, *(f"{share:.6f}" for share in shares)] for key, shares in whole),
-    )
+    columns = probability_columns(classes)
+    for key, values in zip(keys.tolist(), np.asarray(probabilities, float).tolist(), strict=True):
+        _shares(dict(zip(columns, values, strict=True)), columns, f"row {key}")

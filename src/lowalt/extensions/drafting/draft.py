@@ -31,13 +31,11 @@ def record_text(
 ) -> str:
     """Return a record file's text for a mesh: what it is about, then the subtype with a row of its
     own, settings and parts, each line of `row` and `parts` as it stands in the file."""
-    lines = [
-        *(f"# {line}" for line in about),
-        f"{yaml.safe_dump(subtype).splitlines()[0]}:",
-        "  source: mesh",
-        *row,
-    ]
-    lines += [*(f"  {key}: {value}" for key, value in settings.items()), "  parts:", *parts]
+    name = yaml.safe_dump(subtype).splitlines()[0]
+    lines = [f"# {line}" for line in about]
+    lines += [f"{name}:", "  source: mesh", *row]
+    lines += [f"  {key}: {value}" for key, value in settings.items()]
+    lines += ["  parts:", *parts]
     return "\n".join(lines) + "\n"
 
 
@@ -62,27 +60,31 @@ def numbers(values: np.ndarray, size: float) -> str:
     return "[" + ", ".join(_number(value, _places(size)) for value in values) + "]"
 
 
-def _place(group: Group, inspection: Inspection) -> str:
-    """Return the place of a group on the target in words: front or rear, left or right."""
+def _position(group: Group, inspection: Inspection) -> str:
+    """Return the position of a group on the target in words: front or rear, left or right."""
     centre = group.centre - (inspection.low + inspection.high) / 2
     right, front, _ = body_axes(inspection.front, inspection.up)
-    return (
-        f"{'front' if centre @ front >= 0 else 'rear'} {'right' if centre @ right >= 0 else 'left'}"
-    )
+    along = "front" if centre @ front >= 0 else "rear"
+    across = "right" if centre @ right >= 0 else "left"
+    return f"{along} {across}"
 
 
 def _diagonal(hubs: np.ndarray) -> float:
-    """The largest distance (m) between two of the hubs (R, 2)."""
-    return float(np.linalg.norm(hubs[:, None] - hubs[None], axis=2).max()) if len(hubs) else 0.0
+    """The largest distance (m) between two of the hubs (R, 2), 0 without any."""
+    if not len(hubs):
+        return 0.0
+    return float(np.linalg.norm(hubs[:, None] - hubs[None], axis=2).max())
 
 
 def size_word(category: str, extent: np.ndarray, hubs: np.ndarray) -> str:
     """Return what the size of a target measures, as a word of the record's `size_is`: of a plane,
     its span.
     """
-    if category == "UAV":
-        return "motor diagonal" if 2 * _diagonal(hubs) > extent.max() else "largest extent"
-    return ALL_AXES if category == "Vehicle" else "length"
+    if category == "Vehicle":
+        return ALL_AXES
+    if category == "Bird":
+        return "length"
+    return "motor diagonal" if 2 * _diagonal(hubs) > extent.max() else "largest extent"
 
 
 def row_lines(
@@ -98,42 +100,36 @@ def row_lines(
     extent: (3,) m along right, front and up; hubs: (R, 2) m, the rotors' in plan, or the places of
     its wheels; wheel_m: diameter of a wheel.
     """
+    width, length, height = extent
+    key = "size_m"
     if category == "Vehicle":
-        sizes = dict(zip(("wid_m", "len_m", "hgt_m"), extent, strict=True)) | {
-            "wheel_diam_m": wheel_m
-        }
+        key = "len_m"
+        sizes = {"wid_m": width, "len_m": length, "hgt_m": height, "wheel_diam_m": wheel_m}
     elif category == "Bird":
-        sizes = {"size_m": extent[1]}
+        sizes = {key: length}
+    elif size_word(category, extent, hubs) == "largest extent":
+        sizes = {key: extent.max()}
     else:
-        sizes = {
-            "size_m": extent.max()
-            if size_word(category, extent, hubs) == "largest extent"
-            else _diagonal(hubs)
-        }
-    key = "len_m" if category == "Vehicle" else "size_m"
-    near = min(
-        (row for row in table.values() if row["category"] == category),
-        key=lambda row: abs(np.log(row[key] / sizes[key])),
-    )
-    cells = {"category": category} | {
-        name: float(f"{value:.4g}") for name, value in sizes.items() if value
-    }
-    if count := 2 if category == "Bird" else len(hubs):
+        sizes = {key: _diagonal(hubs)}
+    rows = [row for row in table.values() if row["category"] == category]
+    near = min(rows, key=lambda row: abs(np.log(row[key] / sizes[key])))
+    cells = {"category": category}
+    for name, value in sizes.items():
+        if value:
+            cells[name] = float(f"{value:.4g}")
+    count = 2 if category == "Bird" else len(hubs)
+    if count:
         cells["n_rotors_or_wings"] = count
-    speeds = (
-        ("vx_abs_max", "vy_abs_max", "vz_abs_max")
-        if category in AIRBORNE
-        else ("speed_lo", "speed_hi")
-    )
-    cells |= {
-        name: near[name]
-        for name in ("wheel_diam_m", "freq_lo_hz", "freq_hi_hz", *speeds)
-        if near[name] is not None and name not in cells
-    }
+    if category in AIRBORNE:
+        speeds = ("vx_abs_max", "vy_abs_max", "vz_abs_max")
+    else:
+        speeds = ("speed_lo", "speed_hi")
+    for name in ("wheel_diam_m", "freq_lo_hz", "freq_hi_hz", *speeds):
+        if near[name] is not None and name not in cells:
+            cells[name] = near[name]
     listed = ", ".join(f"{name}: {value}" for name, value in cells.items())
-    return [
-        f"  row: {{{listed}}}{CONFIRM}: sizes are the file's, rates and speeds those of {near['name']}"
-    ]
+    taken = f"sizes are the file's, rates and speeds those of {near['name']}"
+    return [f"  row: {{{listed}}}{CONFIRM}: {taken}"]
 
 
 def _wings(inspection: Inspection) -> list[str]:
@@ -160,21 +156,22 @@ def _wings(inspection: Inspection) -> list[str]:
         )
     for name, side in (("left wing", -sign), ("right wing", sign)):
         out = side * (inspection.points[:, right] - middle)
-        root = inspection.points[
-            (out > inspection.shoulder_m) & (out < 1.3 * inspection.shoulder_m)
-        ]
+        at_root = (out > inspection.shoulder_m) & (out < 1.3 * inspection.shoulder_m)
+        root = inspection.points[at_root]
         hinge = np.median(root, axis=0) if len(root) else (inspection.low + inspection.high) / 2
         hinge[right] = middle + side * inspection.shoulder_m
         corners = [["null"] * 3, ["null"] * 3]
-        corners[0 if side > 0 else 1][right] = _number(hinge[right], _places(size))
+        inner = 0 if side > 0 else 1
+        corners[inner][right] = _number(hinge[right], _places(size))
         # Tail feathers may spread as wide as the wing's root, behind it.
         along = inspection.points[out > 0.4 * out.max(), front]
         slack = 0.25 * np.ptp(along)
-        reach = (along.min() - slack, along.max() + slack)
-        corners[0][front], corners[1][front] = (_number(end, _places(size)) for end in reach)
+        corners[0][front] = _number(along.min() - slack, _places(size))
+        corners[1][front] = _number(along.max() + slack, _places(size))
         box = ", ".join("[" + ", ".join(corner) + "]" for corner in corners)
+        region = f"region: {{box: [{box}]}}"
         lines.append(
-            f"    {name}: {{kind: wing, region: {{box: [{box}]}}, hinge: {numbers(hinge, size)}}}{CONFIRM}"
+            f"    {name}: {{kind: wing, {region}, hinge: {numbers(hinge, size)}}}{CONFIRM}"
         )
     return lines
 
@@ -188,23 +185,24 @@ def alternating(hubs: np.ndarray) -> list[str]:
 
 
 def mirrored(groups: list[Group]) -> bool:
-    """Return whether groups are three or more alike pieces whose places mirror one another, none
-    near their middle: the propellers of a multirotor, the wheels of a car."""
-    places = np.array([group.centre for group in groups]).reshape(-1, 3)
+    """Return whether groups are three or more alike pieces whose centres mirror one another, none
+    near their middle: the propellers of a multirotor, the wheels of a car.
+    """
     if len(groups) < 3 or any(not alike(groups[0], group) for group in groups):
         return False
-    away = places - (places.min(axis=0) + places.max(axis=0)) / 2
+    centres = np.array([group.centre for group in groups])
+    away = centres - (centres.min(axis=0) + centres.max(axis=0)) / 2
     reach = np.linalg.norm(away, axis=1)
-    images = [away * np.where(np.arange(3) == axis, -1, 1) for axis in range(3)]
-    off = [
-        np.linalg.norm(away[:, None] - image[None], axis=2).min(axis=1).max() for image in images
-    ]
-    # Places mirror one another along an axis in which they are spread, not along the one in which
+    if reach.min() <= 0.3 * reach.max():
+        return False
+    # Centres mirror one another along an axis in which they are spread, not along the one in which
     # they are level.
-    spread = np.ptp(places, axis=0) > 0.3 * reach.max()
-    return bool(
-        reach.min() > 0.3 * reach.max() and (np.array(off)[spread] < 0.05 * reach.max()).any()
-    )
+    for axis in np.flatnonzero(np.ptp(centres, axis=0) > 0.3 * reach.max()):
+        image = away * np.where(np.arange(3) == axis, -1, 1)
+        off = np.linalg.norm(away[:, None] - image[None], axis=2).min(axis=1).max()
+        if off < 0.05 * reach.max():
+            return True
+    return False
 
 
 def refuse_miscount(
@@ -216,18 +214,26 @@ def refuse_miscount(
     Raises: InputError naming what was found, the numbered picture and the option to write.
     """
     kind = MOVING_KIND[inspection.category]
-    named = len({len(group) for group in groups}) == 1  # else some blades may be taken for rotors
-    named &= all(TURNING[kind].search(part.piece) for group in groups for part in group)
-    if kind == "wing" or (named or mirrored(groups) if count is None else len(groups) == count):
+    if kind == "wing":
         return
-    unknown = (
-        f"--{kind}s {len(groups)} where that is all" if groups else f"at least one, or --{kind}s 0"
-    )
-    raise InputError(
-        f"{inspection.path}: {len(groups)} {kind}s found, expected {unknown if count is None else count}; otherwise "
-        f"name each {kind}'s pieces as numbered in {picture}, such as --moving 3 5+6 7 9. A {kind} that has no number "
-        "is joined to the body: separate it first"
-    )
+    if count is None:
+        # Groups of different sizes may be blades taken for rotors.
+        named = len({len(group) for group in groups}) == 1
+        for group in groups:
+            named &= all(TURNING[kind].search(blade.piece) for blade in group)
+        right = named or mirrored(groups)
+        expected = f"at least one, or --{kind}s 0"
+        if groups:
+            expected = f"--{kind}s {len(groups)} where that is all"
+    else:
+        right = len(groups) == count
+        expected = str(count)
+    if not right:
+        raise InputError(
+            f"{inspection.path}: {len(groups)} {kind}s found, expected {expected}; otherwise name "
+            f"each {kind}'s pieces as numbered in {picture}, such as --moving 3 5+6 7 9. "
+            f"A {kind} that has no number is joined to the body: separate it first"
+        )
 
 
 def chosen(inspection: Inspection, words: list[str]) -> list[Group]:
@@ -237,13 +243,13 @@ def chosen(inspection: Inspection, words: list[str]) -> list[Group]:
     Raises: InputError naming the word that is no such number.
     """
     most = len(inspection.components)
+    groups = []
     for word in words:
-        if not all(number.isdecimal() and 1 <= int(number) <= most for number in word.split("+")):
+        written = word.split("+")
+        if not all(number.isdecimal() and 1 <= int(number) <= most for number in written):
             raise InputError(f"--moving is {word!r}, expected numbers from 1 to {most} joined by +")
-    return [
-        Group(inspection.components[int(number) - 1] for number in word.split("+"))
-        for word in words
-    ]
+        groups.append(Group(inspection.components[int(number) - 1] for number in written))
+    return groups
 
 
 def drafted(
@@ -262,7 +268,8 @@ def drafted(
     parts out of the body; a bird's wings are the surface farther out than `shoulder_m`.
     Raises: InputError where the two sides of a bird do not mirror one another.
     """
-    category, kind = inspection.category, MOVING_KIND[inspection.category]
+    category = inspection.category
+    kind = MOVING_KIND[category]
     groups = sorted(groups, key=lambda group: group[0].centre.tolist())
     frame = body_axes(inspection.front, inspection.up)
     hubs = np.array([frame[:2] @ group.centre for group in groups]).reshape(-1, 2)
@@ -270,26 +277,26 @@ def drafted(
     wheel_m = max((float(group.extent.max()) for group in groups), default=None)
     row = row_lines(category, extent, hubs, wheel_m, table) if subtype not in table else []
     size = float((inspection.high - inspection.low).max())
-    sure = inspection.up_from.startswith("as ")
-    up_mark = (
-        f"  # {inspection.up_from}"
-        if sure
-        else f"{CONFIRM}: {inspection.up[-1]} or -{inspection.up[-1]}"
-    )
-    up_mark = "" if "up" in stated_axes else up_mark
-    parts = [
-        f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
-        *(_wings(inspection) if category == "Bird" else []),
-    ]
+    if "up" in stated_axes:
+        up_mark = ""
+    elif inspection.up_from.startswith("as "):
+        up_mark = f"  # {inspection.up_from}"
+    else:
+        up_mark = f"{CONFIRM}: {inspection.up[-1]} or -{inspection.up[-1]}"
+    parts = [f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}"]
+    if category == "Bird":
+        parts += _wings(inspection)
     names: dict[str, int] = {}
     for group, sense in zip(groups, alternating(hubs), strict=True):
-        place = f"{_place(group, inspection)} {kind}"
-        names[place] = names.get(place, 0) + 1
-        name = place if names[place] == 1 else f"{place} {names[place]}"
+        name = f"{_position(group, inspection)} {kind}"
+        names[name] = names.get(name, 0) + 1
+        if names[name] > 1:
+            name = f"{name} {names[name]}"
         slack = MARGIN * float(group.extent.max())
         box = f"[{numbers(group.low - slack, size)}, {numbers(group.high + slack, size)}]"
-        turn = f", sense: {sense}" * (kind == "rotor")
-        axis = turning_axis(group, "xyz".index(inspection.up[-1]), inspection.low, inspection.high)
+        turn = f", sense: {sense}" if kind == "rotor" else ""
+        up = "xyz".index(inspection.up[-1])
+        axis = turning_axis(group, up, inspection.low, inspection.high)
         if kind == "rotor" and axis != int(group.extent.argmin()):
             turn = f", axis: {np.eye(3)[axis].astype(int).tolist()}{turn}"
         parts.append(
@@ -299,11 +306,14 @@ def drafted(
         f"Drafted from {file}. Lengths are in metres along the file's axes.",
         "Confirm each line that is marked, then remove the mark.",
     ]
+    unit_mark = CONFIRM if inspection.unit_from.startswith("guessed") else ""
     settings = {
-        "unit": f"{inspection.unit}{CONFIRM * inspection.unit_from.startswith('guessed')}",
+        "unit": f"{inspection.unit}{unit_mark}",
         "up": f"{inspection.up}{up_mark}",
         "front": f"{inspection.front}{inspection.front_from.comment}",
         "size_is": size_word(category, extent, hubs),
         "licence": "unknown  # the licence of the mesh",
-    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})
+    }
+    if row and category == "Vehicle":
+        settings["wheel_size"] = "mesh"
     return record_text(about, subtype, row, settings, parts)

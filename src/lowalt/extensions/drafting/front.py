@@ -109,7 +109,7 @@ def _axis(number: int, sign: int) -> str:
 
 
 def _clear(way: np.ndarray, level: list[int], size: float) -> tuple[int, int] | None:
-    """The axis along which a direction (3,) m clearly lies, and its sign."""
+    """The axis along which a direction (3,) m clearly lies, and its sign; None where it does not."""
     first, second = sorted(level, key=lambda axis: -abs(way[axis]))
     if abs(way[first]) < max(CLEAR * abs(way[second]), OFF_MIDDLE * size):
         return None
@@ -121,46 +121,71 @@ def _words(name: str) -> set[str]:
     return set(map(str.lower, re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)))
 
 
+def _called(shape: Shape, side: str) -> list[str]:
+    """The names of the parts that WORDS place on a side."""
+    return [name for name in shape.named if _words(name) & WORDS[side]]
+
+
+def _mean_centre(shape: Shape, names: list[str], otherwise: np.ndarray) -> np.ndarray:
+    """The mean centre (3,) m of named parts, `otherwise` where there is none."""
+    if not names:
+        return otherwise
+    return np.mean([shape.named[name] for name in names], axis=0)
+
+
+def _suiting(
+    ahead: dict[tuple[int, int], np.ndarray],
+    up: np.ndarray,
+    ways: dict[str, np.ndarray],
+    least_m: float,
+) -> list[tuple[int, int]]:
+    """Which fronts, by their directions ahead (3,), suit the ways (3,) m to the front and to the
+    right by at least least_m; none where one of the two is unknown.
+    """
+    if len(ways) < 2:
+        return []
+    fits = []
+    for front, along in ahead.items():
+        forward_m = along @ ways["front"]
+        rightward_m = np.cross(along, up) @ ways["right"]
+        if forward_m > least_m and rightward_m > least_m:
+            fits.append(front)
+    return fits
+
+
 def _from_names(
     shape: Shape, level: list[int], middle: np.ndarray, size: float
 ) -> Iterator[Evidence]:
-    """What names such as front_left say by the places of the parts that have them."""
+    """What names such as front_left say by the positions of the parts that have them."""
     ways = {}
     examples = {}
     for word, opposite in (("front", "rear"), ("right", "left")):
-        sides = [
-            [name for name in shape.named if _words(name) & WORDS[side]]
-            for side in (word, opposite)
-        ]
-        if any(sides):
-            ends = [
-                np.mean([shape.named[name] for name in names], axis=0) if names else middle
-                for names in sides
-            ]
-            ways[word] = ends[0] - ends[1]
-            examples[word] = (sides[0] or sides[1])[0]
+        names = _called(shape, word)
+        opposite_names = _called(shape, opposite)
+        if names or opposite_names:
+            end = _mean_centre(shape, names, middle)
+            opposite_end = _mean_centre(shape, opposite_names, middle)
+            ways[word] = end - opposite_end
+            examples[word] = (names or opposite_names)[0]
     # Left and right may be the viewer's, so they count only where front and rear do not tell.
     if "front" in ways and (clear := _clear(ways["front"], level, size)):
         yield Evidence(f"names such as {examples['front']!r}", *clear)
         return
-    ahead = {(axis, sign): sign * np.eye(3)[axis] for axis in level for sign in (1, -1)}
-    axes = {
-        front: {"front": along, "right": np.cross(along, shape.up)}
-        for front, along in ahead.items()
-    }
+    ahead = {}
+    for axis in level:
+        for sign in (1, -1):
+            ahead[axis, sign] = sign * np.eye(3)[axis]
     # Propellers at opposite corners lie neither ahead nor aside alone, but only one front suits
     # both of their words.
-    fits = [
-        front
-        for front in axes
-        if all(axes[front][word] @ way > OFF_MIDDLE * size for word, way in ways.items())
-    ]
-    if len(ways) == 2 and len(fits) == 1:
+    fits = _suiting(ahead, shape.up, ways, OFF_MIDDLE * size)
+    if len(fits) == 1:
         yield Evidence(f"names such as {examples['front']!r}", *fits[0])
         return
     if "right" in ways and (clear := _clear(ways["right"], level, size)):
-        fitting = next(front for front in axes if axes[front]["right"] @ ahead[clear] > LEVEL)
-        yield Evidence(f"names such as {examples['right']!r}", *fitting)
+        for front, along in ahead.items():
+            if np.cross(along, shape.up) @ ahead[clear] > LEVEL:
+                yield Evidence(f"names such as {examples['right']!r}", *front)
+                return
 
 
 def _from_wheels(shape: Shape, level: list[int], size: float) -> Iterator[Evidence]:
@@ -170,7 +195,8 @@ def _from_wheels(shape: Shape, level: list[int], size: float) -> Iterator[Eviden
     if len(axes) == 1:
         yield Evidence("the wheel axles", sum(level) - axes.pop(), binding=True)
     if shape.steered and len(shape.steered) < len(shape.turning):
-        way = np.mean(shape.steered, axis=0) - np.mean([part.hub for part in shape.turning], axis=0)
+        middle = np.mean([part.hub for part in shape.turning], axis=0)
+        way = np.mean(shape.steered, axis=0) - middle
         if along := _clear(way, level, size):
             yield Evidence("the steered wheels", *along)
 
@@ -192,7 +218,8 @@ def _from_propellers(shape: Shape, level: list[int], size: float) -> Iterator[Ev
             yield Evidence("the tail rotor", along[0], -along[1])
             return
     signs = {int(np.sign(part.axis[axis])) for part in others if part.signed}
-    yield Evidence("the axis of the propeller", axis, hint=signs.pop() if len(signs) == 1 else 0)
+    hint = signs.pop() if len(signs) == 1 else 0
+    yield Evidence("the axis of the propeller", axis, hint=hint)
 
 
 def evidence(shape: Shape) -> list[Evidence]:
@@ -202,20 +229,18 @@ def evidence(shape: Shape) -> list[Evidence]:
     low = shape.points.min(axis=0)
     high = shape.points.max(axis=0)
     extent = high - low
-    size = float((high - low).max())
+    size = float(extent.max())
     found = list(_from_names(shape, level, (low + high) / 2, size))
     if shape.category == "Vehicle":
         found += _from_wheels(shape, level, size)
     elif shape.category == "UAV":
         found += _from_propellers(shape, level, size)
-    some = np.unique(
-        np.linspace(0, len(shape.points) - 1, min(len(shape.points), MOST_POINTS)).astype(int)
-    )
+    count = len(shape.points)
+    some = np.unique(np.linspace(0, count - 1, min(count, MOST_POINTS)).astype(int))
     off = off_mirror(shape.points[some])[level]
     if off.min() < SYMMETRIC and off.max() > ASYMMETRIC and off.min() < off.max() / 2:
-        found.append(
-            Evidence("the mirror plane", level[int(off.argmax())], strong=shape.category == "Bird")
-        )
+        along = level[int(off.argmax())]
+        found.append(Evidence("the mirror plane", along, strong=shape.category == "Bird"))
     short, long = sorted(level, key=lambda axis: extent[axis])
     ratio = extent[long] / max(extent[short], 1e-300)
     if shape.category == "Vehicle" and ratio > LONG_CAR:
@@ -231,11 +256,11 @@ def _refuse_given(given: str, found: list[Evidence]) -> None:
     that resolves it.
     """
     for item in found:
-        if item.binding and "xyz"[item.axis] != given[-1]:
-            ahead = "xyz"[item.axis]
+        ahead = "xyz"[item.axis]
+        if item.binding and ahead != given[-1]:
             raise InputError(
-                f"--front is {given}, but {item.words} say that the front is {ahead} or -{ahead}: give "
-                f"--front {ahead} or --front=-{ahead}"
+                f"--front is {given}, but {item.words} say that the front is {ahead} or -{ahead}: "
+                f"give --front {ahead} or --front=-{ahead}"
             )
 
 
@@ -251,17 +276,19 @@ def front_of(shape: Shape, given: str | None, usual: str | None, otherwise: str)
     if given:
         _refuse_given(given, found)
         return Front(given, "", True)
-    if usual:  # long sides alone do not outweigh the convention
+    if usual:
+        # Long sides alone do not outweigh the convention.
         found = [item for item in found if item.words != SPAN or "xyz"[item.axis] == usual[-1]]
     strong = [item for item in found if item.strong]
     ways = {_axis(item.axis, item.sign): item for item in strong if item.sign}
     axes = {item.axis: item for item in strong}
     if len(axes) > 1 or len(ways) > 1:
         one, other, *_ = axes.values() if len(axes) > 1 else ways.values()
-        told = [_axis(item.axis, item.sign or 1) for item in (one, other)]
+        one_front = _axis(one.axis, one.sign or 1)
+        other_front = _axis(other.axis, other.sign or 1)
         raise InputError(
-            f"{one.words} say that the front is {told[0]}, {other.words} that it is {told[1]}: give "
-            f"--front={told[0]} or --front={told[1]}"
+            f"{one.words} say that the front is {one_front}, {other.words} that it is "
+            f"{other_front}: give --front={one_front} or --front={other_front}"
         )
     lifting = sum(abs(part.axis @ shape.up) > LEVEL for part in shape.turning) > 2
     if not strong and usual and (not found or (shape.category == "UAV" and lifting)):

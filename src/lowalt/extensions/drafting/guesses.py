@@ -5,7 +5,6 @@ components may be.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -163,13 +162,13 @@ def guessed_unit(extents: np.ndarray, category: str, wanted_m: float | None = No
     def misfit(unit: str) -> tuple[float, float]:
         """How far the extents lie outside their ranges, and the largest one from the middle."""
         lengths = sizes * UNITS_M[unit]
-        outside = [
-            max(low / size, size / high, 1.0)
-            for size, (low, high) in zip(lengths, usual, strict=False)
-        ]
-        return 0.0 if wanted_m else float(np.log(outside).sum().round(6)), abs(
-            np.log(lengths[0] / middle)
-        )
+        off_middle = abs(np.log(lengths[0] / middle))
+        if wanted_m:
+            return 0.0, off_middle
+        outside = []
+        for size, (low, high) in zip(lengths, usual, strict=False):
+            outside.append(max(low / size, size / high, 1.0))
+        return float(np.log(outside).sum().round(6)), off_middle
 
     return min(UNITS_M, key=misfit)
 
@@ -191,10 +190,13 @@ def mirror_axis(points: np.ndarray) -> int | None:
     """Return the only axis along which a body of points (N, 3) is its own mirror image: left and
     right of a bird.
 
-    Return None if there is no such axis or more than one."""
+    Return None if there is no such axis or more than one.
+    """
     off = off_mirror(points)
     best, second = np.sort(off)[:2]
-    return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
+    if best < SYMMETRIC and best < second / 2:
+        return int(np.argmin(off))
+    return None
 
 
 def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
@@ -214,10 +216,11 @@ def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
             there = (np.abs(ends[:, :, axis] - limit) < IN_PLANE * size).all(axis=1)
             if off[axis] < SYMMETRIC or not there.any():
                 continue
-            span = np.prod(np.delete(np.ptp(ends[there].reshape(-1, 3), axis=0) / extent, axis))
-            if (span > CUT and abs(limit) < AT_ZERO * size) or (
-                span > OPEN_CUT and (uses[there] == 1).all()
-            ):
+            spread = np.ptp(ends[there].reshape(-1, 3), axis=0) / extent
+            span = np.prod(np.delete(spread, axis))
+            through_origin = span > CUT and abs(limit) < AT_ZERO * size
+            is_open = span > OPEN_CUT and (uses[there] == 1).all()
+            if through_origin or is_open:
                 return axis
     return None
 
@@ -233,13 +236,15 @@ def guessed_axes(
     up, right: numbers of axes that are already known.
     """
     order = [axis for axis in np.argsort(extent, kind="stable") if axis not in (up, right)]
-    order = order if up is None else [up, *order]
+    if up is not None:
+        order = [up, *order]
     if right is not None:
         order = [*order, right]
         return "xyz"[order[0]], "xyz"[order[1]]
-    front = int(order[2] if category == "Vehicle" else order[1])
-    if category == "UAV" and abs(extent[order[1]] / extent[order[2]] - 1) < ALIKE:
-        front = next(axis for axis in range(3) if axis != order[0])
+    lowest, middle, longest = order
+    front = int(longest if category == "Vehicle" else middle)
+    if category == "UAV" and abs(extent[middle] / extent[longest] - 1) < ALIKE:
+        front = next(axis for axis in range(3) if axis != lowest)
     return "xyz"[order[0]], "xyz"[front]
 
 
@@ -256,46 +261,46 @@ def alike(first: Component | Group, second: Component | Group) -> bool:
 
 def _one_hub(first: Component, second: Component, up: int, touching: bool) -> bool:
     """Return whether two components turn about one hub: one is centred on the other, as a spinner
-    on a propeller, and they are not a pair of coaxial rotors. touching: whether long blades that
-    touch, unlike discs, share a hub too."""
+    on a propeller, and they are not a pair of coaxial rotors.
+
+    touching: whether long blades that touch, unlike discs, share a hub too.
+    """
     away = np.abs(first.centre - second.centre)
     radius = max(first.extent.max(), second.extent.max()) / 2
     same = alike(first, second)
     if same and away[up] > 2 * max(first.extent[up], second.extent[up]):
         return False
     slack = TOUCH * 2 * radius
-    near = bool(
-        (
-            np.maximum(first.low, second.low) - slack <= np.minimum(first.high, second.high) + slack
-        ).all()
-    )
-    long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (first, second))
+    latest_begin = np.maximum(first.low, second.low) - slack
+    first_end = np.minimum(first.high, second.high) + slack
+    near = bool((latest_begin <= first_end).all())
+    long = all(np.sort(blade.extent)[1] < LONG * blade.extent.max() for blade in (first, second))
     # Two slender blades in one line, closer than their length, at any angle to the axes of the
     # file.
     between = second.centre - first.centre
-    length = float(np.linalg.norm(first.extent))
-    in_line = abs(float(between @ first.along)) > IN_LINE * float(np.linalg.norm(between))
-    if (
-        same
-        and in_line
-        and max(first.slender, second.slender) < SLENDER
-        and np.linalg.norm(between) < length
-    ):
+    distance = float(np.linalg.norm(between))
+    close = distance < float(np.linalg.norm(first.extent))
+    in_line = abs(float(between @ first.along)) > IN_LINE * distance
+    slender = max(first.slender, second.slender) < SLENDER
+    if same and in_line and slender and close:
         return True
     away[up] = 0
-    return near and (float(np.linalg.norm(away)) <= radius / 2 or (touching and same and long))
+    centred = float(np.linalg.norm(away)) <= radius / 2
+    return near and (centred or (touching and same and long))
 
 
 def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list[Group]:
     """Return the components grouped by hub (`_one_hub`), such as the two blades of a propeller."""
     groups: list[Group] = []
     for part in parts:
-        near = [
-            group for group in groups if any(_one_hub(part, other, up, touching) for other in group)
-        ]
-        groups = [group for group in groups if group not in near] + [
-            Group((part, *chain.from_iterable(near)))
-        ]
+        members = [part]
+        others = []
+        for group in groups:
+            if any(_one_hub(part, other, up, touching) for other in group):
+                members += group
+            else:
+                others.append(group)
+        groups = [*others, Group(members)]
     return groups
 
 
@@ -303,7 +308,12 @@ def _is_rotor(group: Group, axes: Sequence[int], whole: np.ndarray) -> bool:
     """Return whether a group is flat along one of the axes, wide enough, and lies about one hub."""
     # Groups named as rotors are tried along all axes and may be wider or smaller: a helicopter's
     # main rotor may be as wide as the craft, and its tail rotor is small.
-    least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
+    if len(axes) == 1:
+        least = SMALLEST_ROTOR
+        most = 0.7
+    else:
+        least = SMALLEST_ROTOR / 2
+        most = 1.01
     for axis in axes:
         across = np.delete(group.extent, axis).max()
         off = np.linalg.norm(np.delete(group.middle - group.centre, axis))
@@ -328,8 +338,10 @@ def turning_axis(group: Group, up: int, low: np.ndarray, high: np.ndarray) -> in
         return up
     if TAIL.search(group[0].piece):
         away = np.abs(group.centre - (low + high) / 2)
-        across = min((axis for axis in range(3) if axis != up), key=lambda axis: away[axis])
-        return across if across in order[:2] else int(order[0])
+        level = [axis for axis in range(3) if axis != up]
+        across = min(level, key=away.__getitem__)
+        if across in order[:2]:
+            return across
     return int(order[0])
 
 
@@ -349,22 +361,21 @@ def rotors(
         good = [group for group in groups if _is_rotor(group, range(3), whole)]
         if good and (count is None or len(good) == count):
             return ups[0], good
+    if count is not None and count <= 2:
+        # Two alike pieces may be two blades, or skids.
+        return ups[0], []
     several = len({part.piece for part in parts}) > 1
     able = [part for part in parts if not (several and FIXED.search(part.piece))]
-    for up in (
-        ups if count is None or count > 2 else ()
-    ):  # two alike pieces may be two blades, or skids
-        across = [np.delete(part.extent, up).max() for part in able]
-        flat = [
-            part
-            for part, width in zip(able, across, strict=True)
-            if part.extent[up] < FLAT * width and width > 0.04 * whole.max()
-        ]
-        sets = [
-            [group for group in groups if _is_rotor(group, [up], whole)]
-            for groups in _grouped(flat, up, count)
-        ]
-        best = _alike_set(sets, up, whole, count)
+    for up in ups:
+        flat = []
+        for part in able:
+            width = np.delete(part.extent, up).max()
+            if part.extent[up] < FLAT * width and width > 0.04 * whole.max():
+                flat.append(part)
+        choices = []
+        for groups in _grouped(flat, up, count):
+            choices.append([group for group in groups if _is_rotor(group, [up], whole)])
+        best = _alike_set(choices, up, whole, count)
         if len(best) > 2:
             return up, best
     return ups[0], []
@@ -373,7 +384,8 @@ def rotors(
 def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[list[Group]]:
     """Return possible groupings of components by hub: by nearness and, where the number of rotors
     is known, also in `count` groups with the same number of alike blades each, clustered by their
-    centres."""
+    centres.
+    """
     # If the number is known, propellers that touch stay apart; otherwise blades that touch are one
     # rotor.
     ways = [clusters(parts, up, touching=not count)]
@@ -382,12 +394,11 @@ def _grouped(parts: Sequence[Component], up: int, count: int | None) -> list[lis
         blades, odd = divmod(len(same), count)
         if odd or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
             continue
-        places = np.delete(np.array([other.centre for other in same]), up, axis=1)
-        label = fcluster(linkage(places, "average"), count, "maxclust")
-        groups = [
-            Group(other for other, at in zip(same, label, strict=True) if at == hub)
-            for hub in np.unique(label)
-        ]
+        in_plan = np.delete(np.array([other.centre for other in same]), up, axis=1)
+        label = fcluster(linkage(in_plan, "average"), count, "maxclust")
+        groups = []
+        for hub in np.unique(label):
+            groups.append(Group(same[number] for number in np.flatnonzero(label == hub)))
         if [len(group) for group in groups] == [blades] * count:
             ways.append(groups)
     return ways
@@ -399,61 +410,56 @@ def _alike_set(
     """The set of alike groups but arms that is farthest out: `count` groups, or two or more at one
     height.
     """
-    best: tuple[float, list[Group]] = (0.0, [])
+    best: list[Group] = []
+    farthest = 0.0
     for groups in choices:
         for group in groups:
             same = [other for other in groups if alike(group, other)]
-            level = [
-                other
-                for other in same
-                if abs(other.centre[up] - group.centre[up]) < 0.1 * whole.max()
-            ]
+            height = group.centre[up]
+            level = [other for other in same if abs(other.centre[up] - height) < 0.1 * whole.max()]
             for able in (level, same) if count else (level,):
-                away = np.delete(np.array([member.centre for member in able]), up, axis=1)
-                reach = np.linalg.norm(away - away.mean(axis=0), axis=1)
                 enough = len(able) == count if count else len(able) >= 2
-                if enough and reach.mean() > best[0] and not _are_arms(able, up):
-                    best = float(reach.mean()), able
-    return best[1]
+                in_plan = np.delete(np.array([member.centre for member in able]), up, axis=1)
+                reach = np.linalg.norm(in_plan - in_plan.mean(axis=0), axis=1).mean()
+                if enough and reach > farthest and not _are_arms(able, up):
+                    best = able
+                    farthest = float(reach)
+    return best
 
 
 def _are_arms(groups: list[Group], up: int) -> bool:
     """Whether all groups are slender pieces that point at the middle between them and reach near
     it.
     """
-    centres, extents = (
-        np.delete(np.array([getattr(group, name) for group in groups]), up, axis=1)
-        for name in ("centre", "extent")
-    )
+    centres = np.delete(np.array([group.centre for group in groups]), up, axis=1)
+    extents = np.delete(np.array([group.extent for group in groups]), up, axis=1)
     away = centres - centres.mean(axis=0)
     reach = np.linalg.norm(away, axis=1)
     along = np.array([np.delete(group[0].along, up) for group in groups])
     radial = np.abs((along * away).sum(axis=1)) > RADIAL * reach
     slender = [len(group) == 1 and group[0].slender < SLENDER for group in groups]
-    return bool(
-        (radial & slender & (reach - np.linalg.norm(extents, axis=1) / 2 < INWARD * reach)).all()
-    )
+    inner_end = reach - np.linalg.norm(extents, axis=1) / 2
+    return bool((radial & slender & (inner_end < INWARD * reach)).all())
 
 
 def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[Group]:
     """Return the groups of components that may be wheels: those whose names say so, otherwise the
-    largest set of at least two alike round ones."""
-    named = [
-        part
-        for part in parts
-        if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I)
-    ]
-    groups = [
-        group
-        for group in clusters(named, int(whole.argmin()), False)
-        if _round(group.extent, whole)
-    ]
+    largest set of at least two alike round ones.
+    """
+    named = []
+    for part in parts:
+        if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I):
+            named.append(part)
+    by_hub = clusters(named, int(whole.argmin()), touching=False)
+    groups = [group for group in by_hub if _round(group.extent, whole)]
     if len(groups) >= 2:
         return groups
     able = [Group([part]) for part in parts if _round(part.extent, whole)]
-    best = max(
-        ([other for other in able if alike(group, other)] for group in able), key=len, default=[]
-    )
+    best: list[Group] = []
+    for group in able:
+        same = [other for other in able if alike(group, other)]
+        if len(same) > len(best):
+            best = same
     return best if len(best) >= 2 else []
 
 

@@ -38,31 +38,30 @@ def inspection_picture(inspection: Inspection, numbered: bool = False) -> bytes:
     front = "xyz".index(inspection.front[-1])
     up = "xyz".index(inspection.up[-1])
     right = 3 - front - up
+    is_bird = inspection.category == "Bird"
     for panel, (across, high) in zip(panels, DIRECTIONS, strict=True):
-        panel.scatter(
-            inspection.points[:, across], inspection.points[:, high], s=4, c=colours, linewidths=0
-        )
+        x = inspection.points[:, across]
+        y = inspection.points[:, high]
+        panel.scatter(x, y, s=4, c=colours, linewidths=0)
         for number, part in enumerate(inspection.components, 1):
-            word = str(number) * (numbered and number <= MOST_NUMBERS) or part.guess
+            word = part.guess
+            if numbered and number <= MOST_NUMBERS:
+                word = str(number)
             if word:
                 panel.text(part.centre[across], part.centre[high], word, fontsize=8, ha="center")
-        for side in (-1, 1) if inspection.category == "Bird" and right in (across, high) else ():
+        if is_bird and right in (across, high):
             line = panel.axvline if across == right else panel.axhline
-            line(
-                middle[right] + side * inspection.shoulder_m,
-                color="tab:red",
-                linewidth=0.8,
-                linestyle="--",
-            )
+            for side in (-1, 1):
+                at = middle[right] + side * inspection.shoulder_m
+                line(at, color="tab:red", linewidth=0.8, linestyle="--")
         limits = np.array([-half, half])
         panel.set(xlim=middle[across] + limits, ylim=middle[high] + limits, aspect="equal")
         panel.set(xlabel=f"the file's {'xyz'[across]} (m)", ylabel=f"the file's {'xyz'[high]} (m)")
         panel.grid(alpha=0.25)
     unit = f"unit {inspection.unit} ({inspection.unit_from})"
     words = f"{inspection.path.name}: {unit}; guessed: up {inspection.up}, front {inspection.front}"
-    figure.suptitle(
-        words.replace("$", r"\$")
-        + (", wings beyond the dashed lines" if inspection.category == "Bird" else "")
-    )
+    if is_bird:
+        words += ", wings beyond the dashed lines"
+    figure.suptitle(words.replace("$", r"\$"))
     figure.tight_layout()
     return png(figure)

@@ -5,6 +5,7 @@ places, numbers.
 import math
 import os
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -16,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from lowalt.files.errors import InputError, warn
 from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
-from lowalt.targets.mesh_files import SUFFIXES, selected
+from lowalt.targets.mesh_files import selected, suffixes
 
 LARGEST_BYTES = 16 << 20
 MOST_FILES = 200
@@ -64,11 +65,8 @@ class Robot:
         pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
         links = [link]
         for name in links:
-            links += [
-                child
-                for parent, child in pairs
-                if parent == name and child not in {*links, *others}
-            ]
+            left = {*links, *others}
+            links += [child for parent, child in pairs if parent == name and child not in left]
         return links
 
     def turns(
@@ -91,8 +89,11 @@ def numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndar
     """Numbers of a text; a single one stands for all. Raises: ValueError where they are not `count`
     finite ones.
     """
-    values = np.array([float(word) for word in text.split()] if text else default, float)
-    values = np.repeat(values, count) if len(values) == 1 else values
+    values = np.array(default, float)
+    if text:
+        values = np.array([float(word) for word in text.split()])
+    if len(values) == 1:
+        values = np.repeat(values, count)
     if len(values) != count or not np.isfinite(values).all():
         raise ValueError(f"{text!r}, expected {count} finite numbers")
     return values
@@ -101,7 +102,8 @@ def numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndar
 def place_of(shift: np.ndarray, turn: Rotation) -> np.ndarray:
     """A place (4, 4) of a shift (3,) and a turn."""
     place = np.eye(4)
-    place[:3, :3], place[:3, 3] = turn.as_matrix(), shift
+    place[:3, :3] = turn.as_matrix()
+    place[:3, 3] = shift
     return place
 
 
@@ -113,9 +115,8 @@ class Files:
     def __init__(self, inputs: Path) -> None:
         self.inputs = inputs.resolve()
         self.opened = 0
-        self.listed: list[tuple[str, ...]] | None = (
-            None  # parts of every path below `inputs`, once they are needed
-        )
+        # The folders and name of every path below `inputs`, once they are needed.
+        self.listed: list[tuple[str, ...]] | None = None
 
     def find(self, name: str, base: Path) -> Path:
         """Return the file that a description in the folder `base` names: relative, package://,
@@ -123,29 +124,26 @@ class Files:
         """
         scheme, slashes, location = name.strip().partition("://")
         if not slashes or scheme == "file":
-            places = [base / (location or name)]
+            paths = [base / (location or name)]
         elif scheme in ("package", "model"):
             head, _, tail = location.partition("/")
-            above = [
-                folder for folder in (base, *base.parents) if folder.is_relative_to(self.inputs)
-            ]
-            places = [
-                place
-                for folder in above
-                for place in (folder / location, folder / "models" / location)
-            ]
-            places += [folder / tail for folder in above if folder.name == head]
+            folders = (base, *base.parents)
+            above = [folder for folder in folders if folder.is_relative_to(self.inputs)]
+            paths = []
+            for folder in above:
+                paths += [folder / location, folder / "models" / location]
+            paths += [folder / tail for folder in above if folder.name == head]
         else:
             raise InputError(
                 f"{name!r} is no file of the folder of inputs, expected a downloaded one"
             )
-        places = [place.resolve() for place in places]
-        inside = [place for place in places if place.is_relative_to(self.inputs)]
-        for place in inside:
-            if place.exists():
-                return place
-        if scheme in ("package", "model") and (place := self.elsewhere(name, location)):
-            return place
+        paths = [path.resolve() for path in paths]
+        inside = [path for path in paths if path.is_relative_to(self.inputs)]
+        for path in inside:
+            if path.exists():
+                return path
+        if scheme in ("package", "model") and (path := self.elsewhere(name, location)):
+            return path
         problem = "is not there" if inside else f"lies outside the folder of inputs {self.inputs}"
         raise InputError(
             f"{name!r} {problem}, expected it inside, by the name that the description has"
@@ -159,31 +157,33 @@ class Files:
         Raises: InputError where several fit. Warns: InputWarning naming the file that is taken.
         """
         if self.listed is None:
-            found = (
-                Path(folder, entry)
-                for folder, folders, files in os.walk(self.inputs)
-                for entry in (*folders, *files)
-            )
-            self.listed = [
-                path.relative_to(self.inputs).parts for path in islice(found, MOST_SEARCHED)
-            ]
-        parts = Path(location).parts
-        for tail in (parts, parts[1:]):
-            fits = [path for path in self.listed if tail and path[-len(tail) :] == tail]
-            fits = [
-                path
-                for path in fits
-                if self.inputs.joinpath(*path).resolve().is_relative_to(self.inputs)
-            ]
+            found = islice(self.walked(), MOST_SEARCHED)
+            self.listed = [path.relative_to(self.inputs).parts for path in found]
+        whole = Path(location).parts
+        for tail in (whole, whole[1:]):
+            fits = []
+            for path in self.listed:
+                if not tail or path[-len(tail) :] != tail:
+                    continue
+                # A link may lead out of the folder.
+                if self.inputs.joinpath(*path).resolve().is_relative_to(self.inputs):
+                    fits.append(path)
             if len(fits) > 1:
                 shown = ", ".join(str(Path(*path)) for path in fits[:3])
                 raise InputError(
-                    f"{name!r}: {len(fits)} files below the folder of inputs fit ({shown}), expected one"
+                    f"{name!r}: {len(fits)} files below the folder of inputs fit ({shown}), "
+                    "expected one"
                 )
             if fits:
                 warn(f"{name!r} is taken from {Path(*fits[0])}, the only file that fits")
                 return self.inputs.joinpath(*fits[0]).resolve()
         return None
+
+    def walked(self) -> Iterator[Path]:
+        """Yield all folders and files below the folder of inputs."""
+        for folder, folders, files in os.walk(self.inputs):
+            for name in (*folders, *files):
+                yield Path(folder, name)
 
     def parsed(self, path: Path) -> Element:
         """Return the root of an XML file, bounded in size and count. Namespaces are dropped, except
@@ -195,11 +195,11 @@ class Files:
             )
         root = parsed(path)
         for element in root.iter():
-            element.tag = element.tag if "xacro" in element.tag else element.tag.rsplit("}", 1)[-1]
+            if "xacro" not in element.tag:
+                element.tag = element.tag.rsplit("}", 1)[-1]
             element.text = OPTIONAL.sub(r"\1", element.text or "")
-            element.attrib.update(
-                {key: OPTIONAL.sub(r"\1", value) for key, value in element.attrib.items()}
-            )
+            for key, value in element.attrib.items():
+                element.attrib[key] = OPTIONAL.sub(r"\1", value)
         return root
 
     def mesh(self, name: str, base: Path, scale: np.ndarray, part: str | None = None) -> np.ndarray:
@@ -207,9 +207,11 @@ class Files:
         counts.
         """
         path = self.find(name, base)
-        if path.suffix.lower() not in SUFFIXES:
-            raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
-        unit = (stated_metres(path) or 1.0) if path.suffix.lower() == ".dae" else 1.0
+        if path.suffix.lower() not in suffixes():
+            raise InputError(f"{name!r} is no mesh of a known format, expected one of {suffixes()}")
+        unit = 1.0
+        if path.suffix.lower() == ".dae":
+            unit = stated_metres(path) or 1.0
         pieces = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
         if not pieces:
             raise InputError(f"{name!r} has no triangle, expected a surface")

@@ -39,16 +39,16 @@ def _steers(joint: Joint) -> bool:
     level.
     """
     names = " ".join(_names(joint))
-    return bool(
-        STEERING_WHEEL.search(names) or (STEERED.search(names) and abs(joint.axis[2]) > LEVEL)
-    )
+    if STEERING_WHEEL.search(names):
+        return True
+    return bool(STEERED.search(names)) and bool(abs(joint.axis[2]) > LEVEL)
 
 
 def _called(joint: Joint, kind: str) -> bool:
     """Return whether a joint or its link is called a rotor, wheel or wing."""
-    return any(TURNING[kind].search(name) for name in _names(joint)) and not (
-        kind == "wheel" and _steers(joint)
-    )
+    if kind == "wheel" and _steers(joint):
+        return False
+    return any(TURNING[kind].search(name) for name in _names(joint))
 
 
 def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Joint]:
@@ -58,23 +58,22 @@ def turning(robot: Robot, kind: str, ahead: np.ndarray | None = None) -> list[Jo
     ahead: (3,) where the front is known; wings beat about it, and joints that sweep or twist them
     are held.
     """
-    able = [
-        joint for joint in robot.joints if (joint.endless or kind == "wing") and not _steers(joint)
-    ]
-    able = [
-        joint
-        for joint in able
-        if any(robot.surfaces.get(link) for link in robot.below(joint.child))
-    ]
+    able = []
+    for joint in robot.joints:
+        turns = (joint.endless or kind == "wing") and not _steers(joint)
+        if turns and any(robot.surfaces.get(link) for link in robot.below(joint.child)):
+            able.append(joint)
     named = [joint for joint in able if _called(joint, kind)]
     if kind == "wing":
         return [joint for joint in named if ahead is None or abs(joint.axis @ ahead) > LEVEL]
-    others = [
-        joint
-        for joint in able
-        if joint.endless and not any(_called(joint, word) for word in TURNING)
-    ]
-    return named or [joint for joint in others if any(map(MOTOR.search, _names(joint)))] or others
+    if named:
+        return named
+    others = []
+    for joint in able:
+        if joint.endless and not any(_called(joint, word) for word in TURNING):
+            others.append(joint)
+    motors = [joint for joint in others if any(map(MOTOR.search, _names(joint)))]
+    return motors or others
 
 
 def category_of(robot: Robot) -> str:
@@ -91,9 +90,8 @@ def category_of(robot: Robot) -> str:
     least = {"rotor": 1, "wheel": min(2, len(turning_joints))}
     named = [kind for kind in kinds if called[kind] and called[kind] >= least[kind]]
     if not any(called.values()):
-        named = [
-            kind for kind in kinds if any(TURNING[kind].search(link) for link in robot.surfaces)
-        ]
+        links = robot.surfaces
+        named = [kind for kind in kinds if any(map(TURNING[kind].search, links))]
     if len(named) == 1:
         return "UAV" if named == ["rotor"] else "Vehicle"
     seen = "both rotors and wheels" if named else "neither rotors nor wheels"
@@ -116,7 +114,8 @@ def parts_of(
     ends = {joint.child for joint in chosen}
     for joint in chosen:
         name = joint.child.replace("::", " ")
-        name = name if name not in joints and name != "body" else joint.name.replace("::", " ")
+        if name in joints or name == "body":
+            name = joint.name.replace("::", " ")
         joints[name] = joint
         for link in robot.below(joint.child, ends):
             taken.setdefault(link, name)
@@ -124,11 +123,11 @@ def parts_of(
         triangles.setdefault(taken.get(link, "body"), []).extend(surfaces)
     if "body" not in triangles:
         raise InputError("no surface is left for the body, expected links that do not turn")
-    parts = {
-        name: np.concatenate(surfaces)
-        for name, surfaces in triangles.items()
-        if sum(map(len, surfaces))
-    }
+    parts = {}
+    for name, surfaces in triangles.items():
+        corners = np.concatenate(surfaces)
+        if len(corners):
+            parts[name] = corners
     return {name: joint for name, joint in joints.items() if name in parts}, parts
 
 
@@ -143,9 +142,8 @@ def write_parts(path: Path, triangles: dict[str, np.ndarray]) -> None:
         raise InputError(f"{path}: more than {LARGEST_TRIANGLES} triangles, expected fewer")
     scene = trimesh.Scene()
     for name, corners in triangles.items():
-        shape = trimesh.Trimesh(
-            corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False
-        )
+        faces = np.arange(3 * len(corners)).reshape(-1, 3)
+        shape = trimesh.Trimesh(corners.reshape(-1, 3), faces, process=False)
         shape.merge_vertices()
         scene.add_geometry(shape, node_name=name, geom_name=name)
     write_file(path, scene.export(file_type="glb"))
@@ -154,14 +152,15 @@ def write_parts(path: Path, triangles: dict[str, np.ndarray]) -> None:
 def _above(robot: Robot, joint: Joint, joints: dict[str, Joint]) -> str:
     """The name of the part on which a joint hangs, "" for the body."""
     ends = {other.child for other in joints.values()}
-    return next(
-        (
-            name
-            for name, other in joints.items()
-            if other is not joint and joint.parent in robot.below(other.child, ends)
-        ),
-        "",
-    )
+    for name, other in joints.items():
+        if other is not joint and joint.parent in robot.below(other.child, ends):
+            return name
+    return ""
+
+
+def _rounded(vector: np.ndarray) -> list[float]:
+    """A vector (3,) with six digits, without negative zeros."""
+    return [float(f"{value:.6g}") for value in vector + 0.0]
 
 
 def part_lines(
@@ -175,62 +174,67 @@ def part_lines(
     lines = [f"    body: {{kind: body, meshes: [{{file: {file!r}, geometry: [body]}}]}}"]
     senses = alternating(hubs)
     for (name, joint), sense in zip(joints.items(), senses, strict=True):
-        hinge, axis = (
-            [float(f"{value:.6g}") for value in vector + 0.0]
-            for vector in (joint.hinge, joint.axis)
-        )
+        hinge = _rounded(joint.hinge)
+        axis = _rounded(joint.axis)
         known = robot.senses.get(joint.name)
-        if known and np.dot(axis, up) < 0:  # a record's sense is seen from above
+        if known and np.dot(axis, up) < 0:
+            # A record's sense is seen from above.
             known = {"ccw": "cw", "cw": "ccw"}.get(known)
-        turn = f", sense: {known or sense}" if kind == "rotor" else ""
-        if kind == "wing" and (above := _above(robot, joint, joints)):
+        turn = ""
+        mark = ""
+        if kind == "rotor":
+            turn = f", sense: {known or sense}"
+            if not known:
+                mark = "  # GUESSED sense: neighbours turn in turn"
+        elif kind == "wing" and (above := _above(robot, joint, joints)):
             turn = f", parent: {above!r}"
-        mark = "  # GUESSED sense: neighbours turn in turn" if kind == "rotor" and not known else ""
+        meshes = f"meshes: [{{file: {file!r}, geometry: [{name!r}]}}]"
         lines.append(
-            f"    {name!r}: {{kind: {kind}, meshes: [{{file: {file!r}, geometry: [{name!r}]}}], hinge: {hinge}, "
-            f"axis: {axis}{turn}}}{mark}"
+            f"    {name!r}: {{kind: {kind}, {meshes}, hinge: {hinge}, axis: {axis}{turn}}}{mark}"
         )
     held = [joint.name for joint in robot.joints if joint not in joints.values()]
-    return lines + ([f"    # Held as drawn: {', '.join(held)}."] if held else [])
+    if held:
+        lines.append(f"    # Held as drawn: {', '.join(held)}.")
+    return lines
 
 
 def shape_of(robot: Robot, joints: dict[str, Joint], category: str, up: np.ndarray) -> Shape:
     """Return what is seen of a robot, whose parts of the category's kind turn at `joints`; up:
     (3,).
     """
-    surfaces = {
-        link.rsplit("::", 1)[-1]: np.concatenate(parts)
-        for link, parts in robot.surfaces.items()
-        if parts
-    }
-    surfaces = {link: part for link, part in surfaces.items() if len(part)}
-    centres = {
-        link: (part.min(axis=(0, 1)) + part.max(axis=(0, 1))) / 2 for link, part in surfaces.items()
-    }
+    surfaces = {}
+    for link, parts in robot.surfaces.items():
+        if parts:
+            surfaces[link.rsplit("::", 1)[-1]] = np.concatenate(parts)
+    surfaces = {link: triangles for link, triangles in surfaces.items() if len(triangles)}
+    centres = {}
+    for link, triangles in surfaces.items():
+        centres[link] = (triangles.min(axis=(0, 1)) + triangles.max(axis=(0, 1))) / 2
     corners = np.concatenate(list(surfaces.values()))
     points = np.concatenate([corners.reshape(-1, 3), corners.mean(axis=1)])
     ends = {joint.child for joint in joints.values()}
-    upright = [
-        joint for joint in robot.joints if not joint.endless and abs(joint.axis @ up) > LEVEL
-    ]
-    steered = [joint.hinge for joint in upright if ends & set(robot.below(joint.child))]
-    turning_parts = [
-        Turning(name, joint.hinge, joint.axis, signed=True) for name, joint in joints.items()
-    ]
+    steered = []
+    for joint in robot.joints:
+        upright = not joint.endless and abs(joint.axis @ up) > LEVEL
+        if upright and ends & set(robot.below(joint.child)):
+            steered.append(joint.hinge)
+    turning_parts = []
+    for name, joint in joints.items():
+        turning_parts.append(Turning(name, joint.hinge, joint.axis, signed=True))
     return Shape(category, up, points, centres, turning_parts, steered)
 
 
 def front_of_robot(
     robot: Robot, joints: dict[str, Joint], category: str, axes: tuple[str | None, str | None]
 ) -> Front:
-    """Return the front of a robot; axes: up and front where the user states them. Raises:
-    InputError as `front_of`.
+    """Return the front of a robot; axes: up and front where the user states them.
+
+    Raises: InputError as `front_of`.
     """
     up = axes[0] or "z"
     upward = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
-    return front_of(
-        shape_of(robot, joints, category, upward), axes[1], "x" if up[-1] != "x" else None, "y"
-    )
+    usual = None if up[-1] == "x" else "x"
+    return front_of(shape_of(robot, joints, category, upward), axes[1], usual, "y")
 
 
 def drafted_robot(
@@ -248,40 +252,33 @@ def drafted_robot(
     the user states them. A subtype that the table of targets lacks gets a row of its own.
     Raises: InputError where the parts contradict one another or the user about the front.
     """
-    (joints, triangles), (subtype, source, file) = parts, names
+    joints, triangles = parts
+    subtype, source, file = names
     up = axes[0] or "z"
     front = front_of_robot(robot, joints, category, axes)
     frame = body_axes(front.axis, up)
     corners = np.concatenate(list(triangles.values())).reshape(-1, 3)
     extent = np.ptp(corners @ frame.T, axis=0)
     hubs = np.array([frame[:2] @ joint.hinge for joint in joints.values()]).reshape(-1, 2)
-    across = [
-        float(
-            np.delete(
-                np.ptp(triangles[name].reshape(-1, 3), axis=0), np.abs(joint.axis).argmax()
-            ).max()
-        )
-        for name, joint in joints.items()
-    ]
-    row = (
-        row_lines(category, extent, hubs, max(across, default=None), table)
-        if subtype not in table
-        else []
-    )
+    across = []
+    for name, joint in joints.items():
+        sizes = np.ptp(triangles[name].reshape(-1, 3), axis=0)
+        across.append(float(np.delete(sizes, np.abs(joint.axis).argmax()).max()))
+    row = []
+    if subtype not in table:
+        row = row_lines(category, extent, hubs, max(across, default=None), table)
     settings = {
         "unit": "m",
         "up": up,
         "front": front.axis + front.comment,
         "size_is": size_word(category, extent, hubs),
         "licence": "unknown  # the licence of the description",
-    } | ({"wheel_size": "mesh"} if row and category == "Vehicle" else {})
+    }
+    if row and category == "Vehicle":
+        settings["wheel_size"] = "mesh"
     about = [
-        f"Drafted from {source}, whose surfaces {file} holds in metres along the axes of the description."
+        f"Drafted from {source}, whose surfaces {file} holds in metres along the axes of the "
+        "description."
     ]
-    return record_text(
-        about,
-        subtype,
-        row,
-        settings,
-        part_lines(robot, joints, MOVING_KIND[category], file, hubs, frame[2]),
-    )
+    lines = part_lines(robot, joints, MOVING_KIND[category], file, hubs, frame[2])
+    return record_text(about, subtype, row, settings, lines)

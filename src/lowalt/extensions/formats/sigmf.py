@@ -19,10 +19,10 @@ import numpy as np
 from lowalt import __version__
 from lowalt.config.command import run
 from lowalt.config.network import Network
-from lowalt.config.plan import GROUPS
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
+from lowalt.shards.plan import GROUPS
 from lowalt.shards.read import ShardSet
 
 KEPT = ("key", "category", "subtype", "group", "model", "fold", "snr_db", "noise", "motion")

@@ -21,13 +21,18 @@ network's.
 """
 
 
+UNNAMED = ("nothing", "beyond", "clipped", "lost")
+"""Outcomes of windows that no network names."""
+
+
 class Answers(NamedTuple):
     """Of n windows: their starts (n,) s, whether each holds a target (n,) bool, class probabilities
-    (n, classes), whether each is clipped (n,) bool, and the speed (n,) m/s of a line beyond
-    `fastest_mps`, NaN for none; `notes` say for which reasons an answer may be wrong.
+    (n, classes), whether each is clipped (n,) bool, the speed (n,) m/s of a line beyond
+    `fastest_mps`, NaN for none, and whether samples of it are lost (n,) bool; `notes` say for which
+    reasons an answer may be wrong.
 
-    A window that is clipped or has such a line counts as one without a target: the network cannot
-    know it.
+    A window that is clipped, lost or has such a line counts as one without a target: the network
+    cannot know it.
     """
 
     starts_s: np.ndarray
@@ -35,25 +40,37 @@ class Answers(NamedTuple):
     probabilities: np.ndarray
     clipped: np.ndarray
     beyond_mps: np.ndarray
+    lost: np.ndarray
     fastest_mps: float
     notes: list[str]
 
-    def words(self, number: int, classes: list[str]) -> str:
-        """Return what is said of one window: its class and probability, or why it has none."""
-        if self.clipped[number]:
-            return "clipped by the receiver"
-        if np.isfinite(self.beyond_mps[number]):
-            return f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g} m/s of this network"
-        if not self.present[number]:
-            return "nothing there"
-        best = int(self.probabilities[number].argmax())
-        return f"{100 * self.probabilities[number, best]:6.2f} %  {classes[best]}"
+    def outcomes(self, classes: list[str]) -> list[str]:
+        """Return what each window is: the most probable of `classes`, or one of `UNNAMED`."""
+        names = np.array(classes, object)[self.probabilities.argmax(axis=1)]
+        names[~self.present] = "nothing"
+        names[np.isfinite(self.beyond_mps)] = "beyond"
+        names[self.clipped] = "clipped"
+        names[self.lost] = "lost"
+        return names.tolist()
+
+    def words(self, number: int, outcome: str) -> str:
+        """Return what is said of one window by its outcome: its class and probability, or why it
+        has none.
+        """
+        said = {
+            "nothing": "nothing there",
+            "clipped": "clipped by the receiver",
+            "lost": "samples are lost: exact zeros",
+            "beyond": f"a line at {self.beyond_mps[number]:.3g} m/s, beyond the {self.fastest_mps:.3g} m/s of this "
+            "network",
+        }
+        return said.get(outcome) or f"{100 * self.probabilities[number].max():6.2f} %  {outcome}"
 
 
 def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
     """Return what a network says of every window of a recording.
 
-    settings: how the network's images are made of signals (`zoo.opened`), with the block `radar`;
+    settings: how the network's images are made of signals (`runs.opened`), with the block `radar`;
     where: the record's path. Raises: InputError where the network knows no recordings, the
     recording's carrier or channel is not the radar's, or the file cannot be read.
     """
@@ -88,7 +105,7 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     values = baseband.values if twin.channel == "complex" else baseband.values.real
     beyond = beyond_mps(values, baseband.rate_hz, twin, count)
     starts = numbers * twin.symbols * twin.symbol_interval_s
-    there = ~found.clipped
+    there = ~(found.clipped | found.lost)
     empty = (
         intervals[_empty(record, starts, twin, where, there)]
         if record.empty_s and not twin.slowest_mps
@@ -97,7 +114,9 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     there[there] = present(intervals[there], twin, empty)
     there &= ~np.isfinite(beyond)
     notes = _notes(record, radar, settings.get("caution", ""), there.any())
-    return Answers(starts, there, shares, found.clipped, beyond, twin.fastest_mps, notes)
+    return Answers(
+        starts, there, shares, found.clipped, beyond, found.lost, twin.fastest_mps, notes
+    )
 
 
 def _empty(

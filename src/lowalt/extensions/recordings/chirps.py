@@ -26,6 +26,29 @@ def in_chirps(values: np.ndarray, samples: int, where: str) -> np.ndarray:
     )
 
 
+def chirp_rows(rows: np.ndarray, samples: int, where: str) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the stream (n,) of a text matrix with a chirp a row, and the times (chirps,) s of its
+    last column, if any.
+
+    rows: (chirps, columns); a row holds the samples of a chirp, or all in-phase and then all
+    quadrature samples, and perhaps the chirp's time. Raises: InputError naming `where` for other
+    numbers of columns.
+    """
+    if rows.shape[1] == 1 and len(rows) % samples == 0:
+        return rows[:, 0], None
+    timed = rows.shape[1] % samples == 1
+    values = rows[:, :-1] if timed else rows
+    times = rows[:, -1].real if timed else None
+    if values.shape[1] == samples:
+        return values.reshape(-1), times
+    if values.shape[1] == 2 * samples:
+        return (values[:, :samples] + 1j * values[:, samples:]).reshape(-1), times
+    raise InputError(
+        f"{where}: rows of {rows.shape[1]} columns, expected the {samples} samples of a chirp, or twice "
+        "as many for in-phase and quadrature, and perhaps its time"
+    )
+
+
 def slow_time(
     stream: np.ndarray, samples: int, receivers: int = 1, receiver: int = 0
 ) -> np.ndarray:

@@ -21,6 +21,10 @@ ORDER = 32
 """Number of earlier numbers that a prediction uses, the same under every reading."""
 REPEATS = 0.3
 """Least correlation of the innovations' power with which a stream counts as chirps."""
+AROUND = 4
+ANEW = 4.0
+"""Samples of a row from which the next one is predicted, and how many times the squared error must
+grow at a place where the samples begin anew."""
 SHORTEST_CHIRP = 16
 STRETCHES = 16
 """Stretches over which the phase of a line and of its image is compared."""
@@ -111,6 +115,21 @@ def _coded(stretches: np.ndarray, order: int) -> float:
     freedom = max(parts * (innovations.shape[1] - order - 1), 1)
     variance = (np.abs(innovations) ** 2).sum(axis=1) / freedom + 1 / 12
     return float(np.mean(0.5 * np.log2(2 * np.pi * np.e * variance)))
+
+
+def begins_anew(rows: np.ndarray, place: int) -> bool:
+    """Whether the samples of rows (n, samples) begin anew at a column: where it is crossed, they
+    follow far worse from the samples before them than elsewhere in the row."""
+    rows = rows - rows.mean(axis=1, keepdims=True)
+    views = np.lib.stride_tricks.sliding_window_view(rows, AROUND + 1, axis=1)
+    columns = np.arange(AROUND, rows.shape[1])
+    crossing = (columns >= place) & (columns < place + AROUND)
+    if crossing.all():
+        return False
+    known = views[:, ~crossing].reshape(-1, AROUND + 1)
+    taps = np.linalg.lstsq(known[:, :-1], known[:, -1], rcond=None)[0]
+    missed = ((views[..., -1] - views[..., :-1] @ taps) ** 2).mean(axis=0)
+    return bool(missed[crossing].mean() > ANEW * missed[~crossing].mean())
 
 
 def chirp_length(values: np.ndarray) -> tuple[int, float]:

@@ -21,12 +21,21 @@ ROUND_STEPS = 2.5
 """Steps of the quantiser by which a smooth wave's top may fall to the next sample."""
 ROUND_RUN = 8
 """Times that a smooth wave may stay longer at its highest level than at the next."""
+LOST_RUN = 16
+"""Least number of exact zeros in a row that count as lost samples."""
+LOST_STEPS = 16
+"""Least ratio of a signal's median to its smallest value, both without zeros, at which zeros in a
+row are no rest.
+"""
 MIRRORED = 0.9
 """Least correlation of a spectrum with its mirror about a quarter of the rate that shows I and Q in
 turn.
 """
 SAME_SHARE = 0.999
 """Least squared correlation of I and Q that makes them the same signal."""
+NEARLY_SAME = 0.8
+"""Least squared correlation at which two columns of sound are no I and Q."""
+SLOW_SHARE = 1e-3
 SIDE_RATIO = 4.0
 """How many times stronger the wrong side of the Doppler axis must be to call the channels swapped
 (6 dB).
@@ -103,6 +112,25 @@ def clipped(values: np.ndarray) -> np.ndarray:
     return _cut(values.real) | _cut(values.imag) if np.iscomplexobj(values) else _cut(values)
 
 
+def lost(values: np.ndarray) -> np.ndarray:
+    """Return which samples (samples,) of a recording, real or complex, are lost packets, (samples,)
+    bool: exact zeros in a row, for longer than the signal itself stays at one value, between
+    samples far from zero."""
+    zero = values == 0
+    if not zero.any() or zero.all():
+        return np.zeros(len(values), bool)
+    starts = np.flatnonzero(np.diff(zero, prepend=~zero[0]))
+    lengths = np.diff(starts, append=len(values))
+    runs = zero[starts]
+    size = np.abs(values)
+    step = size[~zero].min()
+    gaps = runs & (lengths >= LOST_RUN)
+    # A quiet channel of few steps rests at zero as well.
+    if np.median(size[~zero]) < LOST_STEPS * step:
+        return np.zeros(len(values), bool)
+    return np.repeat(gaps, lengths)
+
+
 def _mirrored(values: np.ndarray) -> float:
     """Correlation of a real channel's power spectrum with itself mirrored about a quarter of the
     rate.
@@ -164,6 +192,28 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
                 "in-phase and quadrature, or channel 'real'"
             )
         refuse_swapped(path, values, moves)
+
+
+def refuse_alike(path: Path, values: np.ndarray) -> None:
+    """Refuse two columns of sound as I and Q where one nearly repeats the other, as a trigger and a
+    beat note do.
+
+    What is slower than `SLOW_SHARE` of the rate does not count: a target that moves by a small part
+    of a wavelength draws nearly a line, too.
+    values: (samples,) complex. Raises: InputError naming the file.
+    """
+    fast = slice(2 + round(SLOW_SHARE * len(values)), None)
+    shown = (values - values.mean()) * np.hanning(len(values))
+    first, second = (np.fft.rfft(part)[fast] for part in (shown.real, shown.imag))
+    powers = np.sum(np.abs(first) ** 2) * np.sum(np.abs(second) ** 2)
+    alike = np.sum((first * second.conj()).real) ** 2 / max(powers, 1e-300)
+    if alike > NEARLY_SAME:
+        raise InputError(
+            f"{path}: two columns that nearly repeat each other (squared correlation {alike:.3f}), as "
+            "in-phase and quadrature of a moving target do not, expected channel 'real' with one "
+            "of the "
+            "`columns`, or trust 'record'"
+        )
 
 
 def refuse_swapped(path: Path, values: np.ndarray, moves: str | None) -> None:

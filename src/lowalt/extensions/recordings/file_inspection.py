@@ -15,6 +15,7 @@ from lowalt.extensions.recordings.chirps import slow_time
 from lowalt.extensions.recordings.column_names import rises_evenly, role
 from lowalt.extensions.recordings.evidence import (
     are_powers,
+    begins_anew,
     chirp_length,
     code_bits,
     image_of,
@@ -22,7 +23,7 @@ from lowalt.extensions.recordings.evidence import (
     step_bits,
 )
 from lowalt.extensions.recordings.files import channel_of, table_of, times_of
-from lowalt.extensions.recordings.formats import RAW, READERS, Table
+from lowalt.extensions.recordings.formats import RAW, Table, refuse_kind
 from lowalt.extensions.recordings.layouts import raw_readings, readings
 from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
@@ -32,6 +33,8 @@ from lowalt.files.errors import InputError
 
 SHOWN = 8
 """Most readings that an inspection lists."""
+MOST_COLUMNS = 16
+"""Most columns of a text table that are channels; rows of more hold a chirp each."""
 SLOW_SHARE = 5e-4
 LONGEST = 1 << 20
 """Number of samples, from the start, from which spectra are computed."""
@@ -114,7 +117,10 @@ def _of_columns(table: Table) -> list[Candidate]:
         if np.iscomplexobj(column):
             result.append(Candidate({"channel": "complex", **where}, bits[name]))
             continue
-        for other, values in kept[place + 1 : place + 2]:
+        # Pairs stand next to each other, or all in-phase columns before all quadrature columns.
+        half = len(kept) // 2
+        partners = {place + 1, place + half} if len(kept) % 2 == 0 and place < half else {place + 1}
+        for other, values in (kept[partner] for partner in sorted(partners) if partner < len(kept)):
             if np.iscomplexobj(values):
                 continue
             pair = {"i": 0, "q": 1, "magnitude": 2, "phase": 3}
@@ -151,6 +157,30 @@ def _of_chirps(array: np.ndarray) -> list[Candidate]:
     return result
 
 
+def _of_rows(path: Path, table: Table) -> tuple[list[Candidate], float | None, float | None]:
+    """Readings of a text matrix with a chirp a row, one real channel or I and Q, and perhaps a last
+    column of times.
+    """
+    last = np.asarray(table.columns[-1], float)
+    timed = bool((np.diff(last) > 0).all())
+    samples = len(table.columns) - timed
+    rate = faults.agreed_rate(path, None, None, last) if timed else None
+    stream = np.stack(table.columns[:samples], axis=1).reshape(-1)
+    lengths = [samples]
+    if samples % 2 == 0:
+        lengths.append(samples // 2)
+        if begins_anew(stream.reshape(-1, samples), samples // 2):
+            lengths.reverse()
+    return (
+        [
+            Candidate({"channel": "complex", "chirps": {"samples": length}}, 8.0 + place)
+            for place, length in enumerate(lengths)
+        ],
+        rate,
+        None,
+    )
+
+
 def _of_raw(path: Path) -> list[Candidate]:
     """Readings of a file without a header; `said` marks the one that its ending stands for."""
     own = RAW[path.suffix.lower()]
@@ -165,8 +195,8 @@ def _of_raw(path: Path) -> list[Candidate]:
 
 
 def _arrays(path: Path) -> tuple[list[tuple[dict, np.ndarray]], float | None]:
-    """Arrays of a NumPy or MATLAB file, each with the keys that name it, and a rate (Hz) that a
-    variable says.
+    """Arrays of a NumPy, MATLAB or HDF5 file, each with the keys that name it, and a rate (Hz) that
+    a variable says.
     """
     if path.suffix.lower() == ".npy":
         return [({}, np.load(path, allow_pickle=False))], None
@@ -211,7 +241,7 @@ def _candidates(
     result = []
     if kind in RAW:
         return _of_raw(path), None, None
-    if kind in (".npy", ".mat"):
+    if kind in (".npy", ".mat", ".h5", ".hdf5"):
         arrays, rate = _arrays(path)
         for keys, array in arrays:
             array = np.squeeze(array)
@@ -228,6 +258,8 @@ def _candidates(
         times = times_of(table, _record(path, {"channel": "complex"}, math.nan, None))
         carrier = table.carrier_hz
         rate = table.rate_hz
+        if len(table.columns) > MOST_COLUMNS:
+            return _of_rows(path, table)
         if rate is None and times is not None:
             rate = faults.agreed_rate(path, None, None, times)
         result = [one._replace(keys={**one.keys, **keys}) for one in _of_columns(table)]
@@ -287,10 +319,7 @@ def inspect_recording(
     kind, or nothing in it reads as a signal.
     """
     path = existing(path, "recording")
-    if path.suffix.lower() not in READERS:
-        raise InputError(
-            f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}"
-        )
+    refuse_kind(path)
     try:
         candidates, own_rate, own_carrier = _candidates(path, carrier_hz)
     except UNREADABLE as error:
@@ -371,6 +400,11 @@ def _notes(path: Path, seen: Seen, rate_hz: float | None, carrier_hz: float | No
         )
     spread = values.std()
     mean = values.mean()
+    gone = faults.lost(values).mean()
+    if gone:
+        notes.append(
+            f"{100 * gone:.2g} % of the samples are lost: exact zeros in a row; their windows are left out"
+        )
     constant = _decibels(abs(mean) ** 2 / spread**2)
     if constant > DC_DB:
         notes.append(

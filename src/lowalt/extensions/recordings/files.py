@@ -10,7 +10,7 @@ import numpy as np
 from lowalt.extensions.recordings import faults
 from lowalt.extensions.recordings.chirps import slow_time
 from lowalt.extensions.recordings.column_names import rises_evenly, role, unit
-from lowalt.extensions.recordings.formats import RAW, READERS, Table
+from lowalt.extensions.recordings.formats import RAW, READERS, Table, refuse_kind
 from lowalt.extensions.recordings.layouts import (
     GROUPS,
     TYPES,
@@ -194,10 +194,7 @@ def table_of(record: Record) -> Table:
         raise InputError(
             f"{path}: the record of a radar without any recording, expected the key `file`"
         )
-    if kind not in READERS:
-        raise InputError(
-            f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}"
-        )
+    refuse_kind(path)
     try:
         table = READERS[kind](path, record)
     except InputError:
@@ -228,6 +225,9 @@ def read(record: Record) -> Baseband:
     values = channel_of(table, record)
     _refuse_misread(table, record)
     faults.check(path, values, None if record.chirps else record.moves)
+    # Two columns of sound may be any two channels.
+    if np.iscomplexobj(values) and path.suffix.lower() == ".wav" and record.trust is None:
+        faults.refuse_alike(path, values)
     if record.chirps is None:
         return Baseband(values, rate)
     samples = record.chirps["samples"]

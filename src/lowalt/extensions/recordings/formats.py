@@ -1,20 +1,24 @@
-"""Tables of samples out of WAV, MAT, CSV, NPY, SigMF and raw files, as they stand in the file.
+"""Tables of samples out of WAV, MAT, HDF5, CSV, NPY, SigMF and raw files, as they stand in the
+file.
 
 This module only reads. `lowalt.extensions.recordings.files` picks the channel,
 `lowalt.extensions.recordings.faults` judges it.
 """
 
+import copy
+import io
 import math
 import re
 from collections.abc import Callable
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.recordings.chirps import in_chirps
+from lowalt.extensions.recordings.chirps import chirp_rows, in_chirps
+from lowalt.extensions.recordings.faults import agreed_rate
 from lowalt.extensions.recordings.layouts import number_type
 from lowalt.extensions.recordings.mat_files import read_mat
 from lowalt.extensions.recordings.record import Record
@@ -42,6 +46,23 @@ RAW = {
 """Endings of numbers without a header, and the type and layout that an ending stands for where the
 record has none.
 """
+
+COMPRESSED = (".mp3", ".m4a", ".aac", ".ogg", ".opus", ".wma")
+"""Endings of sound without what ears do not hear."""
+
+
+def refuse_kind(path: Path) -> None:
+    """Raise InputError where no reader knows a file's ending, with what to do."""
+    kind = path.suffix.lower()
+    if kind in COMPRESSED:
+        raise InputError(
+            f"{path}: {kind} keeps what ears hear and drops faint lines of a radar, expected the "
+            "recording as it was made, saved as .wav"
+        )
+    if kind not in READERS:
+        raise InputError(
+            f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}"
+        )
 
 
 class Table(NamedTuple):
@@ -81,11 +102,12 @@ def _wav(path: Path, record: Record) -> Table:
 
 
 def _mat(path: Path, record: Record) -> Table:
-    """Read the record's variable of a MATLAB file, or its only one; `rec.iq` is a field of a
-    struct.
+    """Read the record's variable of a MATLAB or HDF5 file, or its only one.
+
+    `rec.iq` is a field of a struct, `rec/iq` or `rec.iq` an array in a group.
     """
     variables = read_mat(path)
-    name = record.variable
+    name = record.variable and record.variable.strip("/").replace("/", ".")
     if name is None:
         arrays = [key for key, value in variables.items() if value.size > 1]
         if len(arrays) != 1:
@@ -146,6 +168,11 @@ def _csv(path: Path, record: Record) -> Table:
     values = np.loadtxt(
         rows, complex if any("j" in row for row in rows) else float, delimiter=delimiter, ndmin=2
     )
+    if record.chirps:
+        stream, times = chirp_rows(values, record.chirps["samples"], str(path))
+        return Table(
+            [stream], rate_hz=None if times is None else agreed_rate(path, None, None, times)
+        )
     columns = [
         column if np.iscomplexobj(column) and column.imag.any() else column.real
         for column in values.T
@@ -222,6 +249,67 @@ def _captured(
     return slice(first, last)
 
 
+def _byte_count(path: Path, fields: dict, key: str) -> int:
+    """A number of bytes that a SigMF recording states, 0 where it does not.
+
+    Raises: InputError for anything but a whole number from 0.
+    """
+    count = fields.get(key, 0)
+    if not isinstance(count, int) or isinstance(count, bool) or count < 0:
+        raise InputError(f"{path}: {key} is {count!r}, expected a whole number from 0")
+    return count
+
+
+def _other_bytes(path: Path, metadata: dict) -> bool:
+    """Whether a SigMF file holds bytes that are no samples, before its captures or at its end.
+
+    Raises: InputError for a number of bytes that is no whole number from 0.
+    """
+    captures = metadata.get("captures", [])
+    listed = [capture for capture in captures if isinstance(capture, dict)]
+    headers = [_byte_count(path, capture, "core:header_bytes") for capture in listed]
+    trailing = _byte_count(path, metadata["global"], "core:trailing_bytes")
+    return any(headers) or trailing > 0
+
+
+def _samples_alone(path: Path, signal: Any) -> Any:
+    """The SigMF recording without the bytes that its metadata declares to be no samples.
+
+    `core:header_bytes` stand before the samples of a capture, `core:trailing_bytes` after the last
+    sample; the library's `read_samples` passes over neither at the right place.
+    Raises: InputError where the captures' samples lie outside the file.
+    Source: SigMF 1.2, non-conforming datasets.
+    """
+    import sigmf
+
+    data = Path(signal.data_file).read_bytes()
+    end = len(data) - signal.get_global_field("core:trailing_bytes", 0)
+    frame_bytes = signal.get_sample_size() * signal.num_channels
+    kept = []
+    begin = 0
+    skipped = 0
+    for capture in signal.get_captures():
+        header = capture.get("core:header_bytes", 0)
+        start = skipped + frame_bytes * int(capture.get("core:sample_start", 0))
+        if not begin <= start <= start + header < end:
+            raise InputError(
+                f"{path}: {len(data)} bytes, of which {end} are not trailing; a capture would begin "
+                f"at byte {start + header}, expected its samples inside the file and in order"
+            )
+        kept.append(data[begin:start])
+        begin = start + header
+        skipped += header
+    kept.append(data[begin:end])
+    metadata = copy.deepcopy(signal._metadata)
+    for key in ("core:trailing_bytes", "core:dataset", "core:sha512"):
+        metadata["global"].pop(key, None)
+    for capture in metadata["captures"]:
+        capture.pop("core:header_bytes", None)
+    alone = sigmf.SigMFFile(metadata=metadata)
+    alone.set_data_file(data_buffer=io.BytesIO(b"".join(kept)))
+    return alone
+
+
 def _sigmf(path: Path, record: Record) -> Table:
     """Read a SigMF recording from its first capture on, or one capture; it may state its rate and
     carrier.
@@ -231,9 +319,8 @@ def _sigmf(path: Path, record: Record) -> Table:
     except ImportError as error:
         raise lacking(error) from error
 
-    fields = read_object(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording").get(
-        "global"
-    )
+    metadata = read_object(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording")
+    fields = metadata.get("global")
     if not isinstance(fields, dict):
         raise InputError(f"{path}: its metadata has no block global, expected a SigMF recording")
     dataset = fields.get("core:dataset")
@@ -241,8 +328,11 @@ def _sigmf(path: Path, record: Record) -> Table:
         raise InputError(
             f"{path}: core:dataset is {dataset!r}, expected the name of a file beside it"
         )
+    mixed = _other_bytes(path, metadata)
     try:
         signal = sigmf.sigmffile.fromfile(str(path))
+        if mixed and signal.data_file is not None:
+            signal = _samples_alone(path, signal)
         values = signal.read_samples()
         rate = signal.get_global_field("core:sample_rate")
         captures = signal.get_captures()
@@ -265,6 +355,8 @@ def _sigmf(path: Path, record: Record) -> Table:
 READERS: dict[str, Callable[[Path, Record], Table]] = {
     ".wav": _wav,
     ".mat": _mat,
+    ".h5": _mat,
+    ".hdf5": _mat,
     ".csv": _csv,
     ".txt": _csv,
     ".npy": _npy,

@@ -34,9 +34,8 @@ TYPES = (
 )
 """Types that bytes without a header are tried as, the usual ones first."""
 HALVES = 0.01
-"""Bits per number by which I and Q in two halves must fit better: few receivers write so, many have
-a real channel.
-"""
+"""Bits per number by which the rarer orders must fit better, I and Q in two halves and four lanes:
+few receivers write so, many have a real channel or two lanes."""
 LATER = 0.002
 """Bits per number by which a reading must fit better than a more usual one."""
 CONTRADICTED = 0.06
@@ -95,7 +94,7 @@ def readings(numbers: np.ndarray, dtype: str = "") -> list[Reading]:
     for layout in ("iqiq", "", "iiqq", *(("dca2", "dca4") if numbers.dtype.itemsize == 2 else ())):
         with np.errstate(all="ignore"):
             channels = parted(numbers, layout, "") if layout else [numbers]
-        bits = code_bits(channels, step) + HALVES * (layout == "iiqq")
+        bits = code_bits(channels, step) + HALVES * (layout in ("iiqq", "dca4"))
         found.append(Reading(dtype, layout, bits / numbers.dtype.itemsize))
     return _ranked(found)
 

@@ -1,10 +1,11 @@
-"""Variables of MATLAB files, read in a process of their own: scipy's and HDF5's readers crash on
-some damaged files.
+"""Variables of MATLAB and HDF5 files, read in a process of their own: scipy's and HDF5's readers
+crash on some damaged files.
 
     python mat_files.py FILE.mat OUT.npz
 
 The archive holds the numeric variables as `0`, `1`, ... and `names`, a JSON list of their names. A
-field of a struct is named `struct.field`. Files of version 7.3 are HDF5.
+field of a struct is named `struct.field`, an array in a group of HDF5 `group.array`. MATLAB files
+of version 7.3 are HDF5.
 """
 
 import json
@@ -30,7 +31,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read_mat(path: Path) -> dict[str, np.ndarray]:
-    """Return the numeric variables of a MATLAB file by name.
+    """Return the numeric variables of a MATLAB or HDF5 file by name.
 
     Raises: InputError naming the file where it cannot be read.
     """
@@ -43,7 +44,7 @@ def read_mat(path: Path) -> dict[str, np.ndarray]:
             reason = ended.stderr.strip().splitlines()[-1:] or [
                 f"the reader ended with {ended.returncode}"
             ]
-            raise InputError(f"{path}: not a readable .mat file ({reason[0][:200]})")
+            raise InputError(f"{path}: not a readable {path.suffix} file ({reason[0][:200]})")
         with np.load(out, allow_pickle=False) as data:
             names = json.loads(str(data["names"]))
             return {name: data[str(number)] for number, name in enumerate(names)}
@@ -97,12 +98,12 @@ def _below(group, name: str, largest: int, depth: int = 0) -> Iterator[tuple[str
 
 
 def _new(source: str) -> dict[str, np.ndarray]:
-    """Numeric variables of a file of version 7.3; axes stand in the reverse of MATLAB's order."""
+    """Numeric variables of an HDF5 file; axes of MATLAB stand in the reverse of its order."""
     try:
         import h5py
     except ImportError:
         sys.exit(
-            f"version 7.3 needs h5py, expected `{install_command('matlab')}` or a file saved with -v7"
+            f"HDF5, as MATLAB writes with -v7.3, needs h5py, expected `{install_command('matlab')}`"
         )
     with h5py.File(source) as file:
         return dict(_below(file, "", INFLATED * Path(source).stat().st_size))

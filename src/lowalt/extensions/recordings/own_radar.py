@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from torch import nn
 
+from lowalt.extensions.formats import zoo
 from lowalt.extensions.recordings.files import Baseband, read
 from lowalt.extensions.recordings.presence import heard_powers, noise_floor
 from lowalt.extensions.recordings.record import Record
@@ -27,7 +28,7 @@ from lowalt.extensions.recordings.window_samples import Windows
 from lowalt.extensions.recordings.windows import windows
 from lowalt.files.errors import InputError
 from lowalt.machine.progress import reported
-from lowalt.recognition import model_card, model_file, zoo
+from lowalt.recognition import model_card, model_file
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import of_run
 from lowalt.recognition.runs import of_file

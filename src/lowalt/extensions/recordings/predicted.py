@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lowalt.extensions.recordings.record import Record, read_record
+from lowalt.machine.progress import announced
 
 if TYPE_CHECKING:
     from lowalt.recognition.runs import Trained
@@ -26,36 +27,29 @@ def answer(model: "Trained", settings: dict, record: Record, name: str) -> tuple
     # The network's libraries take seconds to import.
     from lowalt.extensions.recordings.answers import answers
 
-    heard = answers(model, settings, record, name)
+    with announced("lowalt predict: reading the recording and answering"):
+        heard = answers(model, settings, record, name)
+    outcomes = heard.outcomes(list(model.classes))
     names = np.array(model.classes)[heard.probabilities.argmax(1)]
-    facts = zip(
-        heard.starts_s.tolist(),
-        heard.present.tolist(),
-        heard.clipped.tolist(),
-        heard.beyond_mps.tolist(),
-        names,
-        heard.probabilities.tolist(),
-        strict=True,
-    )
-    windows = [
-        {
-            "start_s": start,
-            "target": target,
-            "clipped": clipped,
-            "beyond_mps": None if beyond != beyond else beyond,
-            "class": str(name),
-            **dict(zip(model.classes, shares, strict=True)),
+    windows = []
+    lines = []
+    for number, outcome in enumerate(outcomes):
+        start_s = float(heard.starts_s[number])
+        beyond_mps = float(heard.beyond_mps[number])
+        window = {
+            "start_s": start_s,
+            "target": bool(heard.present[number]),
+            "clipped": bool(heard.clipped[number]),
+            "lost": bool(heard.lost[number]),
+            "beyond_mps": None if np.isnan(beyond_mps) else beyond_mps,
+            "class": str(names[number]),
         }
-        for start, target, clipped, beyond, name, shares in facts
-    ]
-    lines = [
-        f"{start:8.2f} s  {heard.words(number, model.classes)}"
-        for number, start in enumerate(heard.starts_s)
-    ]
-    counts = [
-        f"{category} {int((names[heard.present] == category).sum())}" for category in model.classes
-    ]
+        shares = heard.probabilities[number].tolist()
+        windows.append(window | dict(zip(model.classes, shares, strict=True)))
+        lines.append(f"{start_s:8.2f} s  {heard.words(number, outcome)}")
+    counts = [f"{category} {outcomes.count(category)}" for category in model.classes]
     last = f"{heard.present.sum()} of {len(names)} windows hold a target: {', '.join(counts)}"
     if not heard.present.any():
         last = f"nothing there: none of {len(names)} windows holds a target that this network could know"
-    return windows, "\n".join([*lines, last, *(f"note: {note}" for note in heard.notes)])
+    notes = [f"note: {note}" for note in heard.notes]
+    return windows, "\n".join([*lines, last, *notes])

@@ -9,7 +9,7 @@ between them.
 import math
 
 import numpy as np
-from scipy.ndimage import maximum_filter, median_filter
+from scipy.ndimage import maximum_filter, maximum_filter1d, median_filter
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.extensions.recordings.twin import Twin
@@ -31,6 +31,11 @@ BEYOND_DB = 10.0
 """How far a line beyond the speeds that windows show must stand above all that they show: rotors'
 lines do by less.
 """
+STAYS_CELLS = 8
+"""Doppler cells by which interference beyond the speeds that windows show may drift to either side.
+"""
+FEWEST_STAYS = 5
+"""Least number of windows with which such interference can be told from a fast target."""
 SLOW_CELLS = 4
 """Doppler cells about zero speed that hold slow noise and are no line beyond a window's speeds."""
 
@@ -104,6 +109,16 @@ def heard_powers(intervals: np.ndarray, twin: Twin) -> tuple[np.ndarray, np.ndar
     )
 
 
+def strongest_mps(intervals: np.ndarray, twin: Twin) -> np.ndarray:
+    """Return the speed (n,) m/s of the strongest line of intervals (n, symbols) that a target may
+    have.
+    """
+    power, heard = heard_powers(intervals, twin)
+    cells = np.fft.fftshift(np.fft.fftfreq(intervals.shape[1]))
+    speeds = np.abs(speeds_shown(cells * 2 * twin.edge_mps, twin.edge_mps, twin.sides)[1])
+    return speeds[heard][power[:, heard].argmax(axis=1)]
+
+
 def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) -> np.ndarray:
     """Return which intervals (n, symbols) of one recording hold a target, (n,) bool: a line, Hann
     window, that stands `detect_db` above the recording's own noise floor.
@@ -146,7 +161,9 @@ def beyond_mps(values: np.ndarray, rate_hz: float, twin: Twin, count: int) -> np
     twin's windows show, NaN where there is none.
 
     values: samples (samples,) of a recording at `rate_hz`. The line stands `BEYOND_DB` above all
-    that windows show.
+    that windows show. One that stays in its place in nine tenths of `FEWEST_STAYS` windows or more
+    is interference, such as a spur of the receiver, and counts only where it stands as much above
+    that, too.
     """
     long = twin.symbols * twin.symbol_interval_s * rate_hz
     length = min(math.floor(long), len(values))
@@ -158,7 +175,11 @@ def beyond_mps(values: np.ndarray, rate_hz: float, twin: Twin, count: int) -> np
     )
     cells = np.abs(np.fft.fftfreq(length, 1 / length))
     speeds = cells * rate_hz / length * SPEED_OF_LIGHT / twin.carrier_hz / 2
+    level = 10 ** (BEYOND_DB / 10)
     outside = np.where(speeds > twin.fastest_mps, power, 0.0)
+    if count >= FEWEST_STAYS:
+        around = maximum_filter1d(outside, 2 * STAYS_CELLS + 1, axis=1, mode="constant")
+        outside[outside <= level * np.quantile(around, QUIET_SHARE, axis=0)] = 0.0
     shown = power[:, (speeds <= twin.fastest_mps) & (cells >= SLOW_CELLS)].max(axis=1)
-    far = outside.max(axis=1) > 10 ** (BEYOND_DB / 10) * shown
+    far = outside.max(axis=1) > level * shown
     return np.where(far, speeds[outside.argmax(axis=1)], np.nan)

@@ -39,7 +39,7 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
     inspect.add_argument(
         "file",
         type=Path,
-        help="the samples: WAV, MAT, CSV, NPY, SigMF, or numbers without a header",
+        help="the samples: WAV, MAT, HDF5, CSV, NPY, SigMF, or numbers without a header",
     )
     inspect.add_argument(
         "--carrier", type=hertz, metavar="HZ", help="carrier, where the file does not say it"

@@ -20,6 +20,8 @@ from lowalt.files.shipped import shipped
 from lowalt.spectra import Fourier, Spectra, Transfer
 
 CHANNELS = ("complex", "real")
+NO_CLASS = "none of these"
+"""Name of the class of what belongs to no category, such as a hand that waves."""
 RADARS = "config/measured/radars"
 """Folder of the records of the measured radars: each says what `lowalt recording train` makes its
 network of.
@@ -166,9 +168,8 @@ def twin_of(record: Record, rate_hz: float) -> Twin:
     channel has not, or rates that do not go together.
     """
     said = record.twin or {}
-    usual_scenes = [
-        label for label in said.get("classes", CATEGORIES) if label not in said.get("scenes", {})
-    ]
+    asked_of = {*said.get("classes", CATEGORIES)} - {NO_CLASS}
+    usual_scenes = asked_of - set(said.get("scenes", {}))
     missing = [key for key in (ASKED if usual_scenes else ASKED[:1]) if key not in said]
     if missing:
         raise InputError(

@@ -34,6 +34,40 @@ def straight(times_s: np.ndarray, start_m: np.ndarray, speed_mps: float, yaw_rad
     return Course(np.asarray(start_m) + times_s[:, None] * velocity, tilt, times_s)
 
 
+def drive(
+    times_s: np.ndarray,
+    start_m: np.ndarray,
+    speed_mps: float,
+    yaw_rad: float,
+    acceleration_mps2: float,
+    curve_per_m: float,
+    own_speed_mps: float,
+) -> Course:
+    """Return a course from `start_m` (3,) that speeds up or brakes to a stop and follows a bend of
+    constant curvature.
+
+    speed_mps: at time 0, not negative; curve_per_m: one over the bend's radius, positive to the
+    left. The clock is the way covered over `own_speed_mps`, so that wheels roll and limbs stop
+    where the target does.
+    """
+    moving = (
+        times_s if acceleration_mps2 >= 0 else np.minimum(times_s, speed_mps / -acceleration_mps2)
+    )
+    covered = speed_mps * moving + 0.5 * acceleration_mps2 * moving**2
+    yaw = yaw_rad + curve_per_m * covered
+    # The front is (-sin yaw, cos yaw); its integral over a bend is a chord, whose middle has the
+    # mean yaw.
+    half_turn = 0.5 * curve_per_m * covered
+    chord = covered * np.sinc(half_turn / np.pi)
+    middle = yaw_rad + half_turn
+    tilt = np.zeros((len(times_s), 3))
+    tilt[:, 0] = yaw
+    way = np.stack(
+        [-chord * np.sin(middle), chord * np.cos(middle), np.zeros(len(times_s))], axis=1
+    )
+    return Course(np.asarray(start_m) + way, tilt, covered / own_speed_mps)
+
+
 SWAYS = 3
 """Sinusoids on every axis of a sway."""
 

@@ -4,13 +4,14 @@ setting each.
 Everything is relative to the echo's own mean power over the stretch, behind the high pass, so that
 a setting means the same near and far.
 The order is that of the parts: antenna and mixer (wander, leak), noise of the mixer, hum that the
-amplifier picks up, the amplifier's coupling capacitors (high pass), its supply rails (clipping).
+amplifier picks up, the amplifier's coupling capacitors (high pass), its supply rails (clipping),
+its gain control, the converter.
 """
 
 from dataclasses import MISSING, dataclass, fields
 
 import numpy as np
-from scipy.signal import butter, sosfilt
+from scipy.signal import butter, lfilter, sosfilt
 
 from lowalt.config.command import pick
 from lowalt.noise.awgn import add_noise
@@ -26,7 +27,10 @@ class Receiver:
 
     May be left out: hum_lines, how many harmonics the line has, each 1 / number as strong;
     highpass_hz, corner of a Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude
-    over the rms of all samples, 0 for no limit.
+    over the rms of all samples, 0 for no limit; flicker_slope, exponent of the slow noise's fall;
+    gain_control, the share in decibels by which an automatic gain makes strong and weak stretches
+    alike, and gain_s, over which time it measures; bits, of the converter at full scale, 0 for
+    none.
     """
 
     snr_db: float
@@ -39,6 +43,10 @@ class Receiver:
     hum_lines: float = 1.0
     highpass_hz: float = 0.0
     clip_rms: float = 0.0
+    flicker_slope: float = 2.0
+    gain_control: float = 0.0
+    gain_s: float = 0.1
+    bits: float = 0.0
 
     @classmethod
     def from_settings(cls, block: dict) -> "Receiver":
@@ -56,16 +64,18 @@ ORDER = 2
 """Order of the high pass: two coupling capacitors."""
 
 
-def shaped(count: int, rate_hz: float, corner_hz: float, rng: np.random.Generator) -> np.ndarray:
-    """Return complex Gaussian noise (count,) whose density falls as 1 / (1 + (f / corner)^2) from
-    unity at f = 0.
+def shaped(
+    count: int, rate_hz: float, corner_hz: float, rng: np.random.Generator, slope: float = 2.0
+) -> np.ndarray:
+    """Return complex Gaussian noise (count,) whose density falls as 1 / (1 + (f / corner)^slope)
+    from unity at f = 0.
 
     Unity is the density of white noise of unit power.
     """
     white = rng.standard_normal((2, count))
     frequency = np.fft.fftfreq(count, 1 / rate_hz)
     spectrum = np.fft.fft(white[0] + 1j * white[1]) * np.sqrt(
-        0.5 / (1 + (frequency / corner_hz) ** 2)
+        0.5 / (1 + np.abs(frequency / corner_hz) ** slope)
     )
     return np.fft.ifft(spectrum)
 
@@ -91,9 +101,8 @@ def received(
     spread = slow.std() or 1.0
     result = (echo if target else 0 * echo) * 10 ** (settings.wander_db / 20 * slow / spread)
     level = np.sqrt(power) * 10 ** (-settings.snr_db / 20)
-    flicker = (
-        10 ** (settings.flicker_db / 20) * level * shaped(count, rate_hz, settings.flicker_hz, rng)
-    )
+    slow_noise = shaped(count, rate_hz, settings.flicker_hz, rng, settings.flicker_slope)
+    flicker = 10 ** (settings.flicker_db / 20) * level * slow_noise
     angle = rng.uniform(0, 2 * np.pi, 2)
     static = np.sqrt(power) * 10 ** (settings.leak_db / 20) * np.exp(1j * angle[0])
     time = np.arange(count) / rate_hz
@@ -104,7 +113,32 @@ def received(
     hum = np.sqrt(power) * 10 ** (settings.hum_db / 20) * hum
     result = add_noise(result, settings.snr_db, rng, power) + flicker + static + hum
     result = result.real if real else result
-    return clipped(highpassed(result, rate_hz, settings.highpass_hz), settings.clip_rms)
+    result = clipped(highpassed(result, rate_hz, settings.highpass_hz), settings.clip_rms)
+    return quantised(
+        controlled(result, rate_hz, settings.gain_control, settings.gain_s), round(settings.bits)
+    )
+
+
+def controlled(values: np.ndarray, rate_hz: float, share: float, time_s: float) -> np.ndarray:
+    """Return samples (N,) behind an automatic gain that takes `share` of the decibels by which
+    their level, a running mean of the power over about `time_s`, differs from its median; share 0
+    for a constant gain."""
+    if not share:
+        return values
+    kept = np.exp(-1 / (time_s * rate_hz))
+    power = lfilter([1 - kept], [1, -kept], np.abs(values) ** 2, zi=[kept * rms(values) ** 2])[0]
+    return values * (power / np.median(power)) ** (-share / 2)
+
+
+def quantised(values: np.ndarray, bits: int) -> np.ndarray:
+    """Return samples (N,) as a converter of `bits` gives them whose full scale is their largest
+    component; 0 for no converter."""
+    if not bits:
+        return values
+    components = np.stack([values.real, values.imag]) if np.iscomplexobj(values) else values[None]
+    step = np.abs(components).max() / 2 ** (bits - 1)
+    steps = np.rint(components / step) * step
+    return steps[0] + 1j * steps[1] if np.iscomplexobj(values) else steps[0]
 
 
 def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float) -> np.ndarray:

@@ -1,13 +1,15 @@
 """Scenes of a twin: targets in front of the radar and their courses, drawn from the ranges of a
 configuration.
 
-A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene (`scene` in
+A value of a scene is a number, [low, high] for a uniform draw, or [a, b, c, ...] for one whose
+stretches a to b, b to c and so on are equally probable. Keys of a scene (`scene` in
 brought.schema.yaml):
     subtypes       names of targets, one drawn per sample
     course         hover | pass | to_and_fro, and the course's own keys:
                    hover: distance_m, height_m, sway_m, sway_hz, rock_deg
                    pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first
-                   symbol)
+                   symbol); acceleration_mps2 and curve_per_m (one over the radius of a bend), both
+                   or neither
                    to_and_fro: near_m, far_m, height_m, speed_mps, turn_s
     rate_hz        of rotors or wings (optional: the target's own); wheels roll with the speed
     spread, wander of the rotors' rates, as the effect `rotor_spread` has them (both optional)
@@ -17,14 +19,16 @@ brought.schema.yaml):
     (optional: all directions) foils          patterns of foil, one drawn per sample (optional)
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
-    second         share of samples with a second target of the same scene, and its level_db
-    (optional) receiver       settings of `twin_receiver.Receiver` that differ from those of the
-    radar (optional)
+    second         share of samples with a second target, its level_db, and its scene (optional; the
+    same scene) rate_error     of the receiver's clock (optional)
+    receiver       settings of `twin_receiver.Receiver` that differ from those of the radar
+    (optional)
 """
 
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +36,8 @@ from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.extensions.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.extensions.recordings.presence import present
 from lowalt.extensions.recordings.record import Record
-from lowalt.extensions.recordings.twin import RADARS, Twin, records, twin_of
-from lowalt.extensions.recordings.twin_courses import Course, hover, straight, to_and_fro
+from lowalt.extensions.recordings.twin import NO_CLASS, RADARS, Twin, records, twin_of
+from lowalt.extensions.recordings.twin_courses import Course, drive, hover, straight, to_and_fro
 from lowalt.extensions.recordings.twin_echo import (
     beam_gain,
     echo,
@@ -42,6 +46,7 @@ from lowalt.extensions.recordings.twin_echo import (
     strengthened,
     textured,
 )
+from lowalt.extensions.recordings.twin_others import KINDS, NOTHING, other_echo
 from lowalt.extensions.recordings.twin_receiver import Receiver, received
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
@@ -60,16 +65,18 @@ analytic signal.
 
 
 def value(setting: float | list[float], rng: np.random.Generator) -> float:
-    """Return a setting's value: the number, or a uniform draw between the two of a list.
+    """Return a setting's value: the number, or a draw from the stretches between the numbers of a
+    list, which are equally probable; uniform within each.
 
     Raises: InputError for anything else.
     """
     if (
         isinstance(setting, list)
-        and len(setting) == 2
+        and len(setting) >= 2
         and all(isinstance(end, (int, float)) for end in setting)
     ):
-        return float(rng.uniform(*setting))
+        first = int(rng.integers(len(setting) - 1)) if len(setting) > 2 else 0
+        return float(rng.uniform(setting[first], setting[first + 1]))
     if isinstance(setting, bool) or not isinstance(setting, (int, float)):
         raise InputError(f"scene: value is {setting!r}, expected a number or [low, high]")
     return float(setting)
@@ -107,6 +114,10 @@ def _course(
     if kind == "pass":
         place = np.array([drawn("lateral_m"), drawn("ahead_m"), drawn("height_m")])
         speed = drawn("speed_mps")
+        if "acceleration_mps2" in scene:
+            return _driven(
+                place, speed, drawn("acceleration_mps2"), drawn("curve_per_m"), cloud, times_s
+            )
         return straight(times_s, place, abs(speed), 0.0 if speed > 0 else math.pi), abs(speed)
     if kind == "to_and_fro":
         walk = [drawn(name) for name in ("near_m", "far_m", "speed_mps", "turn_s")]
@@ -114,6 +125,28 @@ def _course(
             times_s, *walk, cloud.record["track_speed_mps"], 0.0, drawn("height_m")
         ), walk[2]
     raise InputError(f"scene: course is {kind!r}, expected hover, pass or to_and_fro")
+
+
+def _driven(
+    place_m: np.ndarray,
+    speed_mps: float,
+    acceleration_mps2: float,
+    curve_per_m: float,
+    cloud: Cloud,
+    times_s: np.ndarray,
+) -> tuple[Course, float]:
+    """The course of `drive`, and the speed (m/s) at which its clock runs as fast as time.
+
+    Wheels and limbs follow the way; rotors and wings do not.
+    """
+    own_mps = 1.0
+    if "node" in cloud.kinds:
+        own_mps = cloud.record["track_speed_mps"]
+    yaw = 0.0 if speed_mps > 0 else math.pi
+    course = drive(times_s, place_m, abs(speed_mps), yaw, acceleration_mps2, curve_per_m, own_mps)
+    if cloud.like in AIRBORNE:
+        course = course._replace(clock_s=times_s)
+    return course, own_mps
 
 
 def _rate(scene: dict, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
@@ -140,9 +173,13 @@ def heard(
     place and speed.
     Raises: InputError for a scene with a wrong key or value.
     """
+    if "others" in scene:
+        kind = scene["others"][int(rng.integers(len(scene["others"])))]
+        count = math.ceil((seconds + 2 * MARGIN * twin.symbol_interval_s) * twin.rate_hz)
+        return other_echo(kind, twin, count, rng), kind
     signal, name = _of_one_target(twin, scene, clouds, rng, seconds)
     if "second" in scene and rng.uniform() < scene["second"]["share"]:
-        second, _ = _of_one_target(twin, scene, clouds, rng, seconds)
+        second, _ = _of_one_target(twin, scene["second"].get("scene", scene), clouds, rng, seconds)
         level = 10 ** (value(scene["second"]["level_db"], rng) / 20)
         signal = signal + level * rms(signal) / max(rms(second), 1e-300) * second
     return signal, name
@@ -172,6 +209,8 @@ def _of_one_target(
         )
         margin = 2 * MARGIN * twin.symbol_interval_s
         times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz
+        if "rate_error" in scene:
+            times *= 1 + value(scene["rate_error"], rng)
         times += value(scene.get("start_s", 0.0), rng)
         course, speed = _course(scene, cloud, times, rng)
         row = still_row(cloud, _rate(scene, cloud, speed, rng), rng)
@@ -210,14 +249,22 @@ def stretch(values: np.ndarray, twin: Twin, seconds: float) -> np.ndarray:
 
 
 REDRAWS = 8
-"""Largest number of receivers drawn for one echo until its target is above the noise. The last one
-is kept anyway.
-"""
+"""Largest number of receivers drawn for one echo, and of echoes drawn for a window, until its
+target is above the noise. The last one is kept anyway."""
 
 
-def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np.ndarray:
-    """Return the coherent interval (symbols,) of an echo at a receiver. Where targets move, so that
-    they are not heard all the time, it is drawn again while no target is present."""
+class Drawn(NamedTuple):
+    """A coherent interval (symbols,) of an echo at a receiver, the same without the echo where
+    targets move, and whether the target stands above the noise."""
+
+    interval: np.ndarray
+    quiet: np.ndarray
+    found: bool
+
+
+def _drawn(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> Drawn:
+    """The interval of an echo at a receiver. Where targets move, so that they are not heard all the
+    time, the receiver is drawn again while no target is present."""
     seconds = twin.symbols * twin.symbol_interval_s
     for redraw in range(REDRAWS):
         both = []
@@ -226,9 +273,10 @@ def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np
             both.append(
                 coherent_intervals(stretch(values, twin, seconds), twin.symbols, slow=twin.slow)
             )
-        if not twin.slowest_mps or present(both[0], twin, both[-1]).all():
+        found = not twin.slowest_mps or bool(present(both[0], twin, both[-1]).all())
+        if found:
             break
-    return both[0][0]
+    return Drawn(both[0][0], both[-1][0], found)
 
 
 def intervals(
@@ -239,22 +287,35 @@ def intervals(
     keys: tuple,
     count: int,
     receivers: int = 1,
+    quiet: bool = False,
 ) -> tuple[np.ndarray, list[str]]:
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names
-    (count).
+    (count); quiet: the same without the targets, where targets move.
 
     Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from
     the scene's ranges. As with recordings, a window counts if its target stands above the noise
-    (`presence.present`); a hovering target counts at any SNR.
+    (`presence.present`); a hovering target counts at any SNR. A scene whose target no receiver
+    hears, such as a car that stands, is drawn again.
     """
     seconds = twin.symbols * twin.symbol_interval_s
     result = np.empty((count, receivers, twin.symbols), np.complex128)
     names = []
     for number in reported(range(count), count, "scenes"):
-        signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
-        for again in range(receivers):
-            receiver_keys = (seed, "twin-receiver", *keys, number, again)
-            result[number, again] = _interval(twin, scene["receiver"], signal, receiver_keys)
+        for again in range(REDRAWS):
+            which = (number, again) if again else (number,)
+            signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, *which), seconds)
+            heard_by_all = True
+            for receiver in range(receivers):
+                receiver_keys = (seed, "twin-receiver", *keys, *which, receiver)
+                drawn = _drawn(twin, scene["receiver"], signal, receiver_keys)
+                result[number, receiver] = (
+                    drawn.quiet if quiet or name == NOTHING else drawn.interval
+                )
+                heard_by_all = heard_by_all and drawn.found
+                if not drawn.found and again + 1 < REDRAWS and twin.slowest_mps:
+                    break
+            if heard_by_all:
+                break
         names.append(name)
     return result, names
 
@@ -284,7 +345,7 @@ def _placed(scene: dict, said: dict) -> dict:
 
 
 def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, list[dict]]:
-    """Return the scenes of each category of a record, their receivers filled in.
+    """Return the scenes of each class of a record, their receivers filled in.
 
     snr_db: range of SNR (dB); usual: the content of `SCENES`, for whatever the record's block
     `twin` does not say.
@@ -295,6 +356,9 @@ def scenes_of(record: Record, snr_db: list[float], usual: dict) -> dict[str, lis
     receiver = {key: receiver[key] for key in Receiver.__dataclass_fields__ if key in receiver}
     result = {}
     for label in said.get("classes", CATEGORIES):
+        if label == NO_CLASS:
+            result[label] = [{"others": list(KINDS), "receiver": receiver}]
+            continue
         scenes = said.get("scenes", {}).get(label)
         if scenes is None:
             scenes = [_placed(scene, said) for scene in usual["scenes"][label]]
@@ -356,15 +420,29 @@ class Library:
             radars[name] = about, twin_of(about, float(about.rate_hz or 0)), about.twin["snr_db"]
         return cls.of(radars)
 
-    def simulated(self, twin: str, category: str, count: int, purpose: str, receivers: int = 1):
+    def simulated(
+        self,
+        twin: str,
+        category: str,
+        count: int,
+        purpose: str,
+        receivers: int = 1,
+        quiet: bool = False,
+    ) -> tuple[np.ndarray, list[str]]:
         """Return simulated intervals (count, receivers, symbols) of a category, and the names of
         their subtypes.
 
         The category's scenes share the `count` intervals evenly. `purpose` keys the random streams:
-        equal purposes give equal scenes.
+        equal purposes give equal scenes. quiet: the same intervals without their targets, as
+        `intervals`.
         """
         scenes = self.scenes[twin][category]
-        subtypes_of_all = dict.fromkeys(name for scene in scenes for name in scene["subtypes"])
+        seconds = [
+            scene["second"]["scene"] for scene in scenes if "scene" in scene.get("second", {})
+        ]
+        subtypes_of_all = dict.fromkeys(
+            name for scene in [*scenes, *seconds] for name in scene.get("subtypes", ())
+        )
         clouds = clouds_of(self.records, list(subtypes_of_all), self.seed)
         parts = []
         names = []
@@ -372,7 +450,7 @@ class Library:
             share = len(range(number, count, len(scenes)))
             keys = (purpose, twin, category, number)
             signals, subtypes = intervals(
-                self.twins[twin], scene, clouds, self.seed, keys, share, receivers
+                self.twins[twin], scene, clouds, self.seed, keys, share, receivers, quiet
             )
             parts.append(signals)
             names += subtypes

@@ -4,6 +4,8 @@ The images are those of the data set: spectra, tiles and shrinking by the same f
 station. Recordings are never trained or validated on.
 """
 
+import hashlib
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from lowalt.config.classes import CATEGORIES
 from lowalt.config.layers import load_yaml, merge
 from lowalt.extensions.recordings.twin_scenes import Library
 from lowalt.extensions.recordings.window_samples import Windows, facts, rendered
+from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.recognition.checkpoint import identity
@@ -26,13 +29,14 @@ from lowalt.tiles.image_settings import Images
 RECOGNITION = "config/measured/recognition.yaml"
 
 
-def settings(path: str | Path = RECOGNITION) -> dict:
+def settings(path: str | Path = RECOGNITION, over: dict | None = None) -> dict:
     """Return the recognition settings: the default run's block with the file's network, training
     and augmentation.
 
+    over: keys to lay over those of the file.
     Raises: InputError naming a missing key.
     """
-    block = load_yaml(shipped(path), "recognition of recordings")
+    block = merge(load_yaml(shipped(path), "recognition of recordings"), over or {})
     try:
         default = load_yaml(shipped(block["default"]))
         result = merge(
@@ -52,15 +56,50 @@ def settings(path: str | Path = RECOGNITION) -> dict:
         raise InputError(f"{path}: key {error} is missing") from None
 
 
+def _intervals(
+    library: Library, name: str, category: str, block: dict, fold: str, kept: Path | None
+) -> tuple:
+    """The intervals of a category for a fold, and their subtypes; out of the folder `kept` where it
+    has them.
+    """
+    count = block["echoes"][fold]
+    receivers = block["receivers"]
+    made_of = identity(
+        twin=asdict(library.twins[name]),
+        scenes=library.scenes[name][category],
+        seed=library.seed,
+        count=count,
+        receivers=receivers,
+        fold=fold,
+        name=name,
+        category=category,
+    )
+    path = (
+        None if kept is None else kept / f"{hashlib.sha256(made_of.encode()).hexdigest()[:16]}.npz"
+    )
+    if path is not None and path.is_file():
+        with np.load(path, allow_pickle=False) as data:
+            return data["intervals"], data["subtypes"].tolist()
+    intervals, subtypes = library.simulated(name, category, count, fold, receivers)
+    intervals = intervals.astype(np.complex64)
+    if path is not None:
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, intervals=intervals, subtypes=np.array(subtypes))
+    return intervals, subtypes
+
+
 def simulated(
     library: Library,
     name: str,
     block: dict,
     fold: str,
     classes: tuple[str, ...] = tuple(CATEGORIES),
+    kept: Path | None = None,
 ) -> Windows:
     """Return the windows of a twin's classes for a fold of the block's `echoes`: disjoint random
     streams per fold.
+
+    kept: folder that keeps the signals of each class, so that making them can be interrupted.
     """
     images = Images.from_settings(block["images"])
     parts = []
@@ -71,7 +110,7 @@ def simulated(
     count = block["echoes"][fold]
     receivers = block["receivers"]
     for label, category in enumerate(classes):
-        intervals, subtypes = library.simulated(name, category, count, fold, receivers)
+        intervals, subtypes = _intervals(library, name, category, block, fold, kept)
         every_interval = intervals.reshape(-1, intervals.shape[-1])
         parts.append(rendered(every_interval, library.twins[name], images, block["size"]))
         labels += [label] * count * receivers

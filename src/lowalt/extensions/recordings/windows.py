@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.extensions.recordings.channel import coherent_intervals, symbol_rate
-from lowalt.extensions.recordings.faults import clipped
+from lowalt.extensions.recordings.faults import clipped, lost
 from lowalt.extensions.recordings.files import Baseband, read
 from lowalt.extensions.recordings.record import Record
 from lowalt.extensions.recordings.twin import Twin
@@ -25,7 +25,7 @@ from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 
 CLIPPED_SHARE = 1e-3
-"""A window with this share of its samples in clipped peaks, or more, is left out."""
+"""A window with this share of its samples in clipped peaks, or lost, or more, is left out."""
 SPLIT = {"by": "motion", "train": 1, "val": 0, "test": 1}
 
 
@@ -51,17 +51,17 @@ def at_symbol_rate(record: Record, twin: Twin, baseband: Baseband | None = None)
 
 
 class Looks(NamedTuple):
-    """A recording's coherent intervals (n, symbols) complex128, and which of them the receiver has
-    clipped, (n,).
-    """
+    """A recording's coherent intervals (n, symbols) complex128, which of them the receiver has
+    clipped, and of which samples are lost, both (n,) bool."""
 
     intervals: np.ndarray
     clipped: np.ndarray
+    lost: np.ndarray
 
 
 def looks(record: Record, twin: Twin, baseband: Baseband | None = None) -> Looks:
-    """Return a recording's coherent intervals at the twin's symbol rate. A clipped stretch costs
-    its own ones only.
+    """Return a recording's coherent intervals at the twin's symbol rate. A clipped or lost stretch
+    costs its own ones only.
 
     Raises: InputError as `at_symbol_rate`, and where the recording is shorter than a window or
     clipped in all of them.
@@ -70,25 +70,38 @@ def looks(record: Record, twin: Twin, baseband: Baseband | None = None) -> Looks
     signal = at_symbol_rate(record, twin, baseband)
     intervals = coherent_intervals(signal, twin.symbols, str(record.file), twin.slow)
     edges = np.arange(len(intervals) + 1) * twin.symbols * twin.symbol_interval_s * baseband.rate_hz
-    cuts = np.concatenate([[0], np.cumsum(clipped(baseband.values))])
-    share = np.diff(cuts[np.minimum(np.rint(edges).astype(int), len(cuts) - 1)]) / np.diff(edges)
+    share = _shares(clipped(baseband.values), edges)
+    gone = _shares(lost(baseband.values), edges) > CLIPPED_SHARE
+    if gone.all():
+        raise InputError(
+            f"{record.file}: samples are lost in every window, exact zeros in a row, expected a recording "
+            "without gaps"
+        )
     if (share > CLIPPED_SHARE).all():
         raise InputError(
             f"{record.file}: clipped, {100 * share.mean():.3g} % of the samples stick to the extremes "
             f"{baseband.values.real.min():.6g} and {baseband.values.real.max():.6g}, in every window of "
             f"{twin.symbols * twin.symbol_interval_s:.3g} s"
         )
-    return Looks(intervals, share > CLIPPED_SHARE)
+    return Looks(intervals, share > CLIPPED_SHARE, gone)
+
+
+def _shares(marked: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Share (n,) of the marked samples (samples,) bool between each of n + 1 edges and the next, in
+    samples.
+    """
+    counts = np.concatenate([[0], np.cumsum(marked)])
+    return np.diff(counts[np.minimum(np.rint(edges).astype(int), len(counts) - 1)]) / np.diff(edges)
 
 
 def windows(record: Record, twin: Twin, baseband: Baseband | None = None) -> np.ndarray:
     """Return a recording's windows (n, symbols) complex128: its coherent intervals that are not
-    clipped.
+    clipped and of which no sample is lost.
 
     Raises: InputError as `looks`.
     """
     found = looks(record, twin, baseband)
-    return found.intervals[~found.clipped]
+    return found.intervals[~(found.clipped | found.lost)]
 
 
 def spectra(intervals: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:

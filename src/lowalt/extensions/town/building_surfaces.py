@@ -11,10 +11,13 @@ from lowalt.targets.mesh_files import metres, pieces
 
 
 class Surfaces(NamedTuple):
-    """Triangles as a reader finds them: corners (F, 3, 3) m; material (F,), numbers of `names`, ""
-    where the file names none; left_out: what the reader left out, in words, with how many; notes:
-    what it read otherwise than the file states, in the same way; unknown: names of materials that
-    no table has, one for each surface."""
+    """Triangles as a reader finds them.
+
+    corners: (F, 3, 3) m; material: (F,), numbers of `names`, of which "" stands where the file
+    names none; left_out: what the reader left out, in words, with how many; notes: what it read
+    otherwise than the file states, in the same way; unknown: names of materials that no table has,
+    one for each surface.
+    """
 
     corners: np.ndarray
     material: np.ndarray
@@ -31,22 +34,25 @@ def such_as(values: Iterable[str]) -> str:
 
 
 def joined(
-    parts: Iterable[tuple[np.ndarray, str]],
+    walls: Iterable[tuple[np.ndarray, str]],
     left_out: Mapping[str, int],
     notes: Mapping[str, int],
     unknown: Sequence[str],
 ) -> Surfaces:
-    """Return the surfaces of parts, each the corners (F, 3, 3) and the name of their material.
+    """Return the surfaces of walls, each the corners (F, 3, 3) m and the name of their material.
 
     left_out, notes, unknown: see `Surfaces`.
     """
-    parts = list(parts)
-    names = tuple(dict.fromkeys(name for _, name in parts))
-    material = np.repeat(
-        [names.index(name) for _, name in parts], [len(corners) for corners, _ in parts]
+    corners = [np.zeros((0, 3, 3))]
+    material = [np.zeros(0, np.int64)]
+    names: dict[str, int] = {}
+    for triangles, name in walls:
+        number = names.setdefault(name, len(names))
+        corners.append(triangles)
+        material.append(np.full(len(triangles), number))
+    return Surfaces(
+        np.concatenate(corners), np.concatenate(material), tuple(names), left_out, notes, unknown
     )
-    corners = np.concatenate([np.zeros((0, 3, 3)), *(corners for corners, _ in parts)])
-    return Surfaces(corners, material.astype(np.int64), names, left_out, notes, unknown)
 
 
 def mesh_parts(path: Path, unit: str, up: str) -> tuple[list[tuple[np.ndarray, str]], list[str]]:

@@ -13,7 +13,7 @@ from lowalt.extensions.town.facets import Town, corner_numbers, sizes, town
 from lowalt.extensions.town.materials import MATERIALS
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError, reading
-from lowalt.targets.mesh_files import SUFFIXES
+from lowalt.targets.mesh_files import suffixes
 
 MOST_TRIANGLES = 500_000
 FLOOR_M = 0.05
@@ -26,6 +26,9 @@ LARGEST_M = 20_000.0
 """Heights of the tallest building, and least and largest extents of a town, outside of which the
 unit is wrong.
 """
+
+SMALLEST_M2 = 5e-7
+"""A smaller triangle counts as one without an area."""
 
 KEYS = ("height_m", "unit", "up", "material", "ground", "left_out")
 """Settings of the effect `town` that say how a file is read, beside its origin."""
@@ -53,18 +56,18 @@ def _surfaces(path: Path, settings: dict) -> Surfaces:
         from lowalt.extensions.town.mitsuba import read_mitsuba
 
         found = read_mitsuba(path, settings["unit"])
-    elif kind in SUFFIXES:
+    elif kind in suffixes():
         # glTF states its axes: y is up.
-        parts, unknown = mesh_parts(
-            path, settings["unit"], "y" if kind == ".glb" else settings["up"]
-        )
-        found = joined(parts, {}, {}, unknown)
+        up = "y" if kind == ".glb" else settings["up"]
+        walls, unknown = mesh_parts(path, settings["unit"], up)
+        found = joined(walls, {}, {}, unknown)
     else:
-        known = (".geojson", ".xml", *SUFFIXES)
+        known = (".geojson", ".xml", *suffixes())
         raise InputError(
             f"{path}: ends in {kind!r}, expected a file of buildings that ends in one of {known}"
         )
-    return found._replace(corners=found.corners - np.array([*(origin or [0.0, 0.0]), 0.0]))
+    x, y = origin or (0.0, 0.0)
+    return found._replace(corners=found.corners - np.array([x, y, 0.0]))
 
 
 def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
@@ -102,12 +105,9 @@ def _cleaned(path: Path, found: Surfaces) -> tuple[np.ndarray, np.ndarray, dict[
 
     keep(corners[..., 2].max(axis=1) >= FLOOR_M, "triangles of the ground")
     ordered = np.sort(corner_numbers(corners), axis=1)
-    keep(
-        (sizes(corners)[1] > 5e-7)
-        & (ordered[:, 0] < ordered[:, 1])
-        & (ordered[:, 1] < ordered[:, 2]),
-        "triangles without an area",
-    )
+    different = (ordered[:, 0] < ordered[:, 1]) & (ordered[:, 1] < ordered[:, 2])
+    _, area_m2 = sizes(corners)
+    keep((area_m2 > SMALLEST_M2) & different, "triangles without an area")
     _, first = np.unique(np.sort(corner_numbers(corners), axis=1), axis=0, return_index=True)
     keep(np.isin(np.arange(len(corners)), first), "repeated triangles")
     if not len(corners):
@@ -159,8 +159,9 @@ def _read(path: Path, changed_ns: int, origin: tuple[float, float] | None, key: 
         corners, material, dropped = _cleaned(path, found)
         names = tuple(name or settings["material"] for name in found.names)
         made = town(corners, material, names, settings["ground"])
-    facets, count = made.facets, len(made.facets.offset) - 1
-    walls = int((abs(facets.normal[:-1, 2]) < 0.5).sum())
+    # The last facet is the ground.
+    rise = made.facets.normal[:-1, 2]
+    walls = int((abs(rise) < 0.5).sum())
     used = {name: int((material == k).sum()) for k, name in enumerate(names)}
     notes = dict(found.notes)
     if found.unknown:
@@ -171,9 +172,9 @@ def _read(path: Path, changed_ns: int, origin: tuple[float, float] | None, key: 
         "high_m": corners.max(axis=(0, 1)).tolist(),
         "buildings": int(made.building.max()) + 1,
         "triangles": len(corners),
-        "facets": count,
+        "facets": len(rise),
         "walls": walls,
-        "roofs": count - walls,
+        "roofs": len(rise) - walls,
         "materials": used,
         "ground": settings["ground"],
         "dropped": {reason: number for reason, number in dropped.items() if number},

@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
+from lowalt.numerics import portable
 from lowalt.scene import rays
 
 GRID_M = 1e-3
@@ -63,7 +64,7 @@ class Town(NamedTuple):
     material: (K,) number of each facet's material in `materials`; building: (F,) number of the
     building of each triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet,
     and of_building (E,), their buildings;
-    pairs: cache, by the station's place (3,) m, of the pairs (P, 2) of facets that may reflect its
+    pairs: cache, by the station's position (3,) m, of the pairs (P, 2) of facets that may reflect its
     rays in turn.
     """
 
@@ -98,7 +99,8 @@ def _edges(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     triangle (3 F,) of each.
     """
     edges = np.concatenate([numbers[:, [0, 1]], numbers[:, [1, 2]], numbers[:, [2, 0]]])
-    return np.sort(edges, axis=1), np.tile(np.arange(len(numbers)), 3)
+    triangle_of = np.tile(np.arange(len(numbers)), 3)
+    return np.sort(edges, axis=1), triangle_of
 
 
 def labels(corners: np.ndarray, numbers: np.ndarray, material: np.ndarray) -> np.ndarray:
@@ -107,28 +109,29 @@ def labels(corners: np.ndarray, numbers: np.ndarray, material: np.ndarray) -> np
 
     A facet that is not flat, such as a finely divided dome, falls apart into its triangles.
     """
-    (normal, area), (edges, owner) = sizes(corners), _edges(numbers)
+    normal, area = sizes(corners)
+    edges, triangle_of = _edges(numbers)
     order = np.lexsort(edges.T)
     edges = edges[order]
-    owner = owner[order]
-    met = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
-    first = owner[met]
-    second = owner[met + 1]
-    alike = abs((normal[first] * normal[second]).sum(axis=1)) > 1.0 - PARALLEL**2 / 2
-    alike &= material[first] == material[second]
-    first = first[alike]
-    second = second[alike]
+    triangle_of = triangle_of[order]
+    shared = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    first = triangle_of[shared]
+    second = triangle_of[shared + 1]
+    cosine = abs((normal[first] * normal[second]).sum(axis=1))
+    alike = (cosine > 1.0 - PARALLEL**2 / 2) & (material[first] == material[second])
     count = len(corners)
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
+    links = (np.ones(int(alike.sum()), np.int8), (first[alike], second[alike]))
+    graph = coo_array(links, shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     # The plane of a facet is that of its largest triangle.
     order = np.lexsort((-area, label))
-    leader = np.empty(label.max() + 1, np.int64)
-    leader[label[order][::-1]] = order[::-1]
-    own = leader[label]
-    off = abs(((corners - corners[own, :1]) * normal[own][:, None]).sum(axis=2)).max(axis=1)
-    bent = np.isin(label, label[off > FLAT_M])
-    return np.unique(np.where(bent, count + np.arange(count), label), return_inverse=True)[1]
+    largest = np.empty(label.max() + 1, np.int64)
+    largest[label[order][::-1]] = order[::-1]
+    own = largest[label]
+    heights = ((corners - corners[own, :1]) * normal[own][:, None]).sum(axis=2)
+    bent = np.isin(label, label[abs(heights).max(axis=1) > FLAT_M])
+    alone = count + np.arange(count)
+    return np.unique(np.where(bent, alone, label), return_inverse=True)[1]
 
 
 def _convex(along: np.ndarray, area: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -138,8 +141,10 @@ def _convex(along: np.ndarray, area: np.ndarray, first: np.ndarray) -> np.ndarra
     """
     result = np.ones(len(first) - 1, bool)
     for k in np.flatnonzero(np.diff(first) > 1):
-        part = slice(first[k], first[k + 1])
-        result[k] = ConvexHull(along[part].reshape(-1, 2)).volume <= area[part].sum() * (1.0 + 1e-6)
+        rows = slice(first[k], first[k + 1])
+        # In the plane a hull's volume is its area.
+        hull_m2 = ConvexHull(along[rows].reshape(-1, 2)).volume
+        result[k] = hull_m2 <= area[rows].sum() * (1.0 + 1e-6)
     return result
 
 
@@ -154,21 +159,24 @@ def _outward(
 
     corners (F, 3, 3) m, numbers (F, 3), building and label (F,): of the triangles.
     """
-    edges, owner = _edges(numbers)
+    edges, triangle_of = _edges(numbers)
     _, which = np.unique(edges, axis=0, return_inverse=True)
-    high = np.empty(int(numbers.max()) + 1)
-    high[numbers.reshape(-1)] = corners[..., 2].reshape(-1)
+    height = np.empty(int(numbers.max()) + 1)
+    height[numbers.reshape(-1)] = corners[..., 2].reshape(-1)
     # A surface is closed if each of its edges belongs to two triangles; edges on the ground need
     # only one.
-    lone = (np.bincount(which)[which] != 2) & (high[edges].max(axis=1) > FLAT_M)
+    lone = (np.bincount(which)[which] != 2) & (height[edges].max(axis=1) > FLAT_M)
     result = np.zeros(len(planes))
     order = np.argsort(building, kind="stable")
     starts = np.searchsorted(building[order], np.arange(int(building.max()) + 2))
-    for number in np.setdiff1d(building, building[owner[lone]]):
-        mine = order[starts[number] : starts[number + 1]]
-        which = np.unique(label[mine])
-        over = planes[which, :3] @ corners[mine].reshape(-1, 3).T - planes[which, 3:]
-        result[which] = (over.max(axis=1) <= FLAT_M).astype(float) - (over.min(axis=1) >= -FLAT_M)
+    for number in np.setdiff1d(building, building[triangle_of[lone]]):
+        triangles = order[starts[number] : starts[number + 1]]
+        facets = np.unique(label[triangles])
+        points = corners[triangles].reshape(-1, 3)
+        over = portable.product(planes[facets, :3], points.T) - planes[facets, 3:]
+        all_below = over.max(axis=1) <= FLAT_M
+        all_above = over.min(axis=1) >= -FLAT_M
+        result[facets] = all_below.astype(float) - all_above
     return result
 
 
@@ -187,52 +195,68 @@ def town(
     material = material[order]
     label = label[order]
     first = np.searchsorted(label, np.arange(label.max() + 2))
+    first_edge = corners[:, 1] - corners[:, 0]
+    second_edge = corners[:, 2] - corners[:, 0]
+    triangles = np.concatenate([corners[:, 0], first_edge, second_edge], axis=1)
+    edges, of_building, building = _ridges(corners, numbers, label)
+    facets = _facets(corners, numbers, label, first, building, triangles)
+    tree = rays.tree(corners, False)
+    facet_of = {row.tobytes(): k for row, k in zip(triangles, label, strict=True)}
+    of_tree = [facet_of[row.tobytes()] for row in np.ascontiguousarray(tree.triangles)]
+    names = tuple(dict.fromkeys((*materials, ground)))
+    return Town(
+        facets=facets,
+        occluders=Occluders(tree.boxes, tree.triangles, np.array(of_tree)),
+        material=np.append(material[first[:-1]], names.index(ground)),
+        materials=names,
+        building=building,
+        edges=edges,
+        of_building=of_building,
+        pairs={},
+    )
+
+
+def _facets(
+    corners: np.ndarray,
+    numbers: np.ndarray,
+    label: np.ndarray,
+    first: np.ndarray,
+    building: np.ndarray,
+    triangles: np.ndarray,
+) -> Facets:
+    """The facets of triangles that stand in the order of their facets, and the ground.
+
+    corners (F, 3, 3) m, numbers (F, 3), label and building (F,): of the triangles; first (K + 1,) and
+    triangles (F, 9) as in `Facets`.
+    """
     normal, area = sizes(corners)
     largest = np.array([a + area[a:b].argmax() for a, b in pairwise(first)])
     normal = normal[largest]
     across = np.cross([0.0, 0.0, 1.0], normal)
-    flat = np.linalg.norm(across, axis=1) < 1e-6
-    across[flat] = [1.0, 0.0, 0.0]
+    level = np.linalg.norm(across, axis=1) < 1e-6
+    across[level] = [1.0, 0.0, 0.0]
     across /= np.linalg.norm(across, axis=1)[:, None]
     up = np.cross(normal, across)
     offset = (normal * corners[largest, 0]).sum(axis=1)
-    along = np.stack(
-        [(corners * axis[label][:, None]).sum(axis=2) for axis in (across, up)], axis=2
-    )
+    along_across = (corners * across[label][:, None]).sum(axis=2)
+    along_up = (corners * up[label][:, None]).sum(axis=2)
+    along = np.stack([along_across, along_up], axis=2)
     low = np.minimum.reduceat(along.min(axis=1), first[:-1])
     high = np.maximum.reduceat(along.max(axis=1), first[:-1])
     middle = 0.5 * (low + high)
     centre = offset[:, None] * normal + middle[:, :1] * across + middle[:, 1:] * up
-    triangles = np.concatenate(
-        [corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1
-    )
-    edges, owner, building = _ridges(corners, numbers, label)
     outward = _outward(corners, numbers, building, label, np.column_stack([normal, offset]))
-    facets = Facets(
-        np.vstack([normal, [0.0, 0.0, 1.0]]),
-        np.append(offset, 0.0),
-        np.vstack([centre, np.zeros(3)]),
-        np.vstack([across, [1.0, 0.0, 0.0]]),
-        np.vstack([up, [0.0, 1.0, 0.0]]),
-        np.vstack([0.5 * (high - low) + FLAT_M, [np.inf, np.inf]]),
-        np.append(first, first[-1]),
-        triangles,
-        np.append(_convex(along, area, first), False),
-        np.append(outward, 1.0),
-    )
-    tree = rays.tree(corners, False)
-    facet = {row.tobytes(): k for row, k in zip(triangles, label, strict=True)}
-    of_tree = np.array([facet[row.tobytes()] for row in np.ascontiguousarray(tree.triangles)])
-    names = tuple(dict.fromkeys((*materials, ground)))
-    return Town(
-        facets,
-        Occluders(tree.boxes, tree.triangles, of_tree),
-        np.append(material[first[:-1]], names.index(ground)),
-        names,
-        building,
-        edges,
-        owner,
-        {},
+    return Facets(
+        normal=np.vstack([normal, [0.0, 0.0, 1.0]]),
+        offset=np.append(offset, 0.0),
+        centre=np.vstack([centre, np.zeros(3)]),
+        across=np.vstack([across, [1.0, 0.0, 0.0]]),
+        up=np.vstack([up, [0.0, 1.0, 0.0]]),
+        half=np.vstack([0.5 * (high - low) + FLAT_M, [np.inf, np.inf]]),
+        first=np.append(first, first[-1]),
+        triangles=triangles,
+        convex=np.append(_convex(along, area, first), False),
+        outward=np.append(outward, 1.0),
     )
 
 
@@ -247,11 +271,13 @@ def _ridges(
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(size, size))
     building = connected_components(graph, directed=False)[1]
     building = np.unique(building[numbers[:, 0]], return_inverse=True)[1]
-    edges, owner = _edges(numbers)
-    _, which = np.unique(np.column_stack([edges, label[owner]]), axis=0, return_inverse=True)
+    edges, triangle_of = _edges(numbers)
+    of_facet = np.column_stack([edges, label[triangle_of]])
+    _, which = np.unique(of_facet, axis=0, return_inverse=True)
     # An edge that one facet has twice lies inside it.
     rim = np.flatnonzero(np.bincount(which)[which] == 1)
     _, first = np.unique(edges[rim], axis=0, return_index=True)
-    place = np.empty((size, 3))
-    place[numbers.reshape(-1)] = corners.reshape(-1, 3)
-    return place[edges[rim[first]]], building[owner[rim[first]]], building
+    points = np.empty((size, 3))
+    points[numbers.reshape(-1)] = corners.reshape(-1, 3)
+    rim = rim[first]
+    return points[edges[rim]], building[triangle_of[rim]], building

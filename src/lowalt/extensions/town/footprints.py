@@ -38,8 +38,8 @@ NO_HEIGHT = "buildings that end below where they begin"
 
 
 class Footprint(NamedTuple):
-    """A building of a file: its outline, in degrees or metres, its properties, and its place in the
-    file.
+    """A building of a file: its outline, in degrees or metres, its properties, and where it stands
+    in the file.
     """
 
     outline: Polygon | MultiPolygon
@@ -52,20 +52,15 @@ def _prism(polygon: Polygon, height_m: float, low_m: float) -> np.ndarray:
     polygon = orient(polygon.simplify(0.0))
     walls = []
     for ring in (polygon.exterior, *polygon.interiors):
-        places = np.asarray(ring.coords)[:, :2]
-        first = places[:-1]
-        second = places[1:]
-        corners = [
-            np.column_stack([xy, np.full(len(xy), z)])
-            for z in (low_m, height_m)
-            for xy in (first, second)
-        ]
-        walls += [np.stack([corners[0], corners[1], corners[3]], axis=1)]
-        walls += [np.stack([corners[0], corners[3], corners[2]], axis=1)]
-    flat = shapely.constrained_delaunay_triangles(polygon)
-    roof = np.array(
-        [np.asarray(orient(part).exterior.coords)[:3, :2] for part in flat.geoms]
-    ).reshape(-1, 3, 2)
+        corners = np.asarray(ring.coords)[:, :2]
+        foot = np.column_stack([corners, np.full(len(corners), low_m)])
+        eaves = np.column_stack([corners, np.full(len(corners), height_m)])
+        # Each wall is two triangles, from one corner of the ring to the next.
+        walls.append(np.stack([foot[:-1], foot[1:], eaves[1:]], axis=1))
+        walls.append(np.stack([foot[:-1], eaves[1:], eaves[:-1]], axis=1))
+    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
+    corners_of = [np.asarray(orient(triangle).exterior.coords)[:3, :2] for triangle in triangles]
+    roof = np.array(corners_of).reshape(-1, 3, 2)
     roofs = [np.concatenate([roof, np.full((*roof.shape[:2], 1), height_m)], axis=2)]
     if low_m > 0.0:
         roofs.append(np.concatenate([roof[:, ::-1], np.full((*roof.shape[:2], 1), low_m)], axis=2))
@@ -130,9 +125,8 @@ def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counte
         left_out[NO_BUILDING] += len(others)
     elif others:
         found = others
-        notes["polygons without a tag of buildings, read as buildings: the file tags none"] = len(
-            others
-        )
+        note = "polygons without a tag of buildings, read as buildings: the file tags none"
+        notes[note] = len(others)
     kept = [footprint for footprint in found if not footprint.outline.is_empty]
     left_out[NO_AREA] += len(found) - len(kept)
     for footprint in kept:
@@ -145,8 +139,8 @@ def _refuse_metres(path: Path, places: np.ndarray) -> None:
     if not (abs(places) <= (180, 90)).all():
         shown = ", ".join(f"{value:g}" for value in places[0])
         raise InputError(
-            f"{path}: the place [{shown}] is no longitude and latitude in degrees, expected EPSG:4326 (RFC 7946): "
-            "in QGIS export with this reference system"
+            f"{path}: the place [{shown}] is no longitude and latitude in degrees, expected "
+            "EPSG:4326 (RFC 7946): in QGIS export with this reference system"
         )
 
 
@@ -161,10 +155,11 @@ def middle_of(path: Path, height_m: float | None) -> tuple[float, float]:
         found, _, _ = _footprints(path, height_m is not None)
         if not found:
             raise InputError(
-                f"{path}: has no building, expected polygons with the key building or height, or --height, with which "
-                "polygons without a tag of buildings are read as well"
+                f"{path}: has no building, expected polygons with the key building or height, "
+                "or --height, with which polygons without a tag of buildings are read as well"
             )
-        low_x, low_y, high_x, high_y = np.array([footprint.outline.bounds for footprint in found]).T
+        bounds = np.array([footprint.outline.bounds for footprint in found])
+        low_x, low_y, high_x, high_y = bounds.T
     return float((low_x.min() + high_x.max()) / 2), float((low_y.min() + high_y.max()) / 2)
 
 
@@ -178,9 +173,8 @@ def moved(origin: Sequence[float], offset_m: Sequence[float]) -> list[float]:
     """Return the place (longitude, latitude; degrees) that lies offset_m (2,), east and north, of
     an origin.
     """
-    return [
-        round(float(value), 7) for value in _local(origin).transform(*offset_m, direction="INVERSE")
-    ]
+    there = _local(origin).transform(*offset_m, direction="INVERSE")
+    return [round(float(value), 7) for value in there]
 
 
 def _united(outline: Polygon | MultiPolygon) -> Polygon | MultiPolygon | None:
@@ -197,17 +191,17 @@ def _united(outline: Polygon | MultiPolygon) -> Polygon | MultiPolygon | None:
 
 def _without_replaced(footprints: list[Footprint]) -> list[Footprint]:
     """The footprints without outlines in which a building:part lies. Source: Simple 3D Buildings."""
-    parts = [footprint.outline for footprint in footprints if is_part(footprint.properties)]
-    if not parts:
+    points = []
+    for footprint in footprints:
+        if is_part(footprint.properties):
+            points.append(footprint.outline.representative_point())
+    if not points:
         return footprints
-    within = shapely.STRtree([part.representative_point() for part in parts])
+    parts = shapely.STRtree(points)
     kept = []
     for footprint in footprints:
-        replaced = (
-            not is_part(footprint.properties)
-            and len(within.query(footprint.outline, predicate="contains")) > 0
-        )
-        if not replaced:
+        held = parts.query(footprint.outline, predicate="contains")
+        if is_part(footprint.properties) or not len(held):
             kept.append(footprint)
     return kept
 
@@ -221,9 +215,9 @@ def _refuse_many_left_out(path: Path, left_out: Counter, kept: int, share: float
     if count > share * (count + kept):
         reasons = ", ".join(f"{number} {reason}" for reason, number in missing.items())
         raise InputError(
-            f"{path}: {count} of {count + kept} buildings are left out ({reasons}), expected at most {share:.3g} of "
-            "them: mend the file, or allow a larger share: --left-out, or effects.town.left_out of "
-            "a scene"
+            f"{path}: {count} of {count + kept} buildings are left out ({reasons}), expected at "
+            f"most {share:.3g} of them: mend the file, or allow a larger share: --left-out, or "
+            "effects.town.left_out of a scene"
         )
 
 
@@ -252,9 +246,8 @@ def _heights(
             "expected their height: --height, or effects.town.height_m of a scene"
         )
     if unread:
-        notes[
-            f"heights that cannot be read{such_as(unread)}: building:levels or --height stands for them"
-        ] = len(unread)
+        which = f"heights that cannot be read{such_as(unread)}"
+        notes[f"{which}: building:levels or --height stands for them"] = len(unread)
     return result
 
 
@@ -292,7 +285,7 @@ def read_footprints(path: Path, origin: tuple[float, float] | None, settings: di
     if len(standing) < len(valid):
         notes["outlines, in whose place their building:parts stand"] = len(valid) - len(standing)
     heights = _heights(path, standing, settings["height_m"], notes)
-    parts = []
+    walls = []
     unknown = []
     unread = []
     for (outline, properties, _), height in zip(standing, heights, strict=True):
@@ -306,14 +299,11 @@ def read_footprints(path: Path, origin: tuple[float, float] | None, settings: di
         name = named(text)
         if text and name is None:
             unknown.append(text)
-        polygons = getattr(outline, "geoms", [outline])
-        parts += [
-            (_prism(polygon, height, low), name or settings["material"]) for polygon in polygons
-        ]
+        for polygon in getattr(outline, "geoms", [outline]):
+            walls.append((_prism(polygon, height, low), name or settings["material"]))
     if unread:
-        notes[f"least heights that cannot be read{such_as(unread)}: the ground stands for them"] = (
-            len(unread)
-        )
+        which = f"least heights that cannot be read{such_as(unread)}"
+        notes[f"{which}: the ground stands for them"] = len(unread)
     kept = len(standing) - left_out[NO_HEIGHT]
     _refuse_many_left_out(path, left_out, kept, settings["left_out"])
-    return joined(parts, left_out, notes, unknown)
+    return joined(walls, left_out, notes, unknown)

@@ -1,15 +1,23 @@
 """Paths between a station and a target in a town: direct, past edges, and by one or two facets or
 the ground.
 
-The image method finds reflected rays. Every ray of every point and symbol is tested against all
-buildings.
+Three steps find the reflected ones. *Candidates*: the routes over facets that may lead to the
+target at all (`candidates`). *Image method*: the rays of each route, every one tested against all
+buildings (`traced`). *Fields*: images and coefficients of the rays that there are (`with_field`).
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.extensions.town import image_loops, knife_edge, shadow_loops
+from lowalt.extensions.town import (
+    candidate_loops,
+    field_loops,
+    image_loops,
+    knife_edge,
+    shadow_loops,
+)
 from lowalt.extensions.town.facets import Town
 from lowalt.extensions.town.materials import properties
 from lowalt.scene.fresnel import VACUUM_F_M
@@ -23,7 +31,8 @@ STEP = 8
 class Route(NamedTuple):
     """A path: the facets (0 to 2) from the station on; images (N, L, 3) m, where the station sees
     the points; coefficient (N, L) complex, 0 where there is no ray; station_m (3,), where the
-    points see the station."""
+    points see the station.
+    """
 
     facets: tuple[int, ...]
     images: np.ndarray
@@ -32,38 +41,51 @@ class Route(NamedTuple):
 
 
 class TracedRays(NamedTuple):
-    """The rays that decide which points are reached: places (R, 1, 3) m, where they end; of_point
-    (N, L): the ray that decides for each point and symbol; boxes (C, 2, 3) m: low and high corners
-    around the places of BLOCK rays each."""
+    """The rays that decide which points are reached.
+
+    places (R, 1, 3) m: where they end; of_point (N, L): the ray that decides for each point and
+    symbol; boxes (C, 2, 3) m: low and high corners around the ends of BLOCK rays each.
+    """
 
     places: np.ndarray
     of_point: np.ndarray
     boxes: np.ndarray
 
 
+def _ends_in_cells(points: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """One end (R, 3) m in each occupied cell of a grid, and the end (N, L) for each point and symbol
+    of points (N, L, 3) m; STEP symbols share their ends.
+    """
+    count = len(points)
+    # The middle one of the symbols that share rays.
+    middles = np.arange(STEP // 2, count + STEP // 2, STEP)
+    some = points[np.minimum(middles, count - 1)]
+    cells = np.floor(some / cell_m).astype(np.int64)
+    cells -= cells.min(axis=(0, 1))
+    sizes = cells.max(axis=(0, 1)) + 1
+    keys = np.arange(len(some))[:, None]
+    for axis in range(3):
+        keys = keys * sizes[axis] + cells[..., axis]
+    _, first, which = np.unique(keys, return_index=True, return_inverse=True)
+    ends = some.reshape(-1, 3)[first]
+    of_point = np.repeat(which.reshape(keys.shape), STEP, axis=0)[:count]
+    return ends, of_point
+
+
 def rays_to(places: np.ndarray, cell_m: float) -> TracedRays:
     """Return one ray for the points of places (N, L, 3) m that are in one cell of a grid of cell_m
-    (m), STEP symbols sharing them; with cell_m 0 one for each point and symbol."""
-    count, points = places.shape[:2]
+    (m), STEP symbols sharing them; with cell_m 0 one for each point and symbol.
+    """
     if cell_m == 0.0:
-        ends = places.reshape(-1, 1, 3)
-        which = np.arange(count * points).reshape(count, points)
+        ends = places.reshape(-1, 3)
+        of_point = np.arange(len(ends)).reshape(places.shape[:2])
     else:
-        # The middle one of the symbols that share rays.
-        some = places[np.minimum(np.arange(STEP // 2, count + STEP // 2, STEP), count - 1)]
-        cells = np.floor(some / cell_m).astype(np.int64)
-        cells -= cells.min(axis=(0, 1))
-        sizes = cells.max(axis=(0, 1)) + 1
-        keys = np.arange(len(some))[:, None]
-        for axis in range(3):
-            keys = keys * sizes[axis] + cells[..., axis]
-        _, first, which = np.unique(keys, return_index=True, return_inverse=True)
-        ends = some.reshape(-1, 1, 3)[first]
-        which = np.repeat(which.reshape(keys.shape), STEP, axis=0)[:count]
+        ends, of_point = _ends_in_cells(places, cell_m)
     starts = np.arange(0, len(ends), BLOCK)
-    low = np.minimum.reduceat(ends[:, 0], starts)
-    high = np.maximum.reduceat(ends[:, 0], starts)
-    return TracedRays(np.ascontiguousarray(ends), which, np.stack([low, high], axis=1))
+    low = np.minimum.reduceat(ends, starts)
+    high = np.maximum.reduceat(ends, starts)
+    boxes = np.stack([low, high], axis=1)
+    return TracedRays(np.ascontiguousarray(ends[:, None]), of_point, boxes)
 
 
 def epsilons(town: Town, frequency_hz: float, where: str) -> np.ndarray:
@@ -74,9 +96,8 @@ def epsilons(town: Town, frequency_hz: float, where: str) -> np.ndarray:
     of_material = []
     for name in town.materials:
         permittivity, conductivity = properties(name, frequency_hz, where)
-        of_material.append(
-            permittivity - 1j * conductivity / (2 * np.pi * frequency_hz * VACUUM_F_M)
-        )
+        loss = conductivity / (2 * np.pi * frequency_hz * VACUUM_F_M)
+        of_material.append(permittivity - 1j * loss)
     return np.array(of_material)[town.material]
 
 
@@ -87,46 +108,84 @@ def _pairs(town: Town, station_m: np.ndarray) -> np.ndarray:
     key = tuple(station_m.tolist())
     facets = town.facets
     if key not in town.pairs:
-        every = np.arange(len(facets.offset))
-        corners = np.repeat(station_m[None], 8, axis=0)
-        unseen = shadow_loops.hidden(facets, town.occluders, every, corners)
-        town.pairs[key] = image_loops.ordered_pairs(
-            facets, ~unseen, station_m, np.hypot(*facets.half.T)
-        )
+        every_facet = np.arange(len(facets.offset))
+        at_station = np.repeat(station_m[None], 8, axis=0)
+        seen_first = ~candidate_loops.hidden(facets, town.occluders, every_facet, at_station)
+        radii = np.hypot(*facets.half.T)
+        town.pairs[key] = candidate_loops.ordered_pairs(facets, seen_first, station_m, radii)
     return town.pairs[key]
 
 
 def _unhidden(town: Town, routes: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """The routes whose last facet is not hidden from the whole box between two corners (3,) m."""
-    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(
-        8, 3
-    )
+    axes = np.meshgrid(*zip(low, high, strict=True), indexing="ij")
+    corners = np.stack(axes, axis=-1).reshape(8, 3)
     last, which = np.unique(routes[:, -1], return_inverse=True)
-    return routes[~shadow_loops.hidden(town.facets, town.occluders, last, corners)[which]]
+    hidden = candidate_loops.hidden(town.facets, town.occluders, last, corners)
+    return routes[~hidden[which]]
 
 
 def candidates(
     town: Town, station_m: np.ndarray, places: np.ndarray, order: int
 ) -> list[np.ndarray]:
     """Return the routes of each of 1 to `order` facets, (P, order) int64, that may lead from a
-    station (3,) m to places (N, L, 3) m."""
+    station (3,) m to places (N, L, 3) m.
+    """
     low = places.min(axis=(0, 1))
     high = places.max(axis=(0, 1))
-    routes = [np.arange(len(town.facets.offset))[:, None]] if order >= 1 else []
-    routes += [_pairs(town, station_m)] if order >= 2 else []
-    fitting = [image_loops.fitting(town.facets, one, station_m, low, high) for one in routes]
-    return [_unhidden(town, one, low, high) for one in fitting]
+    routes = []
+    if order >= 1:
+        routes.append(np.arange(len(town.facets.offset))[:, None])
+    if order >= 2:
+        routes.append(_pairs(town, station_m))
+    result = []
+    for one in routes:
+        fitting = candidate_loops.fitting(town.facets, one, station_m, low, high)
+        result.append(_unhidden(town, fitting, low, high))
+    return result
 
 
 def seen(town: Town, station_m: np.ndarray, rays: TracedRays, facets: np.ndarray) -> np.ndarray:
     """Return which points a ray from a station by facets (0 to 2,) reaches past all buildings, (N,
     L) bool.
     """
+    path = shadow_loops.RayPath(town.facets, town.occluders, facets, station_m)
     present = np.zeros((len(rays.places), 1), bool)
-    shadow_loops.trace(
-        town.facets, town.occluders, facets, station_m, rays.places, rays.boxes, BLOCK, present
-    )
+    shadow_loops.trace(path, rays.places, rays.boxes, BLOCK, present)
     return present[:, 0][rays.of_point]
+
+
+def traced(
+    town: Town, station_m: np.ndarray, rays: TracedRays, routes: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the routes (P, 1 or 2) that reach any point, each with which points, (N, L) bool."""
+    reaching = shadow_loops.reaching(
+        town.facets, town.occluders, routes, station_m, rays.places, rays.boxes, BLOCK
+    )
+    for route in routes[reaching]:
+        yield route, seen(town, station_m, rays, route)
+
+
+def with_field(
+    town: Town,
+    epsilon: np.ndarray,
+    station_m: np.ndarray,
+    places: np.ndarray,
+    route: np.ndarray,
+    present: np.ndarray,
+) -> Route:
+    """Return the path by a route (0 to 2,), where it is present (N, L), with images and coefficients;
+    others as in `reflected`.
+    """
+    images = np.empty((len(places), 3, places.shape[1]))
+    coefficient = np.empty(present.shape, np.complex128)
+    field_loops.coefficients(
+        town.facets, epsilon, route, station_m, places, present, images, coefficient
+    )
+    behind = station_m.copy()
+    for k in route:
+        image_loops.mirrored(town.facets, k, behind)
+    return Route(tuple(route.tolist()), images.swapaxes(1, 2), coefficient, behind)
 
 
 def reflected(
@@ -145,18 +204,8 @@ def reflected(
     """
     result = []
     for routes in candidates(town, station_m, rays.places, order):
-        ask = town.facets, town.occluders, routes, station_m, rays.places, rays.boxes, BLOCK
-        for route in routes[shadow_loops.reaching(*ask)]:
-            present = seen(town, station_m, rays, route)
-            images = np.empty((len(places), 3, places.shape[1]))
-            coefficient = np.empty(present.shape, np.complex128)
-            image_loops.coefficients(
-                town.facets, epsilon, route, station_m, places, present, images, coefficient
-            )
-            behind = station_m.copy()
-            for k in route:
-                image_loops.mirrored(town.facets, k, behind)
-            result.append(Route(tuple(route.tolist()), images.swapaxes(1, 2), coefficient, behind))
+        for route, present in traced(town, station_m, rays, routes):
+            result.append(with_field(town, epsilon, station_m, places, route, present))
     return result
 
 
@@ -168,8 +217,8 @@ def direct(
     wavelength_m: float,
     diffraction: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the direct ray is free, (N, L) bool, and its field over that in free space, (N,
-    L) complex.
+    """Return where the direct ray is free, (N, L) bool, and its field over that in free space,
+    (N, L) complex.
     """
     lit = seen(town, station_m, rays, np.empty(0, np.int64))
     if not diffraction:

@@ -40,7 +40,8 @@ def named(text: str) -> str | None:
     none that is known.
     """
     plain = text.lower().replace("-", "_").replace(" ", "_")
-    return max((name for name in MATERIALS if name in plain), key=len, default=None)
+    held = [name for name in MATERIALS if name in plain]
+    return max(held, key=len, default=None)
 
 
 def properties(name: str, frequency_hz: float, where: str) -> tuple[float, float]:
@@ -57,7 +58,7 @@ def properties(name: str, frequency_hz: float, where: str) -> tuple[float, float
     ghz = frequency_hz / 1e9
     if not law.low <= ghz <= law.high:
         raise InputError(
-            f"{where}: {name} is known from {law.low:g} to {law.high:g} GHz, the carrier is {ghz:.3g} GHz; expected "
-            "another material"
+            f"{where}: {name} is known from {law.low:g} to {law.high:g} GHz, the carrier is "
+            f"{ghz:.3g} GHz; expected another material"
         )
     return law.a * ghz**law.b, law.c * ghz**law.d

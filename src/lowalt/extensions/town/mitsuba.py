@@ -1,4 +1,4 @@
-"""Reading Mitsuba scenes: shapes that are meshes, their places and the names of their materials.
+"""Reading Mitsuba scenes: shapes that are meshes, their poses and the names of their materials.
 Nothing is run.
 
 Source: Mitsuba 3, scene format (shape, transform, bsdf, ref) and plugins ply and obj; Sionna RT's
@@ -23,23 +23,25 @@ LARGEST_BYTES = 64 << 20
 
 def _numbers(element: Element, size: int, default: float) -> np.ndarray:
     """The numbers of an element: `value` with one or all, or x, y and z."""
-    text = element.get("value", "").replace(",", " ").split() or [
-        element.get(axis, str(default)) for axis in "xyz"
-    ]
-    if len(text) not in (1, size):
+    words = element.get("value", "").replace(",", " ").split()
+    if not words:
+        words = [element.get(axis, str(default)) for axis in "xyz"]
+    if len(words) not in (1, size):
         raise InputError(
             f"<{element.tag}> has {element.get('value')!r}, expected as many numbers as it takes"
         )
-    return np.broadcast_to(np.array([float(part) for part in text]), size).copy()
+    return np.broadcast_to(np.array([float(word) for word in words]), size).copy()
 
 
-def _place(shape: Element) -> np.ndarray:
-    """The place (4, 4) of a shape in the scene; each step of its transform acts after those before
+def _pose(shape: Element) -> np.ndarray:
+    """The pose (4, 4) of a shape in the scene; each step of its transform acts after those before
     it.
     """
     result = np.eye(4)
     for transform in shape.findall("transform"):
-        for step in transform if transform.get("name") == "to_world" else ():
+        if transform.get("name") != "to_world":
+            continue
+        for step in transform:
             matrix = np.eye(4)
             if step.tag == "translate":
                 matrix[:3, 3] = _numbers(step, 3, 0.0)
@@ -86,14 +88,11 @@ def _file_of(shape: Element, path: Path) -> Path:
     """The mesh file of a shape. Raises: InputError where it is not in the folder of the scene, or
     not there.
     """
-    name = next(
-        (
-            text.get("value", "")
-            for text in shape.findall("string")
-            if text.get("name") == "filename"
-        ),
-        "",
-    )
+    name = ""
+    for text in shape.findall("string"):
+        if text.get("name") == "filename":
+            name = text.get("value", "")
+            break
     folder = path.resolve().parent
     try:
         file = (folder / name).resolve()
@@ -131,10 +130,11 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
     shapes = root.findall("shape")
     if root.tag != "scene" or len(shapes) > MOST_SHAPES:
         raise InputError(
-            f"{path}: <{root.tag}> with {len(shapes)} shapes, expected a scene with at most {MOST_SHAPES}"
+            f"{path}: <{root.tag}> with {len(shapes)} shapes, expected a scene with at most "
+            f"{MOST_SHAPES}"
         )
     materials = {bsdf.get("id", ""): _names(bsdf) for bsdf in root.findall("bsdf")}
-    parts = []
+    walls = []
     left_out = {}
     unknown = []
     for shape in shapes:
@@ -145,8 +145,8 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
         material, unknown_name = _material(shape, materials)
         if unknown_name:
             unknown.append(unknown_name)
-        place = _place(shape)
+        pose = _pose(shape)
         pieces, _ = mesh_parts(_file_of(shape, path), unit, "z")
         for corners, _ in pieces:
-            parts.append((corners @ place[:3, :3].T + place[:3, 3], material))
-    return joined(parts, left_out, {}, unknown)
+            walls.append((corners @ pose[:3, :3].T + pose[:3, 3], material))
+    return joined(walls, left_out, {}, unknown)

@@ -5,16 +5,17 @@ Every ray of every point is traced past all buildings: the direct one, where it 
 roofs and around edges, and those by one or two of all walls, roofs and the ground. Out by any path
 and back by any other add. The SNRs of the configuration refer to the echo on the direct path in
 free space, so a blocked target is weaker by the loss that buildings cause. Echoes of land and of
-the buildings themselves are those of `clutter` and `background_channel`, which know no shadows.
-`ground_reflection`, `walls` and `line_of_sight` would count the same waves twice and are refused.
+the buildings themselves are those of other effects, which know no shadows.
+Effects that reflect or block the same waves would count them twice and are refused.
 """
 
 import numpy as np
 
 from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo.radar import radar
-from lowalt.extensions.town import image_paths, shadow_loops
-from lowalt.extensions.town.buildings import read
+from lowalt.extensions.town import image_paths
+from lowalt.extensions.town.buildings import files_of, read
+from lowalt.extensions.town.bundle_loops import blocked
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.response import ImagePath
@@ -46,20 +47,14 @@ PARTS = {
     "reflections": {"order": 0},
     "diffraction": {"diffraction": False},
 }
-TWICE = ("ground_reflection", "walls", "line_of_sight")
-"""Effects that reflect or block the same waves."""
+FILES = ("buildings",)
+WAVES = ("reflected by the ground", "reflected by walls", "blocked by buildings")
 NEAR_M = 2000.0
 """A town that is farther from every station is at the wrong place."""
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for effects that count waves twice, no file, a wrong place, or an unknown
-    material.
-    """
-    if twice := [name for name in TWICE if name in scene.effects]:
-        raise InputError(
-            f"effects: {twice} together with town, which holds the same waves; expected one or the other"
-        )
+    """Raise InputError for no file, a town far from all stations, or an unknown material."""
     above_ground("town", scene.network)
     found = read(settings)
     refuse_place(settings, scene.network)
@@ -76,25 +71,27 @@ def refuse_place(settings: dict, network: Network) -> None:
     path = settings["buildings"]
     low = np.array(found.facts["low_m"])
     high = np.array(found.facts["high_m"])
-    masts = [(station.name, np.asarray(station.position_m, float)) for station in network.stations]
-    away = {
-        name: float(np.linalg.norm((mast - np.clip(mast, low, high))[:2])) for name, mast in masts
-    }
+    masts = {}
+    away = {}
+    for station in network.stations:
+        mast = np.asarray(station.position_m, float)
+        masts[station.name] = mast
+        away[station.name] = float(np.linalg.norm((mast - np.clip(mast, low, high))[:2]))
     nearest = min(away, key=away.__getitem__)
     if away[nearest] > NEAR_M:
         raise InputError(
-            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station {nearest}, expected at most "
-            f"{NEAR_M / 1000:g} km: set effects.town.origin, the place in the file of x = y = 0"
+            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station {nearest}, "
+            f"expected at most {NEAR_M / 1000:g} km: set effects.town.origin, the place in the "
+            "file of x = y = 0"
         )
-    for name, mast in masts:
+    for name, mast in masts.items():
         top = np.array([mast[0], mast[1], high[2] + 1.0])
-        if (
-            mast[2] < top[2]
-            and shadow_loops.blocked(found.town.occluders, mast[None], top[None])[0]
-        ):
+        if mast[2] >= top[2]:
+            continue
+        if blocked(found.town.occluders, mast[None], top[None])[0]:
             raise InputError(
-                f"{path}: station {name} at {mast.tolist()} m stands under a roof, expected it above the buildings: "
-                "move it, or set effects.town.origin"
+                f"{path}: station {name} at {mast.tolist()} m stands under a roof, expected it "
+                "above the buildings: move it, or set effects.town.origin"
             )
 
 
@@ -111,10 +108,12 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     places = np.ascontiguousarray(view.places)
     rays = image_paths.rays_to(places, settings["cell_m"])
     wavelength_m = SPEED_OF_LIGHT / radio.centre_hz
-    field = image_paths.direct(
+    _, field = image_paths.direct(
         town, station_m, places, rays, wavelength_m, settings["diffraction"]
-    )[1]
-    result = [ImagePath(view.places, field - 1.0)] if (field != 1.0).any() else []
+    )
+    result = []
+    if (field != 1.0).any():
+        result.append(ImagePath(view.places, field - 1.0))
     epsilon = image_paths.epsilons(town, radio.centre_hz, "effects.town")
     for route in image_paths.reflected(town, epsilon, station_m, places, rays, settings["order"]):
         coefficient = route.coefficient * view.relative_gain(route.images)
@@ -122,19 +121,30 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     return result
 
 
-def listed(settings: dict, network: Network, row: dict) -> dict:
-    """Return which paths lead to the origin of a target, a row of the motion table, at the first
-    symbol.
+def files(settings: dict) -> list[str]:
+    """Return the path of the file of buildings and those of the meshes that it names.
+
+    Raises: InputError where one of them is not there.
+    """
+    return [] if settings["buildings"] is None else files_of(settings["buildings"])
+
+
+def record(
+    settings: dict, network: Network, row: dict, rng: np.random.Generator
+) -> dict[str, dict]:
+    """Return the field `paths`: which paths lead to the origin of a target, a row of the motion
+    table, at the first symbol.
 
     `under_roof`: whether a roof is above it; `stations`: by name `direct`, whether the sight is
     free; `field_db`, the direct field over that in free space; and `reflected`, the surfaces of
     each reflected path, as ["wall", "ground"].
     """
-    settings = DEFAULTS | settings
     town = read(settings).town
-    place = np.array([[[row["x_m"], row["y_m"], row["z_m"]]]], float)
-    rays = image_paths.rays_to(place, 0.0)
-    normal = town.facets.normal
+    target = np.array([[[row["x_m"], row["y_m"], row["z_m"]]]], float)
+    rays = image_paths.rays_to(target, 0.0)
+    # The last facet is the ground.
+    kinds = ["wall" if abs(up) < 0.5 else "roof" for up in town.facets.normal[:-1, 2]]
+    kinds.append("ground")
     result = {}
     for station in network.stations:
         if station.transmitter is not None:
@@ -143,15 +153,16 @@ def listed(settings: dict, network: Network, row: dict) -> dict:
         station_m = np.array(station.position_m, float)
         wavelength_m = SPEED_OF_LIGHT / frequency
         lit, field = image_paths.direct(
-            town, station_m, place, rays, wavelength_m, settings["diffraction"]
+            town, station_m, target, rays, wavelength_m, settings["diffraction"]
         )
         epsilon = image_paths.epsilons(town, frequency, "effects.town")
-        found = image_paths.reflected(town, epsilon, station_m, place, rays, settings["order"])
-        kinds = ["wall" if abs(up) < 0.5 else "roof" for up in normal[:-1, 2]] + ["ground"]
+        found = image_paths.reflected(town, epsilon, station_m, target, rays, settings["order"])
+        size = max(abs(field[0, 0]), 1e-20)
         result[station.name] = {
             "direct": bool(lit[0, 0]),
-            "field_db": float(np.round(20 * np.log10(max(abs(field[0, 0]), 1e-20)), 2)),
+            "field_db": float(np.round(20 * np.log10(size), 2)),
             "reflected": [[kinds[k] for k in route.facets] for route in found],
         }
-    roof = shadow_loops.blocked(town.occluders, place[0], place[0] + [0.0, 0.0, 1e4])[0]
-    return {"under_roof": bool(roof), "stations": result}
+    far_above = target[0] + [0.0, 0.0, 1e4]
+    roof = blocked(town.occluders, target[0], far_above)[0]
+    return {"paths": {"under_roof": bool(roof), "stations": result}}

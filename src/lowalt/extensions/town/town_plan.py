@@ -41,13 +41,13 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
     )
     axes.add_collection(faces)
     figure.colorbar(faces, label="height above ground (m)", shrink=0.8)
-    axes.plot(*np.vstack([region, region[:1]]).T, "k--", linewidth=1, label="region of the targets")
+    closed = np.vstack([region, region[:1]])
+    axes.plot(closed[:, 0], closed[:, 1], "k--", linewidth=1, label="region of the targets")
     for station in network.stations:
         if station.transmitter is None:
-            axes.plot(*station.position_m[:2], "r^", markersize=9)
-            axes.annotate(
-                f" {station.name}, {station.position_m[2]:g} m", station.position_m[:2], color="red"
-            )
+            x, y, z = station.position_m
+            axes.plot(x, y, "r^", markersize=9)
+            axes.annotate(f" {station.name}, {z:g} m", (x, y), color="red")
     axes.set(
         xlim=(low[0], high[0]),
         ylim=(low[1], high[1]),
@@ -63,13 +63,16 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
 
 def described(path: Path, found: Buildings) -> list[str]:
     """Return what a town is, what was left out and what was read otherwise than stated, in lines."""
-    facts, low, high = found.facts, np.array(found.facts["low_m"]), np.array(found.facts["high_m"])
+    facts = found.facts
+    low_x, low_y, _ = facts["low_m"]
+    high_x, high_y, top = facts["high_m"]
     used = ", ".join(f"{name} ({count})" for name, count in facts["materials"].items())
     lines = [
-        f"{path}: {facts['buildings']} buildings, {high[0] - low[0]:.0f} m x {high[1] - low[1]:.0f} m, up to "
-        f"{high[2]:.1f} m high",
-        f"x from {low[0]:.1f} to {high[0]:.1f} m, y from {low[1]:.1f} to {high[1]:.1f} m",
-        f"{facts['walls']} walls and {facts['roofs']} roofs, merged from {facts['triangles']} triangles",
+        f"{path}: {facts['buildings']} buildings, {high_x - low_x:.0f} m x {high_y - low_y:.0f} m, "
+        f"up to {top:.1f} m high",
+        f"x from {low_x:.1f} to {high_x:.1f} m, y from {low_y:.1f} to {high_y:.1f} m",
+        f"{facts['walls']} walls and {facts['roofs']} roofs, "
+        f"merged from {facts['triangles']} triangles",
         f"materials (triangles): {used}; ground: {facts['ground']}",
     ]
     lines += [f"left out: {count} {reason}" for reason, count in facts["dropped"].items()]
@@ -77,10 +80,10 @@ def described(path: Path, found: Buildings) -> list[str]:
 
 
 def overlay(settings: dict, name: str, comments: list[str]) -> str:
-    """Return the overlay of a scene in a town, with comments before it; settings: those that are
-    not default.
+    """Return the overlay of a scene in a town, with comments before it.
+
+    settings: those of the effect `town` that are not the default's.
     """
-    block = yaml.safe_dump(
-        {"run": name, "effects": {"town": settings}}, sort_keys=False, allow_unicode=True
-    )
-    return "".join(f"# {line}\n" for line in comments) + block
+    scene = {"run": name, "effects": {"town": settings}}
+    head = "".join(f"# {line}\n" for line in comments)
+    return head + yaml.safe_dump(scene, sort_keys=False, allow_unicode=True)

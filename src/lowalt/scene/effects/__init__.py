@@ -11,9 +11,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from lowalt.config.extensions import AddedEffect, module_offered, offered
 from lowalt.config.named_code import own_effects
-from lowalt.files.errors import InputError, instead
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError, instead, shown
+from lowalt.numerics.streams import stream
 from lowalt.scene.contract import OFFERS, PLACE_ORDER
 from lowalt.scene.own_effect import checked, kept_contract, loaded, place_of
 
@@ -88,6 +92,33 @@ class NamedEffect(NamedTuple):
         """
         return self.settings.get(getattr(self.module, "SET_SNR", None))
 
+    def offers(self, name: str) -> bool:
+        """Whether the effect has a function of the contract, or sets another of its names to a
+        value other than False.
+        """
+        return getattr(self.module, name, False) is not False
+
+    @property
+    def named_files(self) -> dict[str, str]:
+        """The paths that the settings hold (FILES), by the key of the configuration."""
+        keys = [key for key in getattr(self.module, "FILES", ()) if self.settings[key] is not None]
+        return {f"effects.{self.name}.{key}": self.settings[key] for key in keys}
+
+    def texts(self, function: str) -> list[str]:
+        """Return the texts that a function of the settings gives, none where the effect has no such
+        function.
+
+        Raises: InputError where it gives anything else.
+        """
+        if not self.offers(function):
+            return []
+        found = getattr(self.module, function)(self.settings)
+        if not isinstance(found, list) or not all(isinstance(text, str) for text in found):
+            raise InputError(
+                f"effects: {self.name}: {function} gives {shown(found)}, expected a list of texts"
+            )
+        return found
+
     def at_snr(self, snr_db: float) -> "NamedEffect":
         """Return the effect with its noise, if it adds any, at this SNR (dB)."""
         key = getattr(self.module, "SET_SNR", None)
@@ -117,6 +148,40 @@ def module_of(name: str) -> ModuleType:
     return importlib.import_module(dotted(name))
 
 
+def complete(block: Mapping[str, dict | None]) -> list[NamedEffect]:
+    """Return all effects of a scene's `effects` block in the chain's order, idle ones included.
+
+    Raises: InputError for an unknown effect or parameter.
+    """
+    modules = {name: module_of(name) for name in block}
+    own = own_effects(block)
+    if len({Path(name).name for name in own}) < len(own):
+        raise InputError(
+            f"effects: {own}, expected files of different names, after which random streams are "
+            "called"
+        )
+    shipped = [name for name in PLACES if name in block]
+    result = []
+    for name in [*shipped, *own]:
+        module = modules[name]
+        changed = block[name] or {}
+        unknown = sorted(set(changed) - set(module.DEFAULTS))
+        if unknown:
+            raise InputError(
+                f"effects.{name}: unknown parameter(s) {unknown}, expected some of "
+                f"{list(module.DEFAULTS)}"
+            )
+        if name in own or name in ADDED:
+            settings = checked(name, module, changed)
+        else:
+            # The schema of the configuration has checked these.
+            settings = {**module.DEFAULTS, **changed}
+        place = place_of(name, module) if name in own else PLACES[name]
+        result.append(NamedEffect(name, place, module, settings))
+    result.sort(key=lambda effect: PLACE_ORDER.index(effect.place))
+    return result
+
+
 def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
     """Return the effects of a scene's `effects` block in the chain's order, without those that are
     idle.
@@ -124,33 +189,101 @@ def called(block: Mapping[str, dict | None]) -> list[NamedEffect]:
     Raises: InputError for an unknown effect or parameter, or two effects that offer a function of
     which a scene has one (`contract.OFFERS`).
     """
-    modules = {name: module_of(name) for name in block}
-    own = own_effects(block)
-    result = []
-    if len({Path(name).name for name in own}) < len(own):
-        raise InputError(
-            f"effects: {own}, expected files of different names, after which random streams are called"
-        )
-    for name in (*filter(block.__contains__, PLACES), *own):
-        module = modules[name]
-        changed = block[name] or {}
-        unknown = sorted(set(changed) - set(module.DEFAULTS))
-        if unknown:
-            raise InputError(
-                f"effects.{name}: unknown parameter(s) {unknown}, expected some of {list(module.DEFAULTS)}"
-            )
-        brought = name in own or name in ADDED
-        settings = checked(name, module, changed) if brought else {**module.DEFAULTS, **changed}
-        result.append(
-            NamedEffect(
-                name, place_of(name, module) if name in own else PLACES[name], module, settings
-            )
-        )
-    result.sort(key=lambda effect: PLACE_ORDER.index(effect.place))
-    acting = [effect for effect in result if not effect.idle]
+    acting = [effect for effect in complete(block) if not effect.idle]
     for function in OFFERS:
         only(acting, function)
     return acting
+
+
+def named_files(block: Mapping[str, dict | None]) -> dict[str, str]:
+    """Return the paths of files that the settings of a scene's effects hold, by their keys of the
+    configuration.
+    """
+    result: dict[str, str] = {}
+    for effect in complete(block):
+        result |= effect.named_files
+    return result
+
+
+def effect_files(block: Mapping[str, dict | None]) -> list[str]:
+    """Return the paths of all files that a scene's effects read, those included that such files
+    name.
+
+    Raises: InputError where a file that names others is not there or cannot be read.
+    """
+    result: dict[str, None] = {}
+    for effect in complete(block):
+        named = effect.named_files.values()
+        result |= dict.fromkeys(effect.texts("files") if effect.offers("files") else named)
+    return list(result)
+
+
+def needed_subtypes(block: Mapping[str, dict | None]) -> list[str]:
+    """Return the subtypes whose clouds a scene's effects need besides the target's own."""
+    result: dict[str, None] = {}
+    for effect in complete(block):
+        result |= dict.fromkeys(effect.texts("subtypes"))
+    return list(result)
+
+
+def needs_surfaces(block: Mapping[str, dict | None]) -> bool:
+    """Return whether an effect of the scene needs the opaque surfaces of each target."""
+    return any(effect.offers("SURFACES") for effect in complete(block))
+
+
+def breaks_tracks(block: Mapping[str, dict | None]) -> list[str]:
+    """Return the names of the effects that draw a motion for each look, so that the looks of a
+    track do not join.
+    """
+    return [effect.name for effect in complete(block) if effect.offers("JUMPS")]
+
+
+def of_record(block: Mapping[str, dict | None]) -> dict[str, dict]:
+    """Return the effects of an `effects` block that add to the record of a sample, with the
+    settings given there.
+    """
+    return {
+        effect.name: block[effect.name] or {}
+        for effect in complete(block)
+        if effect.offers("record")
+    }
+
+
+def look_stream(seed: int, name: str, row: dict, *more: object) -> np.random.Generator:
+    """Return the random stream of an effect for the motion model `row`, from its start.
+
+    more: what else the draws depend on: stations, an SNR. The stream of a user's own effect has the
+    name of its file, wherever that lies.
+    """
+    return stream(seed, "effect", name.rpartition("/")[2], row["subtype"], row["model"], *more)
+
+
+def record_fields(
+    effects: Iterable[NamedEffect], network: Network, seed: int, row: dict
+) -> dict[str, Any]:
+    """Return what effects add to the record of a sample, by field, sorted.
+
+    row: of the motion table. Raises: InputError where an effect gives no dict, or a field that
+    another effect gives too.
+    """
+    result: dict[str, Any] = {}
+    for name, record in every(effects, "record").items():
+        fields = record(network, row, look_stream(seed, name, row))
+        if not isinstance(fields, dict) or not all(isinstance(key, str) for key in fields):
+            raise InputError(f"{name}: record gives {shown(fields)}, expected fields by name")
+        if twice := sorted(set(fields) & set(result)):
+            raise InputError(
+                f"{name}: record gives {twice}, which another effect of the scene gives"
+            )
+        result |= fields
+    return dict(sorted(result.items()))
+
+
+def with_offer(name: str) -> str:
+    """Return the shipped effects that offer a name of the contract, as sentences name a choice of
+    them.
+    """
+    return " or ".join(f"effects.{one}" for one in PLACES if hasattr(module_of(one), name))
 
 
 def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[..., Any]]:
@@ -165,14 +298,18 @@ def every(effects: Iterable[NamedEffect], function: str) -> dict[str, Callable[.
 
 
 def offering(block: Mapping[str, dict | None], place: str, name: str) -> dict[str, dict]:
-    """Return the part of an `effects` block that acts at a place and has a function, or another
-    name, of the contract.
+    """Return those of an `effects` block that act at a place and have a function, or another name,
+    of the contract.
 
-    Only shipped effects of that place are imported; idle ones are left out.
+    Of shipped effects only those of that place are imported, while a file of the user's own tells
+    its place when it is loaded; idle ones are left out.
     """
-    asked = called({key: value for key, value in block.items() if PLACES.get(key) == place})
+    own = own_effects(block)
+    asked = {key: value for key, value in block.items() if key in own or PLACES.get(key) == place}
     return {
-        effect.name: block[effect.name] or {} for effect in asked if hasattr(effect.module, name)
+        effect.name: block[effect.name] or {}
+        for effect in called(asked)
+        if effect.place == place and effect.offers(name)
     }
 
 

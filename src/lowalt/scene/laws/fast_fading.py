@@ -194,12 +194,12 @@ def rays(
     """
     table = ENVIRONMENTS[environment]
     count = clusters or table.clusters
-    delay = -table.stretch * large.delay_s * np.log1p(-rng.random(count))
+    delay = -table.stretch * large.delay_s * portable.log(1.0 - rng.random(count))
     delay = np.sort(delay - delay.min())
-    power = np.exp(-delay * (table.stretch - 1) / (table.stretch * large.delay_s))
-    power *= 10 ** (-0.3 * rng.standard_normal(count))
+    power = portable.exp(-delay * (table.stretch - 1) / (table.stretch * large.delay_s))
+    power *= portable.from_decibels(-3.0 * rng.standard_normal(count))
     power /= power.sum()
-    depth = -np.log(power / power.max())
+    depth = -portable.log(power / power.max())
     mean_zenith, offset = zenith_spread(environment, link)
     sign = np.where(rng.random((2, count)) < 0.5, -1.0, 1.0)
     spread = np.array([large.azimuth_deg, large.zenith_deg])[:, None]

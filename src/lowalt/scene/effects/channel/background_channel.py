@@ -10,6 +10,7 @@ from scipy.special import gammaincinv
 
 from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo.radar import radar
+from lowalt.numerics.portable import sine_cosine
 from lowalt.scene.antenna import gain
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.crossing import toward
@@ -96,8 +97,9 @@ def drawn(
 
 def _directions(azimuth: np.ndarray, zenith: np.ndarray) -> np.ndarray:
     """Unit vectors (K, 3) of azimuths and zenith angles (K,) rad."""
-    flat = np.sin(zenith)
-    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(zenith)], axis=1)
+    flat, up = sine_cosine(zenith)
+    sine, cosine = sine_cosine(azimuth)
+    return np.stack([flat * cosine, flat * sine, up], axis=1)
 
 
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:

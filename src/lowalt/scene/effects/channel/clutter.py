@@ -7,6 +7,8 @@ moving part with Billingsley's exponential Doppler spectrum (`windblown`). On a 
 are those of the range sum, and the Doppler frequency is that along the bisector.
 """
 
+import math
+
 import numpy as np
 from scipy import fft
 from scipy.signal import lfilter
@@ -15,6 +17,7 @@ from scipy.special import gamma, gammaincinv, ndtr, ndtri
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.scene import land
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.laws.windblown import speckle, windblown
@@ -86,11 +89,11 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
         return gammaincinv(shape, uniform[0]) / shape
     index = 0.5 * shape
     angle = np.pi * uniform[0]
-    wait = -np.log(uniform[1])
-    kanter = (
-        np.sin(index * angle) ** index * np.sin((1 - index) * angle) ** (1 - index) / np.sin(angle)
-    )
-    stable = (kanter ** (1 / (1 - index)) / wait) ** ((1 - index) / index)
+    wait = -portable.log(uniform[1])
+    first = portable.power(portable.sin(index * angle), index)
+    second = portable.power(portable.sin((1 - index) * angle), 1 - index)
+    kanter = first * second / portable.sin(angle)
+    stable = portable.power(portable.power(kanter, 1 / (1 - index)) / wait, (1 - index) / index)
     return 1.0 / (stable * gamma(1.0 + 1.0 / index))
 
 
@@ -121,7 +124,7 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> Still:
     network, frequency = view.network, radar(view.network, view.station).centre_hz
     power, slow = mean_power(settings, view)
     correlation = (
-        np.exp(-network.cell_m / settings["correlation_m"])
+        math.exp(-network.cell_m / settings["correlation_m"])
         if settings["correlation_m"] > 0
         else 0.0
     )

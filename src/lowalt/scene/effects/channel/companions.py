@@ -14,10 +14,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.motion.drawing import AIRBORNE, draw_rates
 from lowalt.motion.table import NUMBERS
-from lowalt.numerics.streams import stream
+from lowalt.numerics.portable import norm
 from lowalt.scene.checks import CheckedScene
 from lowalt.targets.cloud import Cloud
 
@@ -28,6 +29,7 @@ SOURCE = (
 )
 DEFAULTS = {"subtypes": [], "count": [1, 3], "spread_m": 4.0, "speed_mps": 1.0}
 IDLE = [{"count": [0, 0]}]
+JUMPS = True
 
 TRIES = 200
 """Draws of a place that keeps clear of the other targets, before the spread counts as too small."""
@@ -42,11 +44,11 @@ def check(settings: dict, scene: CheckedScene) -> None:
         raise InputError(
             f"effects.companions.count: {settings['count']}, expected the smaller number first"
         )
-    if "occlusion" in scene.effects and settings["subtypes"]:
+    asking = scene.offering("SURFACES")
+    if asking and settings["subtypes"]:
         raise InputError(
             "effects.companions.subtypes: surfaces are known for the target's own subtype only, "
-            "expected [] in a "
-            "scene with effects.occlusion"
+            f"expected [] in a scene with effects.{asking[0]}"
         )
 
 
@@ -58,10 +60,16 @@ def named(settings: dict, subtype: str, rng: np.random.Generator) -> list[str]:
     return [choice[int(rng.integers(0, len(choice)))] for _ in range(count)]
 
 
-def listed(settings: dict, seed: int, row: dict) -> list[str]:
-    """Return the companions' subtypes of the motion model `row`, as its record names them."""
-    rng = stream(seed, "effect", "companions", row["subtype"], row["model"])
-    return named({**DEFAULTS, **settings}, row["subtype"], rng)
+def subtypes(settings: dict) -> list[str]:
+    """Return the subtypes whose clouds companions may need."""
+    return settings["subtypes"]
+
+
+def record(
+    settings: dict, network: Network, row: dict, rng: np.random.Generator
+) -> dict[str, list[str]]:
+    """Return the field `companions`: the companions' subtypes of the motion model `row`."""
+    return {"companions": named(settings, row["subtype"], rng)}
 
 
 def companions(
@@ -91,7 +99,7 @@ def companions(
             place = _place(mine)
             reach = _reach(other)
             if place[2] > reach * (other.like in AIRBORNE) and all(
-                np.linalg.norm(place - away) > reach + size for away, size in taken
+                norm(place - away) > reach + size for away, size in taken
             ):
                 break
         else:
@@ -114,7 +122,7 @@ def _place(row: dict) -> np.ndarray:
 def _reach(cloud: Cloud) -> float:
     """Distance of the farthest point from a target's origin (m)."""
     points = cloud.track if "node" in cloud.kinds else cloud.points
-    return float(np.linalg.norm(points, axis=-1).max())
+    return float(norm(points).max())
 
 
 def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -> dict:

@@ -29,11 +29,13 @@ SOURCE = (
     "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
 DEFAULTS = {"power": 1.0, "blades": "facet"}
+ONE_SIDED = True
 
 
 def diffuse(cosine: np.ndarray, power: float) -> np.ndarray:
     """Return the one-sided lobe 2 (p + 1) max(cosine, 0)^p of mean 1 over the sphere; any shape."""
-    return np.where(cosine > 0, 2.0 * (power + 1.0) * np.maximum(cosine, 0.0) ** power, 0.0)
+    lobe = 2.0 * (power + 1.0) * portable.power(np.maximum(cosine, 0.0), power)
+    return np.where(cosine > 0, lobe, 0.0)
 
 
 def _plate(cosine: np.ndarray, sine: np.ndarray, size: float) -> np.ndarray:

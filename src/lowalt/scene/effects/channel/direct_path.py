@@ -2,13 +2,13 @@
 without the target.
 
 It has the delay of the distance between the masts and no Doppler shift, and it enters through the
-side lobes of both arrays, whose beams point at the target. A station that receives its own signal
-has `transmit_leakage` instead.
+side lobes of both arrays, whose beams point at the target.
 """
 
 import numpy as np
 
 from lowalt.files.errors import InputError
+from lowalt.numerics.portable import norm
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
 from lowalt.scene.view import Still, View
@@ -52,5 +52,5 @@ def from_sender(settings: dict, view: View) -> Still:
     if sends is None:
         return Still(np.zeros(shape, np.complex128))
     turned = crossing(view, sends, hears)[0] * 10 ** (-settings["loss_db"] / 20)
-    cells = float(np.linalg.norm(np.subtract(*view.masts_m))) / (2 * network.cell_m)
+    cells = float(norm(np.subtract(*view.masts_m))) / (2 * network.cell_m)
     return Still(np.broadcast_to(turned, shape).copy(), cells - round(cells))

@@ -33,6 +33,7 @@ SOURCE = (
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
 DRAWN = "pair"
+ONE_SIDED = True
 IDLE = [{"pattern": False, "spread_db": 0}]
 
 CUT = 3.0
@@ -97,12 +98,12 @@ def bistatic_loss_db(faces: tuple[Lobe, ...] | None, angle_rad: np.ndarray) -> n
     Source: TR 38.901, Eq. 7.9.2-3, without its floor, and Eq. 7.9.2-2.
     """
     if faces is None:
-        return BISTATIC_DB * np.sin(0.5 * angle_rad)
+        return BISTATIC_DB * portable.sin(0.5 * angle_rad)
     k1, k2 = BISTATIC[faces]
-    with np.errstate(divide="ignore"):
-        return k1 * np.sin(0.5 * k2 * angle_rad) - 5.0 * np.log10(
-            np.maximum(np.cos(0.5 * angle_rad), 0.0)
-        )
+    cosine = portable.cos(0.5 * angle_rad)
+    narrowed_db = 5.0 / portable.LN_10 * portable.log(np.where(cosine > 0, cosine, 1.0))
+    loss_db = k1 * portable.sin(0.5 * k2 * angle_rad) - narrowed_db
+    return np.where(cosine > 0, loss_db, np.inf)
 
 
 def pattern(view: View) -> np.ndarray:
@@ -132,12 +133,13 @@ def pattern(view: View) -> np.ndarray:
         angle = 2.0 * portable.arctan2(portable.norm(units[0] - units[1]), portable.norm(away))
     loss = bistatic_loss_db(faces, angle)
     if faces is None:
-        return 10 ** (-loss / 10)[:, None]
+        return portable.from_decibels(-loss)[:, None]
     right, front, up = portable.applied(view.motion.rotation[:, body].swapaxes(1, 2), away).T
-    azimuth = np.degrees(np.arctan2(-right, front)) % 360.0
-    zenith = np.degrees(np.arctan2(np.hypot(right, front), up))
+    flat = np.sqrt(right * right + front * front)
+    azimuth = np.degrees(portable.arctan2(-right, front)) % 360.0
+    zenith = np.degrees(portable.arctan2(flat, up))
     shone, floor = pattern_dbsm(faces, azimuth, zenith)
-    return 10 ** ((np.maximum(shone - loss, floor) - mean) / 10)[:, None]
+    return portable.from_decibels(np.maximum(shone - loss, floor) - mean)[:, None]
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
@@ -147,6 +149,6 @@ def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     B2 is log-normal with mean one: its mean in dB is -ln(10) / 20 times its variance (Eq. 7.9.2-1).
     """
     spread = spread_db(view.cloud) if settings["spread_db"] is None else settings["spread_db"]
-    gained_db = -np.log(10) / 20 * spread**2 + spread * min(float(rng.standard_normal()), CUT)
+    gained_db = -portable.LN_10 / 20 * spread**2 + spread * min(float(rng.standard_normal()), CUT)
     factor = pattern(view) if settings["pattern"] else np.ones((len(view.times_s), 1))
     return np.sqrt(factor * 10 ** (gained_db / 10))

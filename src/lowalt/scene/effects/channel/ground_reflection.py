@@ -33,6 +33,7 @@ DEFAULTS = {
     "polarisation": "vertical",
 }
 IDLE = [{"permittivity": 1, "conductivity_s_m": 0}]
+WAVES = ("reflected by the ground",)
 KNOWN_GHZ = 1.0, 10.0
 """Carriers between which the properties of medium dry ground are known, which stand for those not
 given.

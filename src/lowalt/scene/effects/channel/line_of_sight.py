@@ -21,6 +21,7 @@ SOURCE = (
 )
 DEFAULTS = {"environment": "UMa", "blocked_db": 20.0}
 IDLE = [{"blocked_db": 0}]
+WAVES = ("blocked by buildings",)
 
 
 def probability(environment: str, flat_m: float, height_m: float) -> float:

@@ -8,6 +8,7 @@ sum, averaged over aspects and motion, equal to the stated mean.
 """
 
 import hashlib
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -49,10 +50,10 @@ def mean_dbsm(category: str, size: float) -> float:
     body (m).
     """
     if category == "UAV":
-        slope = (LARGE_UAV_DBSM - SMALL_UAV_DBSM) / np.log10(LARGE_UAV_M / SMALL_UAV_M)
-        return float(SMALL_UAV_DBSM + slope * np.log10(size / SMALL_UAV_M))
+        slope = (LARGE_UAV_DBSM - SMALL_UAV_DBSM) / math.log10(LARGE_UAV_M / SMALL_UAV_M)
+        return float(SMALL_UAV_DBSM + slope * math.log10(size / SMALL_UAV_M))
     if category == "Bird":
-        return float(PIGEON_DBSM + 20.0 * np.log10(size / PIGEON_M))
+        return float(PIGEON_DBSM + 20.0 * math.log10(size / PIGEON_M))
     return {"Pedestrian": HUMAN_DBSM, "Vehicle": VEHICLE_DBSM}[category]
 
 

@@ -27,6 +27,8 @@ SOURCE = (
     "Graphics Tools 2, 1997"
 )
 DEFAULTS = {"blades": "bent"}
+SURFACES = True
+ONE_SIDED = True
 
 
 def blades_m(cloud: Cloud, surfaces: dict) -> list[tuple[float, float]]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects import with_offer
 from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
@@ -25,21 +26,20 @@ SOURCE = (
 )
 DEFAULTS: dict[str, float] = {}
 
-FOLLOWED = ("cross_sections", "fluctuation", "occlusion")
-"""Effects that depend on the side that a target shows."""
-
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError where the scene has no reflected route, or none of FOLLOWED."""
-    if not {"ground_reflection", "walls", "town"} & set(scene.effects):
+    """Raise InputError where the scene has no reflected path, or no effect that depends on the side
+    that a target shows.
+    """
+    if not scene.offering("paths"):
         raise InputError(
-            "effects.reflected_aspect: there is no reflected route, expected ground_reflection, "
-            "walls or town in the "
-            "same scene"
+            f"effects.reflected_aspect: there is no reflected route, expected {with_offer('paths')} "
+            "in the same scene"
         )
-    if not set(FOLLOWED) & set(scene.effects):
+    if not scene.offering("ONE_SIDED"):
         raise InputError(
-            f"effects.reflected_aspect: no side to follow, expected one of {list(FOLLOWED)} in the scene"
+            f"effects.reflected_aspect: no side to follow, expected {with_offer('ONE_SIDED')} in the "
+            "same scene"
         )
 
 
@@ -49,12 +49,12 @@ def routes(
     """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the
     direct one first.
 
-    weight(view, names, but): product (N, L) of the effects' amplitude factors as `view` sees them.
+    weight(view, one_sided): product (N, L) of the effects' amplitude factors as `view` sees them.
     On a link, both ways by the same kind of path are the link between both images. A path without
     an image of the station shows the direct one's side: in a town it is the change of the direct
     path, which must cancel a blocked direct path.
     """
-    rest = weight(view, but=FOLLOWED)
+    rest = weight(view, one_sided=False)
     ends = view.ends()
     heard = [None, *(path.station_m for path in paths)]
     sent = [None, *(path.outward.station_m for path in paths)]
@@ -64,9 +64,9 @@ def routes(
     ) -> np.ndarray:
         """The followed effects' factor (N, L) for a station, or a link, that stands at its image."""
         if image_m is None and sender_m is None:
-            return weight(end, FOLLOWED)
+            return weight(end, one_sided=True)
         place_m = end.masts_m[1] if image_m is None else image_m
-        return weight(end.seen_from(place_m, sender_m), FOLLOWED)
+        return weight(end.seen_from(place_m, sender_m), one_sided=True)
 
     back = [two_way(ends[-1], image_m) for image_m in heard]
     out = back

@@ -11,6 +11,7 @@ import numpy as np
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.numerics.chebyshev_series import chebyshev_points, interpolation, orders_of
 from lowalt.scene.response import ERROR
+from lowalt.scene.truth import middle_of, rate
 from lowalt.scene.view import Displacement, View
 
 SOURCE = (
@@ -52,7 +53,7 @@ def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacem
     network = view.network
     if network.sweep_s is None:
         return Displacement()
-    way_mps = np.gradient(view.ways_m(view.places.mean(axis=1)), view.times_s, edge_order=2)
+    way_mps = rate(lambda seen: seen.ways_m(middle_of(seen)), view)
     sweep_hz = network.subcarriers * network.subcarrier_spacing_hz
     last_hz = view.station.frequency_hz + sweep_hz
     return Displacement(delay_s=way_mps / SPEED_OF_LIGHT * last_hz * network.sweep_s / sweep_hz)

@@ -3,8 +3,7 @@
 A facade is an upright rectangle on the ground. The station sees every point's image behind it,
 weaker by the Fresnel coefficient of the wall, where the ray meets the rectangle. All pairs of an
 outward and a return path add. Rays that meet two facades, diffraction at edges and the shadows of
-buildings are left out (`line_of_sight` blocks paths at random). A facade reflects only where
-station and point are on the same side of it.
+buildings are left out. A facade reflects only where station and point are on the same side of it.
 """
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from lowalt.echo.radar import radar
 from lowalt.files.errors import InputError
 from lowalt.numerics import chebyshev_series
+from lowalt.numerics.portable import sine_cosine
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.fresnel import fresnel
 from lowalt.scene.response import ImagePath
@@ -32,6 +32,7 @@ DEFAULTS = {
     "conductivity_s_m": 0.16,
 }
 IDLE = [{"facades": []}, {"permittivity": 1, "conductivity_s_m": 0}]
+WAVES = ("reflected by walls",)
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
@@ -54,8 +55,7 @@ def mirrored(
     the rectangle.
     """
     foot_x, foot_y, azimuth, width, height = facade
-    cosine = np.cos(np.radians(azimuth))
-    sine = np.sin(np.radians(azimuth))
+    sine, cosine = sine_cosine(np.radians(azimuth))
     x, y, z = np.moveaxis(places, -1, 0)
     # Distances from the facade's plane, and along it from the middle of its foot.
     before = (station_m[0] - foot_x) * cosine + (station_m[1] - foot_y) * sine

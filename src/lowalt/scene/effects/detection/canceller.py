@@ -20,6 +20,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.numerics.large_matrices import matrix_product, principal_axes
 from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects import with_offer
 from lowalt.scene.laws.markov import root_of
 from lowalt.scene.laws.windblown import windblown
 
@@ -40,26 +41,30 @@ DEFAULTS = {
     "symbol_interval_s": 2.5e-3,
 }
 IDLE = [{"kind": "none"}, {"kind": "pulse", "order": 0}]
+KINDS = {
+    "none": {"kind": "none"},
+    "mean": {"kind": "mean"},
+    "pulse, order 1": {"kind": "pulse", "order": 1},
+    "pulse, order 2": {"kind": "pulse", "order": 2},
+    "clutter": {"kind": "clutter"},
+}
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError where nothing stands still, and for `clutter` where symbols are missing or
     of another radar.
     """
-    if not any(getattr(module, "STILL", False) for module in scene.modules.values()):
+    if not scene.offering("STILL"):
         raise InputError(
             "effects.canceller: there is no clutter to cancel, expected an effect in the same "
-            "scene whose echoes stand "
-            "still: clutter, background_channel, direct_path or transmit_leakage"
+            f"scene whose echoes stand still: {with_offer('STILL')}"
         )
     if settings["kind"] != "clutter":
         return
-    timing = scene.effects.get("slow_time", {"downlink": 1, "missing": 0})
-    if timing["downlink"] < 1 or timing["missing"] > 0:
+    if leaving := scene.saying("gaps"):
         raise InputError(
-            "effects.canceller.kind: 'clutter' needs all symbols, and effects.slow_time leaves "
-            "gaps, expected mean "
-            "or pulse"
+            "effects.canceller.kind: 'clutter' needs all symbols, and "
+            f"effects.{leaving[0]} leaves gaps, expected mean or pulse"
         )
     for key in ("carrier_hz", "symbol_interval_s"):
         if settings[key] != getattr(scene.network, key):

@@ -8,8 +8,8 @@ from lowalt.scene.waveform import Look
 
 SOURCE = (
     "this project's own error model, for the imperfect range-bin selection that the paper leaves "
-    "out (Luo et al., "
-    "footnote to Eq. 7's signal model); wrong cells that follow from noise are receiver_noise"
+    "out (Luo et al., footnote to Eq. 7's signal model); wrong cells that follow from noise come "
+    "with the receiver's noise"
 )
 DEFAULTS = {"probability": 0.1, "spread_cells": 2}
 IDLE = [{"probability": 0}, {"spread_cells": 0}]

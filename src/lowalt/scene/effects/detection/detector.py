@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 
 from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.errors import InputError
+from lowalt.numerics.portable import log
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.waveform import Look
 
@@ -46,6 +47,7 @@ DEFAULTS = {
     "gate_cells": 3,
     "gain": 0.05,
 }
+TRIED = True
 NAMES = {"cfar": ("cell_averaging", "ordered_statistic"), "range_window": ("none", "hann")}
 HANN_REACH = 2
 """Noise of range cells behind a Hann window is independent where they are more than this many cells
@@ -106,7 +108,7 @@ def ordered_factor(count: int, rank: int, false_alarm: float) -> float:
     most = count * (false_alarm ** (-1.0 / rank) - 1.0)
     return float(
         brentq(
-            lambda t: np.log1p(t / left).sum() + math.log(false_alarm), 0.0, 2.0 * most, xtol=1e-12
+            lambda t: log(1.0 + t / left).sum() + math.log(false_alarm), 0.0, 2.0 * most, xtol=1e-12
         )
     )
 

@@ -30,6 +30,7 @@ SOURCE = (
 )
 DEFAULTS = {"wind_mps": 7.7}
 IDLE = [{"wind_mps": 0}]
+JUMPS = True
 
 SPEED_GAIN = 0.18
 PLACE_GAIN = 0.0171

@@ -20,6 +20,7 @@ SOURCE = (
 )
 DEFAULTS = {"spread": 0.05, "wander": 0.02, "correlation_s": 1.5}
 IDLE = [{"spread": 0, "wander": 0}]
+JUMPS = True
 
 
 def perturb(

@@ -29,10 +29,10 @@ SET_SNR = "snr_db"
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for two sources of noise."""
-    if "receiver_noise" in scene.effects:
+    if others := scene.offering("noise_w"):
         raise InputError(
-            "effects.cell_noise: effects.receiver_noise is named too, expected one of them: set "
-            "SNRs or a link budget"
+            f"effects.cell_noise: effects.{others[0]} is named too, expected one of them: set SNRs "
+            "or a link budget"
         )
     if settings["snr_db"] is not None and scene.snr_db != (math.inf,):
         raise InputError(

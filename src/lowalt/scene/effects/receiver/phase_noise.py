@@ -91,11 +91,13 @@ def density(settings: dict, frequency_hz: np.ndarray) -> np.ndarray:
     def level(points: list) -> np.ndarray:
         """The density of (offset Hz, dBc/Hz) pairs."""
         offset, decibels = np.array(points, float).T
-        return 10 ** (np.interp(np.log(frequency_hz), np.log(offset), decibels) / 10)
+        return portable.from_decibels(
+            np.interp(portable.log(frequency_hz), portable.log(offset), decibels)
+        )
 
     oscillator = level(settings["points"]) * 10 ** (settings["level_db"] / 10)
     loop_hz = settings["loop_hz"]
-    follows = 1.0 / (1.0 + (frequency_hz / loop_hz) ** 4) if loop_hz else 0.0
+    follows = 1.0 / (1.0 + portable.power(frequency_hz / loop_hz, 4)) if loop_hz else 0.0
     return follows * level(settings["reference"]) + (1.0 - follows) * oscillator
 
 
@@ -107,8 +109,10 @@ def range_factor(
 
     Source: Budge and Burt 1993 (range correlation).
     """
-    smooth = np.sinc(width_hz * delay_s)
-    return 4.0 * np.sin(np.pi * frequency_hz * delay_s) ** 2 * smooth + 2.0 * (1.0 - smooth)
+    half_turns = np.maximum(width_hz * delay_s, 1e-20)
+    smooth = portable.sine_cosine_turns(0.5 * half_turns)[0] / (np.pi * half_turns)
+    sine = portable.sine_cosine_turns(0.5 * frequency_hz * delay_s)[0]
+    return 4.0 * sine * sine * smooth + 2.0 * (1.0 - smooth)
 
 
 @lru_cache(maxsize=4)
@@ -144,7 +148,10 @@ def fast_grid(
         math.ceil(EVENLY * (half_hz - bend) / spacing_hz),
     )
     edge = np.concatenate(
-        [np.geomspace(lowest_hz, bend, steps[0] + 1), np.linspace(bend, half_hz, steps[1] + 1)[1:]]
+        [
+            portable.exp(np.linspace(math.log(lowest_hz), math.log(bend), steps[0] + 1)[:-1]),
+            np.linspace(bend, half_hz, steps[1] + 1),
+        ]
     )
     middle = (edge[1:] + edge[:-1]) / 2
     lag_s = np.arange(samples) / (samples * spacing_hz)

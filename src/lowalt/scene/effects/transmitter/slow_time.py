@@ -13,6 +13,7 @@ from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects import with_offer
 from lowalt.scene.view import Sampling
 
 SOURCE = (
@@ -48,17 +49,31 @@ def check(settings: dict, scene: CheckedScene) -> None:
             f"effects.slow_time: downlink {settings['downlink']} of a period of {settings['tdd_period_s']} s holds "
             f"fewer than {FEWEST} of {scene.network.symbols} symbols, expected more"
         )
-    if scene.known_times and settings["regrid"] != "zero":
+    if scene.known_times and even(settings):
         raise InputError(
-            f"effects.slow_time.regrid: {settings['regrid']!r} makes an even signal, and spectra.times is 'known', "
-            "expected 'zero'"
+            f"effects.slow_time.regrid: {settings['regrid']!r} makes an even signal, and "
+            "spectra.times is 'known', expected 'zero'"
         )
-    gaps = settings["downlink"] < 1 or settings["missing"] > 0
-    if scene.noisy and gaps:
+    if scene.all_cells and even(settings):
         raise InputError(
-            f"effects.slow_time: gaps hold no signal, and noise.snr_db {list(scene.snr_db)} would fill them with "
-            "noise; expected [.inf] with receiver_noise"
+            f"effects.slow_time.regrid: {settings['regrid']!r} and range cells of all symbols, "
+            "expected 'zero': cells of symbols that were not received are zeros"
         )
+    if scene.noisy and gaps(settings):
+        raise InputError(
+            f"effects.slow_time: gaps hold no signal, and noise.snr_db {list(scene.snr_db)} would "
+            f"fill them with noise; expected [.inf] with {with_offer('noise_w')}"
+        )
+
+
+def gaps(settings: dict) -> bool:
+    """Return whether symbols of a look may not be received."""
+    return settings["downlink"] < 1 or settings["missing"] > 0
+
+
+def even(settings: dict) -> bool:
+    """Return whether the signal has evenly spaced values other than those of received symbols."""
+    return settings["regrid"] != "zero"
 
 
 def _in_downlink(settings: dict, network: Network) -> np.ndarray:

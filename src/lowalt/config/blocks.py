@@ -1,0 +1,27 @@
+"""Values that follow from several blocks of a configuration."""
+
+from lowalt.files.errors import InputError
+
+
+def snrs_of(config: dict) -> tuple[float, ...]:
+    """Return all SNRs (dB) of a configuration, those added later last.
+
+    Raises: InputError where an SNR stands twice.
+    """
+    snrs = []
+    for step in (config["noise"], *config.get("added", [])):
+        snrs += [float(snr) for snr in step.get("snr_db", [])]
+    if len(set(snrs)) < len(snrs):
+        raise InputError(f"noise.snr_db: value {snrs}, expected every SNR once")
+    return tuple(snrs)
+
+
+def motion_block(config: dict) -> dict:
+    """Return the block `motion` of a configuration; where it has `looks`, with look_s, the length
+    of a look (s).
+    """
+    motion = config["motion"]
+    if "looks" not in motion:
+        return motion
+    network = config["network"]
+    return motion | {"look_s": network["symbols"] * network["symbol_interval_s"]}

@@ -1,0 +1,81 @@
+"""The benchmark's results beside a run: two methods compared, and its section of the report."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from configured import parts
+from lowalt.__main__ import main
+from lowalt.extensions.benchmark import baseline_table, benchmark_results
+from lowalt.files.csv_tables import read_csv
+from lowalt.report.inputs import FILES, Inputs
+from lowalt.report.page import added_sections, assembled
+from pages import sound
+
+
+def test_compare_holds_two_methods_of_the_benchmark_against_each_other(tmp_path, capsys):
+    first = "nearest centroid on moments"
+    second = "majority class"
+    assert main(["compare", first, second, "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)["tracks"]
+    kept = {row["track"]: row for row in baseline_table.read() if row["method"] == first}
+    assert set(facts) == set(kept)
+    for track, found in facts.items():
+        value, low, high = found["difference"]
+        assert found["first"] == [float(kept[track][name]) for name in ("percent", "low", "high")]
+        # What is kept of AUROC has three digits.
+        assert (
+            value == pytest.approx(found["first"][0] - found["second"][0], abs=0.05)
+            and low < value < high
+        )
+    assert main(["compare", first, second]) == 0
+    text = capsys.readouterr().out
+    assert (
+        text.startswith(f"paired difference in percent: {first} | {second}\n  seen ")
+        and "  better; " in text
+    )
+    for wrong, words in (
+        ("majority clas", "expected perhaps ['majority class']"),
+        ("none", "lowalt benchmark table"),
+    ):
+        assert main(["compare", first, wrong]) == 2
+        error = capsys.readouterr().err
+        assert f"{wrong!r}: neither a folder nor a method" in error and words in error
+
+
+def test_a_run_on_a_benchmark_s_data_shows_the_table_of_baselines():
+    files = dict.fromkeys(FILES, "none.csv") | {"clouds": [], "benchmarks": []}
+    assert benchmark_results.values(SimpleNamespace(inputs=Inputs(files))) is None
+    path = "results/reference/lowalt-40-v1/table.csv"
+    own = SimpleNamespace(inputs=Inputs(files | {"benchmark": path}))
+    html = added_sections(own)
+    assert "Baselines of lowalt-40-v1" in html
+    tables = sound(assembled("page", [{"id": "results", "title": "Results", "html": html}])).tables
+    rows = read_csv(path, "method", "track", "percent", "low", "high", "group")
+    assert sum(len(table["rows"]) for table in tables) == 2 * len({row["method"] for row in rows})
+    for row in rows:
+        (cell,) = [
+            line[table["head"].index(row["track"])]
+            for table in tables
+            if row["track"] in table["head"]
+            for line in table["rows"]
+            if line[0] == row["method"]
+        ]
+        interval = "{:.1f} ({:.1f} to {:.1f})".format(
+            *(float(row[name]) for name in ("percent", "low", "high"))
+        )
+        assert cell.startswith(f"{interval} {'abcdefghijkl'[int(row['group']) - 1]}")
+
+
+def test_the_code_and_the_template_of_the_section_are_inputs_of_the_page_that_shows_it():
+    folder = "src/lowalt/extensions/benchmark"
+    inputs = {}
+    for name in ("default", "lowalt-40-v1"):
+        wildcards = SimpleNamespace(run=name)
+        products = parts({"run": name})[1]
+        inputs[name] = {*products.page_code(wildcards), *products.page_templates(wildcards)}
+    added = inputs["lowalt-40-v1"] - inputs["default"]
+    assert {f"{folder}/benchmark_results.py", f"{folder}/benchmark_results.html"} <= added
+    assert not [path for path in inputs["default"] if "extensions/benchmark" in path]
+    assert inputs["default"] < inputs["lowalt-40-v1"]
