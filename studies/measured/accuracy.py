@@ -25,7 +25,6 @@ from typing import NamedTuple
 
 import numpy as np
 from labels import EMPTY, TOGETHER, Interval, intervals_of, label_of, read_labels
-from lowalt.recognition.zoo import opened
 from recorded_sets import HALVES, Measured
 
 from lowalt.config.classes import CATEGORIES
@@ -37,7 +36,7 @@ from lowalt.extensions.recordings.twin_training import simulated, train
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import model_file, runs
-from lowalt.recognition.runs import Trained
+from lowalt.recognition.runs import Trained, opened
 
 COUNTED = (*CATEGORIES, NO_CLASS, *UNNAMED)
 """What is said of a window."""

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 import lowalt
-from dataset import RENDER, SEED, SNRS, SPLIT, build, motion_rows
+from dataset import CONFIG, RENDER, SEED, SPLIT, build, motion_rows
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, card
@@ -21,8 +21,6 @@ from lowalt.shards.card import main, readme
 from lowalt.shards.croissant import metadata
 from lowalt.shards.index import build as index_of
 from lowalt.shards.write import ChunkSamples, write_shard
-
-CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
 
 
 @pytest.fixture(scope="module", params=["image", "signal"])

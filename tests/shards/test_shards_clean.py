@@ -9,9 +9,8 @@ import tarfile
 import numpy as np
 import pytest
 import yaml
-from test_shards_card import CONFIG
 
-from dataset import SEED, SNRS, build
+from dataset import CONFIG, SEED, SNRS, build
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.noise.awgn import noisy_signals

@@ -20,6 +20,8 @@ RENDER = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
 SPLIT = {"by": "motion", "train": 2, "val": 1, "test": 1}
 SNRS = [3, "inf"]
 SEED = 11
+CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
+"""The configuration of the small data set."""
 TARGETS = {"seen": [("DJI Mavic 3", "UAV"), ("Crow", "Bird")], "unseen": [("Model Y", "Vehicle")]}
 
 

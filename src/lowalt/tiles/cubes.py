@@ -67,7 +67,7 @@ class Cubes:
             settings, "seed", "network", "tolerance", "effects"
         )
         scene = Scene(Network.from_settings(network), seed, tolerance, tuple(called(effects)))
-        return cls(scene, clouds, occluders, in_all_cells(effects), empty)
+        return cls(scene, clouds, occluders, bool(in_all_cells(effects)), empty)
 
     def of(
         self, row: dict, snr_db: float, station: Station, signal: np.ndarray | None = None

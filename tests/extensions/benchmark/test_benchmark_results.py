@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from configured import parts
+from configured import stages_of
 from lowalt.__main__ import main
 from lowalt.extensions.benchmark import baseline_table, benchmark_results
 from lowalt.files.csv_tables import read_csv
@@ -73,8 +73,8 @@ def test_the_code_and_the_template_of_the_section_are_inputs_of_the_page_that_sh
     inputs = {}
     for name in ("default", "lowalt-40-v1"):
         wildcards = SimpleNamespace(run=name)
-        products = parts({"run": name})[1]
-        inputs[name] = {*products.page_code(wildcards), *products.page_templates(wildcards)}
+        page = stages_of({"run": name}).page
+        inputs[name] = {*page.code(wildcards), *page.templates(wildcards)}
     added = inputs["lowalt-40-v1"] - inputs["default"]
     assert {f"{folder}/benchmark_results.py", f"{folder}/benchmark_results.html"} <= added
     assert not [path for path in inputs["default"] if "extensions/benchmark" in path]

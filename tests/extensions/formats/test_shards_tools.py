@@ -9,9 +9,8 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 import yaml
-from test_shards_card import CONFIG
 
-from dataset import build
+from dataset import CONFIG, build
 from lowalt.extensions.formats.sigmf import main as sigmf
 from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet

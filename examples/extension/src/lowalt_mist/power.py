@@ -5,12 +5,13 @@ strong.
 import numpy as np
 
 from lowalt.spectra import fourier
-from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, rows, speeds, tables  # noqa: F401
+from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, rows, speeds  # noqa: F401
 from lowalt.spectra.settings import Fourier as Settings
 
 TITLE = "power"
 SOURCE = "square of the paper's Eq. 26"
 DEFAULTS = Settings(64, 1, 256)
+tables = fourier.tables
 
 
 def definition(
@@ -25,11 +26,7 @@ def definition(
 
 
 def fill(
-    re: np.ndarray,
-    im: np.ndarray,
-    settings: Settings,
-    tables: tuple,  # noqa: F811
-    out: np.ndarray,
+    re: np.ndarray, im: np.ndarray, settings: Settings, tables: tuple, out: np.ndarray
 ) -> None:
     """Fill out (rows, starts) float32 with the squares of the windows that start at 0 .. starts -
     1.
