@@ -140,7 +140,7 @@ def write(
 
     Equal predictions give equal bytes.
     """
-    part_of_fold = {}
+    part_of_fold: dict[tuple[str, str], str] = {}
     for part, pairs in FOLDS.get(protocol or "", {}).items():
         part_of_fold |= dict.fromkeys(pairs, part)
     columns = (*COLUMNS, *probability_columns(classes))

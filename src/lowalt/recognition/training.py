@@ -365,9 +365,6 @@ class Trainer:
             weights, json_object(self.run.identity, folder, "a training"), extra, {}, {}
         )
         model_file.write(folder / "model.safetensors", content)
-        write_csv(
-            folder / "history.csv",
-            HISTORY,
-            [[repr(value) for value in row] for row in self.at.history],
-        )
+        rows = [list(map(repr, row)) for row in self.at.history]
+        write_csv(folder / "history.csv", HISTORY, rows)
         (folder / "checkpoint.pt").unlink(missing_ok=True)

@@ -35,9 +35,9 @@ def macro_f1(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
     result: dict = defaultdict(dict)
     for row in rows:
         if row["snr_db"] == "avg" and row.get("macro_f1_percent"):
-            value, low, high = (
-                float(row[f"macro_f1_{name}"]) for name in ("percent", "low", "high")
-            )
+            value = float(row["macro_f1_percent"])
+            low = float(row["macro_f1_low"])
+            high = float(row["macro_f1_high"])
             result[row["protocol"]][row["scheme"]] = f"{value:.1f} ({low:.1f} to {high:.1f})"
     return dict(result)
 

@@ -1,10 +1,10 @@
-"""Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a
-target.
+"""Reading and repairing mesh files; every fault is named by file and reason.
 
-OBJ has a reader of its own (`mesh_polygons`), which says why; trimesh reads STL and DAE and places
-a scene's surfaces; extensions offer readers of other formats. pymeshlab repairs, since its filters keep two
-million triangles within seconds and a gigabyte; sampling is that of `surfaces`, which is seeded
-(pymeshlab's sampling takes no seed and misses the count).
+Nothing here knows a target. OBJ has a reader of its own (`mesh_polygons`), which says why; trimesh
+reads STL and DAE and places a scene's surfaces; extensions offer readers of other formats.
+pymeshlab repairs, since its filters keep two million triangles within seconds and a gigabyte;
+sampling is that of `surfaces`, which is seeded (pymeshlab's sampling takes no seed and misses the
+count).
 """
 
 import io
@@ -182,7 +182,9 @@ def selected(path: Path, names: list[str] | None) -> list[Piece]:
     present = pieces(path)
     if names is None:
         return present
-    known = {name for piece in present for name in piece.names}
+    known: set[str] = set()
+    for piece in present:
+        known.update(piece.names)
     if lacking := sorted(set(names) - known):
         raise InputError(
             f"{path}: geometry {lacking} is not in it, expected some of {sorted(known)}"

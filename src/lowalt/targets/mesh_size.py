@@ -194,7 +194,7 @@ def _refuse_size(
     if size_m:
         for name, unit_m in UNITS_M.items():
             misfits[name] = abs(np.log(numbers * unit_m / wanted_m))
-    best = min(misfits, key=misfits.get, default="")
+    best = min(misfits, key=misfits.__getitem__, default="")
     if best and misfits[best] <= np.log(limit):
         way = (
             f"write `unit: {best}` (--unit {best}), with which it measures "

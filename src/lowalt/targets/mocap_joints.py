@@ -226,8 +226,8 @@ def _followed(joints: list[_Joint], values: np.ndarray) -> dict[str, np.ndarray]
     numbers = len(joints) * len(values) * 9  # a rotation (3, 3) of each joint in each frame
     if twice or numbers > MOST_NUMBERS:
         raise ValueError("a joint that stands twice, or too many frames")
-    positions = {}
-    turns = {}
+    positions: dict[str, np.ndarray] = {}
+    turns: dict[str, np.ndarray] = {}
     column = 0
     for name, parent, offset, channels in joints:
         turn = np.eye(3)

@@ -150,7 +150,8 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
         )
     if record.get("gait") in ("cycle", "trot"):
         raise InputError(
-            f"{record['subtype']}: gait {record['gait']} has no surfaces, expected no effect that needs them"
+            f"{record['subtype']}: gait {record['gait']} has no surfaces, expected no effect that "
+            "needs them"
         )
     if source in ("gait", "mocap"):
         return from_bones(float(record.get("stature_m", record["published"]["hgt_m"])))

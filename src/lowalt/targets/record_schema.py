@@ -44,7 +44,7 @@ def figures(model: str) -> dict[str, str]:
 
     A kind is length, ratio, offset, count or whole.
     """
-    result = {}
+    result: dict[str, str] = {}
     for item in schema()["models"][model]["figures"]:
         # A word names a set of figures that several models share.
         result |= schema()["figures"][item] if isinstance(item, str) else item

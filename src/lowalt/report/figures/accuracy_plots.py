@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from itertools import cycle
+from itertools import cycle, product
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -133,8 +133,9 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
 
 
 def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) -> Plot:
-    """Return what each class is taken for at each SNR: a row of panels per protocol, a panel per
-    true class, and in it a bar per SNR of the shares (percent) of all answers; rows: those of
+    """Return what each class is taken for at each SNR, as a panel per protocol and true class.
+
+    A panel has a bar per SNR of the shares (percent) of all answers. rows: those of
     confusion_by_snr.csv, one scheme per protocol.
     """
     counts = {
@@ -143,13 +144,13 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
     }
     schemes = {row["protocol"]: row["scheme"] for row in rows}
     levels = sorted({row["snr_db"] for row in rows}, key=float)
-    places = [(protocol, true) for protocol in schemes for true in categories]
+    shown_in_panels = list(product(schemes, categories))
     columns = min(len(categories), 4)
-    height = math.ceil(len(places) / columns)
+    height = math.ceil(len(shown_in_panels) / columns)
     figure = Figure(figsize=(3.2 * columns, 2.4 * height + 0.5), layout="constrained")
     panels = plain(figure.subplots(height, columns, sharex=True, sharey=True, squeeze=False))
     shown: list[dict] = []
-    for panel, (protocol, true) in zip(panels, places, strict=False):
+    for panel, (protocol, true) in zip(panels, shown_in_panels, strict=False):
         by_answer = []
         for answer in categories:
             by_answer.append([counts.get((protocol, snr, true, answer), 0) for snr in levels])
@@ -175,7 +176,7 @@ def confusion_by_snr(rows: list[dict[str, str]], categories: tuple[str, ...]) ->
         panel.set(title=f"{true}, {protocol} subtypes", ylim=(0, 100))
         panel.set_xticks(range(len(levels)), [SNR_LABELS.get(snr, snr) for snr in levels])
         panel.grid(visible=False)
-    for panel in panels[len(places) :]:
+    for panel in panels[len(shown_in_panels) :]:
         panel.set_axis_off()
     figure.supxlabel("SNR (dB)")
     figure.supylabel("recognised as (%)")
