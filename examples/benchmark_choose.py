@@ -1,6 +1,4 @@
-"""A choice made on the inner splits, for subtypes that nothing trained on: python
-examples/benchmark_choose.py.
-"""
+"""A choice for subtypes that nothing trained on: python examples/benchmark_choose.py."""
 
 import numpy as np
 from sklearn.linear_model import LogisticRegression

@@ -1,6 +1,4 @@
-"""A submission of features with any estimator of scikit-learn: python
-examples/benchmark_features.py [TRACK].
-"""
+"""A submission of features and an estimator: python examples/benchmark_features.py [TRACK]."""
 
 import sys
 
@@ -28,7 +26,5 @@ test = benchmark.load(track, "test")
 model = HistGradientBoostingClassifier(max_iter=50, random_state=0, verbose=1)
 model.fit(features(train.signals), train.labels)
 benchmark.write("predictions.csv", test, model.predict_proba(features(test.signals)))
-print(
-    "predictions.csv: written; score it with `lowalt benchmark score predictions.csv --track",
-    track + "`",
-)
+score = f"lowalt benchmark score predictions.csv --track {track}"
+print(f"predictions.csv: written; score it with `{score}`")

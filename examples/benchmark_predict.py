@@ -1,6 +1,4 @@
-"""A submission from any function of signals and images: python examples/benchmark_predict.py
-[TRACK].
-"""
+"""A submission from any function: python examples/benchmark_predict.py [TRACK]."""
 
 import sys
 

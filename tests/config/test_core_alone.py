@@ -29,7 +29,7 @@ OF_THE_WHOLE = (
     "attacks_found",
     "brought",
     "bytes",
-    "bytes_blas",
+    "bytes_scenes",
     "bytes_effects",
     "bytes_fused",
     "laws",

@@ -29,7 +29,7 @@ from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.sample_record import record, row_of
 from lowalt.shards.write import select
 from lowalt.targets.cloud import write as write_cloud
-from lowalt.workflow.stages.motion import Motion
+from lowalt.workflow.stages.motion import MotionStage
 
 SUBTYPES = ["DJI Mini 2", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"]
 LOOKS = 12
@@ -250,7 +250,7 @@ def test_a_track_is_in_one_fold_whole(dataset):
 @pytest.mark.parametrize("which", ["dataset", "logged"])
 def test_the_motion_stage_writes_the_rows_of_the_samples(which, request, tmp_path):
     tracks = request.getfixturevalue(which)
-    stage = Motion(run_of(merge(OVERLAY, {"motion": tracks.config["motion"]})))
+    stage = MotionStage(run_of(merge(OVERLAY, {"motion": tracks.config["motion"]})))
     cloud, path, again = (tmp_path / name for name in ("cloud.npz", "motion.csv", "again.csv"))
     write_cloud(cloud, tracks.clouds[SUBTYPES[0]])
     wildcards = type("", (), {"group": "seen", "part": "00000"})()

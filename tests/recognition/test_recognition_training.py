@@ -224,7 +224,9 @@ def test_metrics_for_tensorboard_are_those_of_the_history(views, tmp_path, monke
 
 def test_tensorboard_asked_for_and_absent_is_named(views, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
-    with pytest.raises(InputError, match=r"tensorboard is not installed.*lowalt\[tensorboard\]"):
+    with pytest.raises(
+        InputError, match=r"tensorboard is not installed.*`pip install tensorboard`"
+    ):
         runs.train(sources(views), SCHEME, "seen", with_training(steps=4), tmp_path, events=True)
 
 

@@ -20,9 +20,9 @@ from lowalt.scene.trust import refuse_effects
 from lowalt.shards import clean
 from lowalt.shards.plan import Plan
 from lowalt.workflow import refusals
-from lowalt.workflow.stages.recognition import Recognition
-from lowalt.workflow.stages.shards import Shards
-from lowalt.workflow.stages.stage import Stage
+from lowalt.workflow.stages.recognition import RecognitionStage
+from lowalt.workflow.stages.shards import ShardsStage
+from lowalt.workflow.stages.stage import RunStage
 
 RAIN = """
 from pathlib import Path
@@ -86,14 +86,14 @@ def test_the_contract_s_questions_are_answered_for_it_and_for_shipped_effects(ra
 
 def test_rules_take_its_files_clouds_and_surfaces_and_its_share_of_the_record(usual, rain):
     run = replace(usual, config=merge(usual.config, {"effects": rain}))
-    stage = Stage(run)
+    stage = RunStage(run)
     assert stage.effect_files == ["rates.txt", "january.txt", "february.txt"]
     assert set(stage.scene_subtypes(CHUNK)) == {*stage.subtypes(CHUNK), "owl"}
     assert stage.opaque_subtypes(CHUNK) == stage.subtypes(CHUNK)
-    assert json.loads(Shards(run).settings(CHUNK))["record"] == rain
-    assert Shards(run).modules == ["rain.py"]
+    assert json.loads(ShardsStage(run).settings(CHUNK))["record"] == rain
+    assert ShardsStage(run).modules == ["rain.py"]
     run.config["recognition"]["input"] = "dataset"
-    assert "surfaces" in Recognition(run).samples(CHUNK)
+    assert "surfaces" in RecognitionStage(run).samples(CHUNK)
 
 
 @pytest.mark.parametrize(

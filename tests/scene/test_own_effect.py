@@ -18,9 +18,9 @@ from lowalt.scene.effects import called, dotted
 from lowalt.scene.observe import observe
 from lowalt.shards.remake import Remaker
 from lowalt.workflow import sources
-from lowalt.workflow.stages.noise import Noise
-from lowalt.workflow.stages.shards import Shards
-from lowalt.workflow.stages.tiles import Tiles
+from lowalt.workflow.stages.noise import NoiseStage
+from lowalt.workflow.stages.shards import ShardsStage
+from lowalt.workflow.stages.tiles import TilesStage
 from scenes import network, scene, target
 
 HALF = """
@@ -244,9 +244,9 @@ def test_its_file_is_an_input_of_the_jobs_that_use_it_alone(half):
     echo = sources.code("lowalt.scene", *map(dotted, config["effects"]))
     assert "half.py" in echo and any(name.endswith("measure/fifty_digits.py") for name in echo)
     run = SimpleNamespace(config=config)
-    assert "half.py" in sources.code("lowalt.shards", *Shards(run).modules)
-    for modules in (Noise(run).modules, Tiles(run).modules):
+    assert "half.py" in sources.code("lowalt.shards", *ShardsStage(run).modules)
+    for modules in (NoiseStage(run).modules, TilesStage(run).modules):
         assert "half.py" not in sources.code("lowalt.tiles", *modules)
     cells = config | {"spectra": {"range_doppler": {}}}
-    modules = Tiles(SimpleNamespace(config=cells)).modules
+    modules = TilesStage(SimpleNamespace(config=cells)).modules
     assert "half.py" in sources.code("lowalt.tiles", *modules)

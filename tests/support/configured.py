@@ -6,16 +6,16 @@ from pathlib import Path
 from lowalt.config.layers import merge
 from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow.run import Run
-from lowalt.workflow.stages.accuracy_cost import AccuracyCost
-from lowalt.workflow.stages.cost import Cost
-from lowalt.workflow.stages.echo import Echo
-from lowalt.workflow.stages.motion import Motion
-from lowalt.workflow.stages.noise import Noise
-from lowalt.workflow.stages.recognition import Recognition
-from lowalt.workflow.stages.report import Report
-from lowalt.workflow.stages.shards import Shards
-from lowalt.workflow.stages.targets import Targets
-from lowalt.workflow.stages.tiles import Tiles
+from lowalt.workflow.stages.accuracy_cost import AccuracyCostStage
+from lowalt.workflow.stages.cost import CostStage
+from lowalt.workflow.stages.echo import EchoStage
+from lowalt.workflow.stages.motion import MotionStage
+from lowalt.workflow.stages.noise import NoiseStage
+from lowalt.workflow.stages.recognition import RecognitionStage
+from lowalt.workflow.stages.report import ReportStage
+from lowalt.workflow.stages.shards import ShardsStage
+from lowalt.workflow.stages.targets import TargetsStage
+from lowalt.workflow.stages.tiles import TilesStage
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
@@ -34,16 +34,16 @@ class Stages:
     run: Run
 
     def __post_init__(self) -> None:
-        self.targets = Targets(self.run)
-        self.motion = Motion(self.run)
-        self.echo = Echo(self.run)
-        self.noise = Noise(self.run)
-        self.tiles = Tiles(self.run)
-        self.shards = Shards(self.run)
-        self.recognition = Recognition(self.run)
-        self.cost = Cost(self.run)
-        self.accuracy_cost = AccuracyCost(self.run)
-        self.page = Report(self.run)
+        self.targets = TargetsStage(self.run)
+        self.motion = MotionStage(self.run)
+        self.echo = EchoStage(self.run)
+        self.noise = NoiseStage(self.run)
+        self.tiles = TilesStage(self.run)
+        self.shards = ShardsStage(self.run)
+        self.recognition = RecognitionStage(self.run)
+        self.cost = CostStage(self.run)
+        self.accuracy_cost = AccuracyCostStage(self.run)
+        self.page = ReportStage(self.run)
 
 
 def run_of(overlay: dict | None = None, inputs: str | None = None) -> Run:

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 from lowalt.files.shipped import SHIPPED, as_named, located
 from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow.sources import code, sources
-from lowalt.workflow.stages.report import Report
-from lowalt.workflow.stages.shards import Shards
+from lowalt.workflow.stages.report import ReportStage
+from lowalt.workflow.stages.shards import ShardsStage
 
 ROOT = Path(__file__).parents[2]
 
@@ -64,5 +64,5 @@ def test_the_kept_configuration_and_the_page_s_have_no_path_of_this_machine(tmp_
     config = located(load_yaml(ROOT / "config/default.yaml"), SHIPPED)
     run = SimpleNamespace(config=config, records={})
     assert str(SHIPPED) in config["targets"]["table"]
-    for text in (Shards(run).configuration(None), Report(run).settings(None)):
+    for text in (ShardsStage(run).configuration(None), ReportStage(run).settings(None)):
         assert str(SHIPPED) not in text and "config/targets.csv" in text

@@ -11,9 +11,9 @@ import pytest
 from configured import Stages, run_of, stages_of
 from lowalt.config.layers import merge
 from lowalt.files.atomic import slug
-from lowalt.workflow.stages.noise import Noise
-from lowalt.workflow.stages.shards import Shards
-from lowalt.workflow.stages.tiles import Tiles
+from lowalt.workflow.stages.noise import NoiseStage
+from lowalt.workflow.stages.shards import ShardsStage
+from lowalt.workflow.stages.tiles import TilesStage
 
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 
@@ -51,20 +51,20 @@ def test_a_stage_loads_an_effect_s_module_only_in_its_scene():
     known = {"times": "known"}
     late = {"slow_time": {"jitter_s": 1e-4}}
     slow_time = "lowalt.scene.effects.transmitter.slow_time"
-    of_late = modules(Tiles, spectra=known, effects=late)
+    of_late = modules(TilesStage, spectra=known, effects=late)
     assert of_late == ["lowalt.scene.lateness", "lowalt.motion", slow_time]
-    assert modules(Tiles, effects=late) == []
-    assert modules(Tiles, spectra=known) == []
-    assert modules(Tiles, spectra=known, effects={"slow_time": {"downlink": 1}}) == []
-    of_cells = modules(Tiles, spectra=known | {"hrrp": {"window": 1}}, effects=late)
+    assert modules(TilesStage, effects=late) == []
+    assert modules(TilesStage, spectra=known) == []
+    assert modules(TilesStage, spectra=known, effects={"slow_time": {"downlink": 1}}) == []
+    of_cells = modules(TilesStage, spectra=known | {"hrrp": {"window": 1}}, effects=late)
     assert of_cells == [*of_late, "lowalt.tiles.cubes", slow_time]
     for kind, expected in (("cube", ["lowalt.scene.effects.receiver.adc"]), ("image", [])):
-        assert modules(Shards, effects={"adc": {}}, shards={"kind": kind}) == expected
-    assert modules(Noise, effects={"canceller": None}) == [
+        assert modules(ShardsStage, effects={"adc": {}}, shards={"kind": kind}) == expected
+    assert modules(NoiseStage, effects={"canceller": None}) == [
         "lowalt.scene.set_noise",
         "lowalt.scene.effects.detection.canceller",
     ]
-    assert modules(Noise, effects={"adc": None}) == []
+    assert modules(NoiseStage, effects={"adc": None}) == []
 
 
 def scene(effects, **more):

@@ -102,4 +102,4 @@ def test_the_report_s_files_are_a_manifest_that_the_report_takes():
         assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
     page = stages_of({"run": "lowalt-40-v1"}).page
     assert page.files(CHUNK)["benchmark"].endswith("lowalt-40-v1/table.csv")
-    assert "src/lowalt/report/sections/accuracy.html" in page.templates(CHUNK)
+    assert "src/lowalt/report/sections/accuracy.html" in page.templates

@@ -4,9 +4,9 @@
 #                  trains (`make accuracy-cost` does all); a quiet machine
 # OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv,
 #          results/{run}/accuracy_cost.svg
-from lowalt.workflow.stages.accuracy_cost import AccuracyCost
+from lowalt.workflow.stages.accuracy_cost import AccuracyCostStage
 
-accuracy_cost = Refusing(AccuracyCost(RUN))
+accuracy_cost = Refusing(AccuracyCostStage(RUN))
 
 
 rule speed:

@@ -2,9 +2,9 @@
 # REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of
 #                  this workflow runs meanwhile)
 # OUTPUTS: results/{run}/cost.csv, results/{run}/cost.svg
-from lowalt.workflow.stages.cost import Cost
+from lowalt.workflow.stages.cost import CostStage
 
-cost = Refusing(Cost(RUN))
+cost = Refusing(CostStage(RUN))
 
 
 rule cost_table:

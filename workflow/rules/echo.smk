@@ -2,9 +2,9 @@
 # in one job.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols)
-from lowalt.workflow.stages.echo import Echo
+from lowalt.workflow.stages.echo import EchoStage
 
-echo = Refusing(Echo(RUN))
+echo = Refusing(EchoStage(RUN))
 
 
 rule echo:

@@ -5,9 +5,9 @@
 #                  files that effects read
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and
 #          {station}.power.npy
-from lowalt.workflow.stages.echo import Echo
+from lowalt.workflow.stages.echo import EchoStage
 
-echo = Refusing(Echo(RUN))
+echo = Refusing(EchoStage(RUN))
 
 
 rule echo_in_scene:

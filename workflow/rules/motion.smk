@@ -3,9 +3,9 @@
 # REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's subtypes; the flight log that
 #                  motion.track names
 # OUTPUTS: results/{run}/motion/{group}-{part}.csv
-from lowalt.workflow.stages.motion import Motion
+from lowalt.workflow.stages.motion import MotionStage
 
-motion = Refusing(Motion(RUN))
+motion = Refusing(MotionStage(RUN))
 
 
 rule motion:

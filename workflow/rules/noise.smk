@@ -2,9 +2,9 @@
 # and SNR to SNR.
 # REQUIRED INPUTS: motion table and echoes of the chunk
 # OUTPUTS: results/{run}/noisy/{group}-{part}.npy, complex64 (models, snrs, stations, symbols)
-from lowalt.workflow.stages.noise import Noise
+from lowalt.workflow.stages.noise import NoiseStage
 
-noise = Refusing(Noise(RUN))
+noise = Refusing(NoiseStage(RUN))
 
 
 rule noise:

@@ -4,9 +4,9 @@
 # OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its
 #          companions; where the configuration names other runs, results/{run}/transfer.csv: their
 #          models on this run's test samples
-from lowalt.workflow.stages.recognition import Recognition
+from lowalt.workflow.stages.recognition import RecognitionStage
 
-recognition = Refusing(Recognition(RUN))
+recognition = Refusing(RecognitionStage(RUN))
 
 
 rule views:

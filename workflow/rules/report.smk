@@ -3,9 +3,9 @@
 #                  job's benchmark; where report.cost says so the echo's cost
 # OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html,
 #          results/{run}/stages.csv, results/{run}/figures (each plot as SVG and CSV)
-from lowalt.workflow.stages.report import Report
+from lowalt.workflow.stages.report import ReportStage
 
-page = Refusing(Report(RUN))
+page = Refusing(ReportStage(RUN))
 
 
 rule report_manifest:
@@ -25,8 +25,9 @@ rule report_manifest:
 rule report:
     input:
         unpack(page.files),
-        code=page.code,
+        code=code("lowalt.report"),
         templates=page.templates,
+        added=page.added_sections,
         configuration="results/{run}/config.yaml",
         manifest="results/{run}/report.json",
     output:

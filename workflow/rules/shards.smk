@@ -5,9 +5,9 @@
 # OUTPUTS: results/{run}/shards/{group}-{fold}-{part}{piece}.tar and .npz,
 #          results/{run}/shards/index.json, and next to them the data card: README.md, samples.csv,
 #          croissant.json, SHA256SUMS
-from lowalt.workflow.stages.shards import Shards
+from lowalt.workflow.stages.shards import ShardsStage
 
-shards = Refusing(Shards(RUN))
+shards = Refusing(ShardsStage(RUN))
 
 
 rule shard:

@@ -2,9 +2,9 @@
 # REQUIRED INPUTS: config/targets.csv and the record files; the user's files where a record names
 #                  one.
 # OUTPUTS: results/{run}/clouds/{subtype}.npz, results/{run}/clouds.png
-from lowalt.workflow.stages.targets import Targets
+from lowalt.workflow.stages.targets import TargetsStage
 
-targets = Refusing(Targets(RUN))
+targets = Refusing(TargetsStage(RUN))
 
 
 rule cloud:

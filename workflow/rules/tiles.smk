@@ -4,9 +4,9 @@
 #                  cells
 # OUTPUTS: results/{run}/tiles/{group}-{part}.npz, deleted once its shards are written, and for
 #          every size of tiles.reduced results/{run}/reduced/{size}/{group}-{part}.npy
-from lowalt.workflow.stages.tiles import Tiles
+from lowalt.workflow.stages.tiles import TilesStage
 
-tiles = Refusing(Tiles(RUN))
+tiles = Refusing(TilesStage(RUN))
 
 
 rule tiles:

@@ -23,7 +23,7 @@ SHARED = "signals and shards"
 """The files of a part that every track needs which trains or tests on it."""
 
 
-class Cost(NamedTuple):
+class TrackCost(NamedTuple):
     """Processor time (core-seconds) and disk space (MB)."""
 
     core_s: float
@@ -49,7 +49,7 @@ def parts_of(tracks: list[Track]) -> dict[str, set[tuple[str, str]]]:
     return found
 
 
-def cost_of(tracks: list[Track]) -> Cost | None:
+def cost_of(tracks: list[Track]) -> TrackCost | None:
     """Return the cost of making all data of some tracks; None where a part has not been measured.
 
     Raises: InputError where the table of costs is missing or wrong.
@@ -57,7 +57,7 @@ def cost_of(tracks: list[Track]) -> Cost | None:
     path = shipped(f"{REFERENCE}/{NAME}")
     rows = {}
     for row in read_csv(path, *COLUMNS, what="table of costs"):
-        rows[row["part"], row["files"]] = Cost(
+        rows[row["part"], row["files"]] = TrackCost(
             number(row, "core_s", path), number(row, "megabytes", path)
         )
     found = []
@@ -66,7 +66,7 @@ def cost_of(tracks: list[Track]) -> Cost | None:
             if (part, files) not in rows:
                 return None
             found.append(rows[part, files])
-    return Cost(sum(one.core_s for one in found), sum(one.megabytes for one in found))
+    return TrackCost(sum(one.core_s for one in found), sum(one.megabytes for one in found))
 
 
 def measured(part: str, folder: str | Path) -> list[tuple]:

@@ -30,7 +30,7 @@ class Bundle(NamedTuple):
     box: np.ndarray
 
 
-class Span(NamedTuple):
+class RaySpan(NamedTuple):
     """The least and largest starts and ways of rays, (3, 3) m each: a row for each leg of a path,
     the first where rays have one leg.
     """
@@ -51,7 +51,7 @@ def empty_bundle():
 @ALLOCATING
 def empty_span():
     """Return room for the rays of three legs."""
-    return Span(np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)))
+    return RaySpan(np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)))
 
 
 @INNER

@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.extensions.town.bundle_loops import (
     Bundle,
-    Span,
+    RaySpan,
     between,
     bundle_of,
     can_cross,
@@ -91,7 +91,7 @@ class Box(NamedTuple):
     corner: np.ndarray
 
 
-class Workspace(NamedTuple):
+class RayWorkspace(NamedTuple):
     """Work space of `_trace_blocks`; points (8, 4, 3) m: those of the rays to a box's corners."""
 
     lists: ShadowLists
@@ -101,7 +101,7 @@ class Workspace(NamedTuple):
     box: Box
     corners: BoxCorners
     bundle: Bundle
-    span: Span
+    span: RaySpan
 
 
 @ALLOCATING
@@ -120,7 +120,7 @@ def _workspace(triangles, blocks):
     ray = RayPoints(np.empty((MOST_POINTS, 3)), np.empty(3), np.empty(3))
     points = np.empty((8, MOST_POINTS, 3))
     box = Box(np.empty(3), np.empty(3), np.empty(3))
-    return Workspace(
+    return RayWorkspace(
         lists, waiting, ray, points, box, empty_corners(), empty_bundle(), empty_span()
     )
 

@@ -7,7 +7,7 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.workflow.run import Run
-from lowalt.workflow.stages.stage import Stage
+from lowalt.workflow.stages.stage import RunStage
 
 
 def data_jobs(run: Run) -> list[str]:
@@ -33,7 +33,7 @@ def data_jobs(run: Run) -> list[str]:
     return jobs
 
 
-class AccuracyCost(Stage):
+class AccuracyCostStage(RunStage):
     """Accuracy of recognition against computing time."""
 
     @property

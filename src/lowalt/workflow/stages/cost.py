@@ -3,10 +3,10 @@
 from typing import Any
 
 from lowalt.files.atomic import slug
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 
-class Cost(Stage):
+class CostStage(RunStage):
     """Error of the echo against computing time."""
 
     @property

@@ -4,10 +4,10 @@ from typing import Any
 
 from lowalt.config.network import as_far_as
 from lowalt.scene.set_noise import in_all_cells
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 
-class Echo(Stage):
+class EchoStage(RunStage):
     """Clean signals of a run's chunks; a job makes those of one station or of all stations."""
 
     def stations(self, wildcards: Any) -> list[str]:

@@ -5,13 +5,13 @@ from typing import Any
 from lowalt.config.blocks import motion_block
 from lowalt.config.network import masts_m
 from lowalt.motion.drawing import masts_in_reach
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 DRAWN = ("region", "height_m", "tilt_deg", "cadence", "sizes_m", "looks", "look_s", "track")
 """Keys of the block `motion` that determine the draws; those from `sizes_m` on are optional."""
 
 
-class Motion(Stage):
+class MotionStage(RunStage):
     """Tables of motion models of a run's chunks."""
 
     @property

@@ -4,10 +4,10 @@ from typing import Any
 
 from lowalt.scene.effects import dotted
 from lowalt.scene.set_noise import filters
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 
-class Noise(Stage):
+class NoiseStage(RunStage):
     """Noisy signals of a run's chunks."""
 
     @property

@@ -6,10 +6,10 @@ from typing import Any
 from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import Scheme
 from lowalt.scene.effects import needs_surfaces
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 
-class Recognition(Stage):
+class RecognitionStage(RunStage):
     """Trainings of a run, their predictions and tables."""
 
     def _scheme(self, wildcards: Any) -> Scheme:

@@ -9,7 +9,7 @@ from lowalt.files.shipped import as_named, shipped
 from lowalt.report.inputs import KEPT
 from lowalt.workflow.sources import code, file_of, near
 from lowalt.workflow.stages.accuracy_cost import data_jobs
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 REFERENCE = "results/reference"
 PAGE = (".html", ".css", ".js")
@@ -18,7 +18,7 @@ TABLES = ("accuracy", "confusion_by_snr", "subtypes", "comparisons", "orderings"
 """Tables of recognition that the report shows."""
 
 
-class Report(Stage):
+class ReportStage(RunStage):
     """The page of a run."""
 
     def files(self, wildcards: Any) -> dict[str, str | list[str]]:
@@ -70,23 +70,18 @@ class Report(Stage):
         """Return the files of the report as the JSON text of its manifest."""
         return json.dumps(self.files(wildcards), indent=1)
 
-    def _added_sections(self, wildcards: Any) -> list[str]:
-        """Return the modules of the sections that extensions add to this run's page."""
+    def added_sections(self, wildcards: Any) -> list[str]:
+        """Return the source files and templates of the sections that extensions add to this page."""
         files = self.files(wildcards)
-        return [module for name, module in offered("sections").items() if name in files]
+        modules = [module for name, module in offered("sections").items() if name in files]
+        templates = [near(file_of(module).with_suffix(".html")) for module in modules]
+        return [*code(*modules), *templates]
 
-    def code(self, wildcards: Any) -> tuple[str, ...]:
-        """Return the source files of the report and of the sections that extensions add to it."""
-        return code("lowalt.report", *self._added_sections(wildcards))
-
-    def templates(self, wildcards: Any) -> list[str]:
-        """Return templates, style and scripts of the page and of its added sections."""
+    @property
+    def templates(self) -> list[str]:
+        """Templates, style and scripts of the page."""
         paths = sorted((PACKAGE / "report").rglob("*"))
-        own = [path for path in paths if path.suffix in PAGE]
-        added = []
-        for module in self._added_sections(wildcards):
-            added.append(file_of(module).with_suffix(".html"))
-        return [near(path) for path in [*own, *added]]
+        return [near(path) for path in paths if path.suffix in PAGE]
 
     def settings(self, wildcards: Any) -> str:
         """Return the whole configuration, and the published values of each subtype."""

@@ -8,10 +8,10 @@ from lowalt.scene.effects import dotted, of_record
 from lowalt.scene.set_noise import filters
 from lowalt.workflow.run import Run
 from lowalt.workflow.sources import near
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 
-class Shards(Stage):
+class ShardsStage(RunStage):
     """Shards of a run's chunks and folds, their index, the data card and the configuration."""
 
     def __init__(self, run: Run) -> None:

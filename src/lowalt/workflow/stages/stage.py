@@ -45,7 +45,7 @@ def given(*names: str) -> Callable[[Any, Any], list[str]]:
     return words
 
 
-class Stage:
+class RunStage:
     """What the rules of one stage take, derived from a run."""
 
     def __init__(self, run: Run) -> None:

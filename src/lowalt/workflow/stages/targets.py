@@ -3,10 +3,10 @@
 from typing import Any
 
 from lowalt.targets.records import source_files
-from lowalt.workflow.stages.stage import Stage, text
+from lowalt.workflow.stages.stage import RunStage, text
 
 
-class Targets(Stage):
+class TargetsStage(RunStage):
     """Clouds and occluders of the subtypes of a run."""
 
     def _record(self, wildcards: Any) -> dict:

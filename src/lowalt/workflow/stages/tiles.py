@@ -7,10 +7,10 @@ from lowalt.scene.effects import dotted
 from lowalt.scene.lateness import late_effects
 from lowalt.spectra.catalogue import of_cells
 from lowalt.workflow.run import Run
-from lowalt.workflow.stages.stage import Stage, option, text
+from lowalt.workflow.stages.stage import RunStage, option, text
 
 
-class Tiles(Stage):
+class TilesStage(RunStage):
     """Tiles of a run's chunks, and their images of reduced sizes."""
 
     def __init__(self, run: Run) -> None:
