@@ -206,7 +206,7 @@ def scaling(config: dict, cloud: Cloud) -> list[dict]:
 
 def main() -> None:
     """Measure the stage and write the table."""
-    line = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    line = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     line.add_argument("--clouds", nargs="+", required=True)
     line.add_argument("--config", default="config/default.yaml")
     line.add_argument("--models", type=int, default=2000)

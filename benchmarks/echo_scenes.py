@@ -205,7 +205,7 @@ def failures(rows: list[dict]) -> list[dict]:
 
 def main() -> None:
     """Run the scenes, write the table and print the failures."""
-    line = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    line = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     line.add_argument("--count", type=int, default=10_000)
     line.add_argument("--seed", type=int, default=1)
     line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo_scenes.csv"))

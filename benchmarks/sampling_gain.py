@@ -65,7 +65,7 @@ def gain(
 
 def main(arguments: list[str]) -> None:
     """Write the table."""
-    line = argparse.ArgumentParser("sampling_gain.py", description=__doc__.splitlines()[0])
+    line = argparse.ArgumentParser("sampling_gain.py", description=__doc__.partition("\n\n")[0])
     line.add_argument("--out", required=True, type=Path, help="table to write (.csv)")
     rows = []
     for sampling in SAMPLINGS:

@@ -91,7 +91,7 @@ def measured(name: str, command: str) -> dict:
 
 def main() -> None:
     """Measure every command and write the table."""
-    line = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    line = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     line.add_argument("--out", type=Path, required=True, help="table to write (.csv)")
     options = line.parse_args()
     os.environ.pop("LOWALT_INPUTS", None)

@@ -288,7 +288,7 @@ def _apart(name: str, count: int, seed: int, queue) -> None:
 
 def main() -> None:
     """Attack every reader in a process of its own and write the table."""
-    line = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    line = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     line.add_argument("--count", type=int, default=2000, help="damaged files a reader")
     line.add_argument("--seed", type=int, default=1)
     line.add_argument("--only", help="part of the names of the readers to attack")

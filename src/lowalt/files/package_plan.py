@@ -66,5 +66,7 @@ def rooms_imported(path: Path) -> frozenset[str]:
 
 
 def purpose(path: Path) -> str:
-    """Return the first line of a file's docstring without its full stop."""
-    return (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0].rstrip(".")
+    """Return the first paragraph of a file's docstring on one line, without its full stop."""
+    docstring = ast.get_docstring(ast.parse(path.read_text())) or ""
+    paragraph = docstring.partition("\n\n")[0]
+    return " ".join(paragraph.split()).rstrip(".")

@@ -212,7 +212,7 @@ def table_rows(
 
 def main(arguments: list[str]) -> None:
     """Write the table from predictions, measured speeds and the times of the data's jobs."""
-    line = parser("lowalt.measure.accuracy_cost", __doc__.splitlines()[0])
+    line = parser("lowalt.measure.accuracy_cost", __doc__.partition("\n\n")[0])
     line.add_argument(
         "--predictions",
         nargs="+",

@@ -173,7 +173,7 @@ def measure(network: Network, clouds: list[Cloud], published: dict, block: dict)
 
 def main(arguments: list[str]) -> None:
     """Measure and write the table."""
-    line = parser("lowalt.measure.echo_cost", __doc__.splitlines()[0])
+    line = parser("lowalt.measure.echo_cost", __doc__.partition("\n\n")[0])
     line.add_argument(
         "--clouds", nargs="+", required=True, help="cloud files, best one of each category"
     )

@@ -123,7 +123,7 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 2.0) -> dict:
 
 def main(arguments: list[str]) -> None:
     """Time one scheme's network and write the record."""
-    line = parser("lowalt.measure.network_speed", __doc__.splitlines()[0])
+    line = parser("lowalt.measure.network_speed", __doc__.partition("\n\n")[0])
     line.add_argument("--out", required=True, help="record to write (.json)")
     options = line.parse_args(arguments)
     record = measure(*with_scheme(options.settings))
