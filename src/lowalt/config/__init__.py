@@ -1,3 +1,3 @@
-"""The configuration: its layers, schema, stations, classes, folds and plan of samples. No stage is
-known here.
+"""The configuration: its layers, schema, stations, classes and folds, and the interface of
+extensions. No stage is known here.
 """
