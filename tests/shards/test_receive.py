@@ -255,7 +255,8 @@ def test_an_echo_has_names_and_truth_of_companions_as_cubes_have():
     echo = lowalt.receive(dataset, CAR, 1, "B")
     row = dataset.row(dataset.place_of(CAR, 1, np.inf))
     cube = dataset.maker.cubes(row, np.inf, dataset.maker.signal(row, np.inf))[1]
-    assert echo.companions == tuple(row["companions"]) and len(echo.companions) > 0
+    record = dataset.made(dataset.place_of(CAR, 1, np.inf))[2]
+    assert echo.companions == tuple(record["companions"]) and len(echo.companions) > 0
     for place, name in enumerate(TRUTH):
         expected = np.array([other[:, place] for other in cube.others])
         np.testing.assert_array_equal(echo.others[name], expected)

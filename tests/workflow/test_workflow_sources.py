@@ -44,7 +44,7 @@ FOUND = {
     "files": ["errors", "atomic", "shipped"],
     "numerics": ["streams", "portable"],
     "machine": ["hardware", "timing", "memory", "progress"],
-    "config": ["plan", "splits", "network", "classes", "layers"],
+    "config": ["blocks", "splits", "network", "classes", "layers"],
 }
 
 

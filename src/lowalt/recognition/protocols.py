@@ -3,8 +3,9 @@
 from lowalt.files.errors import InputError
 
 _SEEN_FOLDS = {
-    part: {("seen", fold), ("unseen", fold)}
-    for part, fold in (("train", "train"), ("validation", "val"), ("test", "test"))
+    "train": {("seen", "train"), ("unseen", "train")},
+    "validation": {("seen", "val"), ("unseen", "val")},
+    "test": {("seen", "test"), ("unseen", "test")},
 }
 _UNSEEN_FOLDS = {
     "train": {("seen", "train")},

@@ -46,6 +46,9 @@ def type_of(value: object, where: str) -> Type:
         return None
     if isinstance(value, dict):
         return {name: type_of(item, f"{where}.{name}") for name, item in value.items()}
+    if value == "inf":
+        # Records of version 0.2 write the SNR of a sample without noise as a text.
+        return SCALARS[float]
     if not isinstance(value, list):
         return SCALARS[type(value)]
     kinds = set(map(type, value))
