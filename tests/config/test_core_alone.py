@@ -84,7 +84,7 @@ def core(tmp_path_factory):
 
 
 def test_all_tests_of_the_core_are_collected_and_the_cheap_ones_pass(core):
-    shown = core("-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", CHEAP, *CORE_TESTS)
+    shown = core("-m", "pytest", "-p", "no:cacheprovider", "-k", CHEAP, *CORE_TESTS)
     assert " passed" in shown and " deselected" in shown
 
 

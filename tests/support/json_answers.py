@@ -7,8 +7,8 @@ from lowalt.__main__ import main
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/reference/json.md").read_text()
-STATIC = ("settings", "stages", "method", "otherwise", "materials", "dropped", "notes")
-"""Keys whose own keys are names of settings, stages, fields, filters, materials or reasons that the
+STATIC = ("settings", "stages", "by_class", "method", "otherwise", "materials", "dropped", "notes")
+"""Keys whose own keys are names of settings, stages, classes, fields, filters, materials or reasons that the
 reference does not list."""
 
 
