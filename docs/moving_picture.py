@@ -41,7 +41,9 @@ LEFTS_PX = (138, 788)
 PANEL_WIDTH_PX = 512
 """A whole number of pixels for each of an image's 256 columns."""
 CLOUD_HEIGHT_PX = 270
+CLOUD_BOTTOM_PX = 570
 SPECTRUM_HEIGHT_PX = 360
+SPECTRUM_BOTTOM_PX = 88
 LETTERS_PT = 23
 """Legible where a phone shows the picture at less than a third of its size."""
 DOT_PT2 = 30
@@ -61,10 +63,9 @@ class Subject(NamedTuple):
 
 
 ABOVE, _, BEHIND = DIRECTIONS
-SUBJECTS = (
-    Subject("DJI Mini 4 Pro", 61, "A", ABOVE, "rotors: {:.0f} turns per second"),
-    Subject("Eagle", 29, "C", BEHIND, "wings: {:.1f} beats per second"),
-)
+DRONE = Subject("DJI Mini 4 Pro", 61, "A", ABOVE, "rotors: {:.0f} turns per second")
+BIRD = Subject("Eagle", 29, "C", BEHIND, "wings: {:.1f} beats per second")
+SUBJECTS = (DRONE, BIRD)
 
 
 class Scene(NamedTuple):
@@ -117,8 +118,8 @@ def canvas() -> tuple:
     spectra = []
     for left_px in LEFTS_PX:
         left = left_px / WIDTH_PX
-        above = (left, 570 / HEIGHT_PX, width, CLOUD_HEIGHT_PX / HEIGHT_PX)
-        below = (left, 88 / HEIGHT_PX, width, SPECTRUM_HEIGHT_PX / HEIGHT_PX)
+        above = (left, CLOUD_BOTTOM_PX / HEIGHT_PX, width, CLOUD_HEIGHT_PX / HEIGHT_PX)
+        below = (left, SPECTRUM_BOTTOM_PX / HEIGHT_PX, width, SPECTRUM_HEIGHT_PX / HEIGHT_PX)
         clouds.append(figure.add_axes(above))
         spectra.append(figure.add_axes(below))
     return figure, clouds, spectra
@@ -209,8 +210,7 @@ def write(animation: str, still: str, count: int | None = None) -> None:
             minimize_size=True,
         )
     with replacing(still) as temporary:
-        few = others[-1].quantize(256, dither=Image.Dither.NONE)
-        few.save(temporary, format="png", optimize=True)
+        others[-1].save(temporary, format="png", optimize=True)
 
 
 def main(arguments: list[str]) -> None:
