@@ -162,6 +162,7 @@ reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	$(BIN)/python docs/scale_table.py --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 	$(BIN)/python docs/tiles_picture.py results/default/shards/index.json design/pictures/tiles.png
+	$(BIN)/python docs/moving_picture.py --animation design/pictures/moving.webp --still design/pictures/moving.png
 
 # The picture of a sample is made by the command that its page shows.
 docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error

@@ -112,16 +112,25 @@ def rows_mps(shown: Scene) -> np.ndarray:
     return top_mps + (np.arange(rows) + 0.5) / rows * (bottom_mps - top_mps)
 
 
+def body_speed(shown: Scene) -> float:
+    """The mean radial speed (m/s) of a body."""
+    of_body = np.array([shown.cloud.kinds[part] == "body" for part in shown.cloud.part])
+    return float(radial_speeds(shown)[:, of_body].mean())
+
+
+def band_distance(shown: Scene) -> float:
+    """The distance (m/s) between the lines of two-bladed rotors, by the effective carrier."""
+    effective_hz = shown.station.frequency_hz + 255 / 2 * 120e3
+    return 2 * shown.row["rate_hz"] * 299_792_458 / (2 * effective_hz)
+
+
 def test_the_drone_s_bands_stand_at_its_body_and_at_its_folded_blade_flashes(scenes):
     """Blades that pass the line of sight at the rate n F give lines n F apart, which fold."""
     shown = scenes[SUBJECTS.index(moving_picture.DRONE)]
-    of_body = np.array([shown.cloud.kinds[part] == "body" for part in shown.cloud.part])
-    body_mps = radial_speeds(shown)[:, of_body].mean()
+    body_mps = body_speed(shown)
     speeds_mps = rows_mps(shown)
     span_mps = np.ptp(speeds_mps) * len(speeds_mps) / (len(speeds_mps) - 1)
-    symbol_rate_hz = 400
-    blades = 2
-    apart_mps = blades * shown.row["rate_hz"] / symbol_rate_hz * span_mps
+    apart_mps = band_distance(shown)
     expected_mps = [body_mps, body_mps - apart_mps, body_mps - 2 * apart_mps]
     # Three copies make a band at the fold whole.
     brightness = np.tile(shown.image.mean(axis=1), 3)
@@ -142,3 +151,15 @@ def test_the_bird_s_spectrum_follows_its_wings(scenes):
     seen_mps = rows_mps(shown) @ bright / bright.sum(axis=0)
     assert np.corrcoef(seen_mps, true_mps)[0, 1] > 0.8
     assert abs(seen_mps.mean() - true_mps.mean()) < 0.5
+
+
+def test_the_readme_says_the_figures_of_the_picture(scenes):
+    readme = (ROOT / "README.md").read_text()
+    drone = scenes[SUBJECTS.index(moving_picture.DRONE)]
+    _, first_s, last_s = drone.axes.across
+    frame_s = (last_s - first_s) / (256 / moving_picture.COLUMNS_PER_FRAME)
+    assert f"shown {FRAME_MS / 1000 / frame_s:.1f} times slower" in readme
+    assert f"speeds beyond {max(map(abs, drone.axes.upwards[1:])):.1f} m/s fold" in readme
+    assert f"band at {body_speed(drone):.1f} m/s" in readme
+    assert f"repeat it every {band_distance(drone):.1f} m/s" in readme
+    assert f"turns {frame_s * drone.row['rate_hz']:.2f} times between two frames" in readme
