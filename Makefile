@@ -59,7 +59,9 @@ $(COMPILED): $(BASE)
 	@$(BIN)/lowalt sample 'DJI Mini 2' 0 --out .venv/sample >.venv/kernels.log 2>&1 || { cat .venv/kernels.log >&2; exit 1; }
 	@touch $@
 
-$(SETUP): $(TRAINING) $(COMPILED)
+# Machine code is compiled while packages are downloaded.
+$(SETUP): $(BASE)
+	@$(MAKE) --no-print-directory -j 2 $(TRAINING) $(COMPILED)
 	@touch $@
 
 $(TESTING): $(SETUP)
@@ -83,7 +85,7 @@ $(DOCS): $(BASE)
 # written once here, not in two trainings at the same time.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
 	@test -e $(SETUP) || { \
-		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile && \
+		$(MAKE) --no-print-directory -j 2 $(TRAINING) meanwhile && $(MAKE) --no-print-directory $(SETUP) && \
 		{ $(BIN)/python -c 'import lowalt.recognition.runs, lowalt.report.__main__' 2>.venv/bytecode.log & } }
 	$(SNAKEMAKE)
 
