@@ -370,8 +370,6 @@ def test_the_site_builds_without_a_warning_and_with_every_link(tmp_path):
         "<code>models_per_chunk</code>"
         in (tmp_path / "site/reference/configuration.html").read_text()
     )
-    effects = (tmp_path / "site/reference/effects.html").read_text()
-    assert all(f'id="{name}"' in effects for name in PLACES)
     elsewhere = re.compile(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?:https?:)?//')
     asking = [
         path.name
