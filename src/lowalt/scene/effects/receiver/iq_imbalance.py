@@ -1,5 +1,5 @@
 """IQ imbalance: the two branches of a direct-conversion mixer differ, so every subcarrier gains its
-mirror's image: r becomes mu r + nu conj(r).
+mirror's image.
 """
 
 import numpy as np
