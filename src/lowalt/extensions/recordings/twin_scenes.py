@@ -23,11 +23,6 @@ brought.schema.yaml):
     same scene) rate_error     of the receiver's clock (optional)
     receiver       settings of `twin_receiver.Receiver` that differ from those of the radar
     (optional)
-
-Sources: a rotor seen from below, whose lines end below the speed of the tips: Chen, The Micro-Doppler
-Effect in Radar, 2nd ed. 2019, section 3.2; texture of vehicles: Schuler, Becker and Wiesbeck, IEEE
-Trans. Antennas Propag. 56(11), 2008; limbs and torso: van Dorp and Groen, IEE Proc. Radar Sonar
-Navig. 150(5), 2003; width and floor of beams: estimates; all else: the tuning recordings.
 """
 
 import math
