@@ -4,15 +4,15 @@ between all work.
 A file of docs/ has its path below docs/ in the site; every other file keeps its path in the
 repository. Markdown files of the navigation become pages. Any other file that a page links to is
 added to the site as it is. So the links that work in the repository work in the site, and every
-text stands once. Pages of keys are made of the schemas as the site is built: links to a schema lead
-to its page.
+text stands once. Pages of keys and of effects are made of the schemas and the effects' modules as
+the site is built: links to a schema, or to the list of effects, lead to its page.
 """
 
 import posixpath
 import re
 from pathlib import Path
 
-from key_pages import configuration_page, records_page
+from key_pages import configuration_page, effects_page, records_page
 from mkdocs.structure.files import File
 
 from lowalt.files.yaml_files import load_yaml
@@ -21,8 +21,13 @@ ROOT = Path(__file__).parents[1]
 DOCS = "docs/"
 CONFIGURATION = "workflow/schemas/config.schema.yaml"
 RECORDS = "src/lowalt/targets/records.schema.yaml"
-KEYS = {CONFIGURATION: "reference/configuration.md", RECORDS: "reference/records.md"}
-"""Schemas in the repository, and the pages of the site that are made of them."""
+EFFECTS = "src/lowalt/scene/effects/__init__.py"
+KEYS = {
+    CONFIGURATION: "reference/configuration.md",
+    RECORDS: "reference/records.md",
+    EFFECTS: "reference/effects.md",
+}
+"""Files in the repository, and the pages of the site that are made of them."""
 LINK = re.compile(r"\]\(([^)#\s:]+)((?:#[^)\s]*)?)\)")
 """A link or picture to a file, and its anchor; addresses with a scheme have a colon."""
 
@@ -81,8 +86,13 @@ def pages(nav: list | dict | str) -> list[str]:
 
 def on_files(files, config):
     """Add the navigation's pages that lie outside docs/, and the files to which any page links."""
-    for schema, page in ((CONFIGURATION, configuration_page), (RECORDS, records_page)):
-        files.append(File.generated(config, KEYS[schema], content=page(load_yaml(ROOT / schema))))
+    made = {
+        CONFIGURATION: configuration_page(load_yaml(ROOT / CONFIGURATION)),
+        RECORDS: records_page(load_yaml(ROOT / RECORDS)),
+        EFFECTS: effects_page(),
+    }
+    for name, content in made.items():
+        files.append(File.generated(config, KEYS[name], content=content))
     named = [in_repository(uri) for uri in pages(config.nav) if uri not in KEYS.values()]
     wanted = set(named)
     for name in named:
