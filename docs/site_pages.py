@@ -5,9 +5,10 @@ A file of docs/ has its path below docs/ in the site; every other file keeps its
 repository. Markdown files of the navigation become pages. Any other file that a page links to is
 added to the site as it is. So the links that work in the repository work in the site, and every
 text stands once. Pages of keys are made of the schemas as the site is built: links to a schema lead
-to its page.
+to its page. The viewer of samples is simulated as the site is built.
 """
 
+import functools
 import posixpath
 import re
 from pathlib import Path
@@ -15,7 +16,9 @@ from pathlib import Path
 from key_pages import configuration_page, records_page
 from mkdocs.structure.files import File
 
+from lowalt.config.layers import overlaid
 from lowalt.files.yaml_files import load_yaml
+from lowalt.report.viewer_page import viewer_of
 
 ROOT = Path(__file__).parents[1]
 DOCS = "docs/"
@@ -23,6 +26,11 @@ CONFIGURATION = "workflow/schemas/config.schema.yaml"
 RECORDS = "src/lowalt/targets/records.schema.yaml"
 KEYS = {CONFIGURATION: "reference/configuration.md", RECORDS: "reference/records.md"}
 """Schemas in the repository, and the pages of the site that are made of them."""
+VIEWER = "viewer.md"
+VIEWED = ROOT / "config/viewer.yaml"
+"""The viewer's page of the site, and the configuration whose samples it shows."""
+MARK = "<!-- viewer -->"
+"""Where the viewer stands in its page."""
 LINK = re.compile(r"\]\(([^)#\s:]+)((?:#[^)\s]*)?)\)")
 """A link or picture to a file, and its anchor; addresses with a scheme have a colon."""
 
@@ -100,3 +108,14 @@ def on_files(files, config):
 def on_page_markdown(markdown, page, config, files):
     """Turn the links of a page."""
     return relinked(markdown, in_repository(page.file.src_uri))
+
+
+@functools.cache
+def viewer() -> str:
+    """Return the viewer of the site as HTML, made once per process."""
+    return viewer_of(overlaid([VIEWED]))
+
+
+def on_post_page(output, page, config):
+    """Put the viewer into its page, behind all that reads the texts of pages, such as the search."""
+    return output.replace(MARK, viewer()) if page.file.src_uri == VIEWER else output
