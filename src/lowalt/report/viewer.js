@@ -26,7 +26,7 @@
     table.className = "plain";
     table.createCaption().textContent = "Class probabilities, percent";
     const head = table.createTHead().insertRow();
-    for (const text of ["protocol and scheme", ...data.classes, "answer"]) {
+    for (const text of ["network", ...data.classes, "answer"]) {
       const cell = document.createElement("th");
       cell.scope = "col";
       cell.textContent = text;
@@ -94,8 +94,7 @@
       line.style.display = share >= 0 && share <= 1 ? "" : "none";
       line.setAttribute("transform", `translate(${(wide * share).toFixed(1)} 0)`);
     }
-    const rate = slowed();
-    at("time").textContent = `${state.time.toFixed(3)} s${rate > 1 ? `, ${Math.round(rate)} × slower` : ""}`;
+    at("time").textContent = `${state.time.toFixed(3)} s`;
     at("frame").value = state.time;
   }
 
@@ -128,7 +127,8 @@
       const folds = echo.folds ? `shown at ${echo.shown} m/s, folded ${echo.folds} time${echo.folds > 1 ? "s" : ""}` : "not folded";
       texts.push(`${data.stations[row]} ${echo.range} m and ${echo.speed} m/s (${folds})`);
     });
-    at("speeds").textContent = texts.length ? `Range and radial speed of the whole target, receding positive: ${texts.join("; ")}.` : "";
+    const whole = texts.length ? `Range and radial speed of the whole target, receding positive: ${texts.join("; ")}.` : "";
+    at("speeds").textContent = slowed() > 1 ? `${whole} Played ${slowed().toFixed(0)} times slower.` : whole;
   }
 
   const one = (values) => data.samples.filter((sample) => Object.keys(values).every((name) => String(sample[name]) === values[name]));
@@ -145,13 +145,13 @@
     const found = data.motions[`${subtype} ${model}`] || null;
     all("image.truth").forEach((image) => image.setAttribute("href", found ? found.truth[image.dataset.row] : "data:,"));
     echoes(sample);
-    speeds(sample);
     shares(sample);
     if (found !== state.motion) {
       state.motion = found;
       state.points = found && new Int16Array(bytes(found.points).buffer);
       at("frame").step = Math.min(data.step_s, found ? found.seconds / found.frames : data.step_s);
     }
+    speeds(sample);
     draw();
   }
 
