@@ -17,6 +17,7 @@ from key_pages import configuration_page, records_page
 from mkdocs.structure.files import File
 
 from lowalt.config.layers import overlaid
+from lowalt.files.package_plan import PACKAGE
 from lowalt.files.yaml_files import load_yaml
 from lowalt.report.viewer_page import viewer_of
 
@@ -31,6 +32,8 @@ VIEWED = ROOT / "config/viewer.yaml"
 """The viewer's page of the site, and the configuration whose samples it shows."""
 MARK = "<!-- viewer -->"
 """Where the viewer stands in its page."""
+SHARED = ("tables.js", "tables.css")
+"""Files of the report's page that the site uses as well."""
 LINK = re.compile(r"\]\(([^)#\s:]+)((?:#[^)\s]*)?)\)")
 """A link or picture to a file, and its anchor; addresses with a scheme have a colon."""
 
@@ -99,6 +102,8 @@ def on_files(files, config):
             for path in linked((ROOT / name).read_text(), name)
             if path in named or path[-3:] != ".md"
         }
+    for name in SHARED:
+        files.append(File.generated(config, name, abs_src_path=str(PACKAGE / "report" / name)))
     for path in sorted(wanted):
         if files.get_file_from_path(in_site(path)) is None:
             files.append(File.generated(config, in_site(path), abs_src_path=str(ROOT / path)))
