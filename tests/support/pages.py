@@ -2,6 +2,7 @@
 of it.
 """
 
+import json
 import re
 import shutil
 import subprocess
@@ -132,3 +133,18 @@ def browsed(folder: Path, text: str, script: str = "") -> str:
     wrong = [line for line in ran.stderr.splitlines() if "CONSOLE" in line]
     assert not wrong
     return ran.stdout
+
+
+def narrow(folder: Path, text: str, script: str) -> str:
+    """Return `browsed` of an empty page that holds the page `text` in a frame as wide as a
+    telephone; `script` runs when it is loaded and knows it as `frame`.
+    """
+    inner = json.dumps(text).replace("</", "<\\/")
+    outer = """
+    const frame = document.createElement("iframe");
+    frame.style.width = "390px"; frame.style.height = "3000px"; frame.style.border = "0";
+    frame.srcdoc = INNER;
+    frame.onload = () => { SCRIPT };
+    document.body.append(frame);
+    """.replace("SCRIPT", script).replace("INNER", inner)
+    return browsed(folder, "<body></body>", outer)

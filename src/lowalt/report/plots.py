@@ -12,7 +12,6 @@ from lowalt.files.atomic import write_file
 from lowalt.files.csv_tables import write_csv
 from lowalt.report.figures.style import svg
 
-
 NARROW_IN = 4.9
 """Width of a figure for telephones, which show 358 pixels beside the page's margins, in inches."""
 

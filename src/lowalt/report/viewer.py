@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from lowalt.config.network import Network
-from lowalt.files.atomic import slug, text_file
+from lowalt.files.atomic import text_file
 from lowalt.motion import positions
 from lowalt.recognition import predictions
 from lowalt.recognition.distances import cycle_s, still_row
@@ -213,6 +213,29 @@ def reduced(tile: np.ndarray, spectra: int, pixels: int, palette: np.ndarray) ->
     return embedded(encode(join(images, spectra), palette))
 
 
+def _entry(
+    one: ViewedSample, network: Network, tiles: tuple[str, str], group: str, shares: dict
+) -> dict:
+    """The page's entry of a sample; tiles: its embedded pictures for readers and of the networks."""
+    record = one.record
+    heard = []
+    if one.signal is not None:
+        heard = echoes(one.signal, record["geometry"], network)
+    tile, of_networks = tiles
+    return {
+        "subtype": record["subtype"],
+        "category": record["category"],
+        "model": record["model"],
+        "group": group,
+        "effect": one.effect,
+        "snr": f"{record['snr_db']:g} dB" if record["noise"] else "no noise",
+        "tile": tile,
+        "network": of_networks,
+        "echoes": heard,
+        "probabilities": shares,
+    }
+
+
 def shown(
     viewed: Iterable[ViewedSample],
     renderer: Renderer,
@@ -246,24 +269,12 @@ def shown(
         moves = record["motion"].get("x_m") is not None
         if name not in motions and subtype in clouds and moves:
             motions[name] = motion(clouds[subtype], row_of(record)[0], network)
-        heard = []
-        if one.signal is not None:
-            heard = echoes(one.signal, record["geometry"], network)
-        sample = {
-            "subtype": subtype,
-            "category": record["category"],
-            "model": record["model"],
-            "group": groups.get(subtype, ""),
-            "effect": one.effect,
-            "snr": f"{record['snr_db']:g} dB" if record["noise"] else "no noise",
-            "tile": tile,
-            "network": reduced(one.tile, spectra, network_side, palette),
-            "echoes": heard,
-            "probabilities": shares.get(record["key"], {}),
-        }
-        kept.append((record["snr_db"], sample))
+        tiles = tile, reduced(one.tile, spectra, network_side, palette)
+        shares_of_one = shares.get(record["key"], {})
+        entry = _entry(one, network, tiles, groups.get(subtype, ""), shares_of_one)
+        kept.append((record["snr_db"], entry))
     # The clearest sample of a motion model first, as the page lists them.
-    clearest = [sample for _, sample in sorted(kept, key=lambda pair: -pair[0])]
+    clearest = [entry for _, entry in sorted(kept, key=lambda pair: -pair[0])]
     stations = [station.name for station in network.stations]
     look_s = network.symbols * network.symbol_interval_s
     data = {

@@ -191,7 +191,10 @@ def confusion_by_snr(
     figure.supxlabel("SNR (dB)")
     figure.supylabel("recognised as (%)")
     figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2 * columns, frameon=False
+        *panels[0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=2 * columns,
+        frameon=False,
     )
     words = "what each class is taken for at each SNR, in percent of its samples"
     return drawn("confusion_by_snr", words, figure, shown)
