@@ -228,7 +228,10 @@ def test_every_control_of_the_viewer_works(page, values, renderer, tmp_path):
     choose("effect", "clutter"); tell("effect");
     choose("station", "all"); tell("all");
     choose("subtype", at("subtype").options[1].value); tell("hostile");
-    document.body.dataset.said = JSON.stringify(said);
+    choose("subtype", "DJI Mini 2");
+    const light = ink();
+    document.documentElement.dataset.theme = "dark";
+    setTimeout(() => { said.themed = light !== ink(); document.body.dataset.said = JSON.stringify(said); });
     """
     found = browsed(tmp_path, page, script)
     assert "data-ran" not in found
@@ -247,7 +250,8 @@ def test_every_control_of_the_viewer_works(page, values, renderer, tmp_path):
     # axis has the instant.
     assert said["start"] == 4 and said["moved"] == [True, True, "0.031 s", 10]
     assert said["step"] == pytest.approx(1 / 80 / viewer.FRAMES)
-    assert said["play"] == ["Pause", "Play"]
+    assert said["play"] == ["Pause", "Play"] and said["themed"]
+    assert said["speeds"].endswith(" Played 120 times slower.")
     assert said["truth"] == values["data"]["motions"]["DJI Mini 2 1"]["truth"]
     check_echoes(said, one, renderer.network)
 

@@ -128,7 +128,8 @@
       texts.push(`${data.stations[row]} ${echo.range} m and ${echo.speed} m/s (${folds})`);
     });
     const whole = texts.length ? `Range and radial speed of the whole target, receding positive: ${texts.join("; ")}.` : "";
-    at("speeds").textContent = slowed() > 1 ? `${whole} Played ${slowed().toFixed(0)} times slower.` : whole;
+    const times = Math.round(slowed());
+    at("speeds").textContent = times > 1 ? `${whole} Played ${times} times slower.` : whole;
   }
 
   const one = (values) => data.samples.filter((sample) => Object.keys(values).every((name) => String(sample[name]) === values[name]));
