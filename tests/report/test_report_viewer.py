@@ -16,6 +16,7 @@ from PIL import Image
 from chain import SPECTRA, WAVE
 from craft import craft, row
 from dataset import build
+from lowalt.config.classes import CATEGORIES
 from lowalt.config.network import Network
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
@@ -161,10 +162,10 @@ def values(renderer):
         sample(renderer, "DJI Mini 2", "clutter", np.inf, 1, signals),
         sample(renderer, HOSTILE, viewer.WITHOUT, 8.0, 1, None),
     ]
-    shares = {viewed[0].record["key"]: {"seen A": [0.2, 0.8]}}
+    shares = {viewed[0].record["key"]: {"unseen ABC:VRP+TRP+VT": [0.2, 0.8, 0.0, 0.0]}}
     clouds = {"DJI Mini 2": craft()}
     groups = {"DJI Mini 2": "seen"}
-    return viewer.shown(viewed, renderer, clouds, groups, ("UAV", "Bird"), shares, (16, 8))
+    return viewer.shown(viewed, renderer, clouds, groups, CATEGORIES, shares, (16, 8))
 
 
 @pytest.fixture(scope="module")
@@ -238,7 +239,7 @@ def test_every_control_of_the_viewer_works(page, values, renderer, tmp_path):
     said = told(found, "said")
     one, with_effect, other = values["data"]["samples"]
     name = "UAV: DJI Mini 2 (seen), motion model 1, no noise"
-    percents = "networkUAVBirdanswerseen A20.080.0Bird, wrong"
+    percents = "answerunseen ABC:VRP+TRP+VT20.080.00.00.0Bird, wrong"
     assert said["first"][:2] == [name, one["tile"]] and percents in said["first"][2]
     assert said["first"][3:] == [False, 1]
     assert said["effect"][:2] == [f"{name}, effect clutter", with_effect["tile"]]
