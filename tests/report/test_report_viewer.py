@@ -242,7 +242,7 @@ def test_every_control_of_the_viewer_works(page, values, renderer, tmp_path):
     percents = "answerunseen ABC:VRP+TRP+VT20.080.00.00.0Bird, wrong"
     assert said["first"][:2] == [name, one["tile"]] and percents in said["first"][2]
     assert said["first"][3:] == [False, 1]
-    assert said["effect"][:2] == [f"{name}, effect clutter", with_effect["tile"]]
+    assert said["effect"][:2] == [f"{name}, with clutter", with_effect["tile"]]
     assert said["all"][4] == 2
     none = "No network was asked about this sample."
     hostile = f"UAV: {HOSTILE}, motion model 1, 8 dB"

@@ -138,7 +138,7 @@
     const [subtype, model, snr, effect, station] = ["subtype", "model", "snr", "effect", "station"].map((name) => at(name).value);
     const sample = one({ subtype, model, snr, effect })[0];
     const group = sample.group ? ` (${sample.group})` : "";
-    const scene = effect === "none" ? "" : `, effect ${effect}`;
+    const scene = effect === "none" ? "" : `, with ${effect}`;
     at("name").textContent = `${sample.category}: ${subtype}${group}, motion model ${model}, ${snr}${scene}`;
     all(".station").forEach((node) => { node.hidden = station !== EVERY && data.stations[node.dataset.row] !== station; });
     all("svg.panel").forEach((node) => node.setAttribute("aria-label", `${node.dataset.name} at station ${data.stations[node.dataset.row]} of ${at("name").textContent}`));

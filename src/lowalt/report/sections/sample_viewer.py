@@ -18,7 +18,7 @@ def viewed(
     set that does not say how.
     """
     effects = (shards.index.get("echo") or {}).get("effects")
-    effect = "of the scene" if effects else viewer.WITHOUT
+    effect = "the scene's effects" if effects else viewer.WITHOUT
     for number in numbers:
         record = shards.record(number)
         signal = remaker.signal(record) if remaker else None
