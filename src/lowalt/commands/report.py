@@ -92,8 +92,8 @@ def _refuse_code(config: dict, folder: Path) -> None:
         f"an overlay of your own that names it: `lowalt run OVERLAY --target {folder}/report.html`"
     )
     allowed(config["recognition"]["network"]["backbone"], "", folder, how)
-    refuse_training(config, folder, how)
     refuse_brought(config, folder / "config.yaml")
+    refuse_training(config, folder, how)
 
 
 def gallery(results: Path) -> Answer:
