@@ -26,6 +26,7 @@ from lowalt.recognition.recogniser import backbone
 from lowalt.shards import ShardSet, index
 from lowalt.shards.build import main as build_shards
 from lowalt.targets.records import load_table, with_row
+from lowalt.workflow.refusals import refuse_input
 
 EFFECT = """
 from pathlib import Path
@@ -191,9 +192,7 @@ def zoo(doors):
 
 @pytest.mark.parametrize("attack", [*CODE, *PLACES])
 @pytest.mark.parametrize("entry", ENTRIES)
-def test_a_run_s_configuration_names_no_code_and_no_file_outside(
-    doors, zoo, entry, attack, capsys
-):
+def test_a_run_s_configuration_names_no_code_and_no_file_outside(doors, zoo, entry, attack, capsys):
     path = brought(doors, (CODE | PLACES)[attack])
     told = held(lambda: ENTRIES[entry](path), capsys)
     assert "which a file may not choose; expected an overlay of your own" in told
@@ -312,6 +311,15 @@ def test_a_run_s_configuration_names_no_weights_no_backbone_and_no_table_outside
     assert "may not choose" in held(lambda: TRAINERS[trainer](path), capsys)
 
 
+def test_a_run_whose_jobs_would_refuse_its_own_configuration_does_not_begin(doors):
+    """Jobs that make samples on the spot read config.yaml of the run."""
+    config = attacked(doors, PLACES["own targets"])
+    config = with_key(with_key(config, "recognition.input", "dataset"), "recognition.cache", False)
+    with pytest.raises(InputError, match=r"recognition.input: 'dataset': targets.own.mine is "):
+        refuse_input(config)
+    refuse_input(with_key(config, "targets.own", {}))
+
+
 def test_the_backbone_of_a_run_s_configuration_is_not_trusted_for_a_model(doors, zoo, capsys):
     path = brought(doors, TRAINING["a backbone"])
     told = held(lambda: ENTRIES["predict"](path), capsys)
@@ -321,6 +329,11 @@ def test_the_backbone_of_a_run_s_configuration_is_not_trusted_for_a_model(doors,
 def test_weights_of_the_user_s_own_run_no_pickle(doors):
     told = held(lambda: backbone("test_resnet", "weights.pt", 32))
     assert "with weights 'weights.pt'" in told
+
+
+@pytest.mark.parametrize("name", ["hf-hub:timm/test_resnet", "hf_hub:a/b", "local-dir:theirs"])
+def test_a_backbone_s_name_asks_no_hub(doors, name):
+    assert "is not a timm model" in held(lambda: backbone(name, "none", 32))
 
 
 def test_an_index_whose_images_need_the_instants_of_an_effect_runs_no_effect(doors, tmp_path):

@@ -3,7 +3,6 @@ sets on web servers, and files whose numbers a library warns of.
 """
 
 import json
-import os
 import shutil
 import socket
 import threading
@@ -124,7 +123,13 @@ def test_a_remote_table_is_named_by_its_address(folder, tmp_path):
     copy = shutil.copytree(folder, tmp_path / "copy")
     table = copy / "seen-test-00000.npz"
     whole = table.read_bytes()
-    for damage in (b"", whole[:100], whole[:-50], b"PK" + bytes(300), whole.replace(b"key", b"kez")):
+    for damage in (
+        b"",
+        whole[:100],
+        whole[:-50],
+        b"PK" + bytes(300),
+        whole.replace(b"key", b"kez"),
+    ):
         table.write_bytes(damage)
         with serving(copy) as server, pytest.raises(InputError) as refused:
             ShardSet(f"{server.address}/index.json", ["seen"], ["test"]).signal(0)
@@ -200,4 +205,3 @@ def test_no_warning_of_a_library_stands_before_the_sentence(odd, tmp_path, monke
         assert main(words) == 2
     assert not [one for one in heard if not issubclass(one.category, InputWarning)]
     assert capsys.readouterr().err.strip().count("\n") == 0
-    assert os.listdir(tmp_path)

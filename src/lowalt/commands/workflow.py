@@ -55,8 +55,8 @@ def add_to(commands: argparse._SubParsersAction, name: str) -> None:
 def command(options: argparse.Namespace) -> list[str]:
     """Return the command line of Snakemake.
 
-    Raises: InputError naming an overlay that is missing, no YAML mapping or of a run that names code, wrong cores, a profile
-    that is not there, or where there is no Snakefile.
+    Raises: InputError naming an overlay that is missing, no YAML mapping, or of a run and names
+    code, wrong cores, a profile that is not there, or where there is no Snakefile.
     """
     if not SNAKEFILE.is_file():
         raise InputError(

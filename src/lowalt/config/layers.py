@@ -207,9 +207,7 @@ def of_run(folder: str | Path) -> dict:
     return config
 
 
-def overlaid(
-    overlays: Iterable[str | Path | dict], unused: Iterable[str] = OF_TRAINING
-) -> dict:
+def overlaid(overlays: Iterable[str | Path | dict], unused: Iterable[str] = OF_TRAINING) -> dict:
     """Return the embedded default with overlays laid over it, in order, as `load` does."""
     return load([DEFAULT, *overlays], SCHEMA, unused)
 

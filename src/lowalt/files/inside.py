@@ -1,4 +1,4 @@
-"""Files that a record or a table names relative to its own folder: nothing outside of it is opened."""
+"""Files that a record names relative to its own folder, outside of which nothing is opened."""
 
 from pathlib import Path, PurePosixPath
 

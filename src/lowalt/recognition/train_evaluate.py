@@ -40,8 +40,8 @@ def train(
     run: its folder, such as results/default; scheme: a name of config/schemes.csv; protocol:
     "unseen" trains on twenty subtypes and tests on the others, "seen" trains and tests on other
     motion of all; backbone: FILE.py:FUNCTION of your own, weights: hub or a file of your own to
-    begin with, which a run's folder may not choose; training: settings that replace the run's own, such as steps=500. A training that was
-    interrupted goes on.
+    begin with, which a run's folder may not choose; training: settings that replace the run's own,
+    such as steps=500. A training that was interrupted goes on.
     Raises: InputError for a run that is not finished, or names code, weights or files elsewhere, or
     a wrong name or setting.
     """
