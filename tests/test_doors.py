@@ -9,6 +9,7 @@ import runpy
 import socket
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from lowalt.__main__ import main
 from lowalt.config.layers import overlaid
 from lowalt.files.errors import InputError, in_plain_characters
 from lowalt.files.shipped import SHIPPED
+from lowalt.recognition import train_evaluate
 from lowalt.recognition.dataset_samples import opened
 from lowalt.recognition.recogniser import backbone
 from lowalt.shards import ShardSet, index
@@ -309,6 +311,23 @@ def test_a_run_s_configuration_names_no_weights_no_backbone_and_no_table_outside
 ):
     path = brought(doors, TRAINING[attack])
     assert "may not choose" in held(lambda: TRAINERS[trainer](path), capsys)
+
+
+def test_the_caller_may_name_the_weights_of_a_run(doors, monkeypatch):
+    brought(doors, TRAINING["weights of a hub"])
+    begun = []
+    source = SimpleNamespace(for_training=lambda *_: {})
+    monkeypatch.setattr(
+        train_evaluate, "ShardSet", lambda _: SimpleNamespace(classes=("UAV", "Bird"))
+    )
+    monkeypatch.setattr(train_evaluate.Source, "of_run", lambda *_: source)
+    monkeypatch.setattr(train_evaluate.runs, "load", lambda *_: None)
+    monkeypatch.setattr(
+        train_evaluate.runs, "train", lambda *given: begun.append(given[3]["network"]["weights"])
+    )
+    for weights in ("none", "hub", "mine.safetensors"):
+        lowalt.train("theirs", "A:VT", "seen", weights=weights)
+    assert begun == ["none", "hub", "mine.safetensors"]
 
 
 def test_a_run_whose_jobs_would_refuse_its_own_configuration_does_not_begin(doors):
