@@ -11,14 +11,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from dataset import build
 from lowalt.__main__ import main
 from lowalt.extensions.recordings.__main__ import main as imported
 from lowalt.extensions.recordings.files import read
 from lowalt.extensions.recordings.record import read_record
+from lowalt.extensions.recordings.twin_training import RECOGNITION, settings
 from lowalt.files.errors import InputError, InputWarning, in_plain_characters
 from lowalt.files.shipped import SHIPPED
+from lowalt.files.yaml_files import load_yaml
 from lowalt.shards import ShardSet
 from range_server import serving
 
@@ -94,6 +97,23 @@ def test_a_record_names_files_of_its_own_folder_alone(recordings, entry, attack,
         told = str(error)
     assert told.strip().count("\n") == 0 and len(told) <= 450
     assert "in its own folder or below" in told or "expected the name of a file" in told
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("backbone", "net.py:run"), ("weights", "hub"), ("weights", "weights.pt")]
+)
+def test_the_default_that_a_file_of_recognition_names_has_no_code_and_no_weights(
+    recordings, key, value
+):
+    default = load_yaml(SHIPPED / "config/default.yaml")
+    default["recognition"]["network"][key] = value
+    Path("theirs/scene.yaml").write_text(yaml.safe_dump(default))
+    block = load_yaml(SHIPPED / RECOGNITION)
+    Path("mine.yaml").write_text(yaml.safe_dump(block | {"default": "theirs/scene.yaml"}))
+    with pytest.raises(InputError, match=r"theirs/scene\.yaml: its .*may not choose"):
+        settings("mine.yaml")
+    Path("mine.yaml").write_text(yaml.safe_dump(block))
+    assert settings("mine.yaml") == settings()
 
 
 @pytest.mark.parametrize("name", ["walk.npy", "./walk.npy", "walk.sigmf-meta"])
