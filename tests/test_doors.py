@@ -2,6 +2,7 @@
 asked, and one sentence in plain characters says why.
 """
 
+import functools
 import json
 import os
 import pickle
@@ -149,11 +150,17 @@ INPUTS = {
 }
 
 
+@functools.cache
+def tiny() -> dict:
+    """A whole configuration, which nobody changes."""
+    return overlaid(["config/tiny.yaml"])
+
+
 def attacked(doors: Path, attack: tuple[str, object]) -> dict:
     """A whole configuration with an attack in it, as a run's folder holds it."""
     key, value = attack
     value = json.loads(json.dumps(value).replace("{secret}", str(doors.parent / "secret")))
-    whole = with_key(overlaid(["config/tiny.yaml"]), key, value)
+    whole = with_key(tiny(), key, value)
     if key == "motion.track":
         whole = with_key(whole, "motion.looks", 2)
     return whole
