@@ -49,7 +49,7 @@ EDITS = {
     ),
     "a function that is not compiled": (
         "echo/fast/polynomials.py",
-        "nodes = min(count, 32)",
+        "nodes = min(count, MOST_RATES)",
         "nodes = 31",
         [0, 0],
     ),

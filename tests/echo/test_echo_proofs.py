@@ -14,7 +14,7 @@ import pointwise_echo
 from lowalt.config.network import Station
 from lowalt.echo import Rigid, api, echo_signal, refine
 from lowalt.echo.fast import error_model
-from lowalt.echo.fast.cell_kernel import PLACES
+from lowalt.echo.fast.cell_kernel import POSITIONS
 from lowalt.echo.fast.error_model import echo_plan, pointwise_bound
 from lowalt.echo.fast.range_bounds import (
     END,
@@ -190,7 +190,7 @@ def test_roundings_of_higher_moments_count_with_the_points_distances_from_the_pl
     motion = cloud_in_motion(np.random.default_rng(2), 1, 30, (200.0, 90.0, 60.0), 0.3)
     cells = np.linalg.norm(positions(motion)[0] - SEEN.position_m, axis=1) / NET.cell_m
     centre = np.linalg.norm(motion.translation[0, 0] - SEEN.position_m) / NET.cell_m
-    v = (cells - np.rint(centre * PLACES) / PLACES) / halves[0].half
+    v = (cells - np.rint(centre * POSITIONS) / POSITIONS) / halves[0].half
     assert second / total == pytest.approx(np.average(v**2, weights=cells**-2.0), rel=0.01, abs=0)
     assert mixed / total == pytest.approx(np.sqrt(second / total), rel=1e-6, abs=0)
 

@@ -36,8 +36,11 @@ SAME_UNIT = 1e-6
 
 @dataclass(frozen=True)
 class Mesh(Surface):
-    """A repaired surface in metres along the file's axes: `component` (F,) the number of each
-    face's connected component, `closed` (C,) whether it is watertight."""
+    """A repaired surface in metres along the file's axes.
+
+    component: (F,) the number of each face's connected component; closed: (C,) whether it is
+    watertight.
+    """
 
     component: np.ndarray
     closed: np.ndarray
@@ -46,18 +49,20 @@ class Mesh(Surface):
 def joined(meshes: list[Mesh]) -> Mesh:
     """Return several meshes as one, components numbered on."""
     whole = merged(meshes)
-    first = np.cumsum([0] + [len(mesh.closed) for mesh in meshes[:-1]])
-    component = np.concatenate(
-        [mesh.component + start for mesh, start in zip(meshes, first, strict=True)]
-    )
-    return Mesh(
-        whole.vertices, whole.faces, component, np.concatenate([mesh.closed for mesh in meshes])
-    )
+    components = []
+    first = 0
+    for mesh in meshes:
+        components.append(mesh.component + first)
+        first += len(mesh.closed)
+    closed = np.concatenate([mesh.closed for mesh in meshes])
+    return Mesh(whole.vertices, whole.faces, np.concatenate(components), closed)
 
 
 def metres(unit: str | float) -> float:
     """Return the metres of a unit: one of UNITS_M by name, or the metres themselves."""
-    return UNITS_M[unit] if isinstance(unit, str) else float(unit)
+    if isinstance(unit, str):
+        return UNITS_M[unit]
+    return float(unit)
 
 
 def stated_unit_m(path: Path) -> float | None:
@@ -102,7 +107,9 @@ def _added(suffix: str) -> ModuleType | None:
     from lowalt.config.extensions import module_offered, offered
 
     readers = offered("meshes")
-    return module_offered("meshes", suffix, readers[suffix]) if suffix in readers else None
+    if suffix not in readers:
+        return None
+    return module_offered("meshes", suffix, readers[suffix])
 
 
 def _scene(path: Path) -> list[Piece]:
@@ -128,8 +135,10 @@ def _scene(path: Path) -> list[Piece]:
             continue
         # trimesh numbers the surfaces of one geometry.
         known = [key for key in names if re.fullmatch(re.escape(key) + r"(_\d+)?", name)]
-        more = names[known[0]] if known else []
-        chosen_by = tuple(dict.fromkeys((str(node), name, *more)))
+        chosen_by = [str(node), name]
+        if known:
+            chosen_by += names[known[0]]
+        chosen_by = tuple(dict.fromkeys(chosen_by))
         piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), chosen_by)
         # Values that are not finite are refused later, by name.
         with np.errstate(invalid="ignore"):
@@ -144,6 +153,7 @@ def _refuse_truncated(path: Path) -> None:
     """
     with path.open("rb") as file:
         head = file.read(1000)
+    # A binary STL has 80 bytes of text, the number of triangles in four, and 50 of each triangle.
     stated = int.from_bytes(head[80:84], "little")
     there = (path.stat().st_size - 84) // 50
     is_text = head.startswith(b"solid") and b"facet" in head
@@ -261,14 +271,14 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     a, b, c = np.moveaxis(vertices[faces] - middle, 1, 0)
     volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=len(closed))
     inverted = closed & (volume < 0)
-    return Mesh(
-        vertices, np.where(inverted[component][:, None], faces[:, ::-1], faces), component, closed
-    )
+    outward = np.where(inverted[component][:, None], faces[:, ::-1], faces)
+    return Mesh(vertices, outward, component, closed)
 
 
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
-    """Return the repaired mesh of a file of a format in `suffixes`, in metres along the file's own
-    axes.
+    """Return the repaired mesh of a file of a format in `suffixes`.
+
+    In metres along the file's own axes.
 
     `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry`
     the names of the scene's geometries, instances, objects or groups to take (all by default). Open
@@ -286,11 +296,10 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     faces = np.asarray(whole.faces, np.int64)
     stated = stated_unit_m(path)
     if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
-        text = (
+        warn(
             f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record "
             "is followed"
         )
-        warn(text)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
     # One mark per vertex: a copy of millions of corners would double the memory.

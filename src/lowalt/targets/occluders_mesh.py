@@ -1,5 +1,6 @@
-"""The surfaces of a user's mesh, part by part, as its cloud has them: cut, turned, scaled and
-simplified.
+"""The surfaces of a user's mesh, part by part, as its cloud has them.
+
+Cut, turned, scaled and simplified.
 
 The cloud's own steps cut the mesh; where they take a part's samples, here they take its triangles.
 """
@@ -20,8 +21,9 @@ TRIANGLES = 1500
 
 
 def _pool(mesh: Mesh, regions: list[dict]) -> Pool:
-    """Return a mesh as a pool of one sample per triangle, at its centre; its corners (F, 9) take
-    the place of normals.
+    """Return a mesh as a pool of one sample per triangle, at its centre.
+
+    The triangle's corners (F, 9) take the place of normals.
 
     Large triangles are divided first where `regions` cut through them, so that their middles say
     where they are.
@@ -48,8 +50,9 @@ def _wheel(diameter: float, width: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _triangles(record: dict, inputs: Path) -> dict[str, np.ndarray]:
-    """Triangles (F, 3, 3) of every part in body axes and the mesh's own size; a triangle goes where
-    its middle is.
+    """Triangles (F, 3, 3) of every part in body axes and the mesh's own size.
+
+    A triangle goes where its middle is.
     """
     frame = body_axes(record["front"], record["up"])
     parts = record["parts"]
@@ -65,8 +68,9 @@ def _triangles(record: dict, inputs: Path) -> dict[str, np.ndarray]:
 
 
 def simplified(triangles: np.ndarray, most: int) -> Surface:
-    """Return triangles (F, 3, 3) as a surface of at most about `most`, by quadric edge collapse
-    (Garland 1997).
+    """Return triangles (F, 3, 3) as a surface of at most about `most`.
+
+    By quadric edge collapse (Garland 1997).
     """
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = index.reshape(-1, 3)
@@ -97,8 +101,9 @@ def deviation_m(surface: Surface, points: np.ndarray) -> np.ndarray:
 def mesh_surfaces(
     record: dict, inputs: Path, seed: int
 ) -> tuple[list[Surface], np.ndarray, np.ndarray]:
-    """Return one surface a part in the cloud's axes, how far (L,) m each point lies off, and that
-    none is closed.
+    """Return one surface a part in the cloud's axes, each point's distance (L,) m, and closedness.
+
+    No surface is closed.
 
     `record` is a merged record that `mesh_record.check_record` has passed.
     Raises: InputError naming the file or the part and the reason.

@@ -1,5 +1,4 @@
-"""The 31 nodes of a pedestrian: their names, the parent of each, and forward kinematics; limbs
-whose feet are known.
+"""The 31 nodes of a pedestrian: their names, parents and forward kinematics; limbs to known feet.
 
 Shared by recordings (`mocap`) and the built-in gait (`gait`), so that both give the same cloud. A
 node is the far end of the bone that carries its name, as in the CMU skeleton files. `cyclist` and

@@ -1,3 +1,4 @@
-"""Double-double numbers: constants, arithmetic and sines that give the same bits on every
-processor.
+"""Double-double numbers.
+
+Constants, arithmetic and sines that give the same bits on every processor.
 """
