@@ -166,7 +166,7 @@ def test_a_target_turns_to_climb_the_other_way_while_it_can_still_go_on_for_a_lo
             "yaw_rad": 0.0,
         }
         path = drawn_path(rng, row | {"vz_mps": rng.uniform(-1, 1)}, cell, (40.0, 46.0), 30, 1.0)
-        ahead = path.place_m[:, 2] + path.velocity_mps[:, 2]
+        ahead = path.position_m[:, 2] + path.velocity_mps[:, 2]
         assert ahead.min() >= 40 and ahead.max() <= 46
 
 

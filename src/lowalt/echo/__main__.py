@@ -1,6 +1,6 @@
 """Command line of the echo stage: a chunk's motion table and clouds -> clean signals.
 
-One file per station.
+It writes one file per station.
 """
 
 import sys

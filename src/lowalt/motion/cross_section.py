@@ -19,7 +19,7 @@ TILT_DEG = 20.0
 SEEN_FROM_DEG = {True: (-20.0, 0.0), False: (3.0, 10.0)}
 """Elevations of a station seen from a target in the air (True) and on the ground.
 
-Most of those of config/default.yaml, masts of 25 m.
+They are most of those of config/default.yaml, masts of 25 m.
 """
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73)
 

@@ -1,6 +1,6 @@
 """Poses: position and orientation of each rigid part at each symbol.
 
-In closed form from the initial pose.
+They follow in closed form from the initial pose.
 
 Angles are beta_0 + 2 pi F t instead of products of many small rotations, so errors do not
 accumulate. All poses have the same bits on every processor: sines and products are those of

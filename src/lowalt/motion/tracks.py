@@ -180,7 +180,7 @@ def rows_along(
 ) -> list[dict]:
     """Return the rows of a track's looks: `row` moved along `path`.
 
-    The target's own motion going on.
+    The target's own motion goes on.
 
     cadence: as of `follow_speed`, for a path of changing speed; None where the row's speed is the
     path's.
@@ -208,7 +208,7 @@ def rows_along(
 def _cubic(path: LookStarts, look_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Acceleration at the start of each look, and its rate of change, (L, 3) both.
 
-    The cubic between its ends.
+    They are those of the cubic between its ends.
     """
     way = np.diff(path.position_m, axis=0)
     first = path.velocity_mps[:-1]

@@ -1,4 +1,4 @@
 """Numbers whose bits are the same on every processor.
 
-Elementary functions, exact sums, random draws.
+They come from elementary functions, exact sums and random draws.
 """

@@ -1,6 +1,7 @@
 """Chebyshev series.
 
-How many terms a wave needs, points, interpolation, a band of waves, and a smooth function.
+The module says how many terms a wave needs; it has points, interpolation, a band of waves, and a
+smooth function.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,6 @@
 """Large real matrices in a written order of operations, compiled.
 
-Products, triangular roots and principal axes.
+There are products, triangular roots and principal axes.
 
 A BLAS chooses its kernels, and with them the order of its sums, by the processor. These loops add
 each sum from the first term on and take half to twice the time.

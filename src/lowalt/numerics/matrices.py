@@ -1,6 +1,6 @@
 """3 x 3 matrices in portable operations.
 
-The axis of least variance of vectors, and the nearest rotations.
+They give the axis of least variance of vectors, and the nearest rotations.
 """
 
 import numpy as np

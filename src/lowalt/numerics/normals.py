@@ -1,6 +1,6 @@
 """Complex normal numbers from raw random words, compiled.
 
-The bits of `lowalt.numerics.draws` in less time.
+The bits are those of `lowalt.numerics.draws`, in less time.
 
 Only additions, products, divisions, square roots and comparisons of float64 are used, in a fixed
 order and never fused. No divisor can be zero; without a check for zero the compiler vectorises
@@ -150,7 +150,7 @@ def interleaved(words: np.ndarray) -> np.ndarray:
 def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
     """Return complex normals from raw words (2 N,) uint64 as (2, N) float64.
 
-    Real and imaginary parts.
+    The rows are real and imaginary parts.
 
     Each part has mean 0 and standard deviation `scale`; the k-th number is `scale` times draws 2 k
     and 2 k + 1 of `Draws.standard_normal` on the same words.

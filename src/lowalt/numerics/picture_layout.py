@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 DIGITS = 6
 """Decimal places of a position relative to its figure.
 
-A thousandth of a pixel for a figure of 1000 pixels.
+They are a thousandth of a pixel for a figure of 1000 pixels.
 """
 
 

@@ -231,7 +231,7 @@ def mean(values: np.ndarray, axis: int = -1) -> np.ndarray:
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the sum over the last axis of a b.
 
-    Added from the first product on; other axes broadcast.
+    Products are added from the first one on; other axes broadcast.
     """
     a = np.asarray(a, np.float64)
     b = np.asarray(b, np.float64)
@@ -249,7 +249,7 @@ def norm(vectors: np.ndarray) -> np.ndarray:
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the matrix product of (..., I, K) and (..., K, J): (..., I, J).
 
-    Added from the first k on.
+    Products are added from the first k on.
     """
     a = np.asarray(a, np.float64)
     b = np.asarray(b, np.float64)

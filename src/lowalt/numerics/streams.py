@@ -42,7 +42,7 @@ def digest(seed: int, purpose: str, *keys: Key) -> bytes:
 def stream(seed: int, purpose: str, *keys: Key) -> Draws:
     """Return the generator of the stream (seed, purpose, *keys).
 
-    NumPy's PCG64 seeded by SHA-256, read by `Draws`.
+    It is NumPy's PCG64 seeded by SHA-256, read by `Draws`.
 
     Raises: TypeError for a key that is no str, int or float.
     Source: NumPy's SeedSequence takes entropy of any size; with 256 bits, two equal streams do not

@@ -29,7 +29,7 @@ NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED), *ADDED)
 TIMES = "times"
 """Key of the block `spectra` that is not a spectrum.
 
-Whether spectra use the instants of received symbols.
+It says whether spectra use the instants of received symbols.
 """
 INSTANTS = ("even", "known")
 
@@ -142,7 +142,7 @@ class Spectra(Mapping[str, Any]):
     def check(self, symbols: int, stations: int = 1, subcarriers: int | None = None) -> None:
         """Refuse signals that are too short for a window.
 
-        Spectra of gigabytes, and more range cells than the band has.
+        Spectra of gigabytes, and more range cells than the band has, are refused, too.
 
         Raises: InputError naming the spectrum whose window is no shorter than the signal, or that
         is too large.

@@ -14,7 +14,7 @@ from lowalt.spectra.catalogue import Spectra, spectrum
 def vrp(signals: np.ndarray, settings: Spectra | None = None) -> np.ndarray:
     """Return the velocity-resolution-preferred spectrum.
 
-    (..., symbols) -> (..., 256, 144) by default.
+    By default (..., symbols) becomes (..., 256, 144).
 
     Raises: InputError where the signal is no longer than the window or is not finite.
     Source: paper, Eq. 28.

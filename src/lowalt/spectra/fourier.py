@@ -1,6 +1,6 @@
 """Short-time Fourier spectra: the functions that VRP and TRP share.
 
-Which differ only in their settings.
+They differ only in their settings.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ ZERO_FIRST = True
 def segments(signals: np.ndarray, window: int, hop: int, name: str, extra: int = 0) -> np.ndarray:
     """Return segments of `window + extra` symbols, one per window, complex128.
 
-    Shape (..., windows, window + extra).
+    Their shape is (..., windows, window + extra).
 
     Raises: InputError naming the spectrum where the signal is no longer than the window or is not
     finite.

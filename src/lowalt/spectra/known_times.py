@@ -15,16 +15,15 @@ import numpy as np
 
 SOURCE = (
     "N. R. Lomb, Astrophys. Space Sci. 39, 1976; P. Stoica, J. Li, H. He, Spectral analysis of "
-    "nonuniformly sampled "
-    "data: a new approach versus the periodogram, IEEE Trans. Signal Process. 57(3), 2009 (least "
-    "squares of one line)"
+    "nonuniformly sampled data: a new approach versus the periodogram, IEEE Trans. Signal Process. "
+    "57(3), 2009 (least squares of one line)"
 )
 
 
 def received(signal: np.ndarray) -> np.ndarray:
     """Return which symbols of a signal (N,) were received, (N,) bool.
 
-    Those that are not exactly zero.
+    They are those that are not exactly zero.
     """
     return signal != 0
 

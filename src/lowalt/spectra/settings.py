@@ -124,7 +124,7 @@ class Doppler:
 def windows(symbols: int, window: int, hop: int, name: str) -> int:
     """Return the number of windows, floor((N - L) / hop).
 
-    One fewer than the usual count, as published.
+    It is one fewer than the usual count, as published.
 
     Raises: InputError naming the spectrum where the signal is no longer than the window.
     Source: paper, section IV-B (G), and IV-E (G_transfer).

@@ -1,6 +1,6 @@
 """From a model's parts, each a set of closed shells, to a calibration point cloud.
 
-Of an exact count of points.
+The cloud has an exact count of points.
 
 Allotment of points over parts (the rule, also in the cloud's record):
 the moving parts of a model share `moving_share` of the points between them, by their weights, each

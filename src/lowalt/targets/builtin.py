@@ -1,6 +1,6 @@
 """Built-in models: the check of a record's figures with their units and sources.
 
-And the step to its cloud.
+The module also makes a record's cloud.
 """
 
 import hashlib

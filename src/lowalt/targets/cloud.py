@@ -1,6 +1,6 @@
 """The calibration point cloud (CPC): the one file that passes from targets to motion.
 
-And what it must hold.
+The module says what it must hold.
 
 A cloud is a NumPy archive (.npz): it keeps float64 exactly, holds several arrays of different shape
 in one file, and NumPy, MATLAB (scipy.io) and Julia open it without our code. Frame: metres,
@@ -42,7 +42,7 @@ KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
 """Most rotors or wheels of a cloud, each with a phase of its own.
 
-(EH216-S flown as coaxial pairs has 16 rotors).
+EH216-S, flown as coaxial pairs, has 16 rotors.
 """
 
 LARGEST_RATE_FACTOR = 100
@@ -50,7 +50,7 @@ LARGEST_M = 1e3
 LARGEST_RCS_M2 = 1e9
 """Bounds of coordinates and cross sections.
 
-Far more than any target has, and far less than what overflows.
+They are far more than any target has, and far less than what overflows.
 """
 
 
@@ -89,7 +89,7 @@ class Cloud:
     def rate_factors(self) -> np.ndarray:
         """Rate of each part (P,) divided by the rate of its motion model.
 
-        1 unless the record states it.
+        It is 1 unless the record states it.
         """
         factors = self.record.get("rate_factors", {})
         return np.array([float(factors.get(name, 1.0)) for name in self.names])
@@ -119,7 +119,7 @@ def _near(positions: np.ndarray) -> bool:
 def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
     """Return whether each array has its shape and numbers in range.
 
-    And otherwise the fault in words.
+    The text of each pair states the fault.
     """
     count = len(cloud.points)
     parts = len(cloud.kinds)
@@ -154,7 +154,7 @@ def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
     """Return whether name, kind, parent, hinge and axis of each part are right.
 
-    And otherwise the fault in words.
+    The text of each pair states the fault.
     """
     count = len(cloud.kinds)
     unique = len(set(cloud.names)) == count == len(cloud.names)
@@ -179,7 +179,7 @@ def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
 def _facts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
     """Return whether the record has all required keys and a track fits its nodes.
 
-    And otherwise the fault in words.
+    The text of each pair states the fault.
     """
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     yield not missing, f"record lacks {sorted(missing)}"

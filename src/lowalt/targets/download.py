@@ -32,7 +32,7 @@ The known copy of 07_12.amc ends within its last frame, frame 245.
 def checksum(name: str, path: Path) -> str:
     """Return the SHA-256 (64 hexadecimal digits) of a recording's file.
 
-    As it is pinned: line ends as LF, and only the bytes that are pinned.
+    It is that of the file as it is pinned: line ends as LF, and only the bytes that are pinned.
     """
     content = path.read_bytes().replace(b"\r\n", b"\n")
     return hashlib.sha256(content[: PINNED_BYTES.get(name)]).hexdigest()

@@ -1,6 +1,6 @@
 """The built-in pedestrian: a parametric walk or run that drives the 31 nodes.
 
-Where no recording is given.
+It stands in where no recording is given.
 
 The modules `cyclist` and `quadruped` make a cyclist and a dog in the same way, from nodes of their
 own. This module holds the human body: the lengths of its segments, the rotations of its bones by

@@ -60,7 +60,7 @@ def arm(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
     """Return the trunk's rotations (rad) by name, as `gait_walk.trunk` does.
 
-    Each shaped like `phase`.
+    Each is shaped like `phase`.
     """
     swing = sine_cosine_turns(phase)[1]
     angles = {
@@ -75,7 +75,7 @@ def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
 def shift_m(phase: np.ndarray) -> np.ndarray:
     """Return the root's periodic translation (..., 3) in metres.
 
-    Lowest in each mid-stance, highest in flight.
+    It is lowest in each mid-stance, highest in flight.
     """
     up = -BOB_M * sine_cosine_turns(2 * np.asarray(phase) - SUPPORT)[1]
     return np.stack([np.zeros_like(up), np.zeros_like(up), up], axis=-1)

@@ -23,7 +23,7 @@ DIRECTIONS = {
 }
 """The viewer's azimuth, from the front towards the right, and elevation (degrees).
 
-Chosen for each category.
+They are chosen for each category.
 """
 
 BODY_COLOUR = "#52525b"
@@ -71,7 +71,7 @@ def shown(cloud: Cloud) -> np.ndarray:
 def colours(cloud: Cloud) -> np.ndarray:
     """Return the RGBA colour of each point (L, 4).
 
-    Grey for the body, one of PART_COLOURS for each other part.
+    It is grey for the body, one of PART_COLOURS for each other part.
 
     Points that face away from the viewer are faint.
     """

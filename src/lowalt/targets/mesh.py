@@ -1,6 +1,6 @@
 """Turn a user's mesh into a calibration point cloud.
 
-Load, repair, cut into parts, scale to the published size, thin.
+It is loaded, repaired, cut into parts, scaled to the published size and thinned.
 
 These are the steps of the paper's Fig. 4. `mesh_files` reads files, `mesh_parts` cuts parts,
 `mesh_record` checks records and `mesh_size` scales; this module calls them in order and thins each
@@ -34,7 +34,7 @@ __all__ = ["check_record", "mesh_cloud"]
 DENSE = 200
 """Number of dense surface samples per point of the cloud.
 
-Before regions are cut out and the rest is thinned.
+They are counted before regions are cut out and the rest is thinned.
 """
 
 THINNED = 25

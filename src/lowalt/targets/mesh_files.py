@@ -278,7 +278,7 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
 def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
     """Return the repaired mesh of a file of a format in `suffixes`.
 
-    In metres along the file's own axes.
+    It is in metres along the file's own axes.
 
     `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry`
     the names of the scene's geometries, instances, objects or groups to take (all by default). Open

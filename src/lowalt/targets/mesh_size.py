@@ -31,7 +31,7 @@ ROUND = 1.1
 OFF_HUB = 1.0
 """Largest distance between a rotor's hub and the middle of its surface.
 
-As a share of the rotor's largest extent: that of a single blade without its hub.
+It is a share of the rotor's largest extent: that of a single blade without its hub.
 """
 FEWEST_WHEELS = 3
 OFF_MIDDLE = 0.1

@@ -23,7 +23,7 @@ FROM_FILE = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 FADE_S = 0.15
 """Length of the cross-fade that closes a cycle.
 
-About a quarter of a step, at most a sixth of the recording.
+It is about a quarter of a step, at most a sixth of the recording.
 """
 
 SHORTEST_S = 0.5
@@ -65,7 +65,7 @@ class Motion:
 def _euler(angles_rad: np.ndarray) -> np.ndarray:
     """Return rotations (..., 3, 3) for angles (..., 3).
 
-    About x first, then y, then z (ASF's order XYZ).
+    They turn about x first, then y, then z (ASF's order XYZ).
     """
     x, y, z = np.moveaxis(np.asarray(angles_rad, float), -1, 0)
     return product(product(rotation("z", z), rotation("y", y)), rotation("x", x))

@@ -1,6 +1,6 @@
 """Command line of an extra product of the stage: a target's opaque surfaces.
 
-For scenes with self-occlusion.
+It is for scenes with self-occlusion.
 
 A target with a surface is stored as triangles, whose vertices move with their part. A recording has
 nodes without surfaces, so it is stored as capsules along its bones. Built-in shapes keep all their
@@ -66,7 +66,7 @@ men's means, rounded; torso: mean of half breadth and half depth.
 def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
     """Return a surface without its triangles inside the convex `cuts`.
 
-    Divided finely along their borders.
+    Triangles are divided finely along the borders of the cuts.
     """
     corners = surface.vertices[surface.faces]
     grain = np.ptp(surface.vertices, axis=0).max() / GRAIN
@@ -118,7 +118,7 @@ def from_surfaces(
 def from_bones(stature_m: float) -> dict[str, np.ndarray]:
     """Return the arrays of a pedestrian's capsules: one along each bone.
 
-    Its radius scaled with the stature.
+    Its radius is scaled with the stature.
     """
     nodes = range(1, len(NODES))
     radii = [RADII_M[name] if name in RADII_M else RADII_M[name[1:]] for name in NODES[1:]]

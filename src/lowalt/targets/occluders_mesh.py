@@ -1,6 +1,6 @@
 """The surfaces of a user's mesh, part by part, as its cloud has them.
 
-Cut, turned, scaled and simplified.
+They are cut, turned, scaled and simplified.
 
 The cloud's own steps cut the mesh; where they take a part's samples, here they take its triangles.
 """
@@ -70,7 +70,7 @@ def _triangles(record: dict, inputs: Path) -> dict[str, np.ndarray]:
 def simplified(triangles: np.ndarray, most: int) -> Surface:
     """Return triangles (F, 3, 3) as a surface of at most about `most`.
 
-    By quadric edge collapse (Garland 1997).
+    This is quadric edge collapse (Garland 1997).
     """
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = index.reshape(-1, 3)

@@ -233,7 +233,7 @@ def merge(row: dict, record: dict, where: str) -> dict:
 def _check_like(merged: dict, where: str) -> None:
     """Refuse a record without a published class that it is like.
 
-    Or whose row lacks the speeds of that class.
+    Or one whose row lacks the speeds of that class.
     """
     try:
         kind = like(merged)

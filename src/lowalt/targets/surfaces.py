@@ -18,7 +18,7 @@ from lowalt.numerics import portable
 GRAIN = 30
 """Triangles across the border of a cut are divided.
 
-Until their edges are shorter than the part's extent / GRAIN.
+Their edges are then shorter than the part's extent / GRAIN.
 """
 
 
@@ -258,7 +258,7 @@ def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
 def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
     """Return a wing or blade along +x from stations (x, y, z, chord, twist).
 
-    Airfoil sections, closed ends.
+    Sections are airfoils, and the ends are closed.
 
     (x, y, z) is the quarter-chord point, the chord lies along y (leading edge at +y), a positive
     twist (rad) raises the leading edge.

@@ -252,7 +252,7 @@ LAYOUTS = {
 def parts(record: dict) -> tuple[list[Part], dict]:
     """Return the parts of the craft that a merged record describes.
 
-    And the entries for its cloud's record (none).
+    The entries for its cloud's record, of which there are none, come second.
     """
     layout = LAYOUTS[record["model"]]
     return layout(record, figures_si(record)), {}

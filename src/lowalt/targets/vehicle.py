@@ -156,7 +156,7 @@ def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
 def parts(record: dict) -> tuple[list[Part], dict]:
     """Return the parts of the car that a merged record describes.
 
-    And the entries for its cloud's record.
+    The entries for its cloud's record come second.
 
     The entries are `wheel_diameter_m`, which sets the wheels' rate, and `origin_height_m`, the
     height of the origin above the ground on which the wheels stand.

@@ -1,6 +1,6 @@
 """The cubes of samples: the range cells of every symbol with noise.
 
-Before the receiver chooses one of them.
+They are those before the receiver chooses one of them.
 
 The scene's canceller, if any, has already been applied.
 """
@@ -61,7 +61,7 @@ class Cubes:
     ) -> None:
         """Take the scene, clouds by subtype and each subtype's surfaces.
 
-        Where the scene hides points behind them.
+        They are needed where the scene hides points behind them.
 
         every_cell: whether noise at the samples' SNRs is an effect of the scene
         (`set_noise.in_all_cells`); empty: whether the targets reflect nothing, so that noise and

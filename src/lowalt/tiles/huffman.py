@@ -91,7 +91,7 @@ def _count(data, words):
 def _put(out, state, code, length):
     """Append `length` bits, at most 60, without a branch.
 
-    State: word being filled, bits in it, its number.
+    state: word being filled, bits in it, its number.
     """
     word = state[0]
     bits = state[1]

@@ -67,7 +67,7 @@ def _depths(weights, order, nodes):
 def code_lengths(counts, longest):
     """Lengths of a Huffman code for `counts`, at most `longest` bits.
 
-    0 for symbols that do not occur.
+    They are 0 for symbols that do not occur.
 
     Ties go to the lower symbol. Where the best code is too long, counts are halved until it fits.
     """

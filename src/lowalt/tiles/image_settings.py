@@ -1,6 +1,6 @@
 """The settings of an image (the configuration's `images` block).
 
-Size, amplitude scale and colour map.
+They are size, amplitude scale and colour map.
 """
 
 from dataclasses import dataclass, field

@@ -43,7 +43,7 @@ def _chunk(name: bytes, body: bytes) -> bytes:
 def apply_paeth(image, out):
     """Filter image (H, W) uint8 into out (H, W + 1) uint8.
 
-    Filter type 4, then pixel minus Paeth predictor.
+    Filter type 4 is the pixel minus the Paeth predictor.
 
     Source: PNG specification (W3C, third edition), section 9.
     """
@@ -136,7 +136,7 @@ def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
 def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Return index image (H, W) uint8 and palette (256, 3) uint8 of a palette PNG.
 
-    Whoever wrote it.
+    It does not matter who wrote it.
 
     Raises: InputError where the bytes are no 8-bit palette PNG or are damaged.
     """

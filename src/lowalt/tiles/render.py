@@ -223,7 +223,7 @@ class Renderer:
     ) -> None:
         """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,).
 
-        Late: as in `values`.
+        late: as in `values`.
         """
         self.values(signal, station, name, self._image, late)
         index_image(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
@@ -249,7 +249,7 @@ class Renderer:
     ) -> np.ndarray:
         """Return the tile of one sample.
 
-        (stations, symbols) complex64 -> (stations S, spectra S) uint8.
+        signals: (stations, symbols) complex64; the tile is (stations S, spectra S) uint8.
 
         late: (stations, symbols), as in `values`, None for symbols on time; cubes: a cube a
         station, where spectra are made of range cells.
@@ -305,7 +305,7 @@ def _of_station(late: np.ndarray | None, station: int) -> np.ndarray | None:
 def normalised(signal: np.ndarray) -> np.ndarray:
     """Return a signal of any shape as complex64.
 
-    Divided by the power of two that brings it just below 1.
+    It is divided by the power of two that brings it just below 1.
     """
     signal = np.asarray(signal)
     largest = max(np.abs(signal.real).max(), np.abs(signal.imag).max())
@@ -326,7 +326,7 @@ def levels(name: str) -> int:
 def split(tile: np.ndarray, spectra: int) -> np.ndarray:
     """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S).
 
-    Station by station.
+    They come station by station.
 
     Raises: InputError where the tile is not made of rows of so many squares.
     """

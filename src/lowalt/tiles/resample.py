@@ -1,6 +1,6 @@
 """The resampling kernel of the project: a triangle.
 
-With one formula for shrinking and for enlarging.
+One formula serves shrinking and enlarging.
 
 Sample i of n is at i + 1/2, output j of m at (j + 1/2) n / m. The weight of sample i in output j is
     max(0, 1 - |i + 1/2 - (j + 1/2) n / m| / max(1, n / m)),
@@ -103,7 +103,7 @@ def along_rows(values, columns, shares, out):
 def across_rows(values, source, weights, out):
     """The first axis: values (points, n) -> out (S, n).
 
-    Source, weights: (S, taps), summed in order.
+    source, weights: (S, taps), summed in order.
     """
     for j in range(out.shape[0]):
         line = out[j]

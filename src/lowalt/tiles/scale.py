@@ -1,6 +1,6 @@
 """Maps amplitudes to 256 index values.
 
-The scale as a list of thresholds, and lookup tables for them.
+The scale is a list of thresholds, for which there are lookup tables.
 
 With x = value / the image's own largest |value|, and y = f(x) in [0, 1],
     linear   y = x

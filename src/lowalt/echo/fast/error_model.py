@@ -53,7 +53,7 @@ Longer sums exceed a tolerance of 1e-4.
 SINGLE_ERROR = 400 * 2.0**-24
 """Error bound of float32 after the phase reduction.
 
-Float32 is not used if a smaller error is required.
+The type float32 is not used if a smaller error is required.
 """
 
 
@@ -68,7 +68,7 @@ def array_gains(radar: Radar) -> ArrayGains:
 def round_up(value: float, steps: int = 2) -> float:
     """Return `value` rounded up to one of `steps` values an octave.
 
-    So that few polynomials serve all samples.
+    Few polynomials then serve all samples.
     """
     return 2.0 ** (math.ceil(steps * math.log2(max(value, 1e-9))) / steps)
 

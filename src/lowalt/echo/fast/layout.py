@@ -1,6 +1,6 @@
 """Memory layout of the points for the fast kernel.
 
-Sorted by part, one array per coordinate, padded to full vectors.
+They are sorted by part, one array per coordinate, padded to full vectors.
 """
 
 import math
@@ -69,7 +69,7 @@ class EchoSample(NamedTuple):
 def _group(points, part, share, strip, coordinates, groups):
     """Copy the points by coordinate, split them into groups within one part.
 
-    And return the number of groups.
+    Returns the number of groups.
     """
     x, y, z = coordinates
     starts = groups.starts

@@ -10,13 +10,13 @@ from lowalt.machine.jit import LEAN
 PSI, OMEGA, SPREAD, SIZE, MEAN = range(5)
 """Columns of the table of extents.
 
-Two direction cosines of the reference; the largest distance of a point from the reference, relative
-to the range and in metres; and a bound of the amplitude-weighted mean distance (m).
+They are two direction cosines of the reference; the largest distance of a point from the reference,
+relative to the range and in metres; and a bound of the amplitude-weighted mean distance (m).
 """
 START, END, PSI_CENTRE, PSI_HALF, OMEGA_CENTRE, OMEGA_HALF = range(6)
 """Columns of the table of segments.
 
-First symbol, end, centre and half-width of the points' direction cosines.
+They are the first symbol, the end, and centre and half-width of the points' direction cosines.
 """
 DRIFT = 1.0
 WIDER = 1.2

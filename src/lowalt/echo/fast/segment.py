@@ -102,7 +102,7 @@ def constants(sample, ref, segment, centre, half):
 def fill_offsets(sample, n, r, first, size, placing, offsets):
     """Fill the offsets with points first..first + size of symbol n.
 
-    Relative to the reference and over r_ref = r.
+    Offsets are relative to the reference and over r_ref = r.
     """
     rotation = sample.scene.rotation
     translation = sample.scene.translation

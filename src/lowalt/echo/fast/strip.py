@@ -18,8 +18,9 @@ MULTIPLE = 16
 STRIP_ROOM = STRIP + MULTIPLE + 8
 """Length of a work array.
 
-A strip plus room for a part's last group, which may write beyond it. It is not a power of two,
-because with arrays a multiple of 4096 bytes apart loads wait for unrelated stores (4K aliasing).
+It is a strip plus room for a part's last group, which may write beyond it. It is not a power of
+two, because with arrays a multiple of 4096 bytes apart loads wait for unrelated stores (4K
+aliasing).
 """
 
 

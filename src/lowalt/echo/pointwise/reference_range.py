@@ -16,8 +16,8 @@ from lowalt.numerics import double_double
 X, Y, Z, RANGE, TURN, CELL, REST = range(7)
 """Columns of the table of reference ranges.
 
-Vector from the station (m), range (m), fraction of a turn of its phase, nearest whole range cell,
-and the rest of the range in cells.
+They are the vector from the station (m), range (m), fraction of a turn of its phase, nearest whole
+range cell, and the rest of the range in cells.
 """
 
 two_sum = LEAN(double_double.two_sum)

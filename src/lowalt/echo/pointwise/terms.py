@@ -60,7 +60,7 @@ def dirichlet(x, count):
 def aim_cosines(aim, station, sine, cosine):
     """Return the direction cosines (horizontal, vertical) of the beams.
 
-    (Eq. 4 put into Psi and Omega).
+    They are Eq. 4 put into Psi and Omega. 4 put into Psi and Omega).
     """
     x = aim[0] - station[0]
     y = aim[1] - station[1]
@@ -154,7 +154,7 @@ def cell_weight(x, count):
 def cell_sum(z, u, j, count):
     """Return the sum of the points in the cell j cells after the reference's.
 
-    Without the cell's phase.
+    The cell's own phase is left out.
     """
     total = 0.0j
     for l in range(len(z)):  # noqa: E741

@@ -85,7 +85,7 @@ def compute_again(sample, symbols, found, work, bits):
 def same_double(x, error, bits):
     """Return whether all numbers within `error` of a double-double have the same nearest float32.
 
-    Bits: work array.
+    bits: work array.
     """
     # Rounding to double first could move both ends onto the tie between them.
     least, below = two_sum(x[0], x[1] - error)

@@ -18,8 +18,8 @@ constants_of = INLINED(constants)
 X, Y, Z, SIDE, UP, TURN, CELL, AMPLITUDE = range(0, 16, 2)
 """Rows of the work array (16, points), the low half in the row that follows.
 
-Vector from the station (m), half turns of array phase per element, horizontally and vertically,
-turns of phase, distance from the cell over M, and amplitude.
+They are the vector from the station (m), half turns of array phase per element, horizontally and
+vertically, turns of phase, distance from the cell over M, and amplitude.
 """
 ROWS = 16
 
@@ -66,7 +66,7 @@ def vectors(sample, n, work):
 def cosines(x, y, z, constants):
     """Return (range, its inverse, horizontal and vertical direction cosine).
 
-    Of a vector from the station (m).
+    They are those of a vector from the station (m).
     """
     r = root(add(add(multiply(x, x), multiply(y, y)), multiply(z, z)))
     inverse = divide((1.0, 0.0), r)
@@ -156,7 +156,7 @@ def wave(work, points):
 def phase_of(cell, count):
     """Return sine and cosine of a cell's own phase, exp(j pi (M - 1) m / M).
 
-    Reduced in whole numbers.
+    The phase is reduced in whole numbers.
     """
     half_turns = float((count - 1) * cell % (2 * count))
     return sine_cosine(divide((half_turns, 0.0), (2.0 * count, 0.0)))

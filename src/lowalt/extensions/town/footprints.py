@@ -155,8 +155,8 @@ def middle_of(path: Path, height_m: float | None) -> tuple[float, float]:
         found, _, _ = _footprints(path, height_m is not None)
         if not found:
             raise InputError(
-                f"{path}: has no building, expected polygons with the key building or height, "
-                "or --height, with which polygons without a tag of buildings are read as well"
+                f"{path}: has no building, expected polygons with the key building or height, or "
+                "--height, with which polygons without a tag of buildings are read as well"
             )
         bounds = np.array([footprint.outline.bounds for footprint in found])
         low_x, low_y, high_x, high_y = bounds.T
@@ -242,8 +242,8 @@ def _heights(
     if missing:
         raise InputError(
             f"{path}: {len(missing)} of {len(footprints)} buildings have neither height nor "
-            f"building:levels that can be read, the first is {missing[0]}; "
-            "expected their height: --height, or effects.town.height_m of a scene"
+            f"building:levels that can be read, the first is {missing[0]}; expected their height: "
+            "--height, or effects.town.height_m of a scene"
         )
     if unread:
         which = f"heights that cannot be read{such_as(unread)}"

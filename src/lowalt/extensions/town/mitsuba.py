@@ -55,7 +55,8 @@ def _pose(shape: Element) -> np.ndarray:
                 matrix = _numbers(step, 16, 0.0).reshape(4, 4)
             else:
                 raise InputError(
-                    f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or matrix"
+                    f"a shape is placed by <{step.tag}>, expected translate, scale, rotate or "
+                    "matrix"
                 )
             result = matrix @ result
     return result

@@ -23,11 +23,9 @@ from lowalt.scene.view import View
 
 SOURCE = (
     "image method and Fresnel coefficients: Balanis, Advanced Engineering Electromagnetics, "
-    "sections 5.3 and 7.4; "
-    "materials: ITU-R P.2040-3, Table 3; diffraction: ITU-R P.526-15, sections 4.1 and 4.3, and "
-    "Deygout 1966; "
-    "rays per cell of 0.5 m: estimate, below the radius of the first Fresnel zone at 100 m and 4.9 "
-    "GHz"
+    "sections 5.3 and 7.4; materials: ITU-R P.2040-3, Table 3; diffraction: ITU-R P.526-15, "
+    "sections 4.1 and 4.3, and Deygout 1966; rays per cell of 0.5 m: estimate, below the radius of "
+    "the first Fresnel zone at 100 m and 4.9 GHz"
 )
 DEFAULTS = {
     "buildings": None,
@@ -80,9 +78,9 @@ def refuse_place(settings: dict, network: Network) -> None:
     nearest = min(away, key=away.__getitem__)
     if away[nearest] > NEAR_M:
         raise InputError(
-            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station {nearest}, "
-            f"expected at most {NEAR_M / 1000:g} km: set effects.town.origin, the place in the "
-            "file of x = y = 0"
+            f"{path}: the nearest building is {away[nearest] / 1000:.1f} km from station "
+            f"{nearest}, expected at most {NEAR_M / 1000:g} km: set effects.town.origin, the place "
+            "in the file of x = y = 0"
         )
     for name, mast in masts.items():
         top = np.array([mast[0], mast[1], high[2] + 1.0])

@@ -71,8 +71,8 @@ def described(path: Path, found: Buildings) -> list[str]:
         f"{path}: {facts['buildings']} buildings, {high_x - low_x:.0f} m x {high_y - low_y:.0f} m, "
         f"up to {top:.1f} m high",
         f"x from {low_x:.1f} to {high_x:.1f} m, y from {low_y:.1f} to {high_y:.1f} m",
-        f"{facts['walls']} walls and {facts['roofs']} roofs, "
-        f"merged from {facts['triangles']} triangles",
+        f"{facts['walls']} walls and {facts['roofs']} roofs, merged from {facts['triangles']} "
+        "triangles",
         f"materials (triangles): {used}; ground: {facts['ground']}",
     ]
     lines += [f"left out: {count} {reason}" for reason, count in facts["dropped"].items()]

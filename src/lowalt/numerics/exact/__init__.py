@@ -1,4 +1,4 @@
 """Double-double numbers.
 
-Constants, arithmetic and sines that give the same bits on every processor.
+Their constants, arithmetic and sines give the same bits on every processor.
 """

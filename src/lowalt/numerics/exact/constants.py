@@ -1,6 +1,6 @@
 """Constants as double-doubles, from exact fractions and long decimals.
 
-Pi, sines and Taylor coefficients.
+They are pi, sines and Taylor coefficients.
 """
 
 from decimal import Decimal, localcontext

@@ -14,7 +14,7 @@ from lowalt.numerics.exact.constants import taylor
 def _split(first: int, factor: int, exact: int, count: int) -> tuple[tuple, tuple, tuple]:
     """Return Taylor coefficients in reverse.
 
-    (high, low) of the first `exact`, and the others as doubles.
+    They are (high, low) of the first `exact`, and the others as doubles.
     """
     coefficients = taylor(first, factor, count)[::-1]
     high, low = zip(*coefficients[count - exact :], strict=True)
@@ -33,7 +33,7 @@ COSINE_HIGH, COSINE_LOW, COSINE_REST = _split(0, 2, 5, 11)
 def series(x, high, low, rest):
     """Return a sum of powers of the double-double x.
 
-    The lowest orders in double-double, the others in double.
+    The lowest orders are in double-double, the others in double.
     """
     total = rest[0]
     for k in range(1, len(rest)):

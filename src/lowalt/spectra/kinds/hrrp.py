@@ -36,7 +36,7 @@ def axes(
 ) -> tuple[tuple[str, float, float], ...]:
     """Return name, first and last value of the columns.
 
-    (time, s) and of the rows (range from the chosen cell, m).
+    Columns are time (s), rows range from the chosen cell (m).
     """
     reach = settings.cells // 2 * network.cell_m
     last = (network.symbols - settings.window) * network.symbol_interval_s

@@ -45,7 +45,7 @@ def axes(
 ) -> tuple[tuple[str, float, float], ...]:
     """Return name, first and last value of the columns.
 
-    (radial speed, m/s) and of the rows (range, m).
+    Columns are radial speed (m/s), rows range (m).
 
     Ranges count from the cell that the receiver chose in the middle of the look; speeds are
     positive away from the station, at the effective carrier.

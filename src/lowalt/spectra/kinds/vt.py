@@ -63,7 +63,7 @@ def tables(
 ) -> tuple[np.ndarray, ...]:
     """Return cosines and sines (speeds, window + 1) of the matched filters.
 
-    And the longer window's share (1,).
+    The longer window's share (1,) comes third.
     """
     length = settings.window
     steps = np.outer(settings.speeds_mps, np.arange(length + 1))
