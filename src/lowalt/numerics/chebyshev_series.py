@@ -27,7 +27,7 @@ ENOUGH = 1e-14
 SPARE = 24
 """Points of a wave's series beyond its terms.
 
-So that what is left of the series does not fold back into them.
+What is left of the series then does not fold back into them.
 """
 
 

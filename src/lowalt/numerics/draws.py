@@ -155,8 +155,7 @@ class Draws(np.random.Generator):
     def _shuffled(self, count: int, first: int) -> np.ndarray:
         """Return 0 .. count - 1 in random order, or with an unsorted tail alone.
 
-        Each position from the last one down to `first` is swapped with a random one not
-        above it.
+        Each position from the last one down to `first` is swapped with a random one not above it.
         """
         order = list(range(count))
         position = count - 1

@@ -207,10 +207,7 @@ class SceneSample:
         return response(view, paths, self.routes(view, paths), **self._waves)
 
     def _samples(self, view: View) -> np.ndarray:
-        """Time samples (N, M) of a target that moves within symbols.
-
-        Or of one whose echo is later than the cyclic prefix.
-        """
+        """Time samples (N, M) of a target that moves within symbols or beyond the prefix."""
         delays_s = np.zeros(1)
         weights = np.ones((1, self.scene.network.subcarriers))
         if instants := self.only("instants"):
@@ -329,8 +326,8 @@ class SceneSample:
     def moves_only(self) -> bool:
         """Whether the echo engine computes the sample.
 
-        It does for a station that sends and receives, with effects that change nothing but
-        the target's motion and its cross sections.
+        It does for a station that sends and receives, with effects that change nothing but the
+        target's motion and its cross sections.
         """
         if self.view.station.transmitter is not None:
             return False
@@ -384,8 +381,8 @@ class SceneSample:
     def observed(self, view: View) -> tuple[np.ndarray, np.ndarray]:
         """Return where the echo of the middle of a view's target appears on the direct path.
 
-        The result is the range cell (K,), with its fraction, at each received symbol, and
-        the folded speed (N,) m/s at each symbol.
+        The result is the range cell (K,), with its fraction, at each received symbol, and the
+        folded speed (N,) m/s at each symbol.
         """
         displacements = []
         for name, displaced in self.all("displaced").items():

@@ -57,7 +57,7 @@ class Scene:
     def at_snr(self, snr_db: float) -> "Scene":
         """Return the scene with noise in all range cells at this SNR (dB).
 
-        Without it, there is one for each of noise.snr_db.
+        In the scene itself noise is added at each of noise.snr_db.
         """
         changed = [effect.at_snr(snr_db) for effect in self.effects]
         return replace(self, effects=tuple(effect for effect in changed if not effect.idle))

@@ -157,8 +157,8 @@ def hidden_by_bones(
 
     nodes: (N, L, 3) m.
 
-    place_m: the station's position (3,). A capsule hides neither nodes inside it nor the ends
-    of its bone.
+    place_m: the station's position (3,). A capsule hides neither nodes inside it nor the ends of
+    its bone.
     """
     result = np.ascontiguousarray(hidden.T)
     apart = np.ascontiguousarray(nodes.transpose(1, 2, 0))

@@ -272,9 +272,8 @@ def cast(tree, motion, place, order, pair, toward, work, hidden):
 
     place: (3,), the station's position.
 
-    tree: `rays.Tree` of p; motion: as in `rays.hidden_by`; order (strips, STRIP):
-    symbols of each bundle, where one may come twice; pair: (p, q); toward (L,): as in
-    `rays.hidden_by`.
+    tree: `rays.Tree` of p; motion: as in `rays.hidden_by`; order (strips, STRIP): symbols of each
+    bundle, where one may come twice; pair: (p, q); toward (L,): as in `rays.hidden_by`.
     """
     boxes, triangles, closed = tree
     rotation, translation, points, part = motion

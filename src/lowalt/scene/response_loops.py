@@ -87,8 +87,7 @@ def row_sum(cosine, kappa, beam, aim, count, gain):
 def _one_way(end, path, n, work, factors, excess):
     """Fill factors (Q, 2, L) and excess ranges (L,) of one end, by one path, at symbol n.
 
-    The factors are coefficient, array sum, 1/r and half the two-way phase; the excess is in
-    metres.
+    The factors are coefficient, array sum, 1/r and half the two-way phase; the excess is in metres.
 
     work: (3, L). Returns whether every point stands away from the station.
     """
@@ -202,9 +201,9 @@ def _fill_moments(factors, strength, excess, reach, work, result):
 
 @LOOPS
 def moments(out, back, same, strength, reach, result):
-    """Fill result (A, B, N, Q, 2, P) with the moments.
+    """Fill result (A, B, N, Q, 2, P) with the moments of every way out and back.
 
-    Of every way out by path a and back by path b.
+    Waves go out by path a and back by path b.
 
     out, back: `End`; same: whether both are the same array; then a, b also stands for b, a, and
     only b >= a is filled; strength: (A, B, N, L), real amplitudes; reach: m, bound of half the

@@ -80,8 +80,7 @@ def _orders(
 ) -> tuple[int, int, int] | None:
     """Return how many polynomials per axis the sums in a box need.
 
-    The axes are across, up and inverse range. The result is None if the box is close to the
-    array.
+    The axes are across, up and inverse range. The result is None if the box is close to the array.
 
     The phase of an element at distance D from the array's corner changes by k D per unit of a
     direction cosine, and by k D^2 / 2 per unit of inverse range. A third more allows for the mixed

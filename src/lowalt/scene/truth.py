@@ -118,8 +118,8 @@ def observed(
 def of_parts(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return ranges (N, P) m, and lowest and highest radial speeds (N, P) m/s of a target's parts.
 
-    The ranges are those of the parts' middles, the speeds those of their points at each symbol,
-    not folded, positive away from the station.
+    The ranges are those of the parts' middles, the speeds those of their points at each symbol, not
+    folded, positive away from the station.
 
     Rotors turn far between two symbols, so speeds are taken over twice STEP_S.
     """

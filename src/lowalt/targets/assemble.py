@@ -2,11 +2,11 @@
 
 The cloud has an exact count of points.
 
-Allotment of points over parts (the rule, also in the cloud's record):
-the moving parts of a model share `moving_share` of the points between them, by their weights, each
-rounded to whole copies (at least one point a copy); the body gets the rest. Parts with several
-copies (the blades of a rotor) are sampled once and turned, so that blades are equal. Echo strength
-goes with the count of points, so the share is also that of the echo that carries micro-Doppler.
+Allotment of points over parts (the rule, also in the cloud's record): the moving parts of a model
+share `moving_share` of the points between them, by their weights, each rounded to whole copies (at
+least one point a copy); the body gets the rest. Parts with several copies (the blades of a rotor)
+are sampled once and turned, so that blades are equal. Echo strength goes with the count of points,
+so the share is also that of the echo that carries micro-Doppler.
 """
 
 import json

@@ -78,8 +78,7 @@ def bones_m(stature_m: float) -> np.ndarray:
 def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
     """The toes' pitch (rad).
 
-    It is that of the foot while the foot points up, about a third of it where the heel is
-    lifted.
+    It is that of the foot while the foot points up, about a third of it where the heel is lifted.
     """
     # The ball of the foot bends at push-off, else the toes would enter the ground. A smooth
     # estimate.

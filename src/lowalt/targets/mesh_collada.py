@@ -32,8 +32,8 @@ class _Plain(ElementTree.TreeBuilder):
 def parsed(path: Path) -> ElementTree.Element:
     """Return the root of an XML file; nothing that it names is opened.
 
-    Entities of its own are refused. A prefix that it does not declare, such as `gz:`, is part
-    of the name, as Gazebo's own parser has it.
+    Entities of its own are refused. A prefix that it does not declare, such as `gz:`, is part of
+    the name, as Gazebo's own parser has it.
 
     Raises: InputError naming the file where it is no XML or declares a document type.
     """
@@ -97,8 +97,8 @@ def stated_up(path: Path) -> str | None:
 def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
     """Return a COLLADA file whose polygons are triangles, cut as viewers cut them, and names.
 
-    The names are those of its geometries by their ids: those of the nodes that show them, and
-    their own.
+    The names are those of its geometries by their ids: those of the nodes that show them, and their
+    own.
 
     Raises: InputError naming the file where it is no XML or has skins; other exceptions for a
     damaged file.

@@ -29,8 +29,8 @@ SHARED_LIMIT = 0.01
 class Pool:
     """Dense samples of one part.
 
-    points: (N, 3) m, the first `corners` of them vertices that bound the surface; normals: (N,
-    3); component: (N,) of the mesh; area: in m2; hinge: (3,) and axis: (3,), NaN for a body.
+    points: (N, 3) m, the first `corners` of them vertices that bound the surface; normals: (N, 3);
+    component: (N,) of the mesh; area: in m2; hinge: (3,) and axis: (3,), NaN for a body.
     """
 
     points: np.ndarray

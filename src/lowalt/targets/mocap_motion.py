@@ -180,11 +180,11 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
 
     They are in frames and metres.
 
-    The mismatch of two frames is a root mean square over the nodes: of the difference in
-    position, and of the difference in velocity times the fade's length. It leaves out the
-    horizontal motion of the root. Among the cycles whose mismatch is at most 1.5 times the
-    least, the longest is taken, for variety. A cycle must move at least half as fast as the
-    fastest one, so that standing is no cycle. At least `fade` frames follow its end.
+    The mismatch of two frames is a root mean square over the nodes: of the difference in position,
+    and of the difference in velocity times the fade's length. It leaves out the horizontal motion
+    of the root. Among the cycles whose mismatch is at most 1.5 times the least, the longest is
+    taken, for variety. A cycle must move at least half as fast as the fastest one, so that standing
+    is no cycle. At least `fade` frames follow its end.
     """
     frames = len(motion.root_m)
     fade = max(1, min(round(FADE_S * motion.rate_hz), frames // 6))

@@ -58,8 +58,8 @@ RADII_M = {
 }
 """Radius of the limb round each bone of a person of STATURE_M.
 
-From girths and breadths of Gordon et al. 2014, 2012 Anthropometric Survey of U.S. Army Personnel,
-men's means, rounded; torso: mean of half breadth and half depth.
+They are from girths and breadths of Gordon et al. 2014, 2012 Anthropometric Survey of U.S. Army
+Personnel, men's means, rounded; torso: mean of half breadth and half depth.
 """
 
 

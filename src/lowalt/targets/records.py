@@ -231,10 +231,7 @@ def merge(row: dict, record: dict, where: str) -> dict:
 
 
 def _check_like(merged: dict, where: str) -> None:
-    """Refuse a record without a published class that it is like.
-
-    Or one whose row lacks the speeds of that class.
-    """
+    """Refuse a record that is like no published class, or whose row lacks that class's speeds."""
     try:
         kind = like(merged)
     except InputError as error:

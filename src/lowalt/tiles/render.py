@@ -144,10 +144,7 @@ class Renderer:
         return Plan(source, weights, columns, shares, values, between, rows_first)
 
     def plan(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Source rows and weights (S, taps), columns and shares (taps, S).
-
-        Of one spectrum's resampling.
-        """
+        """Return rows and weights (S, taps), columns and shares (taps, S) of one spectrum."""
         plan = self._plans[name]
         return plan.source, plan.weights, plan.columns, plan.shares
 

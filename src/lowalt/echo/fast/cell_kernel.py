@@ -34,8 +34,8 @@ SIDE = 4
 class CellPolynomials(NamedTuple):
     """Tables of the cell kernels' polynomials, by the target's position between two cells.
 
-    kernels: (POSITIONS + 1, 2 SIDE + 1, degree + 1); sines: of pi times the range, (POSITIONS +
-    1, degree + 1).
+    kernels: (POSITIONS + 1, 2 SIDE + 1, degree + 1); sines: of pi times the range, (POSITIONS + 1,
+    degree + 1).
 
     half: the range in cells at |v| = 1; error: bound of every polynomial's error on [-1, 1]; sizes:
     largest |c_0| and |c_1| and largest sum of the other |c_k| of any kernel: they weight the

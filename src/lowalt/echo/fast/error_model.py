@@ -20,11 +20,10 @@ FINEST = 1e-15
 class EchoPlan(NamedTuple):
     """How to compute a sample.
 
-    `fit`: error of gains and cell kernels; `share`, `peak`: bound of the other errors, relative
-    to the sum of amplitudes and to the sum of peak amplitudes; `phase`: rounding of the phase
-    relative to the sum of amplitudes times distances from the reference, per metre; `single`:
-    float32 after the phase; `cosine`, `sine`: coefficients of `polynomials.smooth` in the type
-    of the sums.
+    `fit`: error of gains and cell kernels; `share`, `peak`: bound of the other errors, relative to
+    the sum of amplitudes and to the sum of peak amplitudes; `phase`: rounding of the phase relative
+    to the sum of amplitudes times distances from the reference, per metre; `single`: float32 after
+    the phase; `cosine`, `sine`: coefficients of `polynomials.smooth` in the type of the sums.
     """
 
     fit: float

@@ -191,7 +191,7 @@ def _nodes() -> tuple[np.ndarray, np.ndarray]:
 def _expansion(kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the Chebyshev coefficients (96,) of a function of `smooth`.
 
-    And the error of stopping at each degree.
+    The error of stopping at each degree comes second.
     """
     s, matrix = _nodes()
     two_pi = 8 * np.arctan(np.longdouble(1))

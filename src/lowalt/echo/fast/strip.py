@@ -27,9 +27,8 @@ aliasing).
 class Placing(NamedTuple):
     """Constants that give a point's offset from the reference in the array's axes.
 
-    twice_x, twice_y, twice_z: twice the unit vector to the reference; the others: how
-    horizontal and vertical coordinates become direction cosines on [-1, 1] before the division
-    by r.
+    twice_x, twice_y, twice_z: twice the unit vector to the reference; the others: how horizontal
+    and vertical coordinates become direction cosines on [-1, 1] before the division by r.
     """
 
     twice_x: float
@@ -73,8 +72,8 @@ class Offsets(NamedTuple):
 class Strip(NamedTuple):
     """A strip's points in the type of the sums, (STRIP_ROOM,) each.
 
-    psi, omega, cells: direction cosines and ranges on [-1, 1]; turn: on [-1/2, 1/2]; square:
-    (r_ref / r)^2; gain_h, gain_v: array gains; real, imag: of the amplitudes.
+    psi, omega, cells: direction cosines and ranges on [-1, 1]; turn: on [-1/2, 1/2]; square: (r_ref
+    / r)^2; gain_h, gain_v: array gains; real, imag: of the amplitudes.
     """
 
     psi: np.ndarray

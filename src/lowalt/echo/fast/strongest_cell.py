@@ -97,9 +97,8 @@ def certify(table, position, size, totals, error, bound, count, work):
     the others. table: `cell_kernel.CellPolynomials`; position: row of its tables; size: largest
     distance of a point from the reference (cells); totals: sums of |z| and of |z| v^2; error:
     relative to them, of the sums in `far_moments`; bound: of the error of any cell's sum; work:
-    `workspace.Workspace`, which holds the moments.
-    lead: lower bound of |sum| in the strongest cell less |sum| in any other, negative where none is
-    proved.
+    `workspace.Workspace`, which holds the moments. lead: lower bound of |sum| in the strongest cell
+    less |sum| in any other, negative where none is proved.
     """
     half = table.half
     centre = position / POSITIONS - 0.5

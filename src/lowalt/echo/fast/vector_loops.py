@@ -86,7 +86,7 @@ def place_part(coordinates, low, size, pose, placing, offsets, at):
 def place_nodes(translation, n, q, low, size, axes, placing, offsets):
     """Fill the offsets with `size` points from `low` that are parts of their own.
 
-    Else as `place_part`. The offsets are relative to the point q.
+    They are relative to the point q; everything else is as in `place_part`.
 
     axes: cosine and sine of the array's normal, and 1 / r_ref.
     """

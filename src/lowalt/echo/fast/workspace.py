@@ -17,8 +17,8 @@ from lowalt.echo.fast.strip import STRIP_ROOM, Offsets, Strip
 class Approximation(NamedTuple):
     """All approximations of a sample.
 
-    plan: its polynomials; gains: array gains as sums of cosines; cells: the cell kernels; fold:
-    the weights of `polynomials.folding`.
+    plan: its polynomials; gains: array gains as sums of cosines; cells: the cell kernels; fold: the
+    weights of `polynomials.folding`.
     """
 
     plan: EchoPlan
@@ -43,9 +43,9 @@ class Symbols(NamedTuple):
 class Found(NamedTuple):
     """The results of every symbol, each (N,).
 
-    values, cells: the strongest cell's value and index; state: of `strongest_cell`; totals: sum
-    of |amplitudes|; bounds: of the value's error; ties: whether there is a near-tie; gaps:
-    certified lead over every other cell.
+    values, cells: the strongest cell's value and index; state: of `strongest_cell`; totals: sum of
+    |amplitudes|; bounds: of the value's error; ties: whether there is a near-tie; gaps: certified
+    lead over every other cell.
     """
 
     values: np.ndarray
@@ -74,9 +74,9 @@ class Workspace(NamedTuple):
     """Work arrays of the driver.
 
     taylor: Taylor terms of a gain (3, rates); moments: (2, orders); coefficients, typed: of the
-    gains, (2, TOP + 1), in float64 and in the strip's type; sums: of cells, (2 SIDE + 1, 2);
-    far: bounds for far cells (4,); offsets, strip: a strip's arrays; share: every point's share
-    (padded L,) of the sum of amplitudes, in the strip's type.
+    gains, (2, TOP + 1), in float64 and in the strip's type; sums: of cells, (2 SIDE + 1, 2); far:
+    bounds for far cells (4,); offsets, strip: a strip's arrays; share: every point's share (padded
+    L,) of the sum of amplitudes, in the strip's type.
     """
 
     taylor: np.ndarray

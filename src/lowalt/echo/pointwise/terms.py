@@ -17,8 +17,8 @@ from lowalt.machine.jit import LEAN, PLAIN
 class PointTerms(NamedTuple):
     """Values of all points at one symbol, (L,) each but `e`.
 
-    e: (L, 3) m, position from the reference's point; z: complex amplitude without the cell's
-    own phase; u: range in cells from the reference's cell; risk: of `terms`.
+    e: (L, 3) m, position from the reference's point; z: complex amplitude without the cell's own
+    phase; u: range in cells from the reference's cell; risk: of `terms`.
     """
 
     e: np.ndarray

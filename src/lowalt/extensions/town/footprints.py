@@ -38,8 +38,9 @@ NO_HEIGHT = "buildings that end below where they begin"
 
 
 class Footprint(NamedTuple):
-    """A building of a file: its outline, in degrees or metres, its properties, and where it stands
-    in the file.
+    """A building of a file.
+
+    outline: in degrees or metres; properties: its tags; place: where it stands in the file.
     """
 
     outline: Polygon | MultiPolygon
@@ -88,8 +89,9 @@ def _object_of(feature: dict, key: str, place: str) -> dict:
 
 
 def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counter, Counter]:
-    """The buildings of a file in degrees, what was left out, and what was read otherwise than
-    stated.
+    """The buildings of a file in degrees, what was left out, and what was read otherwise.
+
+    The latter are read otherwise than stated.
 
     all_polygons: whether all polygons of a file without any tag of buildings are buildings.
     """
@@ -170,16 +172,18 @@ def _local(origin: Sequence[float]) -> Transformer:
 
 
 def moved(origin: Sequence[float], offset_m: Sequence[float]) -> list[float]:
-    """Return the place (longitude, latitude; degrees) that lies offset_m (2,), east and north, of
-    an origin.
+    """Return the place (longitude, latitude; degrees) that lies beside an origin.
+
+    offset_m: (2,), east and north.
     """
     there = _local(origin).transform(*offset_m, direction="INVERSE")
     return [round(float(value), 7) for value in there]
 
 
 def _united(outline: Polygon | MultiPolygon) -> Polygon | MultiPolygon | None:
-    """The outline (m) of a building whose polygons may adjoin or overlap, None where one of them
-    crosses itself.
+    """The outline (m) of a building whose polygons may adjoin or overlap.
+
+    It is None where one of them crosses itself.
     """
     if outline.is_valid:
         return outline
@@ -190,7 +194,10 @@ def _united(outline: Polygon | MultiPolygon) -> Polygon | MultiPolygon | None:
 
 
 def _without_replaced(footprints: list[Footprint]) -> list[Footprint]:
-    """The footprints without outlines in which a building:part lies. Source: Simple 3D Buildings."""
+    """The footprints but outlines in which a building:part lies. Source: Simple 3D Buildings.
+
+    Source: Simple 3D Buildings.
+    """
     points = []
     for footprint in footprints:
         if is_part(footprint.properties):

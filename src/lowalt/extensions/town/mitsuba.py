@@ -34,8 +34,9 @@ def _numbers(element: Element, size: int, default: float) -> np.ndarray:
 
 
 def _pose(shape: Element) -> np.ndarray:
-    """The pose (4, 4) of a shape in the scene; each step of its transform acts after those before
-    it.
+    """The pose (4, 4) of a shape in the scene.
+
+    Each step of its transform acts after those before it.
     """
     result = np.eye(4)
     for transform in shape.findall("transform"):
@@ -69,8 +70,9 @@ def _names(bsdf: Element) -> list[str]:
 
 
 def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
-    """The material of a shape, "" for none that is known, and the name of one that is not known, ""
-    for none.
+    """The material of a shape, and the name of one that is not known.
+
+    Either is "" for none.
 
     scene: the names of the materials of the scene by their identifiers.
     """
@@ -86,8 +88,9 @@ def _material(shape: Element, scene: dict[str, list[str]]) -> tuple[str, str]:
 
 
 def _file_of(shape: Element, path: Path) -> Path:
-    """The mesh file of a shape. Raises: InputError where it is not in the folder of the scene, or
-    not there.
+    """The mesh file of a shape.
+
+    Raises: InputError where it is not in the folder of the scene, or not there.
     """
     name = ""
     for text in shape.findall("string"):

@@ -1,5 +1,6 @@
-"""A town: buildings from a file block, reflect and diffract the waves between a station and a
-target.
+"""A town: buildings from a file, which block, reflect and diffract waves.
+
+The waves go between a station and a target.
 
 Every ray of every point is traced past all buildings: the direct one, where it is blocked over
 roofs and around edges, and those by one or two of all walls, roofs and the ground. Out by any path
@@ -94,8 +95,9 @@ def refuse_place(settings: dict, network: Network) -> None:
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:
-    """Return the reflected paths that reach any point, and the change of the direct one where
-    buildings are near it.
+    """Return the reflected paths that reach any point, and the change of the direct one.
+
+    The direct one changes where buildings are near it.
 
     That change is a path along the direct one whose coefficient is the field there over that in
     free space, less one.
@@ -130,8 +132,9 @@ def files(settings: dict) -> list[str]:
 def record(
     settings: dict, network: Network, row: dict, rng: np.random.Generator
 ) -> dict[str, dict]:
-    """Return the field `paths`: which paths lead to the origin of a target, a row of the motion
-    table, at the first symbol.
+    """Return the field `paths`: which paths lead to a target's origin at the first symbol.
+
+    row: the target's, of the motion table.
 
     `under_roof`: whether a roof is above it; `stations`: by name `direct`, whether the sight is
     free; `field_db`, the direct field over that in free space; and `reflected`, the surfaces of

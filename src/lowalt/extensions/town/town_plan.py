@@ -1,5 +1,6 @@
-"""The plan of a town with stations and the region of the targets, what it is in words, and the
-draft of an overlay.
+"""The plan of a town with stations and the region of the targets, and the draft of an overlay.
+
+The module also says in words what the town is.
 """
 
 from pathlib import Path
@@ -16,8 +17,9 @@ AROUND_M = 100.0
 
 
 def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> None:
-    """Write a picture of a town seen from above, with the stations and the region (C, 2) m of the
-    targets.
+    """Write a picture of a town seen from above, with the stations and the targets' region.
+
+    region: (C, 2) m.
     """
     import matplotlib
 
@@ -62,7 +64,7 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
 
 
 def described(path: Path, found: Buildings) -> list[str]:
-    """Return what a town is, what was left out and what was read otherwise than stated, in lines."""
+    """Return in lines what a town is, what was left out and what was read otherwise than stated."""
     facts = found.facts
     low_x, low_y, _ = facts["low_m"]
     high_x, high_y, top = facts["high_m"]

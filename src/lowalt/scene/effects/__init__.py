@@ -93,9 +93,9 @@ class NamedEffect(NamedTuple):
         return self.settings.get(getattr(self.module, "SET_SNR", None))
 
     def offers(self, name: str) -> bool:
-        """Whether the effect has a function of the contract.
+        """Whether the effect has a function of the contract, or another of its names set.
 
-        Or whether it sets another of the contract's names to a value other than False.
+        A name counts as set where its value is not False.
         """
         return getattr(self.module, name, False) is not False
 

@@ -128,8 +128,7 @@ class Large(NamedTuple):
 class Rays(NamedTuple):
     """Rays (K,) of a link.
 
-    delay_s: after the first; azimuth_deg: from the link's; zenith_deg: zenith angle; power:
-    share.
+    delay_s: after the first; azimuth_deg: from the link's; zenith_deg: zenith angle; power: share.
     """
 
     delay_s: np.ndarray

@@ -1,6 +1,6 @@
 """Spherical wavefront: every element of an array has its own distance to a point.
 
-Without this effect it has the plane wave's.
+Without this effect all elements see a plane wave.
 
 Element e of the array then has the phase 2 pi f |p - e| / c and the amplitude 1 / |p - e|.
 `scene.spherical` sums them where a scene names this effect.
