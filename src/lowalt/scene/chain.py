@@ -258,11 +258,12 @@ class SceneSample:
         shape = (len(self.view.times_s), self.scene.network.subcarriers)
         for name, heard in self.all("heard").items():
             unknown.append(numbers(name, "heard", heard(self), [shape]))
+        none = np.zeros(shape, np.complex128)
         if self.only("instants") or self.only("late_samples"):
-            samples = sum(map(self._samples, self.targets))
+            samples = sum(map(self._samples, self.targets), none)
             samples = sum(map(self._standing, still), samples)
         else:
-            total = sum(map(self.echo, self.targets))
+            total = sum(map(self.echo, self.targets), none)
             total = sum((each.response for each in still), total)
             if not unknown and not self.all("receive") and not self.all("aired"):
                 return total
@@ -448,7 +449,7 @@ def received_signal(
     station: Station,
     cloud: Cloud,
     row: dict,
-    occluders: Mapping[str, dict] | None = None,
+    occluders: dict | None = None,
     clouds: Mapping[str, Cloud] | None = None,
 ) -> Received:
     """Return the signal of a motion model at `station`, with the scene's effects.

@@ -49,16 +49,16 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
     2001, ch. 1.
     """
     network = view.network
-    link = view.station.transmitter is not None
+    sender = view.station.transmitter
     wavelength_m = SPEED_OF_LIGHT / network.carrier_hz
     sender_m, receiver_m = view.masts_m
     out_m = float(norm(view.origin_m - sender_m))
     back_m = float(norm(view.origin_m - receiver_m))
     path = f"path out and back, {out_m:.1f} m, 1 m2"
     ends = {"toward the target, each way": view.station}
-    if link:
+    if sender is not None:
         path = f"path, {out_m:.1f} m and {back_m:.1f} m, 1 m2"
-        ends = {"of the sender": view.station.transmitter, "of the receiver": view.station}
+        ends = {"of the sender": sender, "of the receiver": view.station}
     gains_db = {}
     for name, end in ends.items():
         gains_db[name] = 0.0
@@ -75,7 +75,7 @@ def levels(view: View, effects: Sequence[NamedEffect], echo_w: float) -> list[Le
         Level("mean cross section", cross_section_db, "dBsm"),
     ]
     expected_dbm = sum(level.value for level in budget)
-    if not link:
+    if sender is None:
         # A station's element counts twice.
         expected_dbm += sum(gains_db.values())
     lines = [

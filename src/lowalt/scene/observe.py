@@ -49,9 +49,9 @@ class Scene:
         drawn = getattr(module, "DRAWN", "station")
         if drawn == "look":
             return self.stream(name, row)
-        if drawn == "pair" and station.transmitter is not None:
-            pair = sorted((station.transmitter.name, station.receiver.name))
-            return self.stream(name, row, *pair)
+        ends = [end for end in (station.transmitter, station.receiver) if end is not None]
+        if drawn == "pair" and ends:
+            return self.stream(name, row, *sorted(end.name for end in ends))
         return self.stream(name, row, station.name)
 
     def at_snr(self, snr_db: float) -> "Scene":

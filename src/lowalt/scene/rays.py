@@ -145,8 +145,8 @@ def hidden_by(
     # A point's own part, which hides it most often, comes first.
     pairs = sorted(product(trees, range(len(axes))), key=lambda pair: pair[0] != pair[1])
     for p, q in pairs:
-        order = strips[p] if turns[p] else strips[q]
-        rays_loops.cast(trees[p], moved, place_m, order, (p, q), toward, work, result)
+        in_strips = strips[p] if turns[p] else strips[q]
+        rays_loops.cast(trees[p], moved, place_m, in_strips, (p, q), toward, work, result)
     hidden[:] = result.T
 
 

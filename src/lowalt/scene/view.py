@@ -150,6 +150,12 @@ def located(
     return motion, _carried(cloud.points, motion, motion.translation)
 
 
+def _stood(station: Station, place_m: np.ndarray) -> Station:
+    """The same station at another place (3,) m."""
+    x, y, z = map(float, place_m)
+    return replace(station, position_m=(x, y, z))
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """A target's motion as one station sees it."""
@@ -214,7 +220,8 @@ class View:
 
     def ways_m(self, places: np.ndarray) -> np.ndarray:
         """Return the way from the sender by places (..., 3) m to the receiver, (...) m."""
-        return sum(portable.norm(places - mast_m) for mast_m in self.masts_m)
+        sender_m, receiver_m = self.masts_m
+        return portable.norm(places - sender_m) + portable.norm(places - receiver_m)
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
         """Return the element's amplitude gain toward images (N, L, 3).
@@ -228,6 +235,7 @@ class View:
     @cached_property
     def _gain(self) -> np.ndarray:
         """The element's power gain (N, L) toward the points."""
+        assert self.element is not None  # as `relative_gain` has asked
         return gain(self.element, self.station, self.places)
 
     def at(self, times_s: np.ndarray) -> "View":
@@ -249,10 +257,10 @@ class View:
 
         sender_m: (3,) m, on a link where its sender stands then, None for where it stands.
         """
-        station = replace(self.station, position_m=tuple(map(float, place_m)))
+        station = _stood(self.station, place_m)
         if sender_m is not None:
-            sender = replace(station.transmitter, position_m=tuple(map(float, sender_m)))
-            station = replace(station, transmitter=sender)
+            assert station.transmitter is not None  # a link has one
+            station = replace(station, transmitter=_stood(station.transmitter, sender_m))
         return self.of(station)
 
     def ends(self) -> list["View"]:
@@ -261,7 +269,7 @@ class View:
         A station's own view is both.
         """
         link = self.station
-        if link.transmitter is None:
+        if link.transmitter is None or link.receiver is None:
             return [self]
         hears = replace(link, name=link.receiver.name, transmitter=None, receiver=None)
         return [self.of(link.transmitter), self.of(hears)]

@@ -66,10 +66,10 @@ def _propeller(
     Rotors share their points by the area of their blades.
     """
     diameter, chord, count = size
-    axis = tuple(float(value) for value in sense * facing[:, 2])
+    x, y, z = (sense * facing[:, 2]).tolist()
     shells = (blade(diameter, chord, sense).mapped(facing).moved(hub),)
     area = diameter * chord * count
-    return Part(name, "rotor", shells, hub, axis, copies=int(count), weight=area)
+    return Part(name, "rotor", shells, hub, (x, y, z), copies=int(count), weight=area)
 
 
 def _main_size(f: dict) -> tuple[float, float, float]:

@@ -145,10 +145,13 @@ def _arrays(cloud: Cloud) -> Iterator[tuple[bool, str]]:
         )
     yield _near(cloud.points), f"points has a coordinate that is no number within {LARGEST_M:g} m"
     good_rcs = (cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)
-    yield good_rcs.all(), f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2"
+    yield (
+        bool(good_rcs.all()),
+        f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2",
+    )
     lengths = np.linalg.norm(cloud.normals, axis=1)
     good_normals = np.isnan(lengths) | (abs(lengths - 1) < 1e-9)
-    yield good_normals.all(), "normals has a vector of length other than 1 or NaN"
+    yield bool(good_normals.all()), "normals has a vector of length other than 1 or NaN"
 
 
 def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
@@ -169,7 +172,10 @@ def _parts(cloud: Cloud) -> Iterator[tuple[bool, str]]:
         yield -1 <= parent < index, f"parents[{index}] is {parent}, expected an earlier part or -1"
         if kind in ("rotor", "wing", "wheel"):
             length = np.linalg.norm(cloud.axes[index])
-            yield abs(length - 1) < 1e-12, f"axes[{index}] ({name}) has length {length}, expected 1"
+            yield (
+                bool(abs(length - 1) < 1e-12),
+                f"axes[{index}] ({name}) has length {length}, expected 1",
+            )
             yield (
                 _near(cloud.hinges[index]),
                 f"hinges[{index}] ({name}) is no place within {LARGEST_M:g} m",

@@ -10,6 +10,7 @@ root's mean position is the origin.
 
 import hashlib
 import json
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -160,7 +161,7 @@ def stance_speed_mps(
     rate_hz: float,
     speed_mps: float,
     height_m: float = 0.02,
-    feet: list[int] = FEET,
+    feet: Sequence[int] = FEET,
 ) -> float:
     """Return the mean ground speed (m/s) of the lowest foot node while it carries the body.
 
@@ -181,7 +182,7 @@ def stance_speed_mps(
 
 def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], float, float]:
     """One cycle (frames, L, 3) m, the nodes' names, its duration (s) and its distance (m)."""
-    kind = record.get("gait")
+    kind = record["gait"]
     stature = record["stature_m"]
     speed = record["speed_mps"]
     if kind not in ("cycle", "trot"):
@@ -255,7 +256,7 @@ def gait_cloud(record: dict, seed: int) -> Cloud:
     if record["gait"] == "cycle":
         facts["cadence"] = "tied"  # wheels turn with the speed whatever `motion.cadence` is
     else:
-        feet = FEET
+        feet: Sequence[int] = FEET
         if names != NODES:
             feet = [number for number, name in enumerate(names) if name.endswith("paw")]
         facts["stance_foot_speed_mps"] = stance_speed_mps(track, rate, speed, feet=feet)

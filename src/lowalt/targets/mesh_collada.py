@@ -134,9 +134,9 @@ def _geometry_names(root: ElementTree.Element, elements: dict) -> dict[str, list
     def add_below(element: ElementTree.Element, above: list[str]) -> None:
         """Add the names of the geometries below an element; above: names of the nearest node."""
         for child in element:
-            of_node = []
+            of_node: list[str] = []
             if _name(child) == "node":
-                of_node = [child.get(key) for key in ("name", "id") if child.get(key)]
+                of_node = [child.get(key, "") for key in ("name", "id") if child.get(key)]
             if _name(child) == "instance_geometry":
                 key = child.get("url", "")[1:]
                 names.setdefault(key, []).extend(above)
@@ -153,7 +153,7 @@ def _cut(element: ElementTree.Element, elements: dict) -> None:
     inputs = [child for child in element if _name(child) == "input"]
     width = 1 + max(int(child.get("offset", 0)) for child in inputs)
     vertex = next(child for child in inputs if child.get("semantic") == "VERTEX")
-    of_vertex = elements[vertex.get("source")[1:]]
+    of_vertex = elements[vertex.get("source", "")[1:]]
     position = next(child for child in of_vertex if child.get("semantic") == "POSITION")
     source = elements[position.get("source")[1:]]
     numbers = next(child for child in source.iter() if _name(child) == "float_array")

@@ -119,12 +119,12 @@ def _scene(path: Path) -> list[Piece]:
     # trimesh logs a traceback of every optional reader that it cannot import; failures are raised
     # below.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    source = {"file_obj": path}
-    names = {}
+    names: dict[str, list[str]] = {}
     if path.suffix.lower() == ".dae":
         data, names = for_trimesh(path)
-        source = {"file_obj": io.BytesIO(data), "file_type": "dae"}
-    scene = trimesh.load_scene(**source, process=False)
+        scene = trimesh.load_scene(io.BytesIO(data), "dae", process=False)
+    else:
+        scene = trimesh.load_scene(path, process=False)
     result = []
     for node in sorted(scene.graph.nodes_geometry):
         pose, name = scene.graph[node]
@@ -134,12 +134,12 @@ def _scene(path: Path) -> list[Piece]:
         if not isinstance(mesh, trimesh.Trimesh):
             continue
         # trimesh numbers the surfaces of one geometry.
-        known = [key for key in names if re.fullmatch(re.escape(key) + r"(_\d+)?", name)]
-        chosen_by = [str(node), name]
+        known = [key for key in names if re.fullmatch(re.escape(key) + r"(_\d+)?", str(name))]
+        chosen_by = [str(node), str(name)]
         if known:
             chosen_by += names[known[0]]
-        chosen_by = tuple(dict.fromkeys(chosen_by))
-        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), chosen_by)
+        own = tuple(dict.fromkeys(chosen_by))
+        piece = Piece(np.asarray(mesh.vertices), np.asarray(mesh.faces), own)
         # Values that are not finite are refused later, by name.
         with np.errstate(invalid="ignore"):
             result.append(piece.mapped(pose[:3, :3]).moved(pose[:3, 3]))

@@ -96,7 +96,7 @@ def inside(points: np.ndarray, region: dict) -> np.ndarray:
         lowest, highest = region["box"]
         low = np.array([-np.inf if value is None else value for value in lowest], float)
         high = np.array([np.inf if value is None else value for value in highest], float)
-        return ((points >= low) & (points <= high)).all(axis=1)
+        return np.all((points >= low) & (points <= high), axis=1)
     cylinder = region["cylinder"]
     away = points - np.array(cylinder["centre"])
     axis = "xyz".index(cylinder["axis"])

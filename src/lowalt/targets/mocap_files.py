@@ -69,7 +69,7 @@ def _blocks(lines: list[list[str]]) -> dict[str, dict[str, list[str]]]:
 
 def _refuse_other_nodes(path: Path, hierarchy: list[list[str]]) -> None:
     """Raise InputError where the lines `parent child child ...` are not those of the 31 nodes."""
-    parents = {}
+    parents: dict[str, str] = {}
     for parent, *children in hierarchy:
         parents |= dict.fromkeys(children, parent)
     if parents != LIMBS:

@@ -212,6 +212,8 @@ def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
             elif word == "}":
                 stack.pop()
         timing = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", data)
+        if timing is None:
+            raise ValueError("no lines Frames and Frame Time after MOTION")
         frames = int(timing[1])
         step = float(timing[2])
         values = np.array(re.sub(r"#.*", "", data[timing.end() :]).split(), float)

@@ -164,6 +164,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
     if source in ("gait", "mocap"):
         return from_bones(float(record.get("stature_m", record["published"]["hgt_m"])))
     refuse_source(record, inputs)
+    assert inputs is not None  # a record of a mesh is refused without
     from lowalt.targets.occluders_mesh import mesh_surfaces
 
     return from_surfaces(*mesh_surfaces(record, Path(inputs), seed))

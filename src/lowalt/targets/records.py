@@ -266,7 +266,9 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
     Raises: InputError where the record names files and there is no folder.
     """
     names = record_files(record)
-    if names and inputs is None:
+    if not names:
+        return []
+    if inputs is None:
         raise InputError(
             f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of "
             "inputs"

@@ -90,7 +90,7 @@ def stature_m(offsets_m: np.ndarray) -> float:
     spine = sum(portable.norm(bone(name)) for name in _SPINE)
     legs = 0.0
     for side in "lr":
-        legs += sum(portable.norm(bone(side + name)) for name in _LEG)
+        legs += float(sum(portable.norm(bone(side + name)) for name in _LEG))
         legs -= sum(bone(side + name)[2] for name in ("hipjoint", "foot", "toes"))
     return float(spine + legs / 2)
 

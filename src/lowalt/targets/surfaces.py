@@ -6,7 +6,7 @@ several shells, which may overlap. trimesh's sampler draws the faces independent
 drawn systematically, which halves the unevenness before thinning and spares the import.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -98,7 +98,7 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
     return result
 
 
-def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
+def loft(sections: np.ndarray, tips: np.ndarray | Sequence | None = None) -> Surface:
     """Return the closed skin over sections (K, S, 3), each a loop of S points in the same sense.
 
     Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The
@@ -165,7 +165,9 @@ def ellipsoid(
     return unit.mapped(np.diag(np.asarray(radii, float))).moved(centre)
 
 
-def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surface:
+def tube(
+    path: np.ndarray | Sequence, radii: np.ndarray | Sequence | float, sides: int = 10
+) -> Surface:
     """Return a round tube along `path` (K, 3), a radius at each point, closed by flat ends."""
     path = np.asarray(path, float)
     radii = np.broadcast_to(np.asarray(radii, float), len(path))
@@ -340,7 +342,7 @@ def sample_faces(
 
 
 def thin(
-    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()
+    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | Sequence = ()
 ) -> np.ndarray:
     """Return the indices (count,) of `count` points spread as evenly as can be.
 

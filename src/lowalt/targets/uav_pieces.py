@@ -80,8 +80,8 @@ def rotor(
     for depth, turn in layers:
         layer_sine, layer_cosine = portable.sine_cosine_turns(np.array(turn))
         # The sums of angles; each layer turns on from the one above it.
-        turned = sine * layer_cosine + cosine * layer_sine
-        cosine = cosine * layer_cosine - sine * layer_sine
+        turned = float(sine * layer_cosine + cosine * layer_sine)
+        cosine = float(cosine * layer_cosine - sine * layer_sine)
         sine = turned
         matrix = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
         shells.append(shell.mapped(matrix).moved(hub - [0, 0, depth]))
@@ -97,7 +97,7 @@ def rotors(axles: np.ndarray, height: float, figure: dict, apart: bool = False) 
     """
     parts = []
     single = ((0.0, 0.0),)
-    layers = single
+    layers: tuple[tuple[float, float], ...] = single
     if "layer_gap" in figure and not apart:
         layers = (*single, (figure["layer_gap"], figure["layer_turn"]))
     for index, (x, y) in enumerate(axles):

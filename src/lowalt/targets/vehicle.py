@@ -192,7 +192,10 @@ def parts(record: dict) -> tuple[list[Part], dict]:
     floor = f["ground_clearance"] + 0.06 * height
     wells.append(box((0.86 * width, 1.1 * length, 2 * floor), (0, 0, -height / 2)))
     if record["model"] == "car":
-        skins = (_lower(length, width, height, f), _greenhouse(length, width, height, f))
+        skins: tuple[Surface, ...] = (
+            _lower(length, width, height, f),
+            _greenhouse(length, width, height, f),
+        )
     else:
         skins = (_coach(length, width, height, f),)
     body = Part("body", "body", skins, cuts=tuple(wells))

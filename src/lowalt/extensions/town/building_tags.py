@@ -52,7 +52,7 @@ def _stated(properties: dict, keys: dict[str, str], least_m: float) -> Height:
 
     keys: each with the unit of a bare number.
     """
-    unread = []
+    unread: list[str] = []
     for key, unit in keys.items():
         value = properties.get(key)
         if value is None:

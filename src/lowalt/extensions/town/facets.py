@@ -276,8 +276,8 @@ def _ridges(
     links = np.concatenate([numbers[:, :2], numbers[:, 1:]])
     size = int(numbers.max()) + 1
     graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(size, size))
-    building = connected_components(graph, directed=False)[1]
-    building = np.unique(building[numbers[:, 0]], return_inverse=True)[1]
+    connected = connected_components(graph, directed=False)[1]
+    building = np.unique(connected[numbers[:, 0]], return_inverse=True)[1]
     edges, triangle_of = _edges(numbers)
     of_facet = np.column_stack([edges, label[triangle_of]])
     _, which = np.unique(of_facet, axis=0, return_inverse=True)

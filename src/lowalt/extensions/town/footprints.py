@@ -95,10 +95,10 @@ def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counte
 
     all_polygons: whether all polygons of a file without any tag of buildings are buildings.
     """
-    found = []
-    others = []
-    left_out = Counter()
-    notes = Counter()
+    found: list[Footprint] = []
+    others: list[Footprint] = []
+    left_out: Counter[str] = Counter()
+    notes: Counter[str] = Counter()
     for number, feature in enumerate(_features(path)):
         place = f"features[{number}]"
         if not isinstance(feature, dict):
@@ -176,7 +176,8 @@ def moved(origin: Sequence[float], offset_m: Sequence[float]) -> list[float]:
 
     offset_m: (2,), east and north.
     """
-    there = _local(origin).transform(*offset_m, direction="INVERSE")
+    east_m, north_m = offset_m
+    there = _local(origin).transform(east_m, north_m, direction="INVERSE")
     return [round(float(value), 7) for value in there]
 
 
@@ -237,7 +238,7 @@ def _heights(
     """
     result = []
     missing = []
-    unread = []
+    unread: list[str] = []
     for footprint in footprints:
         stated = height_of(footprint.properties)
         unread += stated.unread
@@ -294,7 +295,7 @@ def read_footprints(path: Path, origin: tuple[float, float] | None, settings: di
     heights = _heights(path, standing, settings["height_m"], notes)
     walls = []
     unknown = []
-    unread = []
+    unread: list[str] = []
     for (outline, properties, _), height in zip(standing, heights, strict=True):
         stated = low_of(properties)
         low = stated.metres or 0.0

@@ -139,7 +139,7 @@ def read_mitsuba(path: Path, unit: str) -> Surfaces:
         )
     materials = {bsdf.get("id", ""): _names(bsdf) for bsdf in root.findall("bsdf")}
     walls = []
-    left_out = {}
+    left_out: dict[str, int] = {}
     unknown = []
     for shape in shapes:
         if shape.get("type") not in KINDS:

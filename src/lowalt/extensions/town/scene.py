@@ -98,7 +98,9 @@ def _settings(options: argparse.Namespace, middle: np.ndarray) -> dict:
     if options.file.suffix.lower() in (".geojson", ".json"):
         from lowalt.extensions.town.footprints import middle_of, moved
 
-        return given | {"origin": moved(middle_of(options.file, options.height), -middle)}
+        return given | {
+            "origin": moved(middle_of(options.file, options.height), (-middle).tolist())
+        }
     facts = read(town.DEFAULTS | given).facts
     centre = (np.array(facts["low_m"]) + facts["high_m"])[:2] / 2
     return given | {"origin": np.round(centre - middle, 1).tolist()}

@@ -35,7 +35,7 @@ def draw(path: Path, found: Buildings, network: Network, region: np.ndarray) -> 
     figure, axes = pyplot.subplots(figsize=(8, 7), layout="constrained")
     # Walls are lines from above, roofs are areas.
     faces = PolyCollection(
-        corners[..., :2],
+        list(corners[..., :2]),
         array=corners[..., 2].max(axis=1),
         cmap="viridis",
         edgecolors="face",

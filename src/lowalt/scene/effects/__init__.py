@@ -48,7 +48,7 @@ def _places() -> dict[str, str]:
     Effects come in the order of LISTED, then the others of its folder, and extensions' between.
     """
     folder = Path(__file__).parent
-    result = {}
+    result: dict[str, str] = {}
     for place in PLACE_ORDER:
         files = sorted(path.stem for path in (folder / place).glob("*.py"))
         names = list(dict.fromkeys((*LISTED[place].split(), *files)))
@@ -261,7 +261,7 @@ def of_record(block: Mapping[str, dict | None]) -> dict[str, dict]:
     }
 
 
-def look_stream(seed: int, name: str, row: dict, *more: object) -> np.random.Generator:
+def look_stream(seed: int, name: str, row: dict, *more: str | float) -> np.random.Generator:
     """Return the random stream of an effect for the motion model `row`, from its start.
 
     more: what else the draws depend on: stations, an SNR. The stream of a user's own effect has the

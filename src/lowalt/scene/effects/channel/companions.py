@@ -12,6 +12,7 @@ configuration refer to its echo alone. The record of a sample lists the companio
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -134,7 +135,7 @@ def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -
 
     In a flock the motion is nearly the target's, otherwise its subtype's own.
     """
-    mine = {
+    mine: dict[str, Any] = {
         **dict.fromkeys(NUMBERS, math.nan),
         "subtype": other.subtype,
         "category": other.category,

@@ -75,7 +75,8 @@ def facet_radius_m(points: np.ndarray) -> float:
 
     Evenly spread points stand in a hexagonal lattice, each with sqrt(3)/2 of its spacing squared.
     """
-    spacing = cKDTree(points).query(points, k=2)[0][:, 1].mean()
+    distances, _ = cKDTree(points).query(points, k=2)
+    spacing = np.asarray(distances)[:, 1].mean()
     return float(np.sqrt(np.sqrt(3.0) / 2.0 / np.pi) * spacing)
 
 

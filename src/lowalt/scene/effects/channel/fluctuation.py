@@ -119,7 +119,7 @@ def pattern(view: View) -> np.ndarray:
     It is taken in the station's direction or at a link's bisector.
     """
     cloud = view.cloud
-    faces = None
+    faces: tuple[Lobe, ...] | None = None
     mean = 0.0
     if "body" in cloud.kinds and cloud.like == "Vehicle":
         faces = VEHICLE

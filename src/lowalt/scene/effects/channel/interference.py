@@ -117,7 +117,9 @@ def sent(settings: dict, sample: SceneSample, sends: Station) -> Callable[[str],
             power = 10 ** (-settings["leakage_db"] / 10)
             result = white(rng, power, result.shape)
         if len(whole):
-            result[:, whole] = sample.on_air(f"{symbol} of {sends.name}")[:, whole - first]
+            aired = sample.on_air(f"{symbol} of {sends.name}")
+            assert aired is not None  # every symbol of OFDM has data
+            result[:, whole] = aired[:, whole - first]
         return result
 
     return cache(data)

@@ -69,6 +69,7 @@ def through_blades(view: View) -> float:
     The rotor's radius is taken as the distance behind the blade, and the phase is left out.
     """
     wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
+    assert view.occluders is not None  # blades hide points only in front of surfaces
     blades = blades_m(view.cloud, view.occluders)
     if not blades:
         return 0.0

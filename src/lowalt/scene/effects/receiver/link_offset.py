@@ -41,12 +41,10 @@ def receive(
     A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late
     makes all echoes late. The samples of a station that receives its own signal stay as they are.
     """
-    late_s, rise_hz = _of(settings, look.network, look.station, rng)
-    return (
-        samples
-        if look.station.transmitter is None
-        else risen(delayed(samples, late_s, look), rise_hz, look)
-    )
+    if look.station.transmitter is None:
+        return samples
+    late_s, rise_hz = map(float, _of(settings, look.network, look.station, rng))
+    return risen(delayed(samples, late_s, look), rise_hz, look)
 
 
 def displaced(settings: dict, view: View, rng: np.random.Generator) -> Displacement:

@@ -42,7 +42,7 @@ DEFAULTS = {
     "loop_hz": 100.0,
     "reference": [[1.0, -46.0], [10.0, -76.0], [100.0, -96.0]],
 }  # fmt: skip
-IDLE = [{"points": []}]
+IDLE: list[dict] = [{"points": []}]
 """Settings with which the effect changes nothing.
 
 Of DEFAULTS, points: offset (Hz) and L(f) (dBc/Hz) of the oscillator; reference: those of what its

@@ -27,7 +27,9 @@ STILL = True
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError where the receiver has an oscillator of its own."""
-    apart = [name for name in ("carrier_offset", "clock_offset") if name in scene.effects]
+    apart: list[str] = [
+        name for name in ("carrier_offset", "clock_offset") if name in scene.effects
+    ]
     if not scene.effects.get("phase_noise", {"shared": True})["shared"]:
         apart.append("phase_noise with shared: false")
     if apart:
