@@ -1,6 +1,4 @@
-"""Range cells from a target's moments: the tabulated kernels, and the bound on the cells that are
-not computed.
-"""
+"""Range cells from a target's moments: kernels in tables, and the bound on cells left out."""
 
 import numpy as np
 import pytest
@@ -96,8 +94,9 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
 
 
 def test_moments_of_far_cells_are_bounded_with_the_orders_that_the_series_of_the_sine_lacks():
-    """|sum z sin(pi u) y^k| of points at one end of the stretch, where a sine of few orders is cut
-    the most.
+    """Sums of points at one end of the stretch, where a sine of few orders is cut most.
+
+    Each is |sum z sin(pi u) y^k|.
     """
     table = cell_polynomials(64, 0.3, 1e-2)
     for place, v in ((3, 1.0), (16, -1.0), (29, 0.9)):
@@ -140,8 +139,9 @@ def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
 
 
 def test_a_point_half_way_between_two_cells_is_counted_as_a_tie_and_one_off_it_is_not():
-    """Both neighbours hold equal amplitudes there; a hundredth of a cell away they differ by more
-    than a percent.
+    """Both neighbours hold equal amplitudes there.
+
+    A hundredth of a cell away they differ by more than a percent.
     """
     station = Station("A", (0.0, 0.0, 0.0), 0.0, 4.9e9)
     net = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (1, 1), (1, 1), 1.0, (station,))

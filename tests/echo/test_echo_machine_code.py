@@ -1,5 +1,6 @@
-"""Kept machine code follows what it is compiled from: kernels, constants and settings, however
-deep, and no more.
+"""Kept machine code follows what it is compiled from, and no more.
+
+That is kernels, constants and settings, however deep.
 """
 
 import shutil

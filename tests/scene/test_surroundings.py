@@ -1,5 +1,6 @@
-"""The surroundings' echoes: path losses by hand, the tables' moments, powers and delays of rays,
-and their sum.
+"""The surroundings' echoes: path losses by hand, the tables' moments, rays and their sum.
+
+Of rays, powers and delays are tested.
 """
 
 from dataclasses import replace
