@@ -33,7 +33,7 @@ class Exact(NamedTuple):
     phase_v: Pair
     """Turns of phase of both arrays' middles.
 
-    They are given per unit of the horizontal and vertical direction cosine.
+    The turns are per unit of the horizontal and vertical direction cosine.
     """
     scale: Pair
     """a0 lambda / (4 pi)^(3/2)."""

@@ -27,9 +27,9 @@ SLOWEST_MPS = 0.5
 def path_of(motion: dict, corners: np.ndarray, masts_m: np.ndarray) -> LookStarts | None:
     """Return the path of a flight log at the starts of looks, None where `motion` names no log.
 
-    motion: the block of the configuration, whose key `track` names the log; corners (K, 2),
-    masts_m (S, 2): as of `Cell`. Velocities at the log's rows are differences of its positions
-    (second order), and cubics join the rows. The heading is the course.
+    motion: the block of the configuration, whose key `track` names the log; corners (K, 2), masts_m
+    (S, 2): as of `Cell`. Velocities at the log's rows are differences of its positions (second
+    order), and cubics join the rows. The heading is the course.
     Raises: InputError naming the file, and the line, column or position that is wrong.
     """
     if "track" not in motion:

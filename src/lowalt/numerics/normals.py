@@ -108,9 +108,7 @@ def _block(words, scale, real, imaginary, twos, lower):
 def fill(words, scale, work, out):
     """Fill out (2, N) with complex normals times `scale`, real and imaginary parts.
 
-    words: (2 N,) uint64;
-
-    work: (2, BLOCK).
+    words: (2 N,) uint64; work: (2, BLOCK).
     """
     for first in range(0, out.shape[1], BLOCK):
         last = min(first + BLOCK, out.shape[1])

@@ -454,10 +454,9 @@ def received_signal(
 ) -> Received:
     """Return the signal of a motion model at `station`, with the scene's effects.
 
-    row: of the motion table;
+    row: of the motion table; occluders: the target's surfaces, where an effect needs them;
+    clouds: the clouds of all subtypes, for effects that add other targets.
 
-    occluders: the target's surfaces, where an effect needs them; clouds: the clouds of all
-    subtypes, for effects that add other targets.
     Raises: InputError naming the sample that cannot be computed.
     """
     return SceneSample(scene, observe(scene, station, cloud, row, occluders), clouds).received()
@@ -475,10 +474,10 @@ def scene_signals(
 
     name: of the station; rows: of the motion table.
 
-    clouds: by subtype, those of other targets included; occluders: each subtype's surfaces,
-    where an effect needs them; snrs (dB): given if the scene itself adds noise at set SNRs; the
-    result has one signal per SNR, (models, snrs, N). Raises: InputError naming the sample whose
-    subtype has no cloud, or that cannot be computed.
+    clouds: by subtype, those of other targets included; occluders: each subtype's surfaces, where
+    an effect needs them; snrs (dB): given if the scene itself adds noise at set SNRs; the result
+    has one signal per SNR, (models, snrs, N). Raises: InputError naming the sample whose subtype
+    has no cloud, or that cannot be computed.
     """
     station = scene.network.station(name)
     occluders = occluders or {}

@@ -15,12 +15,11 @@ from lowalt.scene.view import View
 def crossing(view: View, sends: Station, hears: Station) -> tuple[np.ndarray, float]:
     """Return the free-space response (M,) from mast to mast, and its delay (s).
 
-    It is that on the subcarriers of `hears`.
+    The response is that on the subcarriers of `hears`.
 
     Each station's beam points as in `view`; sends: with the frequency of `hears`. The response is
-    in the units of the
-    echo: the amplitude is sqrt(P / elements) lambda / (4 pi d) times both array sums. Source: Friis
-    1946.
+    in the units of the echo: the amplitude is sqrt(P / elements) lambda / (4 pi d) times both array
+    sums. Source: Friis 1946.
     """
     network = view.network
     distance = float(norm(np.asarray(hears.position_m) - np.asarray(sends.position_m)))
@@ -42,7 +41,7 @@ def crossing(view: View, sends: Station, hears: Station) -> tuple[np.ndarray, fl
 def toward(view: View, station: Station, counts: tuple[int, int], places: np.ndarray) -> np.ndarray:
     """Return the sum (...) over a station's elements toward places (..., 3) m.
 
-    They are steered as in `view`;||counts: of the elements, across and up.
+    The array is steered as in `view`. counts: of the elements, across and up.
     """
     off = (cosines(station, places) - cosines(station, view.aim_of(station))) * station.frequency_hz
     off = off / view.network.carrier_hz

@@ -82,11 +82,11 @@ class Change(NamedTuple):
 
     signal: root mean square of the signal's change over the signal's, the mean over samples and
     stations; by_class: the same of each class; cells: share of symbols with another range cell,
-    modulo the smaller number of cells where the effect changes that number;
-    more: share of the pixels, or of a network's answers, that differ; ms: processor time of the
-    effect per sample and station, a median; spread_ms: standard deviation of that time over samples
-    and stations; also: a further change without which the scene would be refused; refused: why the
-    effect was not tried; part: the part of the effect that was left out, "" for the whole.
+    modulo the smaller number of cells where the effect changes that number; more: share of the
+    pixels, or of a network's answers, that differ; ms: processor time of the effect per sample and
+    station, a median; spread_ms: standard deviation of that time over samples and stations; also: a
+    further change without which the scene would be refused; refused: why the effect was not tried;
+    part: the part of the effect that was left out, "" for the whole.
     """
 
     effect: str
@@ -170,9 +170,9 @@ def finding(
     clouds: dict[str, Cloud],
     listed: bool = False,
 ) -> Finding:
-    """Return whether a sample's target is found at a station.
+    """Return what is found of a sample's target at a station.
 
-    It also says how loud the target is against all else, and its levels if asked.
+    That is whether it is found, how loud it is against all else, and its levels if asked.
 
     listed: whether levels are wanted, which take as long as a sample.
     """

@@ -38,11 +38,9 @@ class Land(NamedTuple):
     """Patches of land (K,) in the order of their range cells; none depends on the beams.
 
     cell: (C,) numbers of the cells with land, and first: (C,) each one's first patch; cells: number
-    of all cells;
-    weight: area times the root of both grazing angles' sines, over both squared ranges, times both
-    element gains;
-    seen: (2, 2, K) direction cosines, across and up, from the sender and the receiver, of a station
-    (1, 2, K); slow: cosine of half the bistatic angle.
+    of all cells; weight: area times the root of both grazing angles' sines, over both squared
+    ranges, times both element gains; seen: (2, 2, K) direction cosines, across and up, from the
+    sender and the receiver, of a station (1, 2, K); slow: cosine of half the bistatic angle.
     """
 
     cell: np.ndarray

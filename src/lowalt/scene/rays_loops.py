@@ -145,7 +145,7 @@ def can_meet(bundle, box):
 def _meets(ray, free, box):
     """Whether a free ray meets a box (6,) between its start and the station.
 
-    It is then in all three slabs at once.
+    A ray meets it where it is in all three slabs at once.
     """
     x = ray[0]
     y = ray[1]

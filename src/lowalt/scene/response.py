@@ -33,9 +33,8 @@ class ImagePath(NamedTuple):
 
     places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's
     complex factor in addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image,
-    where the points see the station;
-    sender: on a link, the path of the same kind between the sender and the points, None where both
-    are alike.
+    where the points see the station; sender: on a link, the path of the same kind between the
+    sender and the points, None where both are alike.
     """
 
     places: np.ndarray

@@ -1,6 +1,6 @@
-"""Array sums of spherical waves at many points.
+"""Array sums of spherical waves at many points, interpolated from a few exact ones.
 
-They are interpolated from exact sums at a few directions and ranges.
+The exact sums are those at a few directions and ranges.
 
 During a few symbols, a target fills a small box of direction cosines and inverse ranges. Over this
 box an array sum is smooth: a polynomial of a few dozen terms takes less time than a sum over all

@@ -62,6 +62,6 @@ def size_m(cloud: Cloud) -> float:
 def large(cloud: Cloud) -> bool:
     """Return whether a UAV counts as large.
 
-    Its body is then longer than the geometric mean of the two sizes.
+    A large one's body is longer than the geometric mean of the two sizes.
     """
     return size_m(cloud) > np.sqrt(SMALL_UAV_M * LARGE_UAV_M)

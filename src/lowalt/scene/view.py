@@ -224,9 +224,9 @@ class View:
         return portable.norm(places - sender_m) + portable.norm(places - receiver_m)
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
-        """Return the element's amplitude gain toward images (N, L, 3).
+        """Return the element's amplitude gain toward images (N, L, 3), over that toward the points.
 
-        It is given over that toward the points, (N, L) or 1.
+        The result is (N, L) or 1.
         """
         if self.element is None:
             return 1.0
@@ -244,9 +244,9 @@ class View:
         return replace(self, times_s=times_s, motion=motion, places=places)
 
     def of(self, station: Station) -> "View":
-        """Return the same target, at the same instants and under the same beams.
+        """Return the same target as another station hears it.
 
-        It is as another station hears it.
+        Instants and beams stay the same.
         """
         return replace(self, station=station)
 

@@ -62,8 +62,7 @@ def _propeller(
 ) -> Part:
     """A turning propeller of a `size` (diameter m, blade's chord m, blades).
 
-    Its axis is facing @ (0, 0, 1).
-    Rotors share their points by the area of their blades.
+    Its axis is facing @ (0, 0, 1). Rotors share their points by the area of their blades.
     """
     diameter, chord, count = size
     x, y, z = (sense * facing[:, 2]).tolist()

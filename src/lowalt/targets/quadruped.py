@@ -30,7 +30,7 @@ LIFT = 0.16
 def stride_hz(mass_kg: float, speed_mps: float) -> float:
     """Return the stride rate (Hz) of a trot.
 
-    It is that at the change to a gallop, times the root of the share of its speed.
+    It is the rate at the change to a gallop, times the root of the share of its speed.
 
     Source: the module's; the root is an estimate between a fixed rate and a fixed stride.
     """

@@ -242,10 +242,8 @@ def ring(profile: np.ndarray, sides: int = 32) -> Surface:
 def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
     """Return a symmetric section (2 panels + 1, 2) of (along chord, across) as a loop.
 
-    The leading edge is at +chord/4.
-
-    `thickness` is the largest thickness over the chord. The blunt trailing edge has a fiftieth of
-    that thickness.
+    The leading edge is at +chord/4. `thickness` is the largest thickness over the chord. The blunt
+    trailing edge has a fiftieth of that thickness.
     Source: NACA four-digit thickness distribution, Abbott & von Doenhoff 1959.
     """
     x = (1 - portable.sine_cosine_turns(np.arange(panels + 1) / (2 * panels))[1]) / 2
@@ -260,10 +258,8 @@ def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
 def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
     """Return a wing or blade along +x from stations (x, y, z, chord, twist).
 
-    Sections are airfoils, and the ends are closed.
-
-    (x, y, z) is the quarter-chord point, the chord lies along y (leading edge at +y), a positive
-    twist (rad) raises the leading edge.
+    Sections are airfoils, and the ends are closed. (x, y, z) is the quarter-chord point, the chord
+    lies along y (leading edge at +y), a positive twist (rad) raises the leading edge.
     """
     sections = []
     for x, y, z, chord, twist in stations:
@@ -296,8 +292,6 @@ def quartered(corners: np.ndarray) -> np.ndarray:
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return each triangle's unit normal (F, 3), by the right-hand rule, and its area (F,).
 
-    The area is in squared units.
-
     `vertices` (V, 3), `faces` (F, 3) indices. A degenerate triangle has area 0 and a zero normal.
     """
     corners = np.asarray(vertices, float)[np.asarray(faces)]
@@ -312,11 +306,10 @@ def sample_faces(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` points (count, 3) spread over the triangles by area, and their triangles.
 
-    The triangles (count,) are indices of faces.
-
-    `vertices` (V, 3), `faces` (F, 3) indices, `rng` the only source of randomness. One point falls
-    into each of `count` equal slices of the running area, so a face of area a gets count * a /
-    total points to within two. Degenerate triangles get none.
+    The triangles (count,) are indices of faces. `vertices` (V, 3), `faces` (F, 3) indices, `rng`
+    the only source of randomness. One point falls into each of `count` equal slices of the running
+    area, so a face of area a gets count * a / total points to within two. Degenerate triangles get
+    none.
     Raises: InputError where the surface has no area or the area is not finite.
     Source: Osada et al. 2002 (uniform point in a triangle), systematic sampling over the faces.
     """
@@ -344,9 +337,7 @@ def sample_faces(
 def thin(
     points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | Sequence = ()
 ) -> np.ndarray:
-    """Return the indices (count,) of `count` points spread as evenly as can be.
-
-    They are in the order in which they were chosen.
+    """Return the indices of `count` points spread as evenly as can be, in the order chosen.
 
     Farthest-point sampling: each next point is the one farthest from all chosen so far (lowest
     index on a tie), from a random first one. `points` (L, D); the indices in `keep` are chosen

@@ -26,10 +26,8 @@ def encoded(
 ) -> Iterator[bytes]:
     """Yield the PNG of every sample, model by model, SNR by SNR.
 
-    seen: called with a sample's number and its tile;
-
-    late: how late a model's symbols are, cubes: those of a model at an SNR, both as in
-    `Renderer.tile`.
+    seen: called with a sample's number and its tile; late: how late a model's symbols are, cubes:
+    those of a model at an SNR, both as in `Renderer.tile`.
     """
     palette = tiles.images.palette
     number = 0

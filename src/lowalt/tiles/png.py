@@ -136,7 +136,7 @@ def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
 def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Return index image (H, W) uint8 and palette (256, 3) uint8 of a palette PNG.
 
-    It does not matter who wrote it.
+    Whoever wrote the file.
 
     Raises: InputError where the bytes are no 8-bit palette PNG or are damaged.
     """

@@ -31,7 +31,7 @@ MOST_PIXELS = 2**29
 """Pixels of a tile."""
 
 
-class Plan(NamedTuple):
+class Resampling(NamedTuple):
     """How one spectrum is resampled to S x S pixels, and its work arrays.
 
     source, weights: rows of the spectrum and their weights, (S, taps); columns, shares: (taps, S);
@@ -49,9 +49,7 @@ class Plan(NamedTuple):
 
 
 class Renderer:
-    """Makes tiles: it holds everything that is the same for all samples.
-
-    These are twiddles, weights, tables and work arrays.
+    """Makes tiles: it holds twiddles, weights, tables and work arrays for all samples.
 
     Three stations' tones:
 
@@ -114,7 +112,7 @@ class Renderer:
             result.append(spectrum(name).tables(settings, station.frequency_hz, interval_s))
         return result
 
-    def _plan(self, name: str) -> Plan:
+    def _plan(self, name: str) -> Resampling:
         """Return the plan of one spectrum."""
         setting = self.spectra[name]
         kind = spectrum(name)
@@ -141,7 +139,7 @@ class Renderer:
             shape = (size, starts)
         between = np.empty(shape, np.float32)
         values = np.empty((points, starts), np.float32)
-        return Plan(source, weights, columns, shares, values, between, rows_first)
+        return Resampling(source, weights, columns, shares, values, between, rows_first)
 
     def plan(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return rows and weights (S, taps), columns and shares (taps, S) of one spectrum."""
@@ -170,10 +168,9 @@ class Renderer:
     ) -> None:
         """Fill out (S, S) float32 with the resampled spectrum `name` of one signal or cube.
 
-        signal: normalised (symbols,), or a cube where the spectrum is made of range cells;
-
-        late: (symbols,), how many symbol intervals after its nominal instant each symbol came, None
-        for 0. Where `spectra.times` is "known", symbols that are exactly zero were not received.
+        signal: normalised (symbols,), or a cube where the spectrum is made of range cells; late:
+        (symbols,), how many symbol intervals after its nominal instant each symbol came, None for
+        0. Where `spectra.times` is "known", symbols that are exactly zero were not received.
         """
         plan = self._plans[name]
         setting = self.spectra[name]

@@ -53,9 +53,7 @@ class CellPolynomials(NamedTuple):
 def cell_polynomials(count: int, deep: float, error: float) -> CellPolynomials | None:
     """Return polynomials to `error`, or None if they are too long.
 
-    deep: how far (cells) the target extends from its reference;
-
-    count: subcarriers M.
+    deep: how far (cells) the target extends from its reference; count: subcarriers M.
     """
     half = deep + 0.5 / POSITIONS
     # Moments are computed four at a time, so round the degree up to one less than a multiple of

@@ -1,6 +1,6 @@
 """A strip: the points of one symbol that the fast kernel processes together.
 
-Its arrays, constants and length.
+Here are its arrays, constants and length.
 
 The arrays of a strip fit into the first-level cache.
 """

@@ -15,9 +15,7 @@ NEAR_TIE = 1e-12
 def strongest_of(sums, first, last):
     """Return (largest |sum|, second largest, row of the largest) of rows first..last of sums.
 
-    sums: (cells, 2);
-
-    The columns are the real and the imaginary part. Of equal sums the first row wins. The second
+    sums: (cells, 2), columns real and imaginary part. Of equal sums the first row wins. The second
     largest is -1 where only one row is given.
     """
     best = -1.0

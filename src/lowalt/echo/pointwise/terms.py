@@ -60,7 +60,7 @@ def dirichlet(x, count):
 def aim_cosines(aim, station, sine, cosine):
     """Return the direction cosines (horizontal, vertical) of the beams.
 
-    They are Eq. 4 put into Psi and Omega. 4 put into Psi and Omega).
+    They are Eq. 4 put into Psi and Omega.
     """
     x = aim[0] - station[0]
     y = aim[1] - station[1]

@@ -62,7 +62,7 @@ _PIECES = _pieces()
 def _edge(nu):
     """The field behind a knife edge over that in free space, for its parameter nu.
 
-    It is given by its real and imaginary part.
+    The result is its real and imaginary part.
 
     (1 + j) / 2 times the integral of exp(-j pi t^2 / 2) from nu on, for waves exp(-j k r); -20 lg
     of its magnitude is J(nu). Source: ITU-R P.526-15, equations 7, 28 and 30; complementary error

@@ -33,10 +33,9 @@ class Facets(NamedTuple):
     normal (K, 3) and offset (K,) m: a facet's plane is normal . x = offset; centre (K, 3) m, across
     and up (K, 3), half (K, 2) m: a rectangle in the plane that holds the facet, infinite for the
     ground; first (K + 1,): a facet's triangles are rows first[k] to first[k + 1] of triangles (F,
-    9) m, a corner and two edges; the ground has none;
-    convex: (K,) bool, whether the triangles fill a convex polygon; outward: (K,), 1 or -1 where the
-    normal points out of or into a closed convex building, within which there are no rays, and 0 for
-    other facets.
+    9) m, a corner and two edges; the ground has none; convex: (K,) bool, whether the triangles fill
+    a convex polygon; outward: (K,), 1 or -1 where the normal points out of or into a closed convex
+    building, within which there are no rays, and 0 for other facets.
     """
 
     normal: np.ndarray
@@ -66,9 +65,9 @@ class Town(NamedTuple):
     """A town as paths need it.
 
     material: (K,) number of each facet's material in `materials`; building: (F,) number of the
-    building of each triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a
-    facet, and of_building (E,), their buildings; pairs: cache, by the station's position (3,)
-    m, of the pairs (P, 2) of facets that may reflect its rays in turn.
+    building of each triangle of `facets`; edges: (E, 2, 3) m, edges that are not inside a facet,
+    and of_building (E,), their buildings; pairs: cache, by the station's position (3,) m, of the
+    pairs (P, 2) of facets that may reflect its rays in turn.
     """
 
     facets: Facets
@@ -232,8 +231,8 @@ def _facets(
 ) -> Facets:
     """The facets of triangles that stand in the order of their facets, and the ground.
 
-    corners (F, 3, 3) m, numbers (F, 3), label and building (F,): of the triangles; first (K +
-    1,) and triangles (F, 9) as in `Facets`.
+    corners (F, 3, 3) m, numbers (F, 3), label and building (F,): of the triangles; first (K + 1,)
+    and triangles (F, 9) as in `Facets`.
     """
     normal, area = sizes(corners)
     largest = np.array([a + area[a:b].argmax() for a, b in pairwise(first)])

@@ -89,9 +89,7 @@ def _object_of(feature: dict, key: str, place: str) -> dict:
 
 
 def _footprints(path: Path, all_polygons: bool) -> tuple[list[Footprint], Counter, Counter]:
-    """The buildings of a file in degrees, what was left out, and what was read otherwise.
-
-    The latter are read otherwise than stated.
+    """The buildings of a file in degrees, what was left out, and what was not read as stated.
 
     all_polygons: whether all polygons of a file without any tag of buildings are buildings.
     """
@@ -195,7 +193,7 @@ def _united(outline: Polygon | MultiPolygon) -> Polygon | MultiPolygon | None:
 
 
 def _without_replaced(footprints: list[Footprint]) -> list[Footprint]:
-    """The footprints but outlines in which a building:part lies. Source: Simple 3D Buildings.
+    """The footprints but outlines in which a building:part lies.
 
     Source: Simple 3D Buildings.
     """

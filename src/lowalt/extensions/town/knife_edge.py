@@ -35,9 +35,7 @@ ALIKE = 0.8
 """Buildings whose nu is more than this share of the way from FREE to the largest nu count with it.
 """
 SURE = 0.1
-"""Where the nu of all edges of a screen lies beyond this, the traced rays must agree.
-
-They must agree with the screen's outline.
+"""Where the nu of all edges of a screen lies beyond this, traced rays must agree with its outline.
 """
 
 

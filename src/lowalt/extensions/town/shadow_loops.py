@@ -69,8 +69,8 @@ class RayPath(NamedTuple):
 class ShadowLists(NamedTuple):
     """The triangles that can be in the way of a group of blocks.
 
-    They are held by the depth of halving and by leg. rows: (D, 3, F), of the occluders' triangles,
-    of which the first counts (D, 3) are valid.
+    Triangles are held by the depth of halving and by leg. rows: (D, 3, F), of the occluders'
+    triangles, of which the first counts (D, 3) are valid.
     """
 
     rows: np.ndarray

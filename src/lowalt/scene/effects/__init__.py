@@ -128,9 +128,9 @@ class NamedEffect(NamedTuple):
 
 
 def dotted(name: str) -> str:
-    """Return the module of an effect.
+    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc.
 
-    It is such as lowalt.scene.effects.receiver.adc, or the path of the user's own.
+    Of the user's own effect it is the path.
 
     Raises: InputError for a name that belongs to no effect.
     """
@@ -294,7 +294,7 @@ def record_fields(
 def with_offer(name: str) -> str:
     """Return the shipped effects that offer a name of the contract.
 
-    They are written as sentences name a choice of them.
+    They are written as a sentence names a choice.
     """
     return " or ".join(f"effects.{one}" for one in PLACES if hasattr(module_of(one), name))
 

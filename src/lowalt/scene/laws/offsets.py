@@ -62,7 +62,7 @@ def of_stations(
 def check_oscillator(effect: str, scene: CheckedScene) -> None:
     """Raise InputError naming `effect` where transmitter and receiver share one oscillator.
 
-    They then have no offset.
+    With one oscillator there is no offset.
     """
     noise = scene.effects.get("phase_noise")
     if noise and noise["shared"]:

@@ -74,9 +74,8 @@ def convolved(
     They are the linear convolution of the sent stream with the range cells.
 
     response: (N, M) of all echoes; on_air: subcarriers (N, M) on the air in the "waveform" and the
-    "previous waveform";
-    offset_cells: distance of the echoes beyond their cells' centres. The prefix counts in whole
-    samples.
+    "previous waveform"; offset_cells: distance of the echoes beyond their cells' centres. The
+    prefix counts in whole samples.
     """
     count = response.shape[1]
     samples = prefix_s(settings, network) * count * network.subcarrier_spacing_hz

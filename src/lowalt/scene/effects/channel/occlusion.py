@@ -64,9 +64,8 @@ def passed(width_m: float, distance_m: float, wavelength_m: float) -> float:
 def through_blades(view: View) -> float:
     """Return the factor on a two-way amplitude behind a blade.
 
-    It is the share of power, averaged over the rotors.
-
-    The rotor's radius is taken as the distance behind the blade, and the phase is left out.
+    It is the share of power, averaged over the rotors. The rotor's radius is taken as the distance
+    behind the blade, and the phase is left out.
     """
     wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
     assert view.occluders is not None  # blades hide points only in front of surfaces
